@@ -1,0 +1,1 @@
+"""Capture studio: recover articulated motion from calibrated cameras by stochastic search, and watch the search."""

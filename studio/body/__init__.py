@@ -1,0 +1,1 @@
+"""The articulated body as tables: joints, limbs, markers; forward and inverse kinematics."""

@@ -1,0 +1,128 @@
+"""The articulated body as data: a kinematic tree, its dimensions, its limbs and its markers.
+
+A `BodyModel` is frozen and says nothing about any particular pose. Each joint's frame is its parent's frame times a
+sequence of elementary `Step`s (a move along, or a turn about, one of the current x, y, z axes by a fixed number or
+by one parameter of the pose vector), so any order and direction of rotation can be written down.
+Lengths in mm, angles in radians here (degrees in body files).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+MOVE, TURN = 0, 1
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One entry of the pose vector.
+
+    kind : "angle" (radians) or "length" (mm). lower, upper : limits, ±inf where unbounded. max_step : largest
+    expected movement, rad/s or mm/s. neutral : the value in the rest pose. limb : group for crossover by limbs.
+    """
+
+    name: str
+    label: str
+    kind: str
+    lower: float
+    upper: float
+    max_step: float
+    neutral: float
+    limb: str
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One elementary motion: kind MOVE or TURN, axis 0..2, and `value` (mm or radians) when parameter < 0,
+    else `value` is the coefficient (±1) of pose entry `parameter`."""
+
+    kind: int
+    axis: int
+    parameter: int
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """A frame of the tree. parent : index of an earlier joint, -1 for the world."""
+
+    name: str
+    parent: int
+    steps: tuple[Step, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Limb:
+    """A truncated elliptical cone along its joint's local z, from z = 0 to z = length (which may be negative).
+
+    radius_start, radius_end : mm at z = 0 and z = length. scale_x, scale_y : of the cross-section along local x, y.
+    side : "left", "right" or "middle" (colours). Limbs of zero length are kept here but are not counted or drawn:
+    see `BodyModel.drawn`.
+    """
+
+    name: str
+    joint: int
+    length: float
+    radius_start: float
+    radius_end: float
+    scale_x: float
+    scale_y: float
+    side: str
+
+
+@dataclass(frozen=True, slots=True)
+class Marker:
+    """A named point fixed to a joint's frame. offset : (3,) mm."""
+
+    name: str
+    joint: int
+    offset: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KinematicTables:
+    """The tree as flat arrays for kernels. F joints, S steps in all, L drawn limbs.
+
+    parent (F,); first_step (F + 1,): joint f owns steps first_step[f]:first_step[f+1]; step_kind, step_axis,
+    step_parameter (S,) int64; step_value (S,) float64; limb_joint (L,) int64; limb_shape (L, 5) float64:
+    length, radius_start, radius_end, scale_x, scale_y.
+    """
+
+    parent: IntArray
+    first_step: IntArray
+    step_kind: IntArray
+    step_axis: IntArray
+    step_parameter: IntArray
+    step_value: Array
+    limb_joint: IntArray
+    limb_shape: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyModel:
+    """A body: parameters in the order of the pose vector, joints parents first, all limbs, markers, dimensions.
+
+    dimensions : the named lengths and radii (mm) that the steps, limbs and markers were built from.
+    """
+
+    name: str
+    title: str
+    parameters: tuple[Parameter, ...]
+    joints: tuple[Joint, ...]
+    limbs: tuple[Limb, ...]
+    markers: tuple[Marker, ...]
+    dimensions: dict[str, float]
+
+    @property
+    def drawn(self) -> tuple[Limb, ...]:
+        """The limbs that have a length, in order: the ones that are counted, weighed and shown."""
+        return tuple(limb for limb in self.limbs if limb.length != 0.0)
+
+    @property
+    def neutral(self) -> Array:
+        """(D,) the rest pose."""
+        return np.array([entry.neutral for entry in self.parameters])

@@ -1,0 +1,1 @@
+"""Cameras solved and footage read: calibration files, videos, picture folders."""

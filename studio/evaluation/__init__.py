@@ -1,0 +1,1 @@
+"""Distance from the truth: marker errors, lost limbs."""

@@ -1,0 +1,1 @@
+"""From pictures to backgrounds, masks and edge maps."""

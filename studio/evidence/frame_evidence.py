@@ -1,0 +1,30 @@
+"""What is seen in one frame, ready to be weighed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Bytes = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ViewEvidence:
+    """One camera's evidence.
+
+    picture : (H, W, 3) uint8 BGR. mask : (H, W) uint8, 0 background, 255 foreground.
+    edges : (H, W) uint8 edge proximity map, 255 = on an edge (Eq. 14's p = edges / 255).
+    """
+
+    camera: str
+    picture: Bytes
+    mask: Bytes
+    edges: Bytes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameEvidence:
+    """All cameras' evidence of one frame, in the order of the session's cameras."""
+
+    frame: int
+    views: tuple[ViewEvidence, ...]

@@ -1,0 +1,1 @@
+"""Rotations, rigid motions, cameras and projected cones (mm, radians, world z up)."""

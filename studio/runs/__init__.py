@@ -1,0 +1,1 @@
+"""One run: a session and settings through the frame loop into a results store."""

@@ -1,0 +1,1 @@
+"""The viser window: body, particle clouds, cameras and panels."""

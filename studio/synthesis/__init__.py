@@ -1,0 +1,1 @@
+"""Footage with exact truth, rendered from bodies that are not the tracker's model."""

@@ -1,0 +1,1 @@
+"""Stochastic search, a layer at a time; sees a function of poses, never an image."""

@@ -1,0 +1,164 @@
+"""The contract of every tracker, and the values that pass between its methods.
+
+A tracker holds nothing that changes in a run: all else is an argument, so moving a slider is calling the same
+function with another argument. A swarm's iteration, a filter's annealing level and Condensation's single step are
+all "layers", counted from 0 in the order they are run (the paper's layer m of M is our layer M - m).
+"""
+
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SearchSpace:
+    """What a tracker knows of the pose vector.
+
+    names : D parameter names. lower, upper : (D,) limits, ±inf where unbounded. sigma : (D,) σ0, the standard
+    deviation of the diffusion from one frame to the next (mm, rad). limb : (D,) int, equal numbers belong to one limb
+    and are neighbours (crossover by whole limbs).
+    """
+
+    names: tuple[str, ...]
+    lower: Array
+    upper: Array
+    sigma: Array
+    limb: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ParticleSet:
+    """N particles. poses : (N, D). log_weights : (N,) natural logs of normalised weights (equal if unweighted).
+
+    raw_log_weights : (N,) the problem's own log w of the same poses where they were weighed, else empty.
+    extra : arrays that only this particle's tracker reads (velocities of a swarm), kept in checkpoints.
+    """
+
+    poses: Array
+    log_weights: Array
+    raw_log_weights: Array = field(default_factory=lambda: np.zeros(0))
+    extra: dict[str, Array] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Carried:
+    """What one frame hands to the next; also how a run starts.
+
+    particles : the weighted set at the end of the frame; None = start uniformly over the space's limits.
+    estimate, previous_estimate : (D,) the last two reported poses (dynamics, Eq. 10); None where there is none yet.
+    """
+
+    particles: ParticleSet | None
+    estimate: Array | None = None
+    previous_estimate: Array | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Estimate:
+    """The pose that is reported. pose, mean, mode : (D,). log_weight : the best particle's log w."""
+
+    pose: Array
+    mean: Array
+    mode: Array
+    log_weight: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LayerRecord:
+    """All that a person may want to look at of one layer.
+
+    frame, layer : layer counts from 0. settings_version : of the settings in use. beta : exponent of Eq. 3.
+    alpha_wanted, alpha_reached : survival rate (Eq. 12), wanted is NaN for trackers without one.
+    variance_weighed, variance_resampled, variance_diffused : (D,) variance of every parameter over the set as it was
+    weighed, after resampling (before noise), and after noise (Fig. 12 a/d, b/e, c/f). In a frame's last layer nothing
+    is diffused: variance_diffused equals variance_resampled.
+    best, mean : (D,) best particle, weighted mean. best_log_weight : raw log w of the best.
+    poses : (N, D) the set as weighed. log_weights : (N,) raw log w, before β.
+    milliseconds : time of the layer.
+    """
+
+    frame: int
+    layer: int
+    settings_version: int
+    beta: float
+    alpha_wanted: float
+    alpha_reached: float
+    variance_weighed: Array
+    variance_resampled: Array
+    variance_diffused: Array
+    best: Array
+    best_log_weight: float
+    mean: Array
+    poses: Array
+    log_weights: Array
+    milliseconds: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameResult:
+    """The result of one frame. evaluations : poses weighed. carried : what the next frame starts from."""
+
+    frame: int
+    estimate: Estimate
+    layers: int
+    evaluations: int
+    settings_version: int
+    milliseconds: float
+    carried: Carried
+
+
+class FrameProblem(Protocol):
+    """One frame as a function of poses."""
+
+    def weigh(self, poses: Array, stage: int = 0) -> Array:
+        """(N, D) poses to (N,) log-weights; -inf never, NaN never."""
+        ...
+
+    def feasible(self, poses: Array) -> NDArray[np.bool_]:
+        """(N, D) poses to (N,) whether the body can take them."""
+        ...
+
+
+class Tracker(Protocol):
+    """A stochastic search of one frame, a layer at a time."""
+
+    name: str
+    settings_type: type
+
+    def layer_count(self, settings: Any) -> int:  # noqa: ANN401 - the tracker's own settings_type
+        """How many layers a frame takes."""
+        ...
+
+    def begin_frame(
+        self, rng: np.random.Generator, previous: Carried, space: SearchSpace, settings: Any  # noqa: ANN401
+    ) -> ParticleSet:
+        """The unweighted set that the first layer weighs."""
+        ...
+
+    def step_layer(  # noqa: PLR0913
+        self,
+        rng: np.random.Generator,
+        particles: ParticleSet,
+        layer: int,
+        problem: FrameProblem,
+        space: SearchSpace,
+        settings: Any,  # noqa: ANN401
+    ) -> tuple[ParticleSet, LayerRecord]:
+        """Weigh the set, then make the next one (in the last layer: return the weighted set itself).
+
+        The record's frame, settings_version and milliseconds are filled in by the frame loop.
+        """
+        ...
+
+    def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: Any) -> Estimate:  # noqa: ANN401
+        """The pose that is reported, from the last layer's weighted set."""
+        ...
+
+
+def generator(seed: int, frame: int, layer: int) -> np.random.Generator:
+    """The random numbers of one layer (layer -1: of `begin_frame`), keyed so that any frame replays bit for bit."""
+    return np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, frame, layer + 1))))

@@ -1,0 +1,1 @@
+"""Pages, JSON API, one WebSocket of events, and the relay to the scene."""

@@ -1,0 +1,1 @@
+"""Evidence to log-weights of poses: named weightings and their kernels."""

@@ -1,0 +1,1 @@
+"""The tracking process: its commands, events and settings mailbox."""

@@ -1,0 +1,83 @@
+"""What the tracking process says. Newest wins where a watcher is slow; small values only, arrays go through the store
+except a layer's own cloud, which travels with `LayerFinished` so that it can be drawn at once."""
+
+from dataclasses import dataclass, field
+
+from studio.tracking.tracker import FrameResult, LayerRecord
+
+Value = bool | int | float | str
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """session, run : names; empty where no run is open."""
+
+    session: str
+    run: str
+
+
+@dataclass(frozen=True, slots=True)
+class StateChanged(Event):
+    """state : idle, compiling, tracking, paused, reannealing, finished, cancelled, failed, lost (process died).
+
+    frame, layer : where the search stands. first, last : frames of the run, half open. done : frames finished.
+    frames_per_second and seconds_left : measured, NaN while unknown. message, hint : for failed and lost.
+    """
+
+    state: str
+    frame: int
+    layer: int
+    first: int
+    last: int
+    done: int
+    frames_per_second: float
+    seconds_left: float
+    message: str = ""
+    hint: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Acknowledged(Event):
+    """A command was taken (ok) or refused (message, hint)."""
+
+    identifier: str
+    command: str
+    ok: bool
+    message: str = ""
+    hint: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class LayerFinished(Event):
+    """reannealed : true for a what-if layer that is not stored."""
+
+    record: LayerRecord
+    reannealed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class FrameFinished(Event):
+    """A frame's result (stored unless reannealed)."""
+
+    result: FrameResult
+    reannealed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class SettingsApplied(Event):
+    """The settings in use since (frame, layer). values : every knob by name. changed : the names that moved."""
+
+    version: int
+    frame: int
+    layer: int
+    values: dict[str, Value] = field(default_factory=dict)
+    changed: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class LogLine(Event):
+    """level : info, warning or error. time : seconds since the epoch."""
+
+    level: str
+    time: float
+    text: str
