@@ -1,0 +1,47 @@
+# Everyday commands. Each makes what it needs first; `make env` is enough to work by hand.
+PYTHON ?= python3
+BIN := .venv/bin
+READY := .venv/.ready
+
+.PHONY: env browser demo test test-slow check bench lock wheel-test clean
+
+env: $(READY)
+
+$(READY): requirements.lock pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable .
+	touch $@
+
+# The system's Chromium where there is one, else the system's package, else Playwright's own download.
+browser: env
+	@command -v chromium chromium-browser google-chrome >/dev/null 2>&1 \
+	  || { [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null 2>&1 && apt-get update -q && apt-get install -q -y chromium; } \
+	  || $(BIN)/playwright install --with-deps chromium
+
+demo: env
+	$(BIN)/studio demo
+
+test: env browser
+	$(BIN)/pytest
+
+test-slow: env browser
+	$(BIN)/pytest -m slow --timeout 3600
+
+check: env
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/pyright
+	$(BIN)/lint-imports
+
+bench: env
+	$(BIN)/studio bench
+
+# Lock with hashes and without download addresses; run after changing the dependencies in pyproject.toml.
+lock:
+	test -x $(BIN)/uv || { $(PYTHON) -m venv .venv && $(BIN)/python -m pip install --quiet uv; }
+	$(BIN)/uv pip compile pyproject.toml --group dev --generate-hashes --no-emit-index-url --universal \
+	  --python-version 3.11 --quiet --custom-compile-command "make lock" -o requirements.lock
+
+clean:
+	rm -rf .venv artefacts
