@@ -1,0 +1,1 @@
+"""The `studio` command: commands to calls, no logic."""
