@@ -1,0 +1,88 @@
+"""What every command shares: `--json`, progress on standard error, errors in words with exit code 2."""
+
+import functools
+import json
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import ParamSpec
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from studio.errors import StudioError
+
+P = ParamSpec("P")
+ProgressCallback = Callable[[str, int, int], None]
+
+CANCELLED = 130
+WRONG_INPUT = 2
+
+messages = Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+def command(function: Callable[P, Mapping[str, object]]) -> Callable[P, None]:
+    """Make a function that returns its result a command body: prints it, and turns errors into words.
+
+    The result is printed as one JSON object under `--json` (which this decorator adds), else as aligned lines;
+    a value under the key "text" is what a person reads instead.
+    """
+
+    @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on standard output.")
+    @functools.wraps(function)
+    def body(*arguments: P.args, **options: P.kwargs) -> None:
+        as_json = bool(options.pop("as_json"))
+        try:
+            result = dict(function(*arguments, **options))
+        except StudioError as error:
+            messages.print(f"[bold red]error[/] {_plain(error.message)}")
+            if error.hint:
+                messages.print(f"[bold]remedy[/] {_plain(error.hint)}")
+            sys.exit(WRONG_INPUT)
+        except KeyboardInterrupt:
+            messages.print("Cancelled; what was finished is kept.")
+            sys.exit(CANCELLED)
+        text = result.pop("text", None)
+        if as_json:
+            click.echo(json.dumps(result, allow_nan=False, default=_plain_value))
+        else:
+            click.echo(text if text is not None else "\n".join(f"{key:24} {value}" for key, value in result.items()))
+
+    return body
+
+
+def _plain(text: str) -> str:
+    return text.replace("[", "\\[")
+
+
+def _plain_value(value: object) -> object:
+    """Arrays and paths as JSON values."""
+    as_list = getattr(value, "tolist", None)
+    return as_list() if callable(as_list) else str(value)
+
+
+def note(text: str) -> None:
+    """A line for the person at the terminal, on standard error."""
+    messages.print(_plain(text))
+
+
+@contextmanager
+def progress(title: str) -> Iterator[ProgressCallback]:
+    """A bar on standard error with the time that is left; yields `report(step in words, done, total)`."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[speed]}"),
+    )
+    with Progress(*columns, console=messages, transient=not messages.is_terminal) as bar:
+        task = bar.add_task(title, total=None, speed="")
+
+        def report(step: str, done: int, total: int) -> None:
+            finished = bar.tasks[task]
+            speed = f"{finished.speed:.1f}/s" if finished.speed else ""
+            bar.update(task, description=step or title, completed=done, total=total, speed=speed)
+
+        yield report
