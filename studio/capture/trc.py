@@ -1,0 +1,188 @@
+"""TRC files: named markers over time, as motion capture tools exchange them.
+
+A TRC is tab-separated text: three lines of header (rates, counts, unit), one of marker names (one for
+every three columns), one of axis labels, then rows `Frame#  Time  X1 Y1 Z1  X2 ...`. Its axes are Y up;
+the studio's world is Z up: (X, Y, Z)_world = (z, x, y)_trc. A missing marker is three blank cells; a
+number that is not finite is refused.
+"""
+
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.errors import TruthError
+
+Array = NDArray[np.float64]
+
+MM_PER_UNIT = {"mm": 1.0, "cm": 10.0, "m": 1000.0}
+WORLD_FROM_TRC = (2, 0, 1)
+TRC_FROM_WORLD = (1, 2, 0)
+HEADER_LINES = 5
+FIRST_COLUMNS = 2
+HEADER_FIELDS = (
+    "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames"
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MarkerMotion:
+    """Markers over time.
+
+    names : M marker names. times : (F,) seconds, rising. positions : (F, M, 3) mm, world z up; NaN
+    where a marker is missing. unit : the unit of the file ("m" or "mm"). rate : rows per second as the
+    header says.
+    """
+
+    names: tuple[str, ...]
+    times: Array
+    positions: Array
+    unit: str = "m"
+    rate: float = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Header:
+    names: tuple[str, ...]
+    unit: str
+    rate: float
+    rows: int
+
+
+def read_trc(path: Path) -> MarkerMotion:
+    """The motion in a TRC file.
+
+    Raises TruthError naming file, line and column for anything that is not a complete, finite table.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as problem:
+        raise TruthError(f"'{path.name}' cannot be read as text ({problem}).", "Give a TRC file.") from None
+    header = _header(path, lines)
+    rows = [
+        _row(path, number, line, header.names)
+        for number, line in enumerate(lines[HEADER_LINES:], HEADER_LINES + 1)
+        if line.strip()
+    ]
+    if len(rows) < max(header.rows, 1):
+        raise TruthError(
+            f"'{path.name}' has {len(rows)} rows and its header says {header.rows}.",
+            "The file was cut short: export it again.",
+        )
+    table = np.array(rows)
+    times = table[:, 0]
+    if np.any(np.diff(times) <= 0.0):
+        at = int(np.argmax(np.diff(times) <= 0.0)) + 1
+        raise TruthError(
+            f"In '{path.name}' the time of row {at + 1} ({times[at]:g} s) does not rise.",
+            "Sort the rows by time and remove repeated ones.",
+        )
+    positions = table[:, 1:].reshape(len(rows), len(header.names), 3)[:, :, WORLD_FROM_TRC]
+    return MarkerMotion(header.names, times, positions * MM_PER_UNIT[header.unit], header.unit, header.rate)
+
+
+def write_trc(path: Path, motion: MarkerMotion) -> None:
+    """Write a motion, Y up, in its unit; missing markers become blank cells. The file appears whole or
+    not."""
+    count, rate = len(motion.times), f"{motion.rate:g}"
+    decimals = 4 if motion.unit == "mm" else 7
+    lines = [
+        f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
+        HEADER_FIELDS,
+        f"{rate}\t{rate}\t{count}\t{len(motion.names)}\t{motion.unit}\t{rate}\t1\t{count}",
+        "Frame#\tTime\t" + "\t\t\t".join(motion.names),
+        "\t\t" + "\t".join(f"{axis}{k}" for k in range(1, len(motion.names) + 1) for axis in "XYZ"),
+    ]
+    table = motion.positions[:, :, TRC_FROM_WORLD].reshape(count, -1) / MM_PER_UNIT[motion.unit]
+    for row, (time, values) in enumerate(zip(motion.times, table, strict=True), 1):
+        cells = "\t".join("" if math.isnan(value) else f"{value:.{decimals}f}" for value in values)
+        lines.append(f"{row}\t{time:.8f}\t{cells}")
+    temporary = path.with_name(path.name + ".part")
+    temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    os.replace(temporary, path)
+
+
+def _header(path: Path, lines: list[str]) -> _Header:
+    """Rates, unit and marker names of the first five lines."""
+    if len(lines) < HEADER_LINES or not lines[0].startswith("PathFileType"):
+        raise TruthError(
+            f"'{path.name}' does not start with the five header lines of a TRC file.",
+            "Give a TRC file whose first line begins with 'PathFileType'.",
+        )
+    fields = dict(zip(lines[1].strip().split("\t"), lines[2].strip().split("\t"), strict=False))
+    unit = fields.get("Units", "").strip().lower()
+    if unit not in MM_PER_UNIT:
+        raise TruthError(
+            f"'{path.name}' line 3 gives the unit '{fields.get('Units', '')}'.",
+            "Use one of: mm, cm, m.",
+        )
+    rate = _header_number(path, fields, "DataRate")
+    if rate <= 0.0:
+        raise TruthError(f"'{path.name}' line 3 gives a DataRate of {rate:g}.", "It is rows per second.")
+    names = [name.strip() for name in lines[3].split("\t")[FIRST_COLUMNS::3]]
+    while names and not names[-1]:
+        names.pop()
+    said = int(_header_number(path, fields, "NumMarkers"))
+    if len(names) != said or not names or not all(names) or len(set(names)) != len(names):
+        raise TruthError(
+            f"'{path.name}' line 4 names {len(set(filter(None, names)))} markers and line 3 says {said}.",
+            "Give each marker its own name, one for every three columns.",
+        )
+    return _Header(tuple(names), unit, rate, int(_header_number(path, fields, "NumFrames")))
+
+
+def _header_number(path: Path, fields: dict[str, str], name: str) -> float:
+    """One number of the third line."""
+    try:
+        value = float(fields[name])
+    except (KeyError, ValueError):
+        value = math.nan
+    if not math.isfinite(value):
+        raise TruthError(
+            f"'{path.name}' line 3 gives no {name}.",
+            "Lines 2 and 3 of a TRC name its rates, counts and unit.",
+        )
+    return value
+
+
+def _row(path: Path, number: int, line: str, names: tuple[str, ...]) -> list[float]:
+    """Time and 3 M coordinates of one line, NaN for blank cells."""
+    cells = [cell.strip() for cell in line.split("\t")]
+    wanted = FIRST_COLUMNS + 3 * len(names)
+    while len(cells) > wanted and not cells[-1]:
+        cells.pop()
+    if len(cells) != wanted:
+        raise TruthError(
+            f"'{path.name}' line {number} has {len(cells)} columns, not {wanted}.",
+            "Each row is a frame number, a time and three columns a marker.",
+        )
+    labels = ["Time", *(f"{name} {axis}" for name in names for axis in "XYZ")]
+    values = [
+        math.nan if not cell and column > FIRST_COLUMNS else _cell(path, number, column, labels, cell)
+        for column, cell in enumerate(cells[1:], 2)
+    ]
+    for index, name in enumerate(names):
+        missing = [math.isnan(value) for value in values[1 + 3 * index : 4 + 3 * index]]
+        if any(missing) and not all(missing):
+            raise TruthError(
+                f"'{path.name}' line {number} gives only part of marker {name}.",
+                "Leave all three cells of a missing marker blank.",
+            )
+    return values
+
+
+def _cell(path: Path, number: int, column: int, labels: list[str], text: str) -> float:
+    """One finite number."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise TruthError(
+            f"'{path.name}' line {number}, column {column} ({labels[column - 2]}) is '{text}', not a number.",
+            "Leave the three cells of a missing marker blank, or export the file without gaps.",
+        )
+    return value
