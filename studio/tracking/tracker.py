@@ -1,8 +1,8 @@
 """The contract of every tracker, and the values that pass between its methods.
 
 A tracker holds nothing that changes in a run: all else is an argument, so moving a slider is calling the same
-function with another argument. A swarm's iteration, a filter's annealing level and Condensation's single step are
-all "layers", counted from 0 in the order they are run (the paper's layer m of M is our layer M - m).
+function with another argument. A swarm's iteration, a filter's annealing level and Condensation's single step
+are all "layers", counted from 0 in the order they are run (the paper's layer m of M is our layer M - m).
 """
 
 from dataclasses import dataclass, field
@@ -19,8 +19,8 @@ class SearchSpace:
     """What a tracker knows of the pose vector.
 
     names : D parameter names. lower, upper : (D,) limits, ±inf where unbounded. sigma : (D,) σ0, the standard
-    deviation of the diffusion from one frame to the next (mm, rad). limb : (D,) int, equal numbers belong to one limb
-    and are neighbours (crossover by whole limbs).
+    deviation of the diffusion from one frame to the next (mm, rad). limb : (D,) int, equal numbers belong to
+    one limb and are neighbours (crossover by whole limbs).
     """
 
     names: tuple[str, ...]
@@ -32,7 +32,8 @@ class SearchSpace:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ParticleSet:
-    """N particles. poses : (N, D). log_weights : (N,) natural logs of normalised weights (equal if unweighted).
+    """N particles. poses : (N, D). log_weights : (N,) natural logs of normalised weights (equal if
+    unweighted).
 
     raw_log_weights : (N,) the problem's own log w of the same poses where they were weighed, else empty.
     extra : arrays that only this particle's tracker reads (velocities of a swarm), kept in checkpoints.
@@ -49,7 +50,8 @@ class Carried:
     """What one frame hands to the next; also how a run starts.
 
     particles : the weighted set at the end of the frame; None = start uniformly over the space's limits.
-    estimate, previous_estimate : (D,) the last two reported poses (dynamics, Eq. 10); None where there is none yet.
+    estimate, previous_estimate : (D,) the last two reported poses (dynamics, Eq. 10); None where there is
+    none yet.
     """
 
     particles: ParticleSet | None
@@ -73,12 +75,11 @@ class LayerRecord:
 
     frame, layer : layer counts from 0. settings_version : of the settings in use. beta : exponent of Eq. 3.
     alpha_wanted, alpha_reached : survival rate (Eq. 12), wanted is NaN for trackers without one.
-    variance_weighed, variance_resampled, variance_diffused : (D,) variance of every parameter over the set as it was
-    weighed, after resampling (before noise), and after noise (Fig. 12 a/d, b/e, c/f). In a frame's last layer nothing
-    is diffused: variance_diffused equals variance_resampled.
-    best, mean : (D,) best particle, weighted mean. best_log_weight : raw log w of the best.
-    poses : (N, D) the set as weighed. log_weights : (N,) raw log w, before β.
-    milliseconds : time of the layer.
+    variance_weighed, variance_resampled, variance_diffused : (D,) variance of every parameter over the set as
+    it was weighed, after resampling (before noise), and after noise (Fig. 12 a/d, b/e, c/f). In a frame's
+    last layer nothing is diffused: variance_diffused equals variance_resampled. best, mean : (D,) best
+    particle, weighted mean. best_log_weight : raw log w of the best. poses : (N, D) the set as weighed.
+    log_weights : (N,) raw log w, before β. milliseconds : time of the layer.
     """
 
     frame: int
@@ -126,20 +127,36 @@ class FrameProblem(Protocol):
 class Tracker(Protocol):
     """A stochastic search of one frame, a layer at a time."""
 
-    name: str
-    settings_type: type
+    @property
+    def name(self) -> str:
+        """The tracker's key in the catalogue."""
+        ...
+
+    @property
+    def label(self) -> str:
+        """The tracker's name on screen."""
+        ...
+
+    @property
+    def settings_type(self) -> type:
+        """The frozen dataclass of its knobs."""
+        ...
 
     def layer_count(self, settings: Any) -> int:  # noqa: ANN401 - the tracker's own settings_type
         """How many layers a frame takes."""
         ...
 
     def begin_frame(
-        self, rng: np.random.Generator, previous: Carried, space: SearchSpace, settings: Any  # noqa: ANN401
+        self,
+        rng: np.random.Generator,
+        previous: Carried,
+        space: SearchSpace,
+        settings: Any,  # noqa: ANN401
     ) -> ParticleSet:
         """The unweighted set that the first layer weighs."""
         ...
 
-    def step_layer(  # noqa: PLR0913
+    def step_layer(
         self,
         rng: np.random.Generator,
         particles: ParticleSet,
@@ -160,5 +177,7 @@ class Tracker(Protocol):
 
 
 def generator(seed: int, frame: int, layer: int) -> np.random.Generator:
-    """The random numbers of one layer (layer -1: of `begin_frame`), keyed so that any frame replays bit for bit."""
+    """The random numbers of one layer (layer -1: of `begin_frame`), keyed so that any frame replays bit for
+    bit.
+    """
     return np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, frame, layer + 1))))

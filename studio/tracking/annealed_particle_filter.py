@@ -1,0 +1,134 @@
+"""The annealed particle filter of Deutscher & Reid (2005), sections 3 and 6.
+
+Idea: one frame is searched in M layers. Each weighs the particles, flattens the weights by an exponent β so
+that a wanted share α of them survives, draws the survivors and spreads them with less and less noise, so that
+the cloud moves over local maxima towards the best pose. Two additions make the paper's improved filter:
+adaptive diffusion (noise in proportion to what is still uncertain, Eq. 18) and crossover (children of two
+survivors, Eq. 19).
+
+Symbols: S_{t,m}, the set of layer m, which the paper counts M … 1 and we count 0 … M - 1 in the order they
+run; π, normalised weights; β, α, D see `annealing`; P, B, σ0 see `diffusion`; γ, ε see `crossover`.
+
+Reference: J. Deutscher, I. Reid, Articulated Body Motion Capture by Stochastic Search, IJCV 61(2), 185-205.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.tracking.annealing import anneal
+from studio.tracking.crossover import cross
+from studio.tracking.diffusion import (
+    diffuse,
+    diffuse_proportionally,
+    diffuse_shrunk,
+    planned_sigma,
+    within_limits,
+)
+from studio.tracking.layer_record import layer_record
+from studio.tracking.particles import (
+    estimate,
+    expected,
+    uniform_poses,
+    unweighted,
+    weigh,
+    weighted_variance,
+)
+from studio.tracking.resampling import draw, equal_draw
+from studio.tracking.settings import AnnealedSettings, layer_survivals
+from studio.tracking.tracker import Carried, Estimate, FrameProblem, LayerRecord, ParticleSet, SearchSpace
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class AnnealedParticleFilter:
+    """One frame in M annealing layers; evaluations = layers × particles."""
+
+    name: str = "annealed"
+    label: str = "Annealed particle filter"
+    settings_type: type = AnnealedSettings
+
+    def layer_count(self, settings: AnnealedSettings) -> int:
+        """M."""
+        return settings.layers
+
+    def begin_frame(
+        self, rng: np.random.Generator, previous: Carried, space: SearchSpace, settings: AnnealedSettings
+    ) -> ParticleSet:
+        """Step 1, 2 and 7: the unweighted set of the first layer, the last frame's plus B_0 (Eq. 9, 10)."""
+        if previous.particles is None:
+            return unweighted(uniform_poses(rng, settings.particles, space))
+        survivors = _carried_poses(rng, previous.particles, settings)
+        predicted = expected(survivors, previous, settings.dynamics)
+        poses = diffuse(rng, predicted, space.sigma * settings.diffusion_scale)
+        return unweighted(within_limits(poses, space, settings.limits))
+
+    def step_layer(
+        self,
+        rng: np.random.Generator,
+        particles: ParticleSet,
+        layer: int,
+        problem: FrameProblem,
+        space: SearchSpace,
+        settings: AnnealedSettings,
+    ) -> tuple[ParticleSet, LayerRecord]:
+        """Steps 3 to 5: weigh (Eq. 3, 6, 11, 12), draw, cross (Eq. 19) and spread (Eq. 7, 13 or 18)."""
+        raw, eligible = weigh(problem, particles.poses, settings.limits)
+        wanted = layer_survivals(settings, layer + 1)[-1]
+        annealed = anneal(eligible, wanted)
+        weighted = ParticleSet(particles.poses, annealed.log_weights, raw, particles.extra)
+        if layer == settings.layers - 1:
+            kept = weighted_variance(weighted)
+            return weighted, layer_record(layer, weighted, annealed, wanted, resampled=kept, diffused=kept)
+        survivors = _survivors(rng, weighted, space, settings)
+        spread = _spread(rng, survivors, layer, space, settings)
+        poses = within_limits(spread, space, settings.limits)
+        record = layer_record(
+            layer, weighted, annealed, wanted, resampled=survivors.var(axis=0), diffused=poses.var(axis=0)
+        )
+        return unweighted(poses, particles.extra), record
+
+    def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: AnnealedSettings) -> Estimate:
+        """Step 6: the mean (Eq. 8) or the mode of the last layer's weighted set."""
+        return estimate(particles, settings.estimate)
+
+
+def _carried_poses(rng: np.random.Generator, last: ParticleSet, settings: AnnealedSettings) -> Array:
+    """(N, D) what the last frame hands on: all particles as they are (Eq. 9), survivors drawn by π, or the
+    mode.
+    """
+    weights = np.exp(last.log_weights)
+    drawn = draw(rng, weights, settings.particles, settings.resampling)
+    if settings.carry == "weighted":
+        drawn = equal_draw(len(weights), settings.particles)
+    elif settings.carry == "mode":
+        drawn = np.full(settings.particles, np.argmax(weights))
+    return last.poses[drawn]
+
+
+def _survivors(
+    rng: np.random.Generator, weighted: ParticleSet, space: SearchSpace, settings: AnnealedSettings
+) -> Array:
+    """(N, D) drawn by π with replacement, some of them children of two (step 4 as section 6.2.1 amends
+    it).
+    """
+    weights, count = np.exp(weighted.log_weights), len(weighted.poses)
+    first = weighted.poses[draw(rng, weights, count, settings.resampling)]
+    # A systematic draw is in order: shuffled, the two parents of a child are independent.
+    second = weighted.poses[rng.permutation(draw(rng, weights, count, settings.resampling))]
+    return cross(rng, first, second, space, share=settings.crossover, by=settings.crossover_by)
+
+
+def _spread(
+    rng: np.random.Generator, survivors: Array, layer: int, space: SearchSpace, settings: AnnealedSettings
+) -> Array:
+    """(N, D) survivors plus B_m: planned (Eq. 13) or following their own covariance (Eq. 18)."""
+    if not settings.adaptive_diffusion:
+        survivals = layer_survivals(settings, layer + 1)
+        sigma = planned_sigma(space.sigma * settings.diffusion_scale, survivals, settings.diffusion_decay)
+        return diffuse(rng, survivors, sigma)
+    if settings.diffusion_form == "shrink":
+        return diffuse_shrunk(rng, survivors, settings.diffusion_fraction, settings.diffusion_covariance)
+    return diffuse_proportionally(rng, survivors, settings.diffusion_constant, settings.diffusion_covariance)

@@ -1,0 +1,10 @@
+"""The trackers by name."""
+
+from studio.tracking.annealed_particle_filter import AnnealedParticleFilter
+from studio.tracking.condensation import Condensation
+from studio.tracking.tracker import Tracker
+
+TRACKERS: dict[str, Tracker] = {
+    "annealed": AnnealedParticleFilter(),
+    "condensation": Condensation(),
+}

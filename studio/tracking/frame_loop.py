@@ -1,0 +1,187 @@
+"""One frame, a layer at a time, so that it can be stopped between layers, saved, and gone on with.
+
+A frame is searched `repeats` times over (more than once only where a run starts): each search begins with
+what the one before ended with. Layers are numbered through: layer i of search r is record r M + i. Random
+numbers are keyed by (seed, frame, that number), so a frame replays bit for bit from the same particles and
+settings, wherever it was interrupted.
+"""
+
+import dataclasses
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from studio.errors import RunError
+from studio.knobs import knobs_of
+from studio.tracking.tracker import (
+    Carried,
+    FrameProblem,
+    FrameResult,
+    LayerRecord,
+    ParticleSet,
+    SearchSpace,
+    Tracker,
+    generator,
+)
+
+# The version of the settings and the tracker's own settings, as they are at this moment.
+SettingsSource = Callable[[], tuple[int, Any]]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SearchState:
+    """A frame half done: all that is needed, beside what the frame started from, to go on with it.
+
+    layers_done : over all repeats. layer_count : M, layers of one search (0 before the first layer).
+    particles : the set that the next layer weighs (None before the first; the last search's weighted set
+    where a repeat begins, or at the end). settings : read when the search began; its "next frame" knobs hold
+    until the search ends. settings_version : of the settings used last. evaluations : poses weighed.
+    milliseconds : time of the layers.
+    """
+
+    layers_done: int = 0
+    layer_count: int = 0
+    particles: ParticleSet | None = None
+    settings: Any = None
+    settings_version: int = 0
+    evaluations: int = 0
+    milliseconds: float = 0.0
+
+
+class FrameSearch:
+    """The search of one frame. Call `step` until `finished`, then `result`.
+
+    `state` is immutable and may be kept at any moment; a search made with a kept state goes on from there
+    with the same result, bit for bit, as one that was never interrupted.
+    """
+
+    def __init__(
+        self,
+        tracker: Tracker,
+        previous: Carried,
+        space: SearchSpace,
+        *,
+        seed: int,
+        frame: int,
+        repeats: int = 1,
+        state: SearchState | None = None,
+    ) -> None:
+        self.tracker, self.previous, self.space = tracker, previous, space
+        self.seed, self.frame, self.repeats = seed, frame, repeats
+        self.state = state or SearchState()
+
+    @property
+    def finished(self) -> bool:
+        """Whether all layers of all repeats are done."""
+        state = self.state
+        return state.layer_count > 0 and state.layers_done == self.repeats * state.layer_count
+
+    def step(self, problem: FrameProblem, version: int, settings: Any) -> LayerRecord:  # noqa: ANN401
+        """Do one layer with these settings (of the tracker's type) and return its record.
+
+        Knobs that take effect with the next frame keep the value they had when the search began.
+        """
+        if self.finished:
+            raise RunError(f"Frame {self.frame} has no layer left.", "Go on with the next frame.")
+        began = time.perf_counter()
+        state = self.state
+        held = state.settings if state.layers_done else settings
+        in_use = held_over(settings, held)
+        count = self.tracker.layer_count(in_use)
+        repeat, layer = divmod(state.layers_done, count)
+        particles = self._beginning(repeat, in_use) if layer == 0 else state.particles
+        assert particles is not None
+        rng = generator(self.seed, self.frame, state.layers_done)
+        following, record = self.tracker.step_layer(rng, particles, layer, problem, self.space, in_use)
+        milliseconds = 1000.0 * (time.perf_counter() - began)
+        self.state = SearchState(
+            state.layers_done + 1,
+            count,
+            following,
+            held,
+            version,
+            state.evaluations + len(record.poses),
+            state.milliseconds + milliseconds,
+        )
+        return dataclasses.replace(
+            record,
+            frame=self.frame,
+            layer=state.layers_done,
+            settings_version=version,
+            milliseconds=milliseconds,
+        )
+
+    def result(self, settings: Any = None) -> FrameResult:  # noqa: ANN401
+        """The frame's result; settings : of the tracker's type, those held since the beginning if None.
+
+        Raises RunError while layers are left.
+        """
+        state = self.state
+        if not self.finished or state.particles is None:
+            raise RunError(f"Frame {self.frame} is not searched to its end.", "Do the layers that are left.")
+        in_use = state.settings if settings is None else held_over(settings, state.settings)
+        estimate = self.tracker.end_frame(state.particles, self.space, in_use)
+        return FrameResult(
+            frame=self.frame,
+            estimate=estimate,
+            layers=state.layers_done,
+            evaluations=state.evaluations,
+            settings_version=state.settings_version,
+            milliseconds=state.milliseconds,
+            carried=Carried(state.particles, estimate.pose, self.previous.estimate),
+        )
+
+    def _beginning(self, repeat: int, settings: Any) -> ParticleSet:  # noqa: ANN401
+        """The unweighted set of a search's first layer."""
+        rng = beginning_generator(self.seed, self.frame, repeat)
+        start = self.previous if repeat == 0 else Carried(self.state.particles)
+        return self.tracker.begin_frame(rng, start, self.space, settings)
+
+
+def search_frame(
+    tracker: Tracker,
+    problem: FrameProblem,
+    previous: Carried,
+    space: SearchSpace,
+    *,
+    seed: int,
+    frame: int,
+    settings_source: SettingsSource,
+    repeats: int = 1,
+    on_layer: Callable[[LayerRecord], None] | None = None,
+    checkpoint: Callable[[SearchState], None] | None = None,
+) -> FrameResult:
+    """Search a frame to its end.
+
+    settings_source : asked before every layer for (version, tracker settings). on_layer : gets each record.
+    checkpoint : called after each layer with the state; it may wait, or raise to leave the frame (whose state
+    can then be given to a `FrameSearch`).
+    """
+    search = FrameSearch(tracker, previous, space, seed=seed, frame=frame, repeats=repeats)
+    settings = None
+    while not search.finished:
+        version, settings = settings_source()
+        record = search.step(problem, version, settings)
+        if on_layer is not None:
+            on_layer(record)
+        if checkpoint is not None:
+            checkpoint(search.state)
+    return search.result(settings)
+
+
+def held_over(settings: Any, held: Any) -> Any:  # noqa: ANN401
+    """`settings`, but knobs that do not take effect with the next layer as they are in `held`."""
+    slow = [entry.name for entry in knobs_of(type(settings)) if entry.takes_effect != "next layer"]
+    return dataclasses.replace(settings, **{name: getattr(held, name) for name in slow})
+
+
+def beginning_generator(seed: int, frame: int, repeat: int) -> np.random.Generator:
+    """The random numbers of `begin_frame`: `generator(seed, frame, -1)` for the first search, others for
+    repeats.
+    """
+    if repeat == 0:
+        return generator(seed, frame, -1)
+    return np.random.Generator(np.random.Philox(np.random.SeedSequence((seed, frame, 0, repeat))))

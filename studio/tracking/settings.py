@@ -1,0 +1,161 @@
+"""The knobs of every tracker, one line each; sliders, options, checks and the guide are made from these
+lines.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from studio.errors import SettingsError
+from studio.knobs import knob
+
+
+def _scale(default: float = 1.0) -> Any:  # noqa: ANN401 - a dataclass field, as `knob` returns it
+    return knob(
+        default, 0.1, 5.0, 0.05, label="diffusion scale", takes_effect="next layer",
+        help="Multiplies σ0, the largest expected movement from one frame to the next (Eq. 9).",
+    )  # fmt: skip
+
+
+def _dynamics() -> Any:  # noqa: ANN401
+    return knob(
+        "none", choices=("none", "constant_velocity"), takes_effect="next frame",
+        help="What a frame expects before it looks (Eq. 10): the last pose, or the last movement going on.",
+    )  # fmt: skip
+
+
+def _estimate() -> Any:  # noqa: ANN401
+    return knob(
+        "mean", choices=("mean", "mode"), takes_effect="next layer",
+        help="The pose that is reported: the particles' weighted mean (Eq. 8) or the best of them (Eq. 2).",
+    )  # fmt: skip
+
+
+def _limits() -> Any:  # noqa: ANN401
+    return knob(
+        "clamp", choices=("clamp", "reflect", "ignore"), label="joint limits", takes_effect="next layer",
+        help="What becomes of a particle beyond a limit: set on it, mirrored at it, or left where it is.",
+    )  # fmt: skip
+
+
+def _resampling() -> Any:  # noqa: ANN401
+    return knob(
+        "systematic", choices=("systematic", "multinomial"), takes_effect="next layer",
+        help="How survivors are drawn: evenly spaced (least noise) or one by one as the paper writes it.",
+    )  # fmt: skip
+
+
+def _start_repeats(default: int = 2) -> Any:  # noqa: ANN401
+    return knob(
+        default, 1, 20, 1, label="searches of the first frame", takes_effect="new run",
+        help="How often the first frame is searched over, each search starting where the one before ended.",
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class AnnealedSettings:
+    """Knobs of the annealed particle filter (Deutscher & Reid 2005, sections 3 and 6)."""
+
+    title = "Annealed particle filter"
+
+    survival: float = knob(
+        0.5, 0.02, 0.98, 0.01, label="survival rate",
+        help="α: share of the particles that survive a layer (Eq. 12); lower is faster and misses more.",
+    )  # fmt: skip
+    layers: int = knob(10, 1, 60, 1, takes_effect="next frame", help="M: annealing layers in a frame.")
+    particles: int = knob(200, 1, 20000, 10, takes_effect="next frame", help="N: particles in every layer.")
+    crossover: float = knob(
+        0.5, 0.0, 1.0, 0.05, label="crossover share",
+        help="Share of the particles that are made from two parents (Eq. 19).",
+    )  # fmt: skip
+    crossover_by: str = knob(
+        "limbs", choices=("limbs", "parameters"), label="crossover by",
+        help="Where two parents may be cut: between whole limbs, or between any two parameters (Eq. 19).",
+    )  # fmt: skip
+    adaptive_diffusion: bool = knob(
+        True, help="Noise in proportion to what is still uncertain (Eq. 18) instead of a fixed plan (Eq. 13)."
+    )
+    diffusion_form: str = knob(
+        "shrink", choices=("shrink", "paper"), label="adaptive form",
+        help="Survivors shrink towards their mean so that the cloud never grows, or only get noise (Eq. 18).",
+    )  # fmt: skip
+    diffusion_fraction: float = knob(
+        0.4, 0.02, 1.0, 0.02, label="adaptive noise",
+        help="h: noise as a share of the sample's standard deviation, for the form 'shrink'.",
+    )  # fmt: skip
+    diffusion_constant: float = knob(
+        0.1, 0.001, 2.0, 0.01, label="constant of Eq. 18",
+        help="P as a multiple of the sample's covariance, for the form 'paper'; much makes the cloud grow.",
+    )  # fmt: skip
+    diffusion_covariance: str = knob(
+        "diagonal", choices=("diagonal", "full"), label="covariance",
+        help="Whether adaptive noise follows each parameter on its own or all of them together.",
+    )  # fmt: skip
+    diffusion_scale: float = _scale()
+    diffusion_decay: str = knob(
+        "variance", choices=("variance", "deviation"), label="decay of Eq. 13",
+        help="Without adaptive diffusion: what the survival rates of the layers multiply, σ0² or σ0.",
+    )  # fmt: skip
+    survival_per_layer: str = knob(
+        "", label="survival of each layer",
+        help="Rates of the layers in turn, like 0.6, 0.5, 0.4 (the last holds on); empty: one rate for all.",
+    )  # fmt: skip
+    carry: str = knob(
+        "weighted", choices=("weighted", "resampled", "mode"), label="carried over",
+        takes_effect="next frame",
+        help="What the next frame starts from: every particle (Eq. 9), survivors by weight, or the best one.",
+    )  # fmt: skip
+    dynamics: str = _dynamics()
+    estimate: str = _estimate()
+    limits: str = _limits()
+    resampling: str = _resampling()
+    start_repeats: int = _start_repeats()
+
+    def __post_init__(self) -> None:
+        """Raise SettingsError unless `survival_per_layer` is empty or a list of rates in range."""
+        layer_survivals(self, 1)
+
+
+@dataclass(frozen=True, slots=True)
+class CondensationSettings:
+    """Knobs of Condensation, the baseline (Isard & Blake 1996)."""
+
+    title = "Condensation"
+
+    particles: int = knob(
+        2000, 1, 200000, 100, takes_effect="next frame", help="N: particles, each weighed once."
+    )
+    scale_survival: float = knob(
+        0.1, 0.05, 0.2, 0.01, label="survival aimed at",
+        help="Share of the particles that survive while the first frames choose the likelihood's scale.",
+    )  # fmt: skip
+    scale_frames: int = knob(
+        5, 1, 100, 1, label="frames for the scale", takes_effect="next frame",
+        help="How many weighings choose the likelihood's scale (their geometric mean), which then stays.",
+    )  # fmt: skip
+    diffusion_scale: float = _scale()
+    dynamics: str = _dynamics()
+    estimate: str = _estimate()
+    limits: str = _limits()
+    resampling: str = _resampling()
+    start_repeats: int = _start_repeats()
+
+
+def layer_survivals(settings: AnnealedSettings, layers: int) -> tuple[float, ...]:
+    """α wanted of each of the frame's layers, in the order they run.
+
+    A list shorter than the frame goes on with its last rate. Raises SettingsError for a list that is none, or
+    for a rate outside 0.02 … 0.98.
+    """
+    words = [word for word in settings.survival_per_layer.replace(",", " ").split() if word]
+    if not words:
+        return (settings.survival,) * layers
+    try:
+        rates = [float(word) for word in words]
+    except ValueError:
+        rates = [float("nan")]
+    if not all(0.02 <= rate <= 0.98 for rate in rates):
+        raise SettingsError(
+            f"Setting 'survival_per_layer' cannot be '{settings.survival_per_layer}'.",
+            "Write one rate from 0.02 to 0.98 for each layer, separated by commas, or nothing.",
+        )
+    return tuple(rates[min(index, len(rates) - 1)] for index in range(layers))
