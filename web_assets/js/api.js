@@ -1,0 +1,30 @@
+// The JSON API. Errors carry the server's cause and remedy.
+
+async function call(method, path, body, options = {}) {
+  const request = { method, headers: {}, ...options };
+  if (body !== undefined) {
+    request.body = JSON.stringify(body);
+    request.headers["content-type"] = "application/json";
+  }
+  let answer;
+  try {
+    answer = await fetch(path, request);
+  } catch (cause) {
+    if (cause.name === "AbortError") throw cause;
+    throw Object.assign(new Error("The studio does not answer."), { hint: "Look whether it still runs in its terminal." });
+  }
+  if (!answer.ok) {
+    const told = await answer.json().catch(() => ({}));
+    throw Object.assign(new Error(told.message ?? `The studio answered ${answer.status}.`), { hint: told.hint ?? "", status: answer.status });
+  }
+  const kind = answer.headers.get("content-type") ?? "";
+  return kind.includes("json") ? answer.json() : answer.text();
+}
+
+export const fetchJson = (path, options) => call("GET", path, undefined, options);
+export const post = (path, body = {}) => call("POST", path, body);
+export const patch = (path, body) => call("PATCH", path, body);
+export const remove = (path) => call("DELETE", path);
+
+export const runPath = (session, run) => `/api/sessions/${encodeURIComponent(session)}/runs/${encodeURIComponent(run)}`;
+export const sessionPath = (session) => `/api/sessions/${encodeURIComponent(session)}`;

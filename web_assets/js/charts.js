@@ -1,0 +1,81 @@
+// ECharts with the studio's tokens: one place that knows how a chart looks here.
+
+import * as echarts from "../vendor/echarts.esm.min.js";
+import { onTheme, token } from "./theme.js";
+
+const MILLISECONDS_BETWEEN_DRAWS = 100;
+
+/** Three significant figures unless more are needed. */
+export function figure(value) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  if (size >= 1e5 || size < 1e-3) return value.toExponential(2);
+  return String(Number(value.toPrecision(3)));
+}
+
+/** A chart in an element: `draw(option)` at most ten times a second, resized and redrawn with theme and page. */
+export class Chart {
+  constructor(id, { empty }) {
+    this.element = document.getElementById(id);
+    this.emptyText = empty;
+    this.make = null;
+    this.timer = null;
+    this.chart = echarts.init(this.element, null, { renderer: "canvas" });
+    new ResizeObserver(() => this.element.clientWidth && this.chart.resize()).observe(this.element);
+    onTheme(() => this.redraw());
+  }
+
+  /** Draw what `make()` returns; null draws the empty state. */
+  draw(make) {
+    this.make = make;
+    this.timer ??= setTimeout(() => { this.timer = null; this.redraw(); }, MILLISECONDS_BETWEEN_DRAWS);
+  }
+
+  redraw() {
+    if (!this.make || !this.element.clientWidth) return;
+    const option = this.make();
+    this.chart.setOption({ ...look(), ...(option ?? nothing(this.emptyText)) }, { notMerge: true });
+  }
+
+  on(name, listener) { this.chart.on(name, listener); }
+}
+
+function nothing(text) {
+  return { xAxis: undefined, yAxis: undefined, series: [], graphic: { type: "text", left: "center", top: "middle", style: { text, fill: token("text-quiet"), font: "450 13px Inter" } } };
+}
+
+function look() {
+  return {
+    animation: false,
+    backgroundColor: "transparent",
+    textStyle: { fontFamily: "Inter", fontSize: 11, color: token("text") },
+    grid: { left: 56, right: 16, top: 34, bottom: 30 },
+    tooltip: tooltip(),
+  };
+}
+
+/** The tooltip's look, to be merged with a chart's own formatter. */
+export const tooltip = (more = {}) => ({
+  backgroundColor: token("surface-raised"), borderColor: token("line-strong"), confine: true,
+  textStyle: { color: token("text"), fontFamily: "Inter", fontSize: 12 }, ...more,
+});
+
+/** A title at the chart's top left, with its unit in a quieter tone. */
+export const title = (text, unit = "") => ({
+  left: 12, top: 8, text: unit ? `{a|${text}} {b|${unit}}` : `{a|${text}}`,
+  textStyle: { rich: { a: { color: token("text"), fontWeight: 600, fontSize: 12, fontFamily: "Inter" }, b: { color: token("text-quiet"), fontSize: 11, fontFamily: "Inter" } } },
+});
+
+/** An axis in the page's tones. */
+export const axis = (more = {}) => ({
+  axisLine: { lineStyle: { color: token("line-strong") } },
+  axisTick: { show: false },
+  axisLabel: { color: token("text-quiet"), fontSize: 11, ...(more.axisLabel ?? {}) },
+  splitLine: { lineStyle: { color: token("line") } },
+  nameTextStyle: { color: token("text-quiet"), fontSize: 11 },
+  ...Object.fromEntries(Object.entries(more).filter(([key]) => key !== "axisLabel")),
+});
+
+/** The legend in the top right corner. */
+export const legend = (data) => ({ right: 12, top: 6, itemWidth: 12, itemHeight: 8, data, textStyle: { color: token("text-quiet"), fontSize: 11 } });

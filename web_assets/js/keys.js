@@ -1,0 +1,40 @@
+// The keyboard. One table: what it does here is what the list says.
+
+import { lookThrough } from "./cameras.js";
+import { openList } from "./dialogs.js";
+import { reanneal } from "./header.js";
+import { togglePlay, toggleLoop } from "./playback.js";
+import { get } from "./state.js";
+import { goTo, stepLayer } from "./timeline.js";
+
+const KEYS = [
+  ["Space", "play or pause what is stored", (event) => event.key === " ", togglePlay],
+  ["←", "frame before", (event) => event.key === "ArrowLeft" && !event.shiftKey, () => goTo(get("frame") - 1)],
+  ["→", "next frame", (event) => event.key === "ArrowRight" && !event.shiftKey, () => goTo(get("frame") + 1)],
+  ["Shift ←", "layer before", (event) => event.key === "ArrowLeft" && event.shiftKey, () => stepLayer(-1)],
+  ["Shift →", "next layer", (event) => event.key === "ArrowRight" && event.shiftKey, () => stepLayer(1)],
+  ["Home", "first frame", (event) => event.key === "Home", () => goTo(-Infinity)],
+  ["End", "last frame", (event) => event.key === "End", () => goTo(Infinity)],
+  ["1 – 9", "look through a camera", (event) => /^[1-9]$/.test(event.key), (event) => lookThrough(Number(event.key) - 1)],
+  ["0", "free view", (event) => event.key === "0", () => lookThrough(null)],
+  ["r", "anneal this frame again", (event) => event.key === "r", reanneal],
+  ["l", "loop", (event) => event.key === "l", toggleLoop],
+  ["?", "this list", (event) => event.key === "?", () => showKeys()],
+];
+
+function showKeys() {
+  openList("Keys", KEYS.map(([key, what]) => [key, what]));
+}
+
+/** Listen on the page (typing in a field and holding control are left alone). */
+export function startKeys() {
+  document.addEventListener("keydown", (event) => {
+    const typing = event.target.closest?.("input, select, textarea, dialog");
+    if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (event.key === " " && event.target.closest?.("button, a")) return;
+    const found = KEYS.find(([, , fits]) => fits(event));
+    if (!found) return;
+    event.preventDefault();
+    found[3](event);
+  });
+}

@@ -1,0 +1,40 @@
+// One observable value for the whole page: what is open, which frame and layer are shown, what the worker does.
+
+const values = {
+  sessions: null,      // [{name, title, thumbnail, runs: [...]}], null while unknown
+  session: null,       // name of the open session
+  run: null,           // name of the open run
+  summary: null,       // the run's frames: weights, errors, settings changes
+  frame: null,         // frame that is shown
+  layer: null,         // layer that is shown, null = all together
+  follow: true,        // show every new frame as it is finished
+  detail: null,        // the shown frame's layers
+  whatIf: null,        // layers of a re-annealed frame that is not stored
+  work: null,          // the worker's last state
+  connected: false,    // whether the event socket is open
+};
+
+const watchers = new Map();
+
+/** The current value under a name. */
+export const get = (name) => values[name];
+
+/** Change values and tell whoever watches one of them, once per call. */
+export function set(changes) {
+  const told = new Set();
+  for (const [name, value] of Object.entries(changes)) {
+    if (values[name] === value) continue;
+    values[name] = value;
+    for (const watcher of watchers.get(name) ?? []) told.add(watcher);
+  }
+  for (const watcher of told) watcher(values);
+}
+
+/** Call `watcher(values)` now and after every change of one of the names. */
+export function watch(names, watcher) {
+  for (const name of names) {
+    if (!watchers.has(name)) watchers.set(name, new Set());
+    watchers.get(name).add(watcher);
+  }
+  watcher(values);
+}

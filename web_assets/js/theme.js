@@ -1,0 +1,50 @@
+// Light or dark, remembered; the scene follows.
+
+import { post } from "./api.js";
+
+const root = document.documentElement;
+const listeners = new Set();
+
+/** The theme in use: "light" or "dark". */
+export const theme = () => root.dataset.theme;
+
+/** A token's colour in the theme in use. */
+export const token = (name) => getComputedStyle(root).getPropertyValue(`--${name}`).trim();
+
+/** Colour of layer `index` of `count`, from the tokens' sequence, first cool to last warm. */
+export function layerColour(index, count) {
+  const at = count > 1 ? (index / (count - 1)) * 9 : 9;
+  const low = Math.floor(at);
+  const rest = at - low;
+  const mix = (a, b) => `color-mix(in srgb, ${a} ${Math.round((1 - rest) * 100)}%, ${b})`;
+  return rest < 0.01 || low === 9 ? token(`layer-${low}`) : resolved(mix(token(`layer-${low}`), token(`layer-${low + 1}`)));
+}
+
+const probe = document.createElement("i");
+probe.hidden = true;
+document.documentElement.append(probe);
+
+/** A CSS colour expression as the rgb() text that canvas charts understand. */
+function resolved(expression) {
+  probe.style.color = expression;
+  const text = getComputedStyle(probe).color;
+  const parts = text.match(/color\(srgb ([\d.]+) ([\d.]+) ([\d.]+)/);
+  return parts ? `rgb(${parts.slice(1, 4).map((part) => Math.round(part * 255)).join(",")})` : text;
+}
+
+/** Call `listener` whenever the theme changes. */
+export const onTheme = (listener) => listeners.add(listener);
+
+function apply(name) {
+  root.dataset.theme = name;
+  localStorage.setItem("theme", name);
+  post("/api/scene/view", { dark: name === "dark" }).catch(() => {});
+  for (const listener of listeners) listener(name);
+}
+
+/** Take the remembered theme (else the system's), and wire the header's button. */
+export function startTheme() {
+  const wanted = localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark");
+  apply(wanted);
+  document.getElementById("theme").onclick = () => apply(theme() === "dark" ? "light" : "dark");
+}

@@ -1,0 +1,119 @@
+// The timeline: what is tracked, weight and error over the frames, lost spans, settings changes, the cursor.
+
+import { get, set, watch } from "./state.js";
+import { onTheme, token } from "./theme.js";
+
+const track = document.getElementById("track");
+const canvas = document.getElementById("track-canvas");
+const label = document.getElementById("frame-label");
+const PADDING = 6;
+
+/** First and last frame (half open) of the run that is open. */
+export function range() {
+  const summary = get("summary");
+  return summary ? [summary.first, summary.last] : [0, 1];
+}
+
+/** Show a frame that has a result: the nearest one to the wish. */
+export function goTo(frame) {
+  const frames = get("summary")?.frames;
+  if (!frames?.length) return;
+  const wish = Math.max(frames[0].frame, Math.min(frames[frames.length - 1].frame, Math.round(frame)));
+  set({ frame: wish, follow: wish === frames[frames.length - 1].frame && get("work")?.state === "tracking", whatIf: null });
+}
+
+function position(frame, width) {
+  const [first, last] = range();
+  return PADDING + ((frame - first) / Math.max(1, last - first - 1)) * (width - 2 * PADDING);
+}
+
+function curve(pen, frames, key, colour, width, height, fromZero) {
+  const known = frames.filter((entry) => Number.isFinite(entry[key]) && entry[key] !== null);
+  if (known.length < 2) return;
+  const values = known.map((entry) => entry[key]);
+  const low = fromZero ? 0 : Math.min(...values);
+  const span = Math.max(...values) - low || 1;
+  pen.beginPath();
+  for (const entry of known) pen.lineTo(position(entry.frame, width), height - 5 - ((entry[key] - low) / span) * (height - 12));
+  pen.strokeStyle = colour;
+  pen.lineWidth = 1.3;
+  pen.stroke();
+}
+
+function drawTimeline() {
+  const scale = devicePixelRatio || 1;
+  const width = track.clientWidth;
+  const height = track.clientHeight;
+  if (canvas.width !== width * scale || canvas.height !== height * scale) Object.assign(canvas, { width: width * scale, height: height * scale });
+  const pen = canvas.getContext("2d");
+  pen.setTransform(scale, 0, 0, scale, 0, 0);
+  pen.clearRect(0, 0, width, height);
+  const summary = get("summary");
+  if (!summary) return;
+  const frames = summary.frames;
+  if (frames.length) {
+    const start = position(frames[0].frame, width);
+    pen.fillStyle = token("accent-soft");
+    pen.fillRect(start - 2, 0, position(frames[frames.length - 1].frame, width) - start + 4, height);
+  }
+  pen.fillStyle = token("bad");
+  for (const entry of frames) if (entry.lost) pen.fillRect(position(entry.frame, width) - 1, height - 4, 3, 4);
+  curve(pen, frames, "log_weight", token("text-quiet"), width, height, false);
+  curve(pen, frames, "error_mm", token("layer-7"), width, height, true);
+  pen.fillStyle = token("warn");
+  for (const change of summary.settings_changes ?? []) pen.fillRect(position(change.frame, width) - 0.5, 0, 1.5, 7);
+  if (get("frame") !== null) {
+    const at = position(get("frame"), width);
+    pen.fillStyle = token("text");
+    pen.fillRect(at - 1, 0, 2, height);
+    pen.beginPath();
+    pen.arc(at, 5, 4, 0, 7);
+    pen.fill();
+  }
+}
+
+function tellFrame() {
+  const summary = get("summary");
+  const frame = get("frame");
+  if (!summary || frame === null) { label.textContent = "–"; return; }
+  const entry = summary.frames.find((one) => one.frame === frame);
+  label.innerHTML = "";
+  label.append(`${frame} `);
+  const rest = document.createElement("small");
+  rest.textContent = entry?.error_mm != null ? `/ ${summary.last - 1} · ${entry.error_mm.toPrecision(3)} mm` : `/ ${summary.last - 1}`;
+  label.append(rest);
+  track.setAttribute("aria-valuemin", summary.first);
+  track.setAttribute("aria-valuemax", summary.last - 1);
+  track.setAttribute("aria-valuenow", frame);
+}
+
+function frameAt(event) {
+  const [first, last] = range();
+  const box = track.getBoundingClientRect();
+  return first + ((event.clientX - box.left - PADDING) / (box.width - 2 * PADDING)) * (last - first - 1);
+}
+
+/** Wire the timeline. */
+export function startTimeline() {
+  track.addEventListener("pointerdown", (event) => { track.setPointerCapture(event.pointerId); goTo(frameAt(event)); });
+  track.addEventListener("pointermove", (event) => event.buttons && goTo(frameAt(event)));
+  new ResizeObserver(drawTimeline).observe(track);
+  onTheme(drawTimeline);
+  watch(["summary", "frame"], () => { drawTimeline(); tellFrame(); });
+  const layerLabel = document.getElementById("layer-label");
+  watch(["layer", "detail", "whatIf"], () => {
+    const count = (get("whatIf") ?? get("detail")?.layers)?.length ?? 0;
+    layerLabel.textContent = get("layer") === null ? "all layers" : `layer ${get("layer") + 1} / ${count}`;
+  });
+  document.getElementById("layer-back").onclick = () => stepLayer(-1);
+  document.getElementById("layer-on").onclick = () => stepLayer(1);
+}
+
+/** Show the layer before or after; past either end all layers are shown together. */
+export function stepLayer(by) {
+  const count = (get("whatIf") ?? get("detail")?.layers)?.length ?? 0;
+  if (!count) return;
+  const at = get("layer");
+  const next = at === null ? (by > 0 ? 0 : count - 1) : at + by;
+  set({ layer: next < 0 || next >= count ? null : next });
+}

@@ -1,0 +1,90 @@
+// The variance reduction (Figs. 12-14, 17, 19): a parameters x layers map, and the bars of the layer under the cursor.
+
+import { Chart, axis, figure, legend, title, tooltip } from "./charts.js";
+import { get, set, watch } from "./state.js";
+import { token } from "./theme.js";
+
+const LOWEST_SHARE = 1e-4;
+
+/** Share of the first layer's variance that is left, before or after diffusion: rows = layers. */
+export function shares(layers, key) {
+  const first = layers[0].variance_weighed;
+  return layers.map((layer) => layer[key].map((value, at) => (first[at] > 0 ? value / first[at] : NaN)));
+}
+
+function unitOf(detail, at) {
+  return detail.parameters[at].unit === "mm" ? "mm²" : "rad²";
+}
+
+function cell(detail, layers, layer, at) {
+  const record = layers[layer];
+  const share = record.variance_resampled[at] / layers[0].variance_weighed[at];
+  const unit = unitOf(detail, at);
+  return `<b>${detail.parameters[at].label}</b>, layer ${layer + 1} of ${layers.length}<br>` +
+    `as weighed ${figure(record.variance_weighed[at])} ${unit}<br>before diffusion ${figure(record.variance_resampled[at])} ${unit}<br>` +
+    `after diffusion ${figure(record.variance_diffused[at])} ${unit}<br>${figure(share * 100)} % of the first layer's`;
+}
+
+function heat(detail, layers) {
+  const left = shares(layers, "variance_resampled");
+  const names = detail.parameters.map((parameter) => parameter.label);
+  const cells = left.flatMap((row, layer) => row.map((share, at) => [at, layer, Math.log10(Math.max(share, LOWEST_SHARE))]));
+  return {
+    title: title("Variance left before diffusion", "share of the first layer's, per parameter"),
+    tooltip: tooltip({ formatter: ({ value }) => cell(detail, layers, value[1], value[0]) }),
+    grid: { left: 56, right: 76, top: 34, bottom: names.length > 8 ? 78 : 34 },
+    xAxis: axis({ type: "category", data: names, axisLabel: { rotate: names.length > 8 ? 55 : 0, interval: 0, fontSize: 10 }, splitLine: { show: false } }),
+    yAxis: axis({ type: "category", inverse: true, name: "layer", nameGap: 6, data: layers.map((_, at) => String(at + 1)), splitLine: { show: false } }),
+    visualMap: {
+      min: -4, max: 0, calculable: false, orient: "vertical", right: 4, top: "middle", itemHeight: 90, itemWidth: 10, precision: 0,
+      inRange: { color: [token("surface-sunken"), token("layer-0"), token("layer-4"), token("layer-9")] },
+      text: ["100 %", "0.01 %"], textStyle: { color: token("text-quiet"), fontSize: 10 },
+    },
+    series: [{ type: "heatmap", data: cells, itemStyle: { borderColor: token("surface"), borderWidth: 1 }, emphasis: { itemStyle: { borderColor: token("text") } } }],
+  };
+}
+
+function bars(detail, layers, layer) {
+  const at = layer ?? layers.length - 1;
+  const first = layers[0].variance_weighed;
+  const share = (key) => layers[at][key].map((value, index) => (first[index] > 0 ? (100 * value) / first[index] : null));
+  const names = detail.parameters.map((parameter) => parameter.label);
+  return {
+    title: title(`Layer ${at + 1} of ${layers.length}`, "% of the first layer's variance"),
+    legend: { ...legend(["before diffusion", "after diffusion"]), top: 26 },
+    tooltip: tooltip({ trigger: "axis", axisPointer: { type: "shadow" }, formatter: (points) => cell(detail, layers, at, points[0].dataIndex) }),
+    grid: { left: 48, right: 12, top: 50, bottom: names.length > 8 ? 78 : 30 },
+    xAxis: axis({ type: "category", data: names, axisLabel: { rotate: names.length > 8 ? 55 : 0, fontSize: 10 }, splitLine: { show: false } }),
+    yAxis: axis({ type: "value", name: "%", min: 0 }),
+    series: [
+      { name: "before diffusion", type: "bar", data: share("variance_resampled"), itemStyle: { color: token("layer-1") }, barGap: "0%" },
+      { name: "after diffusion", type: "bar", data: share("variance_diffused"), itemStyle: { color: token("layer-8") } },
+    ],
+  };
+}
+
+/** The variance of a frame as CSV: one row a layer and moment, one column a parameter. */
+export function varianceCsv(detail, layers) {
+  const head = ["frame", "layer", "moment", ...detail.parameters.map((parameter) => parameter.name)];
+  const moments = [["weighed", "variance_weighed"], ["before_diffusion", "variance_resampled"], ["after_diffusion", "variance_diffused"]];
+  const rows = layers.flatMap((layer, at) => moments.map(([word, key]) => [detail.frame, at, word, ...layer[key]]));
+  return [head, ...rows].map((row) => row.join(",")).join("\n") + "\n";
+}
+
+/** Wire the two charts to the state. */
+export function startVariance() {
+  const map = new Chart("chart-heat", { empty: "No layers yet. Track a frame to see where its variance goes." });
+  const bar = new Chart("chart-bars", { empty: "" });
+  let under = null;
+  const draw = () => {
+    const detail = get("detail");
+    const layers = get("whatIf") ?? detail?.layers;
+    const shown = layers?.length ? layers : null;
+    map.draw(() => shown && heat(detail, shown));
+    bar.draw(() => shown && bars(detail, shown, Math.min(under ?? get("layer") ?? shown.length - 1, shown.length - 1)));
+  };
+  map.on("mouseover", ({ value }) => { if (value && under !== value[1]) { under = value[1]; draw(); } });
+  map.on("globalout", () => { under = null; draw(); });
+  map.on("click", ({ value }) => value && set({ layer: value[1] }));
+  watch(["detail", "whatIf", "layer"], draw);
+}
