@@ -14,7 +14,8 @@ class CameraSource:
 
     name : the camera's name in `calibration/cameras.toml`. kind : a video file or a folder of pictures.
     path, masks, background : relative to the session folder with forward slashes, or absolute where the
-    footage is referred to; masks (video or folder) and background (picture or clip) are "" if there is none.
+    footage is referred to; masks (video or folder) and background (picture or clip) are "" if there is
+    none.
     width, height : pixels. frame_count : frames that decode, whatever the file's header claims.
     """
 

@@ -1,0 +1,174 @@
+"""A session's footage: the pictures and masks of any frame, at random or onwards.
+
+Each camera has its own decoder behind a lock, so cameras can be read from several threads and the same
+session can be opened twice. The last pictures are kept, so that re-annealing a frame or looking at it
+again decodes nothing.
+"""
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.capture.footage_source import CameraSource, FootageSource
+from studio.capture.pictures import PictureReader
+from studio.capture.video import VideoReader
+from studio.errors import FootageError, NotFoundError
+
+Bytes = NDArray[np.uint8]
+
+KEPT_BYTES = 24_000_000
+"""Pictures kept for each camera: eight of 1920x1080/2, twenty-six of 640x480."""
+MASK_LEVEL = 127
+"""Masks that come with the data are foreground above this grey level (lossy videos blur 0 and 255)."""
+
+
+class Reader(Protocol):
+    """Frames of one file or folder."""
+
+    def read(self, index: int) -> Bytes:
+        """(H, W, 3) uint8 BGR."""
+        ...
+
+    def close(self) -> None:
+        """Let go of files."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FramePictures:
+    """One frame as all cameras saw it. pictures : (H, W, 3) uint8 BGR each, in the order of the cameras."""
+
+    frame: int
+    cameras: tuple[str, ...]
+    pictures: tuple[Bytes, ...]
+
+
+class Footage:
+    """Pictures and masks of a session, frame by frame."""
+
+    def __init__(self, source: FootageSource, folder: Path) -> None:
+        self.source, self.folder = source, folder
+        self.cameras = tuple(camera.name for camera in source.cameras)
+        self.frame_count, self.fps = source.frame_count, source.fps
+        self._by_name = {camera.name: camera for camera in source.cameras}
+        self._pictures = {
+            camera.name: _Kept(_reader(camera.kind, folder / camera.path, camera), camera, colour_as_it_is)
+            for camera in source.cameras
+        }
+        self._masks = {
+            camera.name: _Kept(_mask_reader(folder / camera.masks, camera), camera, thresholded_mask)
+            for camera in source.cameras
+            if camera.masks
+        }
+
+    def picture(self, camera: str, frame: int) -> Bytes:
+        """(H, W, 3) uint8 BGR of one camera; read-only. Raises NotFoundError, FootageError."""
+        return self._pictures[camera].read(self._checked(frame))
+
+    def mask(self, camera: str, frame: int) -> Bytes | None:
+        """(H, W) uint8, 0 or 255, the mask that came with the data, or None where the camera has none."""
+        kept = self._masks.get(camera)
+        return None if kept is None else kept.read(self._checked(frame))
+
+    def pictures(self, frame: int) -> FramePictures:
+        """All cameras' pictures of a frame."""
+        return FramePictures(frame, self.cameras, tuple(self.picture(name, frame) for name in self.cameras))
+
+    def masks(self, frame: int) -> dict[str, Bytes] | None:
+        """The masks that came with the data by camera, or None if no camera has any."""
+        found = {name: kept.read(self._checked(frame)) for name, kept in self._masks.items()}
+        return found or None
+
+    def has_masks(self, camera: str) -> bool:
+        """Whether masks came with a camera's pictures."""
+        return camera in self._masks
+
+    def background_path(self, camera: str) -> Path | None:
+        """The plate picture or empty clip of a camera, if there is one."""
+        entry = self._by_name[camera].background
+        return self.folder / entry if entry else None
+
+    def close(self) -> None:
+        """Close all files."""
+        for kept in (*self._pictures.values(), *self._masks.values()):
+            kept.close()
+
+    def _checked(self, frame: int) -> int:
+        if not 0 <= frame < self.frame_count:
+            raise NotFoundError(
+                f"There is no frame {frame}.", f"The footage has frames 0 to {self.frame_count - 1}."
+            )
+        return frame
+
+
+def open_footage(source: FootageSource, session_folder: Path) -> Footage:
+    """The footage that a manifest describes. Raises FootageError if a file is gone."""
+    for camera in source.cameras:
+        for entry in filter(None, (camera.path, camera.masks, camera.background)):
+            if not (session_folder / entry).exists():
+                raise FootageError(
+                    f"Footage '{entry}' of camera {camera.name} is not there.",
+                    "Put the file back, or import the session again.",
+                )
+    return Footage(source, session_folder)
+
+
+def colour_as_it_is(picture: Bytes) -> Bytes:
+    """The picture itself."""
+    return picture
+
+
+def thresholded_mask(picture: Bytes) -> Bytes:
+    """(H, W) 255 where any channel of a mask picture is above the level, else 0."""
+    return np.where(picture.max(axis=2) > MASK_LEVEL, np.uint8(255), np.uint8(0))
+
+
+class _Kept:
+    """A reader that checks sizes and keeps its last pictures."""
+
+    def __init__(self, reader: Reader, camera: CameraSource, prepare: Callable[[Bytes], Bytes]) -> None:
+        self._reader, self._camera, self._prepare = reader, camera, prepare
+        self._kept: OrderedDict[int, Bytes] = OrderedDict()
+        self._lock = threading.Lock()
+        self._room = max(2, KEPT_BYTES // (3 * camera.width * camera.height))
+
+    def read(self, index: int) -> Bytes:
+        with self._lock:
+            found = self._kept.get(index)
+            if found is not None:
+                self._kept.move_to_end(index)
+                return found
+            picture = self._reader.read(index)
+            height, width = picture.shape[:2]
+            if (width, height) != (self._camera.width, self._camera.height):
+                raise FootageError(
+                    f"Frame {index} of camera {self._camera.name} is {width}x{height} pixels,"
+                    f" not {self._camera.width}x{self._camera.height}.",
+                    "Put the original file back, or import the session again.",
+                )
+            prepared = self._prepare(picture)
+            prepared.setflags(write=False)
+            self._kept[index] = prepared
+            while len(self._kept) > self._room:
+                self._kept.popitem(last=False)
+            return prepared
+
+    def close(self) -> None:
+        self._reader.close()
+
+
+def _reader(kind: str, path: Path, camera: CameraSource) -> Reader:
+    return (
+        VideoReader(path, camera.frame_count) if kind == "video" else PictureReader(path, camera.frame_count)
+    )
+
+
+def _mask_reader(path: Path, camera: CameraSource) -> Reader:
+    """Masks may have been trimmed with the footage, so only the frames in use need to be there."""
+    return PictureReader(path, 0) if path.is_dir() else VideoReader(path, camera.frame_count)

@@ -1,0 +1,149 @@
+"""Folders of pictures, one file a frame, in natural order."""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import av
+import av.error
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.capture.naming import natural_key
+from studio.capture.video import MAX_PIXELS
+from studio.errors import FootageError
+
+Bytes = NDArray[np.uint8]
+
+PICTURE_SUFFIXES = frozenset((".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm"))
+STRICTLY_DECODED = frozenset((".png", ".jpg", ".jpeg", ".bmp"))
+"""Formats whose damage OpenCV may paper over and the video library reports."""
+
+
+@dataclass(frozen=True, slots=True)
+class PicturesMeasure:
+    """What reading every picture of a folder found. missing : numbers that the file names skip."""
+
+    width: int
+    height: int
+    frame_count: int
+    missing: tuple[int, ...]
+
+
+def list_pictures(folder: Path) -> tuple[Path, ...]:
+    """The pictures of a folder in natural order of their names; hidden files are passed over."""
+    found = [
+        path
+        for path in folder.iterdir()
+        if path.suffix.lower() in PICTURE_SUFFIXES and not path.name.startswith(".") and path.is_file()
+    ]
+    return tuple(sorted(found, key=lambda path: natural_key(path.name)))
+
+
+def is_picture(path: Path) -> bool:
+    """Whether a file is a picture by its name."""
+    return path.suffix.lower() in PICTURE_SUFFIXES
+
+
+def read_picture(path: Path) -> Bytes:
+    """(H, W, 3) uint8 BGR; grey pictures become three equal channels. Raises FootageError naming the file."""
+    try:
+        content = np.frombuffer(path.read_bytes(), np.uint8)
+    except OSError as problem:
+        raise FootageError(
+            f"'{path.name}' cannot be read ({problem.strerror}).", "Put the file back."
+        ) from None
+    picture = None
+    if content.size:
+        try:
+            picture = cv2.imdecode(content, cv2.IMREAD_COLOR)
+        except cv2.error:
+            picture = None
+    if picture is None:
+        raise _damaged(path)
+    return picture.astype(np.uint8, copy=False)
+
+
+def check_picture(path: Path) -> tuple[int, int]:
+    """Width and height of a picture that decodes whole. Raises FootageError for damage or an absurd size."""
+    if path.suffix.lower() in STRICTLY_DECODED:
+        try:
+            with av.open(str(path), options={"protocol_whitelist": "file"}) as container:
+                stream = container.streams.video[0]
+                if stream.width * stream.height > MAX_PIXELS:
+                    raise FootageError(
+                        f"'{path.name}' is {stream.width}x{stream.height} pixels.", "Scale the pictures down."
+                    )
+                stream.codec_context.options = {"err_detect": "explode"}
+                if any(frame.is_corrupt for frame in container.decode(stream)):
+                    raise _damaged(path)
+        except (av.error.FFmpegError, OSError, IndexError):
+            raise _damaged(path) from None
+    height, width = read_picture(path).shape[:2]
+    return width, height
+
+
+def measure_pictures(folder: Path, on_frame: Callable[[int, int], None] | None = None) -> PicturesMeasure:
+    """Size and count of a folder's pictures, every one decoded once, and the numbers that are missing in
+    between.
+
+        on_frame : called with pictures read and pictures in all; may raise to stop.
+        Raises FootageError if there are none, one is damaged or sizes differ.
+    """
+    paths = list_pictures(folder)
+    if not paths:
+        raise FootageError(f"'{folder.name}' holds no pictures.", "Put the frames in it as PNG, JPEG or BMP.")
+    width, height = check_picture(paths[0])
+    for number, path in enumerate(paths, 1):
+        size = check_picture(path)
+        if size != (width, height):
+            raise FootageError(
+                f"'{folder.name}/{path.name}' is {size[0]}x{size[1]} pixels,"
+                f" '{paths[0].name}' is {width}x{height}.",
+                "Give all pictures of a camera one size.",
+            )
+        if on_frame is not None:
+            on_frame(number, len(paths))
+    return PicturesMeasure(width, height, len(paths), _missing_numbers(paths))
+
+
+class PictureReader:
+    """The pictures of a folder as frames."""
+
+    def __init__(self, folder: Path, frame_count: int) -> None:
+        self._folder = folder
+        self._paths = list_pictures(folder) if folder.is_dir() else ()
+        if len(self._paths) < frame_count:
+            raise FootageError(
+                f"'{folder.name}' holds {len(self._paths)} pictures and had {frame_count} at import.",
+                "Put the pictures back, or import the session again.",
+            )
+
+    def read(self, index: int) -> Bytes:
+        """(H, W, 3) uint8 BGR picture of frame `index`."""
+        return read_picture(self._paths[index])
+
+    def close(self) -> None:
+        """Nothing is kept open."""
+
+
+def _missing_numbers(paths: tuple[Path, ...]) -> tuple[int, ...]:
+    """Numbers skipped in the last number of the file names, where these are otherwise evenly spaced."""
+    found = [re.findall(r"\d+", path.stem) for path in paths]
+    if len(paths) < 3 or not all(found):
+        return ()
+    numbers = np.array([int(digits[-1]) for digits in found])
+    steps = np.diff(numbers)
+    stride = int(np.median(steps))
+    if stride <= 0 or np.all(steps == stride):
+        return ()
+    wanted = set(range(int(numbers[0]), int(numbers[-1]) + 1, stride))
+    return tuple(sorted(wanted - set(numbers.tolist())))[:1000]
+
+
+def _damaged(path: Path) -> FootageError:
+    return FootageError(
+        f"'{path.parent.name}/{path.name}' is damaged or no picture.", "Copy or export the picture again."
+    )

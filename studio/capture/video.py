@@ -1,0 +1,262 @@
+"""Video files, frame by frame and exactly: damage is reported, never skipped over.
+
+Headers are not believed: a video is measured by decoding every frame once (`measure_video`). The
+decoder is told to stop at damage (`err_detect=explode`), frames that it marks as corrupt count as
+damage, and fewer frames than the container announces mean that the file was cut. Damage that leaves a
+lawful bit stream cannot be seen by any decoder.
+"""
+
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import av
+import av.container
+import av.error
+import av.video
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.errors import FootageError
+
+Bytes = NDArray[np.uint8]
+
+VIDEO_SUFFIXES = frozenset((".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".ts", ".mts"))
+MAX_PIXELS = 64_000_000
+MAX_FRAMES = 2_000_000
+STEADY = 0.6
+"""Frames may lie this share of a frame's duration off an even spacing before a frame rate is called
+variable."""
+FORWARD = 24
+"""A jump forward of up to this many frames is decoded through instead of sought."""
+
+
+@dataclass(frozen=True, slots=True)
+class VideoMeasure:
+    """What decoding a whole video found. width, height : pixels as shown (the file's rotation applied).
+
+    uneven_frame : the first frame that is not where a constant frame rate puts it, or -1.
+    """
+
+    width: int
+    height: int
+    frame_count: int
+    fps: float
+    uneven_frame: int
+
+
+def measure_video(path: Path, on_frame: Callable[[int, int], None] | None = None) -> VideoMeasure:
+    """Size, frame count and rate of a video, by decoding it once.
+
+    on_frame : called with frames decoded and frames announced (0 if unknown); may raise to stop.
+    Raises FootageError naming the file and the frame where it is damaged or cut.
+    """
+    times: list[float] = []
+    width = height = 0
+    with _opened(path) as container:
+        stream = container.streams.video[0]
+        announced = _announced(container, stream)
+        for frame in _decoded(path, container, stream):
+            turned = round(frame.rotation / 90.0) % 2 == 1
+            size = (frame.height, frame.width) if turned else (frame.width, frame.height)
+            if times and size != (width, height):
+                raise FootageError(
+                    f"'{path.name}' changes its size at frame {len(times)}.", "Re-encode it with one size."
+                )
+            width, height = size
+            times.append(frame.time if frame.time is not None else float("nan"))
+            if len(times) > MAX_FRAMES:
+                raise FootageError(f"'{path.name}' has more than {MAX_FRAMES} frames.", "Cut it into pieces.")
+            if on_frame is not None:
+                on_frame(len(times), announced)
+        nominal = float(stream.average_rate or stream.guessed_rate or 0)
+    if not times:
+        raise FootageError(f"'{path.name}' holds no frames.", "Record or export the video again.")
+    if len(times) < announced - max(1, announced // 100):
+        raise FootageError(
+            f"'{path.name}' ends at frame {len(times)} of the {announced} that it announces.",
+            "The file was cut short: copy or export it again.",
+        )
+    fps, uneven = _rate(np.array(times), nominal)
+    return VideoMeasure(width, height, len(times), fps, uneven)
+
+
+class VideoReader:
+    """Random access to the frames of one measured video; reading onwards keeps the decoder open.
+    Thread-safe."""
+
+    def __init__(self, path: Path, frame_count: int) -> None:
+        self._path, self._count = path, frame_count
+        self._lock = threading.Lock()
+        self._container: av.container.InputContainer | None = None
+        self._frames: Iterator[av.VideoFrame] = iter(())
+        self._next = 0
+        self._times: list[int] | None = None
+        self._keys: list[int] = []
+
+    def read(self, index: int) -> Bytes:
+        """(H, W, 3) uint8 BGR picture of frame `index`. Raises FootageError for damage."""
+        with self._lock:
+            if self._container is None or not self._next <= index <= self._next + FORWARD:
+                self._go_to(index)
+            while True:
+                frame = next(self._frames, None)
+                if frame is None:
+                    raise _cut(self._path, self._next, self._count)
+                self._next += 1
+                if self._next > index:
+                    return upright_array(frame)
+
+    def close(self) -> None:
+        """Let go of the file."""
+        with self._lock:
+            if self._container is not None:
+                self._container.close()
+            self._container = None
+
+    def _go_to(self, index: int) -> None:
+        """Place the decoder so that frame `index` is at most a keyframe's distance ahead."""
+        if self._times is None and index > FORWARD:
+            self._times, self._keys = _packet_times(self._path)
+        usable = self._times is not None and len(self._times) == self._count
+        key = max((key for key in self._keys if key <= index), default=0) if usable else 0
+        if self._container is not None and self._next <= index and key <= self._next:
+            return
+        if self._container is None or key == 0:
+            self._restart()
+        if key == 0 or self._times is None or self._container is None:
+            return
+        stream = self._container.streams.video[0]
+        self._container.seek(self._times[key], stream=stream, backward=True)
+        self._frames = _decoded(self._path, self._container, stream, key)
+        first = next(self._frames, None)
+        position = {time: number for number, time in enumerate(self._times)}
+        landed = position.get(first.pts, -1) if first is not None and first.pts is not None else -1
+        if first is None or not 0 <= landed <= index:
+            self._restart()
+            return
+        self._frames = _again(first, self._frames)
+        self._next = landed
+
+    def _restart(self) -> None:
+        """Open the file afresh at its first frame."""
+        if self._container is not None:
+            self._container.close()
+        self._container = _opened(self._path)
+        self._frames = _decoded(self._path, self._container, self._container.streams.video[0])
+        self._next = 0
+
+
+def upright_array(frame: av.VideoFrame) -> Bytes:
+    """(H, W, 3) uint8 BGR, turned as the file's rotation says."""
+    picture = frame.to_ndarray(format="bgr24").astype(np.uint8, copy=False)
+    turns = round(frame.rotation / 90.0) % 4
+    return np.ascontiguousarray(np.rot90(picture, turns)) if turns else picture
+
+
+def _opened(path: Path) -> av.container.InputContainer:
+    """The container, its only or first video stream checked and set to stop at damage."""
+    try:
+        container = av.open(str(path), options={"protocol_whitelist": "file"})
+    except (av.error.FFmpegError, OSError) as problem:
+        raise FootageError(
+            f"'{path.name}' cannot be opened as a video at frame 0 ({_reason(problem)}).",
+            "The file is damaged, was cut short or is no video: copy or export it again.",
+        ) from None
+    if not container.streams.video:
+        container.close()
+        raise FootageError(f"'{path.name}' has no pictures in it.", "Give a video file.")
+    stream = container.streams.video[0]
+    if stream.width * stream.height > MAX_PIXELS:
+        container.close()
+        raise FootageError(
+            f"'{path.name}' is {stream.width}x{stream.height} pixels, more than {MAX_PIXELS} in all.",
+            "Scale the video down.",
+        )
+    stream.thread_type = "NONE"
+    stream.codec_context.options = {"err_detect": "explode"}
+    return container
+
+
+def _decoded(
+    path: Path, container: av.container.InputContainer, stream: av.video.VideoStream, number: int = 0
+) -> Iterator[av.VideoFrame]:
+    """Frames in the order of showing, counted from `number`; damage becomes a FootageError."""
+    last = ""
+    try:
+        for frame in container.decode(stream):
+            if frame.is_corrupt:
+                raise FootageError(
+                    f"'{path.name}' is damaged at frame {number}{last}.", "Copy or export the video again."
+                )
+            if round(frame.rotation) % 90:
+                raise FootageError(
+                    f"'{path.name}' asks to be shown turned by {frame.rotation} degrees.",
+                    "Re-encode it without a rotation.",
+                )
+            yield frame
+            number += 1
+            last = f" after {frame.time:.3f} s" if frame.time is not None else ""
+    except (av.error.FFmpegError, OSError) as problem:
+        raise FootageError(
+            f"'{path.name}' is damaged or cut at frame {number}{last} ({_reason(problem)}).",
+            "Copy or export the video again.",
+        ) from None
+
+
+def _announced(container: av.container.InputContainer, stream: av.video.VideoStream) -> int:
+    """The number of frames that the container promises, 0 if it does not."""
+    if stream.frames:
+        return stream.frames
+    if stream.duration and stream.time_base and stream.average_rate:
+        return int(stream.duration * stream.time_base * stream.average_rate)
+    if container.duration and stream.average_rate and len(container.streams) == 1:
+        return int(container.duration / 1_000_000 * stream.average_rate)
+    return 0
+
+
+def _rate(times: NDArray[np.float64], nominal: float) -> tuple[float, int]:
+    """Frames per second, and the first frame off an even spacing (-1: none)."""
+    if len(times) < 2 or not np.all(np.isfinite(times)):
+        return nominal, -1
+    fps = (len(times) - 1) / float(times[-1] - times[0]) if times[-1] > times[0] else nominal
+    if nominal > 0.0 and abs(fps / nominal - 1.0) < 0.005:
+        fps = nominal
+    off = np.abs((times - times[0]) * fps - np.arange(len(times)))
+    return fps, int(np.argmax(off > STEADY)) if np.any(off > STEADY) else -1
+
+
+def _packet_times(path: Path) -> tuple[list[int] | None, list[int]]:
+    """Presentation times of all frames in order, and which frames are keyframes, without decoding."""
+    shown: list[tuple[int, bool]] = []
+    with _opened(path) as container:
+        try:
+            for packet in container.demux(container.streams.video[0]):
+                if packet.size == 0 or packet.is_discard:
+                    continue
+                if packet.pts is None:
+                    return [], []
+                shown.append((packet.pts, packet.is_keyframe))
+        except av.error.FFmpegError:
+            return [], []
+    shown.sort()
+    return [time for time, _ in shown], [number for number, (_, key) in enumerate(shown) if key]
+
+
+def _again(first: av.VideoFrame, rest: Iterator[av.VideoFrame]) -> Iterator[av.VideoFrame]:
+    """The frame that was looked at, then the others."""
+    yield first
+    yield from rest
+
+
+def _cut(path: Path, frame: int, count: int) -> FootageError:
+    return FootageError(
+        f"'{path.name}' ends at frame {frame}, it had {count} frames when it was imported.",
+        "Put the original file back, or import the session again.",
+    )
+
+
+def _reason(problem: Exception) -> str:
+    """The decoder's words without file names and numbers."""
+    return str(getattr(problem, "strerror", None) or problem).split(": '")[0].lower()

@@ -1,0 +1,160 @@
+"""The knobs of masks and edge maps. All take effect with the next frame, and with a frame that is re-annealed."""
+
+from dataclasses import dataclass
+
+from studio.knobs import knob
+
+BACKGROUND_MODELS = ("auto", "mask", "gaussian", "median", "mog2", "knn")
+NEXT_FRAME = "next frame"
+
+
+@dataclass(frozen=True, slots=True)
+class EvidenceSettings:
+    """How pictures become masks (section 4.2.2) and edge proximity maps (section 4.2.1)."""
+
+    title = "Masks and edges"
+
+    background_model: str = knob(
+        "auto",
+        label="masks from",
+        choices=BACKGROUND_MODELS,
+        takes_effect=NEXT_FRAME,
+        help="mask: the masks that came with the footage; gaussian: difference from the plate or empty clip, else"
+        " from the footage's median; median: from the footage's median; mog2, knn: OpenCV's models, trained on the"
+        " empty clip, else on the footage; auto: masks that came with it, else gaussian.",
+    )
+    mask_threshold: float = knob(
+        4.0,
+        0.5,
+        30.0,
+        0.25,
+        label="mask threshold",
+        unit="σ",
+        takes_effect=NEXT_FRAME,
+        help="Foreground is what differs from the background by more than this many standard deviations.",
+    )
+    mask_noise: float = knob(
+        5.0,
+        0.5,
+        40.0,
+        0.5,
+        label="camera noise",
+        unit="grey levels",
+        takes_effect=NEXT_FRAME,
+        help="Smallest standard deviation of a background pixel; raise it where compression or light flickers.",
+    )
+    mask_gain_fit: bool = knob(
+        True,
+        label="fit brightness",
+        takes_effect=NEXT_FRAME,
+        help="Scale each colour of the background to the frame first, for plates taken with another exposure.",
+    )
+    mask_shadow_test: bool = knob(
+        True,
+        label="shadow test",
+        takes_effect=NEXT_FRAME,
+        help="Count pixels that are only darker than the background, in its own colour, as background.",
+    )
+    mask_shadow_darkest: float = knob(
+        0.5,
+        0.1,
+        0.95,
+        0.05,
+        label="darkest shadow",
+        takes_effect=NEXT_FRAME,
+        help="A shadow leaves at least this share of the background's brightness.",
+    )
+    mask_shadow_colour: float = knob(
+        0.06,
+        0.005,
+        0.5,
+        0.005,
+        label="shadow colour tolerance",
+        takes_effect=NEXT_FRAME,
+        help="How far a shadow's colour may lie from the background's, as a share of its brightness.",
+    )
+    mask_opening: int = knob(
+        3,
+        0,
+        31,
+        1,
+        label="remove specks",
+        unit="px",
+        takes_effect=NEXT_FRAME,
+        help="Opening: specks and threads thinner than this vanish; 0 = off.",
+    )
+    mask_closing: int = knob(
+        5,
+        0,
+        61,
+        1,
+        label="close gaps",
+        unit="px",
+        takes_effect=NEXT_FRAME,
+        help="Closing: gaps narrower than this are filled; 0 = off.",
+    )
+    mask_fill_holes: int = knob(
+        150,
+        0,
+        100000,
+        50,
+        label="fill holes up to",
+        unit="px²",
+        takes_effect=NEXT_FRAME,
+        help="Holes smaller than this area are filled; 0 = off.",
+    )
+    mask_min_component: int = knob(
+        150,
+        0,
+        100000,
+        50,
+        label="smallest piece",
+        unit="px²",
+        takes_effect=NEXT_FRAME,
+        help="Connected pieces smaller than this area are dropped; 0 = off.",
+    )
+    mask_keep_components: int = knob(
+        0,
+        0,
+        20,
+        1,
+        label="pieces kept",
+        takes_effect=NEXT_FRAME,
+        help="Only this many largest pieces are kept; 0 = all.",
+    )
+    mask_clean_given: bool = knob(
+        False,
+        label="clean given masks",
+        takes_effect=NEXT_FRAME,
+        help="Apply the clean-up also to masks that came with the footage.",
+    )
+    edge_threshold: float = knob(
+        5.0,
+        0.5,
+        60.0,
+        0.5,
+        label="edge threshold",
+        unit="grey levels/px",
+        takes_effect=NEXT_FRAME,
+        help="Weaker gradients are no edges.",
+    )
+    edge_smoothing: float = knob(
+        3.0,
+        0.5,
+        20.0,
+        0.25,
+        label="edge smoothing",
+        unit="px",
+        takes_effect=NEXT_FRAME,
+        help="Standard deviation of the Gaussian: from how far an edge is felt.",
+    )
+    edge_near_mask: int = knob(
+        0,
+        0,
+        100,
+        1,
+        label="edges near the mask",
+        unit="px",
+        takes_effect=NEXT_FRAME,
+        help="Forget edges further than this from the foreground; 0 = keep all, as in the paper.",
+    )
