@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.body.definition import BodyDefinition
+
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
@@ -106,7 +108,9 @@ class KinematicTables:
 class BodyModel:
     """A body: parameters in the order of the pose vector, joints parents first, all limbs, markers, dimensions.
 
-    dimensions : the named lengths and radii (mm) that the steps, limbs and markers were built from.
+    dimensions : the named lengths and radii (mm; ratios without unit) that the steps, limbs and markers were built
+    from. definition : the body file's entries, from which other dimensions give another body (None: built by hand,
+    its dimensions cannot change).
     """
 
     name: str
@@ -116,6 +120,7 @@ class BodyModel:
     limbs: tuple[Limb, ...]
     markers: tuple[Marker, ...]
     dimensions: dict[str, float]
+    definition: BodyDefinition | None = None
 
     @property
     def drawn(self) -> tuple[Limb, ...]:

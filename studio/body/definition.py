@@ -1,0 +1,136 @@
+"""What a body file says, entry by entry, before names are looked up.
+
+A body file is TOML. Lengths in mm, angles in degrees. The body's name is the file's name without `.toml`.
+
+    title = "Words on screen"
+    source = "where order, conventions and proportions come from"
+    shape_order = []                  # optional: dimensions in the order of the body's own shape file
+
+    [dimensions]                      # everything that differs between subjects
+    thigh_length = { mm = 424.8, of_height = 0.245 }   # of_height: published share of a person's height
+    torso_flatness = { ratio = 0.88 }                  # a number without unit
+
+    [[parameters]]                    # the pose vector, in order
+    name = "left_knee"
+    label = "left knee"
+    kind = "angle"                    # or "length"
+    lower = 0                         # degrees or mm; absent: unbounded
+    upper = 150
+    neutral = 5                       # the rest pose; absent: 0
+    max_step = 650                    # largest expected movement, degrees or mm per second
+    limb = "left leg"                 # parameters of one limb are neighbours
+
+    [[joints]]                        # parents before children
+    name = "left_shin"
+    parent = "left_thigh"             # or "world"
+    type = "hinge"                    # fixed 0, hinge 1, two-axis 2, ball 3 angles; free 3 angles and 3 lengths
+    sequence = [                      # from the parent's frame to this one, each step in the frame reached so far
+        { move = "z", by = "-thigh_length" },      # mm, [-]dimension or [-]length parameter
+        { turn = "y", by = "left_knee" },          # degrees, or [-]angle parameter
+    ]
+
+    [[limbs]]                         # truncated elliptical cones along the joint's z
+    name = "left shin"
+    joint = "left_shin"
+    length = "-shin_length"           # mm or [-]dimension; 0: kept, but neither counted nor drawn
+    radius_start = 60                 # mm or dimension, at z = 0
+    radius_end = 45                   # at z = length
+    scale_x = 1                       # of the cross-section; number or ratio
+    scale_y = 1
+    side = "left"                     # left, right or middle
+
+    [[markers]]                       # named points; two names joined by "_" name a distance in a subject file
+    name = "LKnee"
+    joint = "left_shin"
+    at = [0, 0, 0]                    # mm or [-]dimension each
+"""
+
+import math
+from typing import Literal
+
+import msgspec
+
+WORLD = "world"
+
+
+class DimensionEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A length that differs between subjects: `mm` or (without unit) `ratio`, and its share of a person's height."""
+
+    mm: float | None = None
+    ratio: float | None = None
+    of_height: float | None = None
+
+    @property
+    def value(self) -> float:
+        """The body's own value, mm or a ratio (exactly one of the two is given)."""
+        given = self.mm if self.mm is not None else self.ratio
+        return math.nan if given is None else given
+
+
+class ParameterEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One entry of the pose vector, degrees or mm."""
+
+    name: str
+    kind: Literal["angle", "length"]
+    max_step: float
+    limb: str
+    label: str = ""
+    lower: float = -math.inf
+    upper: float = math.inf
+    neutral: float = 0.0
+
+
+class StepEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A move along or a turn about one axis, by a number or a [-]name."""
+
+    by: float | str
+    move: Literal["x", "y", "z"] | None = None
+    turn: Literal["x", "y", "z"] | None = None
+
+
+class JointEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A frame of the tree and the steps that lead to it from its parent's."""
+
+    name: str
+    parent: str
+    type: Literal["fixed", "hinge", "two-axis", "ball", "free"]
+    sequence: tuple[StepEntry, ...] = ()
+
+
+class LimbEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A truncated elliptical cone along its joint's z."""
+
+    name: str
+    joint: str
+    length: float | str
+    radius_start: float | str
+    radius_end: float | str
+    scale_x: float | str = 1.0
+    scale_y: float | str = 1.0
+    side: Literal["left", "right", "middle"] = "middle"
+
+
+class MarkerEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A named point fixed to a joint's frame."""
+
+    name: str
+    joint: str
+    at: tuple[float | str, float | str, float | str]
+
+
+class BodyDefinition(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A whole body file."""
+
+    title: str
+    parameters: tuple[ParameterEntry, ...]
+    joints: tuple[JointEntry, ...]
+    limbs: tuple[LimbEntry, ...]
+    source: str = ""
+    dimensions: dict[str, DimensionEntry] = {}
+    markers: tuple[MarkerEntry, ...] = ()
+    shape_order: tuple[str, ...] = ()
+
+
+def split_sign(reference: str) -> tuple[float, str]:
+    """The sign and the name of a reference such as "-left_hip_ry"."""
+    return (-1.0, reference[1:]) if reference.startswith("-") else (1.0, reference)
