@@ -1,0 +1,92 @@
+"""The web application: every route, behind the access guard, on one port.
+
+Order of what a request passes: errors in words, policy headers, access, body limit, routes. Long-lived
+things (the scene, the tracking process, the stream of events) start and stop with the application.
+"""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+from fastapi import FastAPI
+from starlette.staticfiles import StaticFiles
+
+from studio.sessions.workspace import Workspace
+from studio.web import (
+    event_stream,
+    guide_routes,
+    page_routes,
+    scene_relay,
+)
+from studio.web.access import AccessGuard, HostRule, binding_rule
+from studio.web.body_limit import BodyLimit
+from studio.web.content_policy import PolicyHeaders
+from studio.web.doors import Control, Doors, Stage
+from studio.web.error_responses import ErrorsInWords, add_error_handlers
+from studio.web.event_stream import EventStream
+
+DESCRIPTION = (
+    "Sessions, runs, settings and results of the capture studio. Every answer that is no success is "
+    "`{code, message, hint, status}`. Requests carry the cookie that the printed address sets, or the token "
+    "as `Authorization: Bearer`. Lengths in mm, angles in radians, NaN as null. Events: WebSocket `/api/events`."
+)
+ROUTERS = (
+    page_routes.router,
+    guide_routes.router,
+    scene_relay.router,
+    event_stream.router,
+)
+
+
+def build_app(
+    workspace: Workspace,
+    control: Control,
+    stage: Stage,
+    token: str,
+    *,
+    hosts: HostRule | None = None,
+    footage_roots: tuple[Path, ...] = (),
+    log_path: Path | None = None,
+) -> FastAPI:
+    """The application. Serving it starts `stage`, and ends `stage` and `control` when it stops.
+
+    token : what lets a browser in. hosts : the Host headers that are answered (default: this machine's
+    loopback). footage_roots : folders from which footage may be imported by path. log_path : named in
+    answers to unforeseen errors.
+    """
+    doors = Doors(workspace, control, stage, EventStream(control), footage_roots, log_path)
+    app = FastAPI(
+        title="Capture studio",
+        description=DESCRIPTION,
+        lifespan=_lifespan,
+        docs_url=None,
+        redoc_url=None,
+        openapi_url="/api/openapi.json",
+    )
+    app.state.doors = doors
+    add_error_handlers(app)
+    for router in ROUTERS:
+        app.include_router(router)
+    app.mount("/assets", StaticFiles(directory=page_routes.assets_folder()), name="assets")
+    # The last one added is the first to see a request.
+    app.add_middleware(BodyLimit)
+    app.add_middleware(AccessGuard, token=token, hosts=hosts or binding_rule("127.0.0.1", False))
+    app.add_middleware(PolicyHeaders)
+    app.add_middleware(ErrorsInWords, log_path=log_path)
+    return app
+
+
+@asynccontextmanager
+async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
+    """Start the scene and the stream; end them and the tracking process, whatever happens."""
+    doors: Doors = app.state.doors
+    try:
+        doors.scene_port = await asyncio.to_thread(doors.stage.start)
+        doors.events.start()
+        yield
+    finally:
+        doors.scene_port = 0
+        await doors.events.stop()
+        await asyncio.to_thread(doors.stage.stop)
+        await asyncio.to_thread(doors.control.close)

@@ -1,0 +1,44 @@
+"""A limit on what a request may carry, counted as it arrives (the Content-Length header is only a promise).
+
+Upload routes stream to disk and count for themselves; everything else is small JSON.
+"""
+
+from starlette.datastructures import Headers
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from studio.web.error_responses import TooLargeError, error_response
+
+JSON_LIMIT = 1_000_000
+UPLOAD_PREFIX = "/api/uploads"
+
+
+class BodyLimit:
+    """ASGI middleware: refuses bodies over `limit` bytes, except under the upload routes."""
+
+    def __init__(self, app: ASGIApp, *, limit: int = JSON_LIMIT) -> None:
+        self.app = app
+        self.limit = limit
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on, counting what is received."""
+        if scope["type"] != "http" or scope["path"].startswith(UPLOAD_PREFIX):
+            await self.app(scope, receive, send)
+            return
+        too_large = TooLargeError(
+            f"The request carries more than {self.limit} bytes.", "Send less at a time."
+        )
+        promised = Headers(scope=scope).get("content-length", "0")
+        if not promised.isdigit() or int(promised) > self.limit:
+            await error_response(too_large)(scope, receive, send)
+            return
+        received = 0
+
+        async def counting() -> Message:
+            nonlocal received
+            message = await receive()
+            received += len(message.get("body", b""))
+            if received > self.limit:
+                raise too_large
+            return message
+
+        await self.app(scope, counting, send)

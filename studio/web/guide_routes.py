@@ -1,0 +1,94 @@
+"""`/guide`: the packaged text, with a table of every knob made from the declarations."""
+
+import html
+import itertools
+from functools import cache
+
+from fastapi import APIRouter
+from markdown_it import MarkdownIt
+from starlette.responses import HTMLResponse
+
+from studio.evidence.settings import EvidenceSettings
+from studio.knobs import Knob, allowed, knobs_of
+from studio.settings import RecordingSettings
+from studio.tracking.catalogue import TRACKERS
+from studio.web.page_routes import assets_folder
+from studio.weighting.catalogue import WEIGHTINGS
+
+router = APIRouter(tags=["page"], include_in_schema=False)
+
+PLACE_OF_KNOBS = "{{knobs}}"
+PAGE = (
+    '<!doctype html>\n<html lang="en">\n<head><meta charset="utf-8"><title>Guide · Capture studio</title>\n'
+    '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+    '<link rel="icon" href="/assets/icon.svg" type="image/svg+xml">\n'
+    '<link rel="stylesheet" href="/assets/tokens.css"><link rel="stylesheet" href="/assets/page.css">\n'
+    '<link rel="stylesheet" href="/assets/guide.css">\n'
+    '<script type="module" src="/assets/js/guide.js"></script></head>\n'
+    '<body class="guide"><nav class="contents" aria-label="Contents">{contents}</nav>\n'
+    "<main>{content}</main></body></html>"
+)
+COLUMNS = ("Name", "What it does", "Range", "Default", "Unit", "Takes effect")
+
+
+@router.get("/guide")
+def guide() -> HTMLResponse:
+    """The guide as a page."""
+    return HTMLResponse(rendered(), headers={"cache-control": "no-cache"})
+
+
+@cache
+def rendered() -> str:
+    """The whole page, made once."""
+    markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
+    tokens = markdown.parse((assets_folder() / "guide" / "guide.md").read_text(encoding="utf-8"))
+    contents: list[str] = []
+    for opening, inline in itertools.pairwise(tokens):
+        if opening.type == "heading_open" and opening.tag == "h2":
+            anchor = anchor_of(inline.content)
+            opening.attrSet("id", anchor)
+            contents.append(f'<a href="#{anchor}">{html.escape(inline.content)}</a>')
+    content = markdown.renderer.render(tokens, markdown.options, {})
+    content = content.replace(f"<p>{PLACE_OF_KNOBS}</p>", all_knob_tables())
+    return PAGE.replace("{contents}", "".join(contents)).replace("{content}", content)
+
+
+def anchor_of(heading: str) -> str:
+    """A heading as the name of its place in the page."""
+    words = "".join(letter if letter.isalnum() else " " for letter in heading.lower())
+    return "-".join(words.split())
+
+
+def settings_groups() -> dict[str, type]:
+    """Every settings class there is, by the words that head its table."""
+    groups: dict[str, type] = {f"Tracker: {name}": entry.settings_type for name, entry in TRACKERS.items()}
+    groups |= {f"Weighting: {name}": entry.settings_type for name, entry in WEIGHTINGS.items()}
+    return groups | {"Evidence": EvidenceSettings, "Recording": RecordingSettings}
+
+
+def all_knob_tables() -> str:
+    """A table for each tracker, each weighting, the evidence and the recording."""
+    return "\n".join(knob_table(title, knobs_of(settings)) for title, settings in settings_groups().items())
+
+
+def knob_table(title: str, knobs: tuple[Knob, ...]) -> str:
+    """One table of declarations."""
+    head = "".join(f"<th>{name}</th>" for name in COLUMNS)
+    rows = "\n".join(f"<tr>{_row(entry)}</tr>" for entry in knobs)
+    return (
+        f'<h3 id="{anchor_of(title)}">{html.escape(title)}</h3>\n<div class="wide"><table class="knobs">'
+        f"<thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table></div>"
+    )
+
+
+def _row(entry: Knob) -> str:
+    default = str(entry.default).lower() if entry.kind is bool else f"{entry.default}"
+    cells = (
+        f"<strong>{html.escape(entry.label)}</strong><br><code>{html.escape(entry.name)}</code>",
+        html.escape(entry.help),
+        html.escape(allowed(entry)),
+        html.escape(default),
+        html.escape(entry.unit),
+        html.escape(entry.takes_effect),
+    )
+    return "".join(f"<td>{cell}</td>" for cell in cells)
