@@ -1,0 +1,76 @@
+"""Files that are either the old version or the new one, whatever happens in between.
+
+The new content goes to a temporary file in the same folder, is flushed to the disk, and then takes the old
+one's place in one step (`os.replace`); syncing the folder makes the step itself last through a power cut.
+Copies of whole folders are made beside their place under a hidden name and renamed into it the same way.
+"""
+
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+PARTIAL_PREFIX = ".partial-"
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Put `content` at `path`, replacing what was there in one step. Raises OSError; then the old file
+    stands."""
+    handle, temporary = tempfile.mkstemp(prefix=PARTIAL_PREFIX, dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+    sync_folder(path.parent)
+
+
+def write_text(path: Path, content: str) -> None:
+    """Like `write_bytes`, as UTF-8."""
+    write_bytes(path, content.encode("utf-8"))
+
+
+def copy_file(source: Path, path: Path) -> None:
+    """A byte-for-byte copy of `source` at `path`, in one step."""
+    write_bytes(path, source.read_bytes())
+
+
+def new_folder_beside(path: Path) -> Path:
+    """An empty hidden folder next to `path`, to be filled and then given to `move_into_place`."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    made = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=path.parent))
+    made.chmod(0o755)
+    return made
+
+
+def move_into_place(folder: Path, path: Path) -> None:
+    """Rename a finished folder to its place. Raises FileExistsError if something is there; nothing is
+    overwritten."""
+    if path.exists() or path.is_symlink():
+        raise FileExistsError(path)
+    os.rename(folder, path)
+    sync_folder(path.parent)
+
+
+def discard(folder: Path) -> None:
+    """Remove a folder that did not reach its place."""
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def sync_folder(folder: Path) -> None:
+    """Make renames inside `folder` last; a system without folder handles is left alone."""
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError:
+        return
+    try:
+        os.fsync(handle)
+    except OSError:
+        return
+    finally:
+        os.close(handle)

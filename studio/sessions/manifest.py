@@ -1,0 +1,123 @@
+"""`session.json`: what a session is, as measured and decided at import.
+
+Nothing here changes while runs are made, and nothing that can be computed (how far runs got, how many there
+are) is kept beside its source. Unknown entries are refused and the schema's version is checked, so that a
+newer studio's session is named as such instead of being half understood.
+"""
+
+import datetime
+from pathlib import Path
+
+import msgspec
+
+from studio.capture.footage_source import FootageSource
+from studio.errors import NotFoundError, SessionError
+from studio.sessions.atomic_files import write_bytes
+
+SCHEMA_VERSION = 1
+FILE_NAME = "session.json"
+
+
+class CameraMatch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Which calibrated camera a piece of footage was taken for. how : the reason, in words."""
+
+    footage: str
+    camera: str
+    how: str
+
+
+class SessionManifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A session's description.
+
+    name : the folder's name when it was made; title : free text shown to people. created : UTC, ISO 8601.
+    body : the body its subject is fitted to. tracker, weighting : what runs of this session use unless told
+    otherwise, "" for the studio's own default. footage : see `FootageSource`; paths relative to the session
+    folder. calibration_source : name of the imported file or files. assumptions : what was taken for granted
+    to make footage and calibration fit (a crop, a unit, a frame rate). matching : footage to cameras.
+    """
+
+    schema: int = SCHEMA_VERSION
+    name: str
+    title: str
+    created: str
+    body: str
+    footage: FootageSource
+    tracker: str = ""
+    weighting: str = ""
+    calibration_source: str = ""
+    imported_from: str = ""
+    assumptions: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    matching: tuple[CameraMatch, ...] = ()
+
+    @property
+    def fps(self) -> float:
+        """Frames per second of the footage."""
+        return self.footage.fps
+
+    @property
+    def frame_count(self) -> int:
+        """Frames that every camera has."""
+        return self.footage.frame_count
+
+
+def now() -> str:
+    """The time to be written into records: UTC, ISO 8601, to the second."""
+    return datetime.datetime.now(datetime.UTC).replace(microsecond=0).isoformat()
+
+
+def read_manifest(session_folder: Path) -> SessionManifest:
+    """The manifest of the session in `session_folder`.
+
+    Raises NotFoundError where there is none, SessionError where it cannot be understood.
+    """
+    path = session_folder / FILE_NAME
+    try:
+        content = path.read_bytes()
+    except (FileNotFoundError, NotADirectoryError):
+        raise NotFoundError(
+            f"There is no session in '{session_folder}'.",
+            "Make one with 'studio import SOURCE --into SESSION'.",
+        ) from None
+    except OSError as error:
+        raise SessionError(
+            f"'{path}' cannot be read ({error.strerror}).", "Check the folder's permissions."
+        ) from None
+    check_schema(content, path, SCHEMA_VERSION)
+    try:
+        return msgspec.json.decode(content, type=SessionManifest)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise SessionError(
+            f"'{path}' is not a session's manifest: {error}.",
+            "Import the session again, or correct the entry.",
+        ) from None
+
+
+def write_manifest(session_folder: Path, manifest: SessionManifest) -> None:
+    """Write `session.json` in one step."""
+    write_bytes(session_folder / FILE_NAME, readable_json(manifest))
+
+
+def readable_json(record: msgspec.Struct) -> bytes:
+    """A record as indented JSON that ends with a line break."""
+    return msgspec.json.format(msgspec.json.encode(record), indent=2) + b"\n"
+
+
+class _SchemaOnly(msgspec.Struct):
+    schema: int = SCHEMA_VERSION
+
+
+def check_schema(content: bytes, path: Path, known: int) -> None:
+    """Raises SessionError if the record was written by a newer studio."""
+    try:
+        found = msgspec.json.decode(content, type=_SchemaOnly).schema
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise SessionError(
+            f"'{path}' cannot be read: {error}.", "Put back a copy of the file, or import the session again."
+        ) from None
+    if found > known:
+        raise SessionError(
+            f"'{path}' has schema version {found}, this studio knows versions up to {known}.",
+            "Open it with a newer studio.",
+        )

@@ -1,0 +1,132 @@
+"""Small CSV files whose header names the pose vector's parameters: `start_pose.csv`, `sigma.csv` and poses to
+keep.
+
+Numbers are in radians and mm. `sigma.csv` has a leading column `fps`: the frame rate at which its standard
+deviations from one frame to the next were measured. Files of poses have a leading column `frame`.
+"""
+
+import csv
+import io
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.errors import BodyError
+from studio.sessions.atomic_files import write_text
+
+Array = NDArray[np.float64]
+
+FRAME, FPS = "frame", "fps"
+
+
+def read_pose(path: Path, names: tuple[str, ...], frame: int | None = None) -> Array:
+    """(D,) the pose in a CSV file, in the order of `names`.
+
+    A file with several rows needs a column `frame`, from which the row of `frame` (else the first) is taken.
+    Raises BodyError naming file, entry and remedy.
+    """
+    header, rows = _read(path)
+    row = rows[0]
+    if len(rows) > 1:
+        if FRAME not in header:
+            raise BodyError(
+                f"'{path.name}' has {len(rows)} rows and no column 'frame'.",
+                "Keep the one row that is the start pose.",
+            )
+        column = header.index(FRAME)
+        row = next((found for found in rows if frame is not None and found[column] == frame), rows[0])
+    return _ordered(path, header, row, names)
+
+
+def write_pose(path: Path, names: tuple[str, ...], pose: Array) -> None:
+    """Write one pose under its parameters' names, in one step. pose : (D,) radians and mm."""
+    write_text(path, _as_csv([list(names), [repr(float(value)) for value in pose]]))
+
+
+def read_sigma(path: Path, names: tuple[str, ...], fps: float) -> Array:
+    """(D,) standard deviations from frame to frame at `fps`, scaled from the rate that the file names.
+
+    The largest movement between two frames grows with the time between them, so σ scales with 1 / fps.
+    Raises BodyError.
+    """
+    header, rows = _read(path)
+    if FPS not in header:
+        raise BodyError(
+            f"'{path.name}' has no column 'fps'.", "Add the frame rate at which its σ were measured."
+        )
+    measured_at = rows[0][header.index(FPS)]
+    sigma = _ordered(path, header, rows[0], names)
+    if measured_at <= 0.0 or np.any(sigma < 0.0):
+        raise BodyError(
+            f"'{path.name}' has a negative σ or frame rate.", "Give standard deviations of 0 or more."
+        )
+    return sigma * (measured_at / fps)
+
+
+def write_sigma(path: Path, names: tuple[str, ...], sigma: Array, fps: float) -> None:
+    """Write standard deviations (rad, mm from frame to frame at `fps`) under their parameters' names."""
+    write_text(path, _as_csv([[FPS, *names], [repr(float(fps)), *(repr(float(value)) for value in sigma)]]))
+
+
+def poses_csv(names: tuple[str, ...], frames: NDArray[np.int64], poses: Array) -> str:
+    """Poses as CSV text: a column `frame`, then one a parameter. frames : (K,). poses : (K, D) radians and
+    mm."""
+    rows = [
+        [str(int(frame)), *(repr(float(value)) for value in pose)]
+        for frame, pose in zip(frames, poses, strict=True)
+    ]
+    return _as_csv([[FRAME, *names], *rows])
+
+
+def _as_csv(rows: list[list[str]]) -> str:
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows(rows)
+    return stream.getvalue()
+
+
+def _read(path: Path) -> tuple[list[str], list[list[float]]]:
+    """Header and rows of numbers; at least one row."""
+    try:
+        lines = [line for line in csv.reader(path.read_text(encoding="utf-8-sig").splitlines()) if any(line)]
+    except OSError as error:
+        raise BodyError(f"'{path}' cannot be read ({error.strerror}).", "Check the path.") from None
+    except (UnicodeDecodeError, csv.Error):
+        raise BodyError(
+            f"'{path.name}' is not a CSV file.", "Save it as comma-separated text in UTF-8."
+        ) from None
+    header = [entry.strip() for entry in lines[0]] if lines else []
+    if len(lines) < 2:
+        raise BodyError(f"'{path.name}' has no row under its header.", "Give one row of numbers.")
+    rows: list[list[float]] = []
+    for number, line in enumerate(lines[1:], start=2):
+        if len(line) != len(header):
+            raise BodyError(
+                f"Line {number} of '{path.name}' has {len(line)} entries under {len(header)} names.",
+                "Give one number for each name of the header.",
+            )
+        rows.append([_number(path, number, name, entry) for name, entry in zip(header, line, strict=True)])
+    return header, rows
+
+
+def _number(path: Path, line: int, name: str, entry: str) -> float:
+    try:
+        value = float(entry)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise BodyError(f"Line {line} of '{path.name}' has {entry!r} for '{name}'.", "Give a finite number.")
+    return value
+
+
+def _ordered(path: Path, header: list[str], row: list[float], names: tuple[str, ...]) -> Array:
+    known = dict(zip(header, row, strict=True))
+    missing = [name for name in names if name not in known]
+    if missing:
+        listed = ", ".join(missing[:4]) + (" …" if len(missing) > 4 else "")
+        raise BodyError(
+            f"'{path.name}' lacks {len(missing)} of the body's {len(names)} parameters: {listed}.",
+            "Give a row for this body, its parameters' names in the header.",
+        )
+    return np.array([known[name] for name in names])

@@ -1,0 +1,177 @@
+"""Layers, frames and checkpoints as compressed blobs, and back, bit for bit.
+
+A blob is a zstd frame around an npz archive (`allow_pickle=False`: nothing in it can run). The numbers of a
+record that are single values share one array and those that are per parameter another, so that an archive has
+few entries.
+"""
+
+import io
+
+import numpy as np
+import zstandard
+from numpy.typing import NDArray
+
+from studio.errors import SessionError
+from studio.tracking.tracker import Carried, Estimate, FrameResult, LayerRecord, ParticleSet
+
+Array = NDArray[np.float64]
+
+LEVEL = 1
+LARGEST_BLOB = 1 << 30
+
+
+def pack(arrays: dict[str, Array]) -> bytes:
+    """Named arrays as one compressed blob."""
+    stream = io.BytesIO()
+    np.savez(stream, allow_pickle=False, **arrays)  # pyright: ignore[reportArgumentType]
+    return zstandard.ZstdCompressor(level=LEVEL).compress(stream.getbuffer())
+
+
+def unpack(blob: bytes) -> dict[str, Array]:
+    """The arrays of a blob. Raises SessionError if it is damaged."""
+    try:
+        plain = zstandard.ZstdDecompressor().decompress(blob, max_output_size=LARGEST_BLOB)
+        with np.load(io.BytesIO(plain), allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}
+    except (zstandard.ZstdError, ValueError, OSError, EOFError, KeyError) as error:
+        raise SessionError(
+            f"A stored result is damaged ({error}).", "Start the run again; the footage is not touched."
+        ) from None
+
+
+def kept_rows(log_weights: Array, wanted: int) -> NDArray[np.int64]:
+    """The rows of a set that are recorded when `wanted` are: the heaviest, in the order that they have in the
+    set.
+
+    Particles of equal weight are taken in that order too, so the choice is the same on every machine.
+    """
+    if wanted >= len(log_weights):
+        return np.arange(len(log_weights))
+    return np.sort(np.argsort(-log_weights, kind="stable")[:wanted])
+
+
+def pack_layer(record: LayerRecord, particles: int | None = None) -> bytes:
+    """A layer's record with at most `particles` of its set (None: all)."""
+    rows = kept_rows(record.log_weights, len(record.poses) if particles is None else particles)
+    return pack(
+        {
+            "numbers": np.array(
+                [
+                    record.frame,
+                    record.layer,
+                    record.settings_version,
+                    record.beta,
+                    record.alpha_wanted,
+                    record.alpha_reached,
+                    record.best_log_weight,
+                    record.milliseconds,
+                ],
+                dtype=np.float64,
+            ),
+            "vectors": np.stack(
+                [
+                    record.variance_weighed,
+                    record.variance_resampled,
+                    record.variance_diffused,
+                    record.best,
+                    record.mean,
+                ]
+            ),
+            "poses": record.poses[rows],
+            "log_weights": record.log_weights[rows],
+        }
+    )
+
+
+def unpack_layer(blob: bytes) -> LayerRecord:
+    """The inverse of `pack_layer`."""
+    arrays = unpack(blob)
+    numbers, vectors = arrays["numbers"], arrays["vectors"]
+    return LayerRecord(
+        frame=int(numbers[0]),
+        layer=int(numbers[1]),
+        settings_version=int(numbers[2]),
+        beta=float(numbers[3]),
+        alpha_wanted=float(numbers[4]),
+        alpha_reached=float(numbers[5]),
+        variance_weighed=vectors[0],
+        variance_resampled=vectors[1],
+        variance_diffused=vectors[2],
+        best=vectors[3],
+        best_log_weight=float(numbers[6]),
+        mean=vectors[4],
+        poses=arrays["poses"],
+        log_weights=arrays["log_weights"],
+        milliseconds=float(numbers[7]),
+    )
+
+
+def pack_result(result: FrameResult) -> bytes:
+    """A frame's result with everything that the next frame starts from, whole."""
+    estimate = result.estimate
+    arrays = carried_arrays(result.carried)
+    arrays["numbers"] = np.array(
+        [
+            result.frame,
+            result.layers,
+            result.evaluations,
+            result.settings_version,
+            result.milliseconds,
+            estimate.log_weight,
+        ],
+        dtype=np.float64,
+    )
+    arrays["vectors"] = np.stack([estimate.pose, estimate.mean, estimate.mode])
+    return pack(arrays)
+
+
+def unpack_result(blob: bytes) -> FrameResult:
+    """The inverse of `pack_result`."""
+    arrays = unpack(blob)
+    numbers, vectors = arrays["numbers"], arrays["vectors"]
+    return FrameResult(
+        frame=int(numbers[0]),
+        estimate=Estimate(vectors[0], vectors[1], vectors[2], float(numbers[5])),
+        layers=int(numbers[1]),
+        evaluations=int(numbers[2]),
+        settings_version=int(numbers[3]),
+        milliseconds=float(numbers[4]),
+        carried=carried_from(arrays),
+    )
+
+
+def carried_arrays(carried: Carried) -> dict[str, Array]:
+    """What goes from one frame to the next, as named arrays; what is None has no entry."""
+    arrays: dict[str, Array] = {}
+    if carried.estimate is not None:
+        arrays["estimate"] = carried.estimate
+    if carried.previous_estimate is not None:
+        arrays["previous_estimate"] = carried.previous_estimate
+    if carried.particles is not None:
+        arrays.update(particle_arrays(carried.particles))
+    return arrays
+
+
+def carried_from(arrays: dict[str, Array]) -> Carried:
+    """The inverse of `carried_arrays`."""
+    particles = particles_from(arrays) if "set_poses" in arrays else None
+    return Carried(particles, arrays.get("estimate"), arrays.get("previous_estimate"))
+
+
+def particle_arrays(particles: ParticleSet) -> dict[str, Array]:
+    """A whole set of particles as named arrays."""
+    arrays = {
+        "set_poses": particles.poses,
+        "set_log_weights": particles.log_weights,
+        "set_raw_log_weights": particles.raw_log_weights,
+    }
+    arrays.update({f"extra_{name}": values for name, values in particles.extra.items()})
+    return arrays
+
+
+def particles_from(arrays: dict[str, Array]) -> ParticleSet:
+    """The inverse of `particle_arrays`."""
+    extra = {
+        name.removeprefix("extra_"): values for name, values in arrays.items() if name.startswith("extra_")
+    }
+    return ParticleSet(arrays["set_poses"], arrays["set_log_weights"], arrays["set_raw_log_weights"], extra)

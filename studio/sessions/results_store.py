@@ -1,0 +1,231 @@
+"""A run's results on disk, written frame by frame and readable at any moment by any process.
+
+One SQLite file in WAL mode per run (`results.sqlite`): readers never wait for the writer nor hold it up, and
+a frame with all its layers arrives in one transaction or not at all, also when the writer is killed. Layers
+and frames are compressed blobs (see `results_codec`); what lists and timelines need stands beside them in
+columns. Neither side holds more than the frame at hand.
+"""
+
+import json
+import sqlite3
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.errors import RunError, SessionError
+from studio.sessions.results_codec import pack, pack_layer, pack_result
+from studio.sessions.results_reader import FILE_NAME, ResultsReader, SettingsEntry
+from studio.tracking.tracker import FrameResult, LayerRecord
+
+Array = NDArray[np.float64]
+Value = bool | int | float | str
+
+__all__ = ["FILE_NAME", "ResultsReader", "ResultsWriter", "SettingsEntry", "is_being_written"]
+
+LOCK_NAME = "results.lock"
+SCHEMA_VERSION = "1"
+SCHEMA = """
+CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS settings (
+    version INTEGER PRIMARY KEY, frame INTEGER NOT NULL, layer INTEGER NOT NULL, "values" TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS frames (
+    frame INTEGER PRIMARY KEY, log_weight REAL NOT NULL, milliseconds REAL NOT NULL, evaluations INTEGER NOT
+    NULL, layers INTEGER NOT NULL, settings_version INTEGER NOT NULL, pose BLOB NOT NULL, blob BLOB NOT NULL);
+CREATE TABLE IF NOT EXISTS layers (
+    frame INTEGER NOT NULL, layer INTEGER NOT NULL, blob BLOB NOT NULL, UNIQUE (frame, layer));
+CREATE TABLE IF NOT EXISTS partial (
+    id INTEGER PRIMARY KEY CHECK (id = 1), frame INTEGER NOT NULL, next_layer INTEGER NOT NULL, blob BLOB NOT
+    NULL);
+CREATE TABLE IF NOT EXISTS partial_layers (layer INTEGER PRIMARY KEY, blob BLOB NOT NULL);
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class _Lock:
+    """Held as an exclusive transaction on an empty database beside the store; freed by the system when a
+    process dies, on every system alike."""
+
+    connection: sqlite3.Connection
+
+    @staticmethod
+    def take(run_folder: Path) -> "_Lock | None":
+        connection = sqlite3.connect(
+            run_folder / LOCK_NAME, timeout=0.0, isolation_level=None, check_same_thread=False
+        )
+        try:
+            connection.execute("BEGIN EXCLUSIVE")
+        except sqlite3.OperationalError:
+            connection.close()
+            return None
+        return _Lock(connection)
+
+    def free(self) -> None:
+        self.connection.close()
+
+
+def is_being_written(run_folder: Path) -> bool:
+    """Whether some living process has this run open for tracking."""
+    if not (run_folder / LOCK_NAME).exists():
+        return False
+    lock = _Lock.take(run_folder)
+    if lock is None:
+        return True
+    lock.free()
+    return False
+
+
+def create_store(run_folder: Path) -> None:
+    """Make the empty store of a new run."""
+    connection = sqlite3.connect(run_folder / FILE_NAME, isolation_level=None)
+    try:
+        connection.execute("PRAGMA journal_mode = WAL")
+        connection.executescript(SCHEMA)
+        connection.execute("INSERT OR IGNORE INTO meta VALUES ('schema', ?)", (SCHEMA_VERSION,))
+    finally:
+        connection.close()
+
+
+class ResultsWriter:
+    """The one writer of a run's store; a second one, in this process or another, is refused with RunError.
+
+    To be used by one thread at a time. Close it (or use it as a context) to free the run for others.
+    """
+
+    def __init__(self, run_folder: Path) -> None:
+        lock = _Lock.take(run_folder)
+        if lock is None:
+            raise RunError(
+                f"Run '{run_folder.name}' is being tracked by another process.",
+                "Stop it there first, or start a new run.",
+            )
+        self._lock = lock
+        self._path = run_folder / FILE_NAME
+        try:
+            self._connection = sqlite3.connect(
+                self._path, timeout=30.0, isolation_level=None, check_same_thread=False
+            )
+            self._connection.execute("PRAGMA journal_mode = WAL")
+            self._connection.execute("PRAGMA synchronous = NORMAL")
+            self._connection.executescript(SCHEMA)
+        except sqlite3.DatabaseError as error:
+            lock.free()
+            raise _unwritable(self._path, error) from None
+
+    def __enter__(self) -> "ResultsWriter":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the store and free the run for other writers."""
+        self._connection.close()
+        self._lock.free()
+
+    def write_frame(
+        self, result: FrameResult, layers: Iterable[LayerRecord], particles: int | None = None
+    ) -> None:
+        """Store a finished frame with all its layers in one transaction; the unfinished frame's state goes.
+
+        particles : how many of each layer's set are recorded (None: all); the set at the end of the frame is
+        in `result.carried` and always whole.
+        """
+        statements: list[tuple[str, tuple[object, ...]]] = [
+            ("DELETE FROM layers WHERE frame = ?", (result.frame,))
+        ]
+        for record in layers:
+            statements.append(
+                (
+                    "INSERT INTO layers VALUES (?, ?, ?)",
+                    (record.frame, record.layer, pack_layer(record, particles)),
+                )
+            )
+        row = (
+            result.frame,
+            result.estimate.log_weight,
+            result.milliseconds,
+            result.evaluations,
+            result.layers,
+            result.settings_version,
+            np.ascontiguousarray(result.estimate.pose, dtype="<f8").tobytes(),
+            pack_result(result),
+        )
+        statements.append(("INSERT OR REPLACE INTO frames VALUES (?, ?, ?, ?, ?, ?, ?, ?)", row))
+        self._transaction([*statements, *_FORGET_PARTIAL])
+
+    def write_partial(
+        self, frame: int, next_layer: int, state: Mapping[str, Array], layers: Iterable[LayerRecord]
+    ) -> None:
+        """Store where the search stopped inside a frame: its state (named arrays, whole) and its layers so
+        far."""
+        statements: list[tuple[str, tuple[object, ...]]] = list(_FORGET_PARTIAL)
+        statements.append(("INSERT INTO partial VALUES (1, ?, ?, ?)", (frame, next_layer, pack(dict(state)))))
+        for record in layers:
+            statements.append(
+                ("INSERT INTO partial_layers VALUES (?, ?)", (record.layer, pack_layer(record)))
+            )
+        self._transaction(statements)
+
+    def forget_partial(self) -> None:
+        """Drop the state of an unfinished frame."""
+        self._transaction(list(_FORGET_PARTIAL))
+
+    def forget_from(self, frame: int) -> None:
+        """Drop the results of `frame` and all later ones, and the settings that were first used in them.
+
+        What is kept: at least one entry of the settings' history.
+        """
+        self._transaction(
+            [
+                ("DELETE FROM frames WHERE frame >= ?", (frame,)),
+                ("DELETE FROM layers WHERE frame >= ?", (frame,)),
+                (
+                    "DELETE FROM settings WHERE frame >= ? AND version > (SELECT MIN(version) FROM settings)",
+                    (frame,),
+                ),
+                ("DELETE FROM meta WHERE key = 'ended'", ()),
+                *_FORGET_PARTIAL,
+            ]
+        )
+
+    def write_settings(self, version: int, frame: int, layer: int, values: Mapping[str, Value]) -> None:
+        """Note that settings `version` are in use since (frame, layer)."""
+        row = (version, frame, layer, json.dumps(dict(values)))
+        self._transaction([("INSERT OR REPLACE INTO settings VALUES (?, ?, ?, ?)", row)])
+
+    def mark_ended(self, how: str) -> None:
+        """Note that a person ended the run (`how`: "cancelled"), or with "" that it goes on."""
+        if how:
+            self._transaction([("INSERT OR REPLACE INTO meta VALUES ('ended', ?)", (how,))])
+        else:
+            self._transaction([("DELETE FROM meta WHERE key = 'ended'", ())])
+
+    def _transaction(self, statements: list[tuple[str, tuple[object, ...]]]) -> None:
+        """All statements or none."""
+        try:
+            self._connection.execute("BEGIN IMMEDIATE")
+            try:
+                for sql, values in statements:
+                    self._connection.execute(sql, values)
+                self._connection.execute("COMMIT")
+            except BaseException:
+                self._connection.execute("ROLLBACK")
+                raise
+        except sqlite3.DatabaseError as error:
+            raise _unwritable(self._path, error) from None
+
+
+_FORGET_PARTIAL: tuple[tuple[str, tuple[object, ...]], ...] = (
+    ("DELETE FROM partial", ()),
+    ("DELETE FROM partial_layers", ()),
+)
+
+
+def _unwritable(path: Path, error: sqlite3.DatabaseError) -> SessionError:
+    return SessionError(
+        f"The results in '{path}' cannot be written ({error}).",
+        "Check the free disk space and the folder's permissions, or start a new run.",
+    )

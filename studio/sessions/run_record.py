@@ -1,0 +1,85 @@
+"""`run.json`: what a run was asked to do, written once when it is made.
+
+Everything that a run's poses depend on is here or beside it in the run's folder: the body with its dimensions
+(`body/`), the cameras as they were (`cameras.toml`), the start pose, σ0, the seed and the settings that it
+began with. Settings changed on the way, and how far it got, are facts of the results store.
+"""
+
+from pathlib import Path
+
+import msgspec
+
+from studio.errors import NotFoundError, SessionError
+from studio.sessions.atomic_files import write_bytes
+from studio.sessions.manifest import check_schema, readable_json
+
+Value = bool | int | float | str
+
+SCHEMA_VERSION = 1
+FILE_NAME = "run.json"
+CAMERAS_NAME = "cameras.toml"
+
+
+class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A run's description.
+
+    name : the run's folder. session : the session's name when the run was made. created : UTC, ISO 8601.
+    first, last : frames, half open. fps : frames per second. settings : every knob by its flat name at the
+    start. body : name or file of the body; dimensions : its lengths and radii, mm, as they were fitted to the
+    subject. parameters : names of the pose vector. start_pose : radians and mm, None where the search starts
+    uniformly. start_source : where it came from, in words. sigma : σ0 of every parameter from frame to frame,
+    rad and mm. software : the studio's version. notes : what a reader of the results should know.
+    """
+
+    schema: int = SCHEMA_VERSION
+    name: str
+    session: str
+    created: str
+    tracker: str
+    weighting: str
+    body: str
+    dimensions: dict[str, float]
+    parameters: tuple[str, ...]
+    seed: int
+    first: int
+    last: int
+    fps: float
+    settings: dict[str, Value]
+    sigma: tuple[float, ...]
+    start_pose: tuple[float, ...] | None = None
+    start_source: str = ""
+    software: str = ""
+    notes: tuple[str, ...] = ()
+
+    @property
+    def frame_count(self) -> int:
+        """How many frames the run is to track."""
+        return self.last - self.first
+
+
+def read_run_record(run_folder: Path) -> RunRecord:
+    """The record of the run in `run_folder`.
+
+    Raises NotFoundError where there is none, SessionError where it cannot be understood.
+    """
+    path = run_folder / FILE_NAME
+    try:
+        content = path.read_bytes()
+    except (FileNotFoundError, NotADirectoryError):
+        raise NotFoundError(
+            f"There is no run '{run_folder.name}'.", "List the runs with 'studio runs'."
+        ) from None
+    except OSError as error:
+        raise SessionError(
+            f"'{path}' cannot be read ({error.strerror}).", "Check the folder's permissions."
+        ) from None
+    check_schema(content, path, SCHEMA_VERSION)
+    try:
+        return msgspec.json.decode(content, type=RunRecord)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise SessionError(f"'{path}' is not a run's record: {error}.", "Start a new run.") from None
+
+
+def write_run_record(run_folder: Path, record: RunRecord) -> None:
+    """Write `run.json` in one step."""
+    write_bytes(run_folder / FILE_NAME, readable_json(record))

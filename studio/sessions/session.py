@@ -1,0 +1,191 @@
+"""A session on disk: footage, cameras, subject, truth and runs, each read when it is asked for.
+
+Folder: `session.json`, `videos/` or `pictures/<camera>/`, `masks/<camera>/`, `background/`,
+`calibration/original.*` and `calibration/cameras.toml`, `truth/*.trc`, `subject.toml`, `start_pose.csv`,
+`sigma.csv`, `thumbnail.jpg`, `bodies/*.toml` (bodies of this session's own), `runs/<run>/`.
+"""
+
+import shutil
+from functools import cached_property
+from pathlib import Path
+
+from studio.body.catalogue import load_body
+from studio.body.model import BodyModel
+from studio.body.subject import Subject, fit_subject, read_subject
+from studio.capture.calibration_files import read_calibration
+from studio.capture.footage import Footage, open_footage
+from studio.errors import NotFoundError, SessionError
+from studio.geometry.camera import Camera
+from studio.sessions import atomic_files
+from studio.sessions.manifest import SessionManifest, read_manifest, write_manifest
+from studio.sessions.named_rows import Array, read_pose, read_sigma
+from studio.sessions.names import checked_name, free_name, inside
+from studio.sessions.results_store import create_store
+from studio.sessions.run_record import CAMERAS_NAME, RunRecord, write_run_record
+from studio.sessions.stored_run import BODY_FOLDER, StoredRun
+from studio.sessions.thumbnails import thumbnail_of
+
+CAMERAS_PATH = Path("calibration") / "cameras.toml"
+SUBJECT_NAME, START_POSE_NAME, SIGMA_NAME = "subject.toml", "start_pose.csv", "sigma.csv"
+THUMBNAIL_NAME, BODIES_NAME, RUNS_NAME = "thumbnail.jpg", "bodies", "runs"
+
+
+class Session:
+    """A session's folder. Raises NotFoundError if there is no manifest in it."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path.resolve()
+        self.manifest: SessionManifest = read_manifest(self.path)
+
+    @property
+    def name(self) -> str:
+        """The session's name: its folder's."""
+        return self.path.name
+
+    def cameras(self) -> tuple[Camera, ...]:
+        """The calibrated cameras in the order of the footage. Raises CalibrationError."""
+        by_name = {camera.name: camera for camera in self._calibrated}
+        sources = self.manifest.footage.cameras
+        missing = [source.name for source in sources if source.name not in by_name]
+        if missing:
+            raise SessionError(
+                f"Session '{self.name}' has footage of '{missing[0]}' but no calibration of it.",
+                "Import the session again with a calibration that names it.",
+            )
+        return tuple(by_name[source.name] for source in sources)
+
+    @cached_property
+    def _calibrated(self) -> tuple[Camera, ...]:
+        return tuple(read_calibration(self.path / CAMERAS_PATH).cameras)
+
+    def footage(self) -> Footage:
+        """The session's footage, opened anew; close it when done. Raises FootageError."""
+        return open_footage(self.manifest.footage, self.path)
+
+    def subject(self) -> Subject | None:
+        """The person's measures, if the session has them. Raises BodyError."""
+        path = self.path / SUBJECT_NAME
+        return read_subject(path) if path.exists() else None
+
+    def body(self, name: str | None = None, subject: Subject | None = None) -> BodyModel:
+        """The body `name` (default: the session's) scaled to `subject` (default: the session's). Raises
+        BodyError."""
+        return self.body_with_notes(name, subject)[0]
+
+    def body_with_notes(
+        self, name: str | None = None, subject: Subject | None = None
+    ) -> tuple[BodyModel, tuple[str, ...]]:
+        """Like `body`, with notes on measures of the subject that the body cannot follow."""
+        measures = subject or self.subject()
+        wanted = name or (subject.body if subject else "") or self.manifest.body
+        tree = load_body(wanted, self.body_folders)
+        return fit_subject(tree, measures) if measures else (tree, ())
+
+    @property
+    def body_folders(self) -> tuple[Path, ...]:
+        """Where bodies of a user's own are looked for: in the session, then in the workspace around it."""
+        folders = (self.path / BODIES_NAME, self.path.parent / BODIES_NAME)
+        return tuple(folder for folder in folders if folder.is_dir())
+
+    def start_pose(self, body: BodyModel | None = None) -> Array | None:
+        """(D,) the session's own start pose in the order of the body's parameters, None without one.
+
+        Raises BodyError if it does not name this body's parameters.
+        """
+        path = self.path / START_POSE_NAME
+        return read_pose(path, _parameter_names(body or self.body())) if path.exists() else None
+
+    def sigma(self, fps: float | None = None, body: BodyModel | None = None) -> Array | None:
+        """(D,) the session's own σ0 from frame to frame at `fps` (default: its own), None without one.
+
+        It belongs to the session's body; None for any other.
+        """
+        path = self.path / SIGMA_NAME
+        model = body or self.body()
+        if not path.exists() or model.name != self.body_name:
+            return None
+        return read_sigma(path, _parameter_names(model), fps or self.manifest.fps)
+
+    @property
+    def body_name(self) -> str:
+        """Name of the session's body."""
+        return self.manifest.body
+
+    @property
+    def truth_path(self) -> Path | None:
+        """The TRC file with the true motion, None without one."""
+        found = sorted((self.path / "truth").glob("*.trc"))
+        return found[0] if found else None
+
+    def thumbnail(self) -> Path | None:
+        """A small picture of the session (JPEG), made when first asked for; None if the footage cannot be
+        read."""
+        path = self.path / THUMBNAIL_NAME
+        if not path.exists():
+            content = thumbnail_of(self)
+            if content is None:
+                return None
+            atomic_files.write_bytes(path, content)
+        return path
+
+    def runs(self) -> tuple[StoredRun, ...]:
+        """The session's runs, oldest first."""
+        folder = self.path / RUNS_NAME
+        found = [StoredRun(path) for path in folder.iterdir() if _is_run(path)] if folder.is_dir() else []
+        return tuple(sorted(found, key=lambda run: (run.folder / "run.json").stat().st_mtime_ns))
+
+    def run(self, name: str) -> StoredRun:
+        """The run of that name. Raises NotFoundError, NameRefused."""
+        path = inside(self.path / RUNS_NAME, name, "run")
+        if not _is_run(path):
+            raise NotFoundError(
+                f"Session '{self.name}' has no run '{name}'.",
+                "List the runs with 'studio runs', or start one.",
+            )
+        return StoredRun(path)
+
+    def free_run_name(self) -> str:
+        """A name for the next run: run-1, run-2, …"""
+        folder = self.path / RUNS_NAME
+        taken = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+        number = len(taken) + 1
+        return free_name(f"run-{number}", taken)
+
+    def new_run(self, record: RunRecord, body_text: str = "") -> StoredRun:
+        """Make the folder of a run: its record, the calibration's and the body file's snapshot, an empty
+        store.
+
+        It appears whole or not at all. `runs.new_run.prepare_run` fills in the record. body_text : content of
+        the body's file, "" where it is not to be kept. Raises SessionError if the name is taken.
+        """
+        place = self.path / RUNS_NAME / checked_name(record.name, "run")
+        folder = atomic_files.new_folder_beside(place)
+        try:
+            atomic_files.copy_file(self.path / CAMERAS_PATH, folder / CAMERAS_NAME)
+            if body_text:
+                (folder / BODY_FOLDER).mkdir()
+                name = Path(record.body).stem
+                atomic_files.write_text(folder / BODY_FOLDER / f"{name}.toml", body_text)
+            create_store(folder)
+            write_run_record(folder, record)
+            atomic_files.move_into_place(folder, place)
+        except FileExistsError:
+            raise SessionError(
+                f"Session '{self.name}' has a run '{record.name}'.", "Choose another name."
+            ) from None
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
+        return StoredRun(place)
+
+    def with_manifest(self, manifest: SessionManifest) -> "Session":
+        """Write a changed manifest and return the session as it is then."""
+        write_manifest(self.path, manifest)
+        return Session(self.path)
+
+
+def _is_run(path: Path) -> bool:
+    return not path.name.startswith(".") and (path / "run.json").is_file()
+
+
+def _parameter_names(body: BodyModel) -> tuple[str, ...]:
+    return tuple(entry.name for entry in body.parameters)

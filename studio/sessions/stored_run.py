@@ -1,0 +1,123 @@
+"""A run on disk: its record, its results, and how it stands, computed from them."""
+
+import dataclasses
+from dataclasses import dataclass
+from pathlib import Path
+
+from studio.body.catalogue import load_body
+from studio.body.dimensions import with_dimensions
+from studio.body.model import BodyModel
+from studio.capture.calibration_files import read_calibration
+from studio.errors import BodyError
+from studio.geometry.camera import Camera
+from studio.sessions.results_store import ResultsReader, is_being_written
+from studio.sessions.run_record import CAMERAS_NAME, RunRecord, read_run_record
+
+BODY_FOLDER = "body"
+
+
+@dataclass(frozen=True, slots=True)
+class RunSummary:
+    """A run as a line of a list.
+
+    status : "new", "tracking" (some process has it open), "interrupted", "cancelled" or "finished".
+    done : finished frames of first … last. tracked_to : the frame after the last finished one.
+    """
+
+    session: str
+    name: str
+    created: str
+    tracker: str
+    weighting: str
+    body: str
+    seed: int
+    first: int
+    last: int
+    done: int
+    tracked_to: int
+    status: str
+
+
+class StoredRun:
+    """A run's folder. Opening it reads nothing; each part is read when it is asked for."""
+
+    def __init__(self, folder: Path, record: RunRecord | None = None) -> None:
+        self.folder = folder
+        self._record = record
+
+    @property
+    def name(self) -> str:
+        """The run's name: its folder's."""
+        return self.folder.name
+
+    @property
+    def session_name(self) -> str:
+        """Name of the session that the run belongs to."""
+        return self.folder.parent.parent.name
+
+    @property
+    def record(self) -> RunRecord:
+        """What the run was asked to do. Raises SessionError."""
+        if self._record is None:
+            self._record = read_run_record(self.folder)
+        return self._record
+
+    def results(self) -> ResultsReader:
+        """A reader of the run's results; close it when done."""
+        return ResultsReader(self.folder)
+
+    def body(self) -> BodyModel:
+        """The body as it was when the run was made, dimensions and all. Raises BodyError."""
+        snapshots = sorted((self.folder / BODY_FOLDER).glob("*.toml"))
+        tree = load_body(str(snapshots[0]) if snapshots else self.record.body)
+        body = with_dimensions(tree, self.record.dimensions)
+        if tuple(entry.name for entry in body.parameters) != self.record.parameters:
+            raise BodyError(
+                f"The body '{self.record.body}' has changed since run '{self.name}' was made.",
+                "Start a new run with the body as it is now.",
+            )
+        return body
+
+    def cameras(self) -> tuple[Camera, ...]:
+        """The cameras as they were when the run was made. Raises CalibrationError."""
+        return tuple(read_calibration(self.folder / CAMERAS_NAME).cameras)
+
+    def being_tracked(self) -> bool:
+        """Whether some living process has the run open for tracking."""
+        return is_being_written(self.folder)
+
+    def summary(self) -> RunSummary:
+        """The run as a line of a list, its status computed from the facts in its store. Raises
+        SessionError."""
+        record = self.record
+        with self.results() as results:
+            frames, ended = results.frames(), results.ended()
+        done = len(frames)
+        if done >= record.frame_count:
+            status = "finished"
+        elif self.being_tracked():
+            status = "tracking"
+        elif ended:
+            status = ended
+        else:
+            status = "interrupted" if done else "new"
+        tracked_to = frames[-1] + 1 if frames else record.first
+        return dataclasses.replace(self.empty_summary(), done=done, tracked_to=tracked_to, status=status)
+
+    def empty_summary(self) -> RunSummary:
+        """The run as if nothing had been tracked."""
+        record = self.record
+        return RunSummary(
+            session=self.session_name,
+            name=self.name,
+            created=record.created,
+            tracker=record.tracker,
+            weighting=record.weighting,
+            body=record.body,
+            seed=record.seed,
+            first=record.first,
+            last=record.last,
+            done=0,
+            tracked_to=record.first,
+            status="new",
+        )

@@ -1,0 +1,260 @@
+"""The folder in which a person's sessions live: listing, naming, copying, throwing away."""
+
+import dataclasses
+import os
+import shutil
+import sqlite3
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+import platformdirs
+
+from studio.errors import NotFoundError, SessionError, StudioError
+from studio.sessions import atomic_files
+from studio.sessions.catalogue import Catalogue, RunEntry, SessionEntry
+from studio.sessions.manifest import FILE_NAME, write_manifest
+from studio.sessions.names import checked_name, free_name, inside, is_name
+from studio.sessions.results_reader import FILE_NAME as RESULTS_NAME
+from studio.sessions.session import RUNS_NAME, THUMBNAIL_NAME, Session
+from studio.sessions.stored_run import RunSummary, StoredRun
+
+VARIABLE = "STUDIO_WORKSPACE"
+TRASH_NAME = ".trash"
+APPLICATION = "capture-studio"
+
+
+@dataclass(frozen=True, slots=True)
+class SessionSummary:
+    """A session as a line of a list.
+
+    cameras, frames, fps : of the footage. runs : oldest first. has_truth : whether there is a true motion.
+    thumbnail : whether `Session.thumbnail` has been made. problem : why the session cannot be opened, "" if
+    it can.
+    """
+
+    name: str
+    title: str
+    created: str
+    body: str
+    cameras: tuple[str, ...]
+    frames: int
+    fps: float
+    has_truth: bool
+    thumbnail: bool
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+    runs: tuple[RunSummary, ...]
+    problem: str = ""
+
+
+def workspace_root() -> Path:
+    """Where sessions are kept: the environment variable STUDIO_WORKSPACE, or the user's data folder."""
+    chosen = os.environ.get(VARIABLE, "").strip()
+    if chosen:
+        return Path(chosen).expanduser()
+    return Path(platformdirs.user_data_dir(APPLICATION, appauthor=False)) / "workspace"
+
+
+class Workspace:
+    """A folder of sessions, made when it is first written to. Every command and the server work on one."""
+
+    def __init__(self, root: Path | None = None) -> None:
+        self.root = (root or workspace_root()).expanduser().absolute()
+        self.catalogue = Catalogue(self.root)
+
+    def sessions(self) -> tuple[SessionSummary, ...]:
+        """All sessions by name, with their runs; those that cannot be opened carry the reason."""
+        entries, runs = self.catalogue.read()
+        return tuple(self._summary(entry, runs) for entry in entries)
+
+    def session(self, name: str) -> Session:
+        """The session of that name. Raises NameRefused, NotFoundError."""
+        path = inside(self.root, name)
+        if not (path / FILE_NAME).is_file():
+            raise NotFoundError(
+                f"There is no session '{name}' in '{self.root}'.",
+                "Import one with 'studio import SOURCE --into SESSION', or set STUDIO_WORKSPACE.",
+            )
+        return Session(path)
+
+    def resolve(self, name_or_path: str | Path) -> Session:
+        """The session of that name, else the one in that folder (commands only: it may lie anywhere).
+
+        Raises NotFoundError naming both places.
+        """
+        text = str(name_or_path)
+        if is_name(text) and (self.root / text / FILE_NAME).is_file():
+            return self.session(text)
+        if "\0" not in text and (Path(text).expanduser() / FILE_NAME).is_file():
+            return Session(Path(text).expanduser())
+        raise NotFoundError(
+            f"There is no session '{text}', neither in '{self.root}' nor as a folder.",
+            "Give the folder that holds session.json, or a name that 'studio runs' lists.",
+        )
+
+    def place_for(self, name_or_path: str | Path) -> Path:
+        """Where a new session goes: a name means the workspace, a path itself. Raises SessionError if it is
+        taken."""
+        text = str(name_or_path)
+        if is_name(text):
+            self.root.mkdir(parents=True, exist_ok=True)
+            path = inside(self.root, text)
+        else:
+            path = Path(checked_name(text) if "/" not in text and os.sep not in text else text)
+            path = path.expanduser().absolute()
+            checked_name(path.name)
+        if path.exists():
+            raise SessionError(
+                f"There is something at '{path}' already.", "Choose another name, or delete it first."
+            )
+        return path
+
+    def rename(self, name: str, new_name: str) -> Session:
+        """Give a session another name. Raises SessionError if it is taken or a run of it is being tracked."""
+        session = self._idle(name)
+        place = self._free(new_name)
+        os.rename(session.path, place)
+        atomic_files.sync_folder(self.root)
+        manifest = session.manifest
+        title = new_name if manifest.title in ("", name) else manifest.title
+        return Session(place).with_manifest(msgspec.structs.replace(manifest, name=new_name, title=title))
+
+    def retitle(self, name: str, title: str) -> Session:
+        """Change the text that people see. Raises SessionError if it is empty or longer than 200
+        characters."""
+        session, words = self.session(name), " ".join(title.split())
+        if not 0 < len(words) <= 200:
+            raise SessionError(
+                f"A title of {len(words)} characters cannot be shown.", "Use 1 to 200 characters."
+            )
+        return session.with_manifest(msgspec.structs.replace(session.manifest, title=words))
+
+    def duplicate(self, name: str, new_name: str | None = None) -> Session:
+        """A copy of a session with its runs, whole or not at all; results being written are copied as they
+        stand."""
+        session = self.session(name)
+        wanted = new_name or free_name(name, {path.name for path in self.root.iterdir()})
+        place = self._free(wanted)
+        folder = atomic_files.new_folder_beside(place)
+        try:
+            shutil.copytree(session.path, folder, symlinks=True, dirs_exist_ok=True, ignore=_transient)
+            for store in session.path.glob(f"{RUNS_NAME}/*/{RESULTS_NAME}"):
+                _copy_database(store, folder / store.relative_to(session.path))
+            title = f"{session.manifest.title} (copy)"
+            write_manifest(folder, msgspec.structs.replace(session.manifest, name=wanted, title=title))
+            atomic_files.move_into_place(folder, place)
+        finally:
+            atomic_files.discard(folder)
+        return Session(place)
+
+    def trash(self, name: str) -> Path:
+        """Move a session to the trash folder and return where it lies. Raises SessionError while it is
+        tracked."""
+        return self._to_trash(self._idle(name).path, name)
+
+    def trash_run(self, session_name: str, run_name: str) -> Path:
+        """Move a run to the trash folder. Raises SessionError while it is tracked."""
+        run = self.session(session_name).run(run_name)
+        _check_idle(run)
+        return self._to_trash(run.folder, f"{session_name}--{run_name}")
+
+    def trashed(self) -> tuple[str, ...]:
+        """What lies in the trash, oldest first; sessions among it can be given to `restore`."""
+        folder = self.root / TRASH_NAME
+        found = [path for path in folder.iterdir() if path.is_dir()] if folder.is_dir() else []
+        return tuple(path.name for path in sorted(found, key=lambda path: path.stat().st_ctime_ns))
+
+    def restore(self, trashed_name: str) -> Session:
+        """Bring a session back under its own name, or one like it if that is taken. Raises NotFoundError."""
+        path = inside(self.root / TRASH_NAME, trashed_name)
+        if not (path / FILE_NAME).is_file():
+            raise NotFoundError(
+                f"There is no session '{trashed_name}' in the trash.", "List what lies there first."
+            )
+        name = free_name(Session(path).manifest.name, {entry.name for entry in self.root.iterdir()})
+        os.rename(path, inside(self.root, name))
+        return self.session(name)
+
+    def _to_trash(self, path: Path, label: str) -> Path:
+        trash = self.root / TRASH_NAME
+        trash.mkdir(exist_ok=True)
+        stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime())
+        place = trash / free_name(f"{label[:44]}--{stamp}", {entry.name for entry in trash.iterdir()})
+        os.rename(path, place)
+        atomic_files.sync_folder(trash)
+        return place
+
+    def _free(self, name: str) -> Path:
+        """The place for a session of this name. Raises SessionError if there is something."""
+        path = inside(self.root, name)
+        taken = {entry.name.lower() for entry in self.root.iterdir()}
+        if name.lower() in taken:
+            raise SessionError(f"There is a session '{name}' already.", "Choose another name.")
+        return path
+
+    def _idle(self, name: str) -> Session:
+        session = self.session(name)
+        for run in session.runs():
+            _check_idle(run)
+        return session
+
+    def _summary(self, entry: SessionEntry, runs: tuple[RunEntry, ...]) -> SessionSummary:
+        manifest, path = entry.manifest, self.root / entry.name
+        if manifest is None:
+            return SessionSummary(
+                entry.name, entry.name, "", "", (), 0, 0.0, False, False, (), (), (), entry.problem
+            )
+        mine = [run for run in runs if run.session == entry.name and run.record is not None]
+        return SessionSummary(
+            name=entry.name,
+            title=manifest.title,
+            created=manifest.created,
+            body=manifest.body,
+            cameras=tuple(camera.name for camera in manifest.footage.cameras),
+            frames=manifest.frame_count,
+            fps=manifest.fps,
+            has_truth=any((path / "truth").glob("*.trc")),
+            thumbnail=(path / THUMBNAIL_NAME).exists(),
+            notes=manifest.notes,
+            warnings=manifest.warnings,
+            runs=tuple(_run_summary(path / RUNS_NAME / run.name, run) for run in mine),
+        )
+
+
+def _run_summary(folder: Path, entry: RunEntry) -> RunSummary:
+    """A run's line; one whose results are damaged says so as its status."""
+    assert entry.record is not None
+    try:
+        return StoredRun(folder, entry.record).summary()
+    except StudioError:
+        empty = StoredRun(folder, entry.record).empty_summary()
+        return dataclasses.replace(empty, status="damaged")
+
+
+def _check_idle(run: StoredRun) -> None:
+    if run.being_tracked():
+        raise SessionError(f"Run '{run.name}' is being tracked.", "Cancel it first.")
+
+
+def _transient(folder: str, names: list[str]) -> set[str]:
+    """What a copy leaves out: locks, unfinished files, and databases, which are copied by the database
+    itself."""
+    left_out = {name for name in names if name.startswith((RESULTS_NAME, "results.lock"))}
+    return left_out | {name for name in names if name.startswith(atomic_files.PARTIAL_PREFIX)}
+
+
+def _copy_database(source: Path, target: Path) -> None:
+    """A consistent copy of a database that may be in use."""
+    reading, writing = sqlite3.connect(source), sqlite3.connect(target)
+    try:
+        reading.backup(writing)
+        writing.execute("PRAGMA journal_mode = WAL")
+    except sqlite3.DatabaseError as error:
+        raise SessionError(
+            f"'{source}' cannot be copied ({error}).", "Delete the damaged run first."
+        ) from None
+    finally:
+        reading.close()
+        writing.close()
