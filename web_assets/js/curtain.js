@@ -1,0 +1,55 @@
+// What lies over the scene when there is nothing to look at yet, or nobody to talk to.
+
+import { post, runPath } from "./api.js";
+import { importForm } from "./importing.js";
+import { complain } from "./messages.js";
+import { newRunForm } from "./new_run.js";
+import { refreshSessions, openSession } from "./rail.js";
+import { get, watch } from "./state.js";
+
+const curtain = document.getElementById("curtain");
+
+function card(heading, text, actions = [], { bar = false } = {}) {
+  const box = document.createElement("div");
+  box.className = "card";
+  const title = Object.assign(document.createElement("h2"), { textContent: heading });
+  const words = Object.assign(document.createElement("p"), { textContent: text });
+  box.append(title, words);
+  if (bar) {
+    const progress = Object.assign(document.createElement("div"), { className: "progress unknown" });
+    progress.append(document.createElement("i"));
+    box.append(progress);
+  }
+  const row = Object.assign(document.createElement("div"), { className: "group" });
+  for (const [label, act, primary] of actions) row.append(Object.assign(document.createElement("button"), { textContent: label, className: primary ? "primary" : "", onclick: act }));
+  if (actions.length) box.append(row);
+  curtain.replaceChildren(box);
+  curtain.hidden = false;
+}
+
+async function addSample() {
+  try {
+    const told = await post("/api/samples", { name: "walk" });
+    await refreshSessions();
+    openSession(told.name);
+  } catch (error) { complain(error); }
+}
+
+function draw() {
+  const sessions = get("sessions");
+  const work = get("work");
+  const entry = sessions?.find((one) => one.name === get("session"));
+  if (sessions?.length === 0) return card("Nothing here yet", "Import the footage of your cameras, or start with the bundled walk.", [["Open the sample", addSample, true], ["Import footage", importForm]]);
+  if (work?.state === "lost" && work.session === get("session")) {
+    const resume = () => post(`${runPath(work.session, work.run)}/start`).catch(complain);
+    return card("The tracking process ended", `${work.message} What was tracked is kept. ${work.hint}`, [["Resume", resume, true]]);
+  }
+  if (work?.state === "compiling" && work.session === get("session")) return card("Compiling the kernels, once", "The first run on this machine takes about half a minute longer.", [], { bar: true });
+  if (entry && !entry.runs.length) return card(entry.title || entry.name, "No run yet. Start one and watch the search.", [["New run", () => newRunForm(entry), true]]);
+  curtain.hidden = true;
+}
+
+/** Wire the curtain. */
+export function startCurtain() {
+  watch(["sessions", "session", "run", "work"], draw);
+}

@@ -1,0 +1,44 @@
+// A new run: tracker, weighting, frames, seed and the knobs that matter most; everything else stays at its default.
+
+import { fetchJson, post, runPath, sessionPath } from "./api.js";
+import { openForm } from "./dialogs.js";
+import { refreshSessions, openSession } from "./rail.js";
+import { set } from "./state.js";
+
+let choices = null;
+
+/** What can be chosen: trackers, weightings, bodies (asked once). */
+async function known() {
+  choices ??= await fetchJson("/api/choices");
+  return choices;
+}
+
+/** Open the form for a session; `like` is a run whose settings are taken over. */
+export async function newRunForm(entry, like = null) {
+  const { trackers, weightings, bodies, presets } = await known();
+  const bodyChoices = [{ value: "", label: `the session's (${entry.body})` }, ...bodies.map((body) => ({ value: body.name, label: `${body.name} · ${body.parameters} parameters` }))];
+  openForm({
+    heading: `New run of ${entry.name}`, action: "Track",
+    rows: [
+      [{ name: "tracker", label: "Tracker", choices: trackers.map((one) => ({ value: one.name, label: one.label })), value: like?.tracker ?? entry.tracker },
+        { name: "weighting", label: "Weighting", choices: weightings.map((one) => ({ value: one.name, label: one.label })), value: like?.weighting ?? entry.weighting }],
+      [{ name: "preset", label: "Preset", choices: [{ value: "", label: "defaults" }, ...presets.map((one) => ({ value: one.name, label: one.label }))], value: "" },
+        { name: "body", label: "Body", choices: bodyChoices, value: "" }],
+      [{ name: "first", label: "First frame", kind: "number", min: 0, max: entry.frame_count - 1, value: 0 },
+        { name: "last", label: "Last frame", kind: "number", min: 0, max: entry.frame_count - 1, value: entry.frame_count - 1 }],
+      [{ name: "seed", label: "Seed", kind: "number", min: 0, value: like ? like.seed + 1 : 0, hint: "The same seed gives the same run." },
+        { name: "name", label: "Name", value: "", placeholder: "numbered", pattern: "[A-Za-z0-9_\\-]{0,64}" }],
+    ],
+    send: async (values) => {
+      const preset = presets.find((one) => one.name === values.preset);
+      const made = await post(`${sessionPath(entry.name)}/runs`, {
+        name: values.name || null, tracker: values.tracker, weighting: values.weighting, body: values.body || null, seed: Number(values.seed),
+        first: Number(values.first), last: Number(values.last) + 1, settings: preset?.values ?? {},
+      });
+      await refreshSessions();
+      openSession(entry.name, made.name);
+      set({ follow: true });
+      await post(`${runPath(entry.name, made.name)}/start`);
+    },
+  });
+}
