@@ -1,0 +1,41 @@
+"""Frame problems without pictures, whose answers are known in closed form."""
+
+import numpy as np
+
+from studio.tracking.tracker import SearchSpace
+
+
+class Bowl:
+    """log w = -Σ ((x - centre) / width)²: one smooth maximum."""
+
+    def __init__(self, centre: np.ndarray, width: float = 1.0) -> None:
+        self.centre, self.width = centre, width
+        self.weighed = 0
+
+    def weigh(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
+        """Log-weights, counting the poses."""
+        self.weighed += len(poses)
+        return -np.sum(((poses - self.centre) / self.width) ** 2, axis=1)
+
+    def feasible(self, poses: np.ndarray) -> np.ndarray:
+        """Every pose is possible."""
+        return np.ones(len(poses), dtype=bool)
+
+
+class HalfBowl(Bowl):
+    """A bowl whose maximum lies where the body cannot go: x0 must not be positive."""
+
+    def feasible(self, poses: np.ndarray) -> np.ndarray:
+        """Possible where x0 <= 0."""
+        return poses[:, 0] <= 0.0
+
+
+def toy_space(count: int = 6, limit: float = 5.0, sigma: float = 0.3) -> SearchSpace:
+    """`count` parameters within ±limit, three to a limb."""
+    return SearchSpace(
+        tuple(f"x{index}" for index in range(count)),
+        np.full(count, -limit),
+        np.full(count, limit),
+        np.full(count, sigma),
+        np.arange(count) // 3,
+    )
