@@ -1,4 +1,4 @@
-"""The knobs of masks and edge maps. All take effect with the next frame, and with a frame that is re-annealed."""
+"""The knobs of masks and edge maps. All take effect with the next frame, or when a frame is re-annealed."""
 
 from dataclasses import dataclass
 
@@ -19,9 +19,9 @@ class EvidenceSettings:
         label="masks from",
         choices=BACKGROUND_MODELS,
         takes_effect=NEXT_FRAME,
-        help="mask: the masks that came with the footage; gaussian: difference from the plate or empty clip, else"
-        " from the footage's median; median: from the footage's median; mog2, knn: OpenCV's models, trained on the"
-        " empty clip, else on the footage; auto: masks that came with it, else gaussian.",
+        help="mask: the masks that came with the footage; gaussian: difference from the plate or empty clip,"
+        " else from the footage's median; median: from the footage's median; mog2, knn: OpenCV's models,"
+        " trained on the empty clip, else on the footage; auto: masks that came with it, else gaussian.",
     )
     mask_threshold: float = knob(
         4.0,
@@ -41,13 +41,13 @@ class EvidenceSettings:
         label="camera noise",
         unit="grey levels",
         takes_effect=NEXT_FRAME,
-        help="Smallest standard deviation of a background pixel; raise it where compression or light flickers.",
+        help="Smallest standard deviation of a background pixel; raise it where the light flickers.",
     )
     mask_gain_fit: bool = knob(
         True,
         label="fit brightness",
         takes_effect=NEXT_FRAME,
-        help="Scale each colour of the background to the frame first, for plates taken with another exposure.",
+        help="Scale each colour of the background to the frame first: plates may be exposed differently.",
     )
     mask_shadow_test: bool = knob(
         True,

@@ -1,0 +1,235 @@
+"""Calibrations in TOML: Pose2Sim, aniposelib, FreeMoCap, Caliscope, and the studio's own canonical file.
+
+All give a table for each camera with size, matrix, distortions, rotation (Rodrigues or 3x3) and
+translation, mapping world to camera. They differ in the unit (which most do not name), in how many
+distortion numbers they write, and in where the camera's name is. The canonical file adds
+`quarter_turns` and `assumed_crop` and names its unit, mm.
+"""
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+import tomli_w
+from numpy.typing import NDArray
+
+from studio.capture.sanity import check_rotation
+from studio.errors import CalibrationError
+from studio.geometry.camera import Camera
+
+Array = NDArray[np.float64]
+
+CANONICAL = "capture-studio"
+DISTORTION_NUMBERS = (4, 5)
+
+
+@dataclass(frozen=True, slots=True)
+class AssumedCrop:
+    """How footage is taken to have been cut from the calibrated picture.
+
+    left, top, right, bottom : pixels cut off (negative: added), halves where the difference is odd.
+    calibrated : (width, height) that the calibration was made for.
+    """
+
+    left: float
+    top: float
+    right: float
+    bottom: float
+    calibrated: tuple[int, int]
+
+    def words(self, camera: str) -> str:
+        """The assumption as a sentence."""
+        return (
+            f"Camera {camera}: assumed that {self.left:g} px at the left, {self.right:g} px at the right,"
+            f" {self.top:g} px at the top and {self.bottom:g} px at the bottom of the calibrated"
+            f" {self.calibrated[0]}x{self.calibrated[1]} picture were cut off (a centred crop);"
+            f" the principal point is moved by ({-self.left:g}, {-self.top:g}) px."
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class TomlCalibration:
+    """Cameras with translations in the file's own unit. unit : "mm" if the file says so, else "".
+
+    unposed : cameras left out because the file gives them no place in the world.
+    """
+
+    cameras: tuple[Camera, ...]
+    unit: str
+    crops: dict[str, AssumedCrop]
+    unposed: tuple[str, ...]
+
+
+def looks_like_calibration(path: Path) -> bool:
+    """Whether a TOML file holds cameras (or cannot be parsed but is named after calibration)."""
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        return "calib" in path.name.lower() or path.name == "cameras.toml"
+    return bool(_camera_tables(document))
+
+
+def read_toml(path: Path) -> TomlCalibration:
+    """The cameras of a TOML calibration. Raises CalibrationError naming file, camera and entry."""
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as problem:
+        raise CalibrationError(f"'{path.name}' is not TOML: {problem}.", "Export it again.") from None
+    tables = _camera_tables(document)
+    metadata = document.get("metadata")
+    metadata = metadata if isinstance(metadata, dict) else {}
+    cameras: list[Camera] = []
+    crops: dict[str, AssumedCrop] = {}
+    unposed: list[str] = []
+    for section, table in tables.items():
+        name = _name(section, table)
+        if table.get("rotation") is None or table.get("translation") is None:
+            unposed.append(name)
+            continue
+        cameras.append(_camera(f"'{path.name}', camera {name}", name, table))
+        crop = table.get("assumed_crop")
+        if isinstance(crop, dict):
+            crops[name] = _crop(f"'{path.name}', camera {name}", crop)
+    if not cameras:
+        raise CalibrationError(
+            f"'{path.name}' places no camera in the world.", "Calibrate the extrinsics and export again."
+        )
+    return TomlCalibration(tuple(cameras), _unit(metadata), crops, tuple(unposed))
+
+
+def write_toml(cameras: tuple[Camera, ...], path: Path, crops: dict[str, AssumedCrop] | None = None) -> None:
+    """Write the canonical file: mm, rotation as matrix rows, names as sections' `name`."""
+    document: dict[str, object] = {}
+    for index, camera in enumerate(cameras):
+        table: dict[str, object] = {
+            "name": camera.name,
+            "size": [camera.width, camera.height],
+            "matrix": camera.matrix.tolist(),
+            "distortions": camera.distortion.tolist(),
+            "rotation": camera.rotation.tolist(),
+            "translation": camera.translation.tolist(),
+            "quarter_turns": camera.quarter_turns,
+        }
+        crop = (crops or {}).get(camera.name)
+        if crop is not None:
+            table["assumed_crop"] = {
+                "left": crop.left,
+                "top": crop.top,
+                "right": crop.right,
+                "bottom": crop.bottom,
+                "calibrated": list(crop.calibrated),
+            }
+        document[f"cam_{index:02d}"] = table
+    document["metadata"] = {"format": CANONICAL, "unit": "mm"}
+    path.write_text(tomli_w.dumps(document), encoding="utf-8")
+
+
+def is_canonical(path: Path) -> bool:
+    """Whether a file is the studio's own calibration."""
+    try:
+        metadata = tomllib.loads(path.read_text(encoding="utf-8")).get("metadata", {})
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        return False
+    return isinstance(metadata, dict) and metadata.get("format") == CANONICAL
+
+
+def _camera_tables(document: dict[str, object]) -> dict[str, dict[str, object]]:
+    """The sections that hold cameras, by name; Caliscope's lie one level down."""
+    nested = document.get("cameras")
+    source = nested if isinstance(nested, dict) else document
+    return {key: table for key, table in source.items() if isinstance(table, dict) and "matrix" in table}
+
+
+def _name(section: str, table: dict[str, object]) -> str:
+    """The camera's name: its `name`, Caliscope's number, or the section."""
+    name = table.get("name")
+    if isinstance(name, str) and name.strip():
+        return name.strip()
+    number = table.get("cam_id", table.get("port"))
+    return f"cam_{number}" if isinstance(number, int) else section
+
+
+def _camera(where: str, name: str, table: dict[str, object]) -> Camera:
+    """One camera from its table."""
+    if table.get("fisheye") is True:
+        raise CalibrationError(
+            f"{where} is a fisheye camera, whose distortion the pinhole model cannot describe.",
+            "Calibrate it with the pinhole model, or undistort its footage first.",
+        )
+    size = _numbers(where, table, "size" if "size" in table else "image_size", (2,))
+    if np.any(size < 1) or np.any(size != np.round(size)):
+        raise CalibrationError(f"{where}: size {size.tolist()} is no picture size.", "Give [width, height].")
+    matrix = _numbers(where, table, "matrix", (3, 3))
+    if matrix[0, 0] <= 0 or matrix[1, 1] <= 0 or matrix[1, 0] != 0 or matrix[2].tolist() != [0.0, 0.0, 1.0]:
+        raise CalibrationError(
+            f"{where}: matrix is no intrinsic matrix.", "It is [[fx, s, cx], [0, fy, cy], [0, 0, 1]]."
+        )
+    return Camera(
+        name,
+        int(size[0]),
+        int(size[1]),
+        matrix,
+        _distortion(where, table),
+        _rotation(where, table),
+        _numbers(where, table, "translation", (3,)),
+        int(_numbers(where, table, "quarter_turns", ())) % 4 if "quarter_turns" in table else 0,
+    )
+
+
+def _distortion(where: str, table: dict[str, object]) -> Array:
+    """(5,) k1 k2 p1 p2 k3; four numbers mean k3 = 0, further ones must be zero."""
+    values = np.atleast_1d(_numbers(where, table, "distortions", None))
+    if values.ndim == 2 and 1 in values.shape:
+        values = values.ravel()
+    if values.ndim != 1 or len(values) < DISTORTION_NUMBERS[0] or np.any(values[5:] != 0.0):
+        raise CalibrationError(
+            f"{where}: distortions has {values.size} numbers, the model has k1, k2, p1, p2 and k3.",
+            "Calibrate with four or five distortion coefficients.",
+        )
+    return np.concatenate([values[:5], np.zeros(max(0, 5 - len(values)))])
+
+
+def _rotation(where: str, table: dict[str, object]) -> Array:
+    """(3, 3) from a Rodrigues vector or from matrix rows."""
+    values = _numbers(where, table, "rotation", None)
+    if values.size == 3:
+        return np.asarray(cv2.Rodrigues(values.reshape(3))[0], dtype=np.float64)
+    return check_rotation(values, where)
+
+
+def _numbers(where: str, table: dict[str, object], entry: str, shape: tuple[int, ...] | None) -> Array:
+    """An entry as finite numbers of a shape (None: any)."""
+    try:
+        values = np.array(table[entry], dtype=np.float64)
+    except KeyError:
+        raise CalibrationError(f"{where} has no '{entry}'.", "Export the calibration again.") from None
+    except (TypeError, ValueError):
+        raise CalibrationError(
+            f"{where}: '{entry}' is not numbers.", "Export the calibration again."
+        ) from None
+    if not np.all(np.isfinite(values)):
+        raise CalibrationError(f"{where}: '{entry}' holds a number that is not finite.", "Calibrate again.")
+    if shape is not None and values.shape != shape:
+        wanted = "x".join(map(str, shape)) or "one"
+        got = "x".join(map(str, values.shape))
+        raise CalibrationError(f"{where}: '{entry}' has {got} numbers, not {wanted}.", "Export it again.")
+    return values
+
+
+def _crop(where: str, table: dict[str, object]) -> AssumedCrop:
+    """The assumption of an earlier import."""
+    left, top, right, bottom = (
+        float(_numbers(where, table, side, ())) for side in ("left", "top", "right", "bottom")
+    )
+    width, height = _numbers(where, table, "calibrated", (2,))
+    return AssumedCrop(left, top, right, bottom, (int(width), int(height)))
+
+
+def _unit(metadata: dict[str, object]) -> str:
+    """The unit where a file names one: ours, and FreeMoCap's by its board."""
+    if metadata.get("unit") in ("mm", "m"):
+        return str(metadata["unit"])
+    board = metadata.get("board")
+    return "mm" if isinstance(board, dict) and "square_length_mm" in board else ""
