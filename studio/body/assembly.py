@@ -25,6 +25,9 @@ def assemble(definition: BodyDefinition, name: str, dimensions: Mapping[str, flo
         sign, dimension = split_sign(value)
         return sign * dimensions[dimension]
 
+    def rest(value: float | tuple[float | str, ...]) -> float:
+        return sum(amount(part) for part in value) if isinstance(value, tuple) else value
+
     def step(entry: StepEntry) -> Step:
         kind, axis = (MOVE, entry.move) if entry.move else (TURN, entry.turn)
         axis_index = AXES.index(axis or "x")
@@ -38,7 +41,7 @@ def assemble(definition: BodyDefinition, name: str, dimensions: Mapping[str, flo
     return BodyModel(
         name=name,
         title=definition.title,
-        parameters=tuple(parameter(entry) for entry in definition.parameters),
+        parameters=tuple(parameter(entry, rest(entry.neutral)) for entry in definition.parameters),
         joints=tuple(
             Joint(
                 entry.name,
@@ -69,8 +72,8 @@ def assemble(definition: BodyDefinition, name: str, dimensions: Mapping[str, flo
     )
 
 
-def parameter(entry: ParameterEntry) -> Parameter:
-    """A pose entry in radians or mm."""
+def parameter(entry: ParameterEntry, neutral: float) -> Parameter:
+    """A pose entry in radians or mm. neutral : degrees or mm."""
     unit = math.radians(1.0) if entry.kind == "angle" else 1.0
     return Parameter(
         name=entry.name,
@@ -79,6 +82,6 @@ def parameter(entry: ParameterEntry) -> Parameter:
         lower=entry.lower * unit,
         upper=entry.upper * unit,
         max_step=entry.max_step * unit,
-        neutral=entry.neutral * unit,
+        neutral=neutral * unit,
         limb=entry.limb,
     )

@@ -11,7 +11,7 @@ SUFFIX = ".toml"
 
 
 def list_bodies(extra_folders: tuple[Path, ...] = ()) -> tuple[str, ...]:
-    """The names of all bodies, sorted. extra_folders : folders with further body files; missing ones are empty."""
+    """The names of all bodies, sorted. extra_folders : folders with further body files, or none."""
     names = set(_packaged())
     for folder in extra_folders:
         names.update(path.stem for path in folder.glob(f"*{SUFFIX}"))

@@ -16,15 +16,15 @@ A body file is TOML. Lengths in mm, angles in degrees. The body's name is the fi
     kind = "angle"                    # or "length"
     lower = 0                         # degrees or mm; absent: unbounded
     upper = 150
-    neutral = 5                       # the rest pose; absent: 0
+    neutral = 5                       # the rest pose; a list of numbers and dimensions: their sum; absent: 0
     max_step = 650                    # largest expected movement, degrees or mm per second
     limb = "left leg"                 # parameters of one limb are neighbours
 
     [[joints]]                        # parents before children
     name = "left_shin"
     parent = "left_thigh"             # or "world"
-    type = "hinge"                    # fixed 0, hinge 1, two-axis 2, ball 3 angles; free 3 angles and 3 lengths
-    sequence = [                      # from the parent's frame to this one, each step in the frame reached so far
+    type = "hinge"                    # fixed 0, hinge 1, two-axis 2, ball 3 angles; free 3 and 3 lengths
+    sequence = [                      # from the parent's frame to this one, each step in the frame so far
         { move = "z", by = "-thigh_length" },      # mm, [-]dimension or [-]length parameter
         { turn = "y", by = "left_knee" },          # degrees, or [-]angle parameter
     ]
@@ -39,7 +39,7 @@ A body file is TOML. Lengths in mm, angles in degrees. The body's name is the fi
     scale_y = 1
     side = "left"                     # left, right or middle
 
-    [[markers]]                       # named points; two names joined by "_" name a distance in a subject file
+    [[markers]]                       # named points, between which a subject's lengths are given
     name = "LKnee"
     joint = "left_shin"
     at = [0, 0, 0]                    # mm or [-]dimension each
@@ -54,7 +54,7 @@ WORLD = "world"
 
 
 class DimensionEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A length that differs between subjects: `mm` or (without unit) `ratio`, and its share of a person's height."""
+    """A size that differs between subjects: `mm` or (without unit) `ratio`, and its share of a height."""
 
     mm: float | None = None
     ratio: float | None = None
@@ -77,7 +77,7 @@ class ParameterEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     label: str = ""
     lower: float = -math.inf
     upper: float = math.inf
-    neutral: float = 0.0
+    neutral: float | tuple[float | str, ...] = 0.0
 
 
 class StepEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -11,8 +11,8 @@ from studio.errors import BodyError
 def with_dimensions(body: BodyModel, changes: Mapping[str, float]) -> BodyModel:
     """The body with some dimensions changed: its steps, limbs and markers are built anew.
 
-    changes : dimension name to mm (or ratio). Raises BodyError for an unknown name, and for a value that is not
-    finite or negative.
+    changes : dimension name to mm (or ratio). Raises BodyError for an unknown name, and for a value that is
+    not finite or negative.
     """
     if body.definition is None:
         raise BodyError(

@@ -1,7 +1,7 @@
 """Where joints, limbs and markers are, for N poses at once.
 
-A joint's frame is its parent's frame times its steps, left to right (`body/model.py`). Frames are (3, 4) motions
-world_from_joint: three axis columns and the origin (mm).
+A joint's frame is its parent's frame times its steps, left to right (`body/model.py`). Frames are (3, 4)
+motions world_from_joint: three axis columns and the origin (mm).
 """
 
 import math
@@ -59,7 +59,7 @@ def marker_points(body: BodyModel, poses: ArrayLike) -> Array:
 
 
 def checked_poses(body: BodyModel, poses: ArrayLike) -> Array:
-    """(N, D) contiguous poses of the body; a single (D,) becomes (1, D). Raises BodyError when D is another."""
+    """(N, D) contiguous poses; a single (D,) becomes (1, D). Raises BodyError when D is not the body's."""
     array = np.ascontiguousarray(np.atleast_2d(np.asarray(poses, dtype=np.float64)))
     wanted = len(body.parameters)
     if array.ndim != 2 or array.shape[1] != wanted:
@@ -72,7 +72,7 @@ def checked_poses(body: BodyModel, poses: ArrayLike) -> Array:
 
 @numba.njit(cache=True, nogil=True)
 def place_joints(poses, parent, first_step, kind, axis, parameter, value, frames):
-    """Fill frames (N, F, 3, 4) with world_from_joint of poses (N, D); the other arrays as in `KinematicTables`."""
+    """Fill frames (N, F, 3, 4) with world_from_joint of poses (N, D); the rest as in `KinematicTables`."""
     for n in range(poses.shape[0]):
         for f in range(parent.shape[0]):
             frame = frames[n, f]

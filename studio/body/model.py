@@ -1,9 +1,9 @@
 """The articulated body as data: a kinematic tree, its dimensions, its limbs and its markers.
 
-A `BodyModel` is frozen and says nothing about any particular pose. Each joint's frame is its parent's frame times a
-sequence of elementary `Step`s (a move along, or a turn about, one of the current x, y, z axes by a fixed number or
-by one parameter of the pose vector), so any order and direction of rotation can be written down.
-Lengths in mm, angles in radians here (degrees in body files).
+A `BodyModel` is frozen and says nothing about any particular pose. Each joint's frame is its parent's frame
+times a sequence of elementary `Step`s (a move along, or a turn about, one of the current x, y, z axes by a
+fixed number or by one parameter of the pose vector), so any order and direction of rotation can be written
+down. Lengths in mm, angles in radians here (degrees in body files).
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,8 @@ class Parameter:
     """One entry of the pose vector.
 
     kind : "angle" (radians) or "length" (mm). lower, upper : limits, ±inf where unbounded. max_step : largest
-    expected movement, rad/s or mm/s. neutral : the value in the rest pose. limb : group for crossover by limbs.
+    expected movement, rad/s or mm/s. neutral : the value in the rest pose. limb : group for crossover by
+    limbs.
     """
 
     name: str
@@ -59,11 +60,11 @@ class Joint:
 
 @dataclass(frozen=True, slots=True)
 class Limb:
-    """A truncated elliptical cone along its joint's local z, from z = 0 to z = length (which may be negative).
+    """A truncated elliptical cone along its joint's z, from z = 0 to z = length (which may be negative).
 
-    radius_start, radius_end : mm at z = 0 and z = length. scale_x, scale_y : of the cross-section along local x, y.
-    side : "left", "right" or "middle" (colours). Limbs of zero length are kept here but are not counted or drawn:
-    see `BodyModel.drawn`.
+    radius_start, radius_end : mm at z = 0 and z = length. scale_x, scale_y : of the cross-section along local
+    x, y. side : "left", "right" or "middle" (colours). Limbs of zero length are kept here but are not counted
+    or drawn: see `BodyModel.drawn`.
     """
 
     name: str
@@ -106,11 +107,11 @@ class KinematicTables:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyModel:
-    """A body: parameters in the order of the pose vector, joints parents first, all limbs, markers, dimensions.
+    """A body: parameters in the order of the pose vector, joints parents first, limbs, markers, dimensions.
 
-    dimensions : the named lengths and radii (mm; ratios without unit) that the steps, limbs and markers were built
-    from. definition : the body file's entries, from which other dimensions give another body (None: built by hand,
-    its dimensions cannot change).
+    dimensions : the named lengths and radii (mm; ratios without unit) that the steps, limbs and markers were
+    built from. definition : the body file's entries, from which other dimensions give another body (None:
+    built by hand, its dimensions cannot change).
     """
 
     name: str

@@ -9,7 +9,7 @@ from studio.body.model import BodyModel, KinematicTables
 
 @lru_cache(maxsize=64)
 def kinematic_tables(body: BodyModel) -> KinematicTables:
-    """The body's tree and drawn limbs as arrays (see `KinematicTables`); made once a body, not to be written to."""
+    """The body's tree and drawn limbs as arrays (see `KinematicTables`), made once a body: read only."""
     steps = [step for joint in body.joints for step in joint.steps]
     counts = [len(joint.steps) for joint in body.joints]
     shapes = [

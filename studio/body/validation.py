@@ -86,7 +86,8 @@ class _Check:
         limbs: list[str] = []
         for entry in self.definition.parameters:
             where = f"parameter '{entry.name}'"
-            values = {"lower": entry.lower, "upper": entry.upper, "neutral": entry.neutral}
+            neutral = self.rest(where, entry.neutral)
+            values = {"lower": entry.lower, "upper": entry.upper, "neutral": neutral}
             for key, value in values.items():
                 if math.isnan(value):
                     self.fail(
@@ -95,8 +96,8 @@ class _Check:
             if entry.lower >= entry.upper:
                 cause = f"has lower {entry.lower:g} not below upper {entry.upper:g}"
                 self.fail(where, cause, "Swap or correct the limits.")
-            if not (math.isfinite(entry.neutral) and entry.lower <= entry.neutral <= entry.upper):
-                cause = f"has neutral {entry.neutral:g} outside its limits {entry.lower:g} to {entry.upper:g}"
+            if not (math.isfinite(neutral) and entry.lower <= neutral <= entry.upper):
+                cause = f"has neutral {neutral:g} outside its limits {entry.lower:g} to {entry.upper:g}"
                 self.fail(where, cause, "Give a rest value between the limits.")
             if not (math.isfinite(entry.max_step) and entry.max_step > 0.0):
                 self.fail(
@@ -108,6 +109,11 @@ class _Check:
                 cause = f"is apart from the other parameters of limb '{entry.limb}'"
                 self.fail(where, cause, "Keep the parameters of one limb next to each other.")
             limbs.append(entry.limb)
+
+    def rest(self, where: str, neutral: float | tuple[float | str, ...]) -> float:
+        if not isinstance(neutral, tuple):
+            return neutral
+        return sum(self.length(where, "neutral", part) for part in neutral)
 
     def joints(self) -> None:
         names = [entry.name for entry in self.definition.joints]

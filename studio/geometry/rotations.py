@@ -42,8 +42,9 @@ def rotation_from_vector(vector: ArrayLike) -> Array:
 def vector_from_rotation(rotation: ArrayLike) -> Array:
     """The rotation vector of a matrix: axis times angle, 0 <= angle <= pi.
 
-    rotation : (3, 3) orthonormal, determinant 1. Returns (3,) radians. Exact near 0 and near pi as well: the axis is
-    taken from the antisymmetric part, or at half a turn from the largest column of the symmetric part.
+    rotation : (3, 3) orthonormal, determinant 1. Returns (3,) radians. Exact near 0 and near pi as well: the
+    axis is taken from the antisymmetric part, or at half a turn from the largest column of the symmetric
+    part.
     """
     rotation = np.asarray(rotation, dtype=float)
     across = 0.5 * np.array(
@@ -68,8 +69,8 @@ def cross_matrix(vector: ArrayLike) -> Array:
 
 
 def orthonormality_error(matrix: ArrayLike) -> float:
-    """How far a (3, 3) matrix is from a rotation: the largest entry of |MᵀM - 1|, infinite when it mirrors space
-    (negative determinant) or holds a NaN."""
+    """How far a (3, 3) matrix is from a rotation: the largest entry of |MᵀM - 1|, infinite when it mirrors
+    space (negative determinant) or holds a NaN."""
     matrix = np.asarray(matrix, dtype=float)
     if not np.isfinite(matrix).all() or np.linalg.det(matrix) < 0.0:
         return float("inf")

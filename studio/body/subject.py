@@ -1,0 +1,224 @@
+"""A person (or animal, or machine) in front of the cameras: which body, and how large.
+
+A subject file is TOML:
+
+    body = "human31"
+    height_mm = 1780
+    [lengths_mm]                 # distances of two markers, in any number
+    RHip_RKnee = 420
+    [dimensions_mm]              # dimensions of the body itself, taken as they are
+    left_foot_length = 260
+    [ratios]
+    torso_scale_x = 0.88
+
+Rules of the fit (`fit_subject`):
+1. `dimensions_mm` and `ratios` are taken as they are.
+2. A pair of markers whose distance no pose changes counts fully. One whose distance an ordinary standing
+posture
+   leaves alone (5 % over 15 degrees in any joint, such as shoulder to shoulder) is read as measured standing
+   and decides only what the others leave open. All other pairs, and those that no dimension sets, are
+   ignored.
+3. The dimensions that set these distances are fitted to them together by least squares. Where fewer equations
+than
+   dimensions are given, all are scaled alike from the prior, which has equal left and right sides.
+4. The prior and all that is missing, hands and feet included, is `of_height` times the height: published
+   proportions, cited in the body file. Without `height_mm` the height is the median of what the fitted
+   dimensions imply; without lengths either, the body keeps its own dimensions.
+"""
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import tomli_w
+from numpy.typing import ArrayLike, NDArray
+
+from studio.body.catalogue import load_body
+from studio.body.dimensions import with_dimensions
+from studio.body.marker_distances import MarkerDistances
+from studio.body.model import BodyModel
+from studio.errors import BodyError
+
+Array = NDArray[np.float64]
+
+DEFAULT_BODY = "human31"
+
+# A distance that is measured standing counts this little beside one that no pose changes.
+STANDING_WEIGHT = 0.03
+
+# Steps of Gauss and Newton; the distances are nearly linear in the dimensions, three suffice.
+FIT_STEPS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """What is known of a subject.
+
+    body : a body's name. height_mm : None where unknown. lengths_mm : "MarkerA_MarkerB" to mm.
+    dimensions_mm, ratios : dimension names of the body to their values.
+    """
+
+    body: str = DEFAULT_BODY
+    height_mm: float | None = None
+    lengths_mm: Mapping[str, float] = field(default_factory=dict)
+    dimensions_mm: Mapping[str, float] = field(default_factory=dict)
+    ratios: Mapping[str, float] = field(default_factory=dict)
+
+
+class _SubjectFile(msgspec.Struct, forbid_unknown_fields=True):
+    body: str = DEFAULT_BODY
+    height_mm: float | None = None
+    lengths_mm: dict[str, float] = {}
+    dimensions_mm: dict[str, float] = {}
+    ratios: dict[str, float] = {}
+
+
+def read_subject(path: Path) -> Subject:
+    """The subject of a TOML file. Raises BodyError naming the file, the entry and the remedy."""
+    try:
+        entries = msgspec.toml.decode(path.read_bytes(), type=_SubjectFile)
+    except OSError as problem:
+        raise BodyError(f"Subject file {path} cannot be read ({problem}).", "Check the path.") from None
+    except (msgspec.DecodeError, UnicodeDecodeError) as problem:
+        cause = f"Subject file {path.name}: {str(problem).replace('`', chr(39))}."
+        hint = "It holds body, height_mm, [lengths_mm], [dimensions_mm] and [ratios], numbers in mm."
+        raise BodyError(cause, hint) from None
+    subject = Subject(**{key: getattr(entries, key) for key in _SubjectFile.__struct_fields__})
+    _check(subject, f"Subject file {path.name}")
+    return subject
+
+
+def write_subject(subject: Subject, path: Path) -> None:
+    """Write a file that `read_subject` reads back; what is unknown is left out."""
+    entries = {key: value for key, value in dataclasses.asdict(subject).items() if value not in (None, {})}
+    path.write_text(tomli_w.dumps(entries), encoding="utf-8")
+
+
+def subject_from_shape(body: BodyModel, numbers: ArrayLike) -> Subject:
+    """The subject of the body's own shape file: its numbers in the order of the body file's `shape_order`.
+
+    Raises BodyError when the body has no such order or the count is another.
+    """
+    order = body.definition.shape_order if body.definition else ()
+    values = np.asarray(numbers, dtype=float).ravel()
+    if not order or len(values) != len(order):
+        cause = f"A shape of {len(values)} numbers does not fit body '{body.name}', which takes {len(order)}."
+        raise BodyError(cause, "Check that the shape file and the body belong together.")
+    lengths, ratios = {}, {}
+    for name, value in zip(order, values.tolist(), strict=True):
+        (ratios if _is_ratio(body, name) else lengths)[name] = value
+    subject = Subject(body=body.name, dimensions_mm=lengths, ratios=ratios)
+    _check(subject, "The shape")
+    return subject
+
+
+def fit_subject(
+    body: BodyModel, subject: Subject, extra_folders: tuple[Path, ...] = ()
+) -> tuple[BodyModel, tuple[str, ...]]:
+    """The body in the subject's size, and notes on what was ignored or assumed (rules: this file's head).
+
+    body : the tree to size; it need not be the subject's own. Dimensions of another body are turned into
+    distances of markers first (`in_lengths`), for which that body is looked up, in extra_folders too. Raises
+    BodyError for values that are not positive, and for dimensions that the subject's own body does not have.
+    """
+    _check(subject, "The subject")
+    if subject.body != body.name and (subject.dimensions_mm or subject.ratios):
+        subject = in_lengths(subject, load_body(subject.body, extra_folders))
+    given = {**subject.dimensions_mm, **subject.ratios}
+    notes: list[str] = []
+    body = with_dimensions(body, given)
+    height = subject.height_mm
+    prior = _proportions(body, height, given) if height else _levelled(body, given)
+    distances = MarkerDistances(with_dimensions(body, prior))
+    measured, ignored = distances.usable(subject.lengths_mm, fixed=frozenset(given))
+    notes += ignored
+    if not measured:
+        return (with_dimensions(body, prior) if height else body), tuple(notes)
+    fitted = _fit(distances, measured, frozenset(given))
+    if not height:
+        height = _implied_height(body, fitted)
+        if height:
+            notes.append(f"No height_mm was given: {height:.0f} mm follows from the lengths.")
+    missing = _proportions(body, height, {**given, **fitted}) if height else {}
+    return with_dimensions(body, {**missing, **fitted}), tuple(notes)
+
+
+def in_lengths(subject: Subject, own_body: BodyModel) -> Subject:
+    """The same subject with its dimensions as marker distances, to which another body can be fitted.
+
+    own_body : the body that `subject.dimensions_mm` belong to.
+    """
+    sized, _ = fit_subject(own_body, dataclasses.replace(subject, body=own_body.name))
+    lengths = {**MarkerDistances(sized).rigid(), **subject.lengths_mm}
+    return Subject(subject.body, subject.height_mm, lengths)
+
+
+def _check(subject: Subject, where: str) -> None:
+    height = subject.height_mm
+    if height is not None and not (math.isfinite(height) and height > 0.0):
+        raise BodyError(f"{where}: height_mm is {height}.", "Give the height in millimetres or leave it out.")
+    for group in ("lengths_mm", "dimensions_mm", "ratios"):
+        for name, value in getattr(subject, group).items():
+            allowed = value > 0.0 or (group == "dimensions_mm" and value == 0.0)
+            if not (math.isfinite(value) and allowed):
+                raise BodyError(f"{where}: {group} entry '{name}' is {value}.", "Give a number above 0.")
+
+
+def _is_ratio(body: BodyModel, name: str) -> bool:
+    return body.definition is not None and body.definition.dimensions[name].ratio is not None
+
+
+def _proportions(body: BodyModel, height: float, known: Mapping[str, float]) -> dict[str, float]:
+    """Every dimension with published proportions that is not known, mm."""
+    entries = body.definition.dimensions if body.definition else {}
+    shares = {name: entry.of_height for name, entry in entries.items() if name not in known}
+    return {name: share * height for name, share in shares.items() if share is not None}
+
+
+def _levelled(body: BodyModel, given: Mapping[str, float]) -> dict[str, float]:
+    """The body's own dimensions with the mean of left and right on either side, as far as they were not
+    given.
+    """
+    levelled = {}
+    for name, value in body.dimensions.items():
+        other = name.replace("left_", "right_") if "left_" in name else name.replace("right_", "left_")
+        if other != name and other in body.dimensions and name not in given and other not in given:
+            levelled[name] = 0.5 * (value + body.dimensions[other])
+    return levelled
+
+
+def _fit(
+    distances: MarkerDistances, measured: dict[str, tuple[float, bool]], fixed: frozenset[str]
+) -> dict[str, float]:
+    """Dimensions (mm) that meet the measured distances in the weighted least squares, from those of the body.
+
+    measured : pair to (mm, whether no pose changes it). With x the dimensions, each step solves for relative
+    changes scaled by √x, whose least norm scales all undetermined dimensions alike.
+    """
+    pairs = list(measured)
+    wanted = np.array([measured[pair][0] for pair in pairs])
+    weights = np.array([1.0 if measured[pair][1] else STANDING_WEIGHT for pair in pairs])
+    slopes = distances.slopes(pairs, distances.start)
+    moving = [name for name in distances.names if np.any(slopes[:, distances.index[name]])]
+    free = [name for name in moving if name not in fixed]
+    columns = [distances.index[name] for name in free]
+    values = distances.start.copy()
+    for _ in range(FIT_STEPS):
+        roots = np.sqrt(values[columns])
+        slopes = distances.slopes(pairs, values)[:, columns]
+        remaining = weights * (wanted - distances.distances(pairs, values))
+        change, *_ = np.linalg.lstsq(weights[:, None] * slopes * roots, remaining, rcond=1e-9)
+        # A dimension may at most halve or double in a step: none becomes zero or negative.
+        values[columns] *= np.clip(1.0 + change / roots, 0.5, 2.0)
+    return {name: float(values[distances.index[name]]) for name in free}
+
+
+def _implied_height(body: BodyModel, fitted: Mapping[str, float]) -> float | None:
+    """The median height over the fitted dimensions that have published proportions, mm."""
+    shares = _proportions(body, 1.0, {})
+    heights = [value / shares[name] for name, value in fitted.items() if shares.get(name)]
+    return float(np.median(heights)) if heights else None
