@@ -1,21 +1,45 @@
-"""What a person may ask of the tracking process. All are acknowledged by an `Acknowledged` event."""
+"""What a person may ask of the tracking process. All are acknowledged by an `Acknowledged` event.
 
+Each works while a frame is being annealed: it is served between two layers.
+"""
+
+import time
+import uuid
 from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """identifier : made by the sender, returned in the acknowledgement."""
+    """identifier : made by the sender, returned in the acknowledgement. asked_at : `time.monotonic()` when it
+    was made."""
 
-    identifier: str
+    identifier: str = field(default_factory=lambda: uuid.uuid4().hex)
+    asked_at: float = field(default_factory=time.monotonic, kw_only=True)
 
 
 @dataclass(frozen=True, slots=True)
 class Open(Command):
-    """Make a run the current one (resuming it where it stands). session, run : folder paths as text."""
+    """Make a run the current one, where it stands. session, run : folder paths as text.
 
-    session: str
-    run: str
+    A run that is being tracked is paused first, saved whole inside its frame.
+    """
+
+    session: str = ""
+    run: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Enqueue(Open):
+    """Track a run: at once if none is being tracked, else after those that wait already.
+
+    The next one begins when the run before it finishes, fails or is cancelled; a paused run holds the others
+    up.
+    """
+
+
+@dataclass(frozen=True, slots=True)
+class Dequeue(Open):
+    """Take a run out of those that wait."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,14 +66,19 @@ class StepLayer(Command):
 class Seek(Command):
     """Make `frame` the one that re-anneal works on; it must have a result or be the next to do."""
 
-    frame: int
+    frame: int = -1
 
 
 @dataclass(frozen=True, slots=True)
 class Reanneal(Command):
-    """Anneal a stored frame again with the current settings, same start and random keys; the stored result stays."""
+    """Anneal a frame again with the current settings, same start and random keys; the stored result stays.
 
-    frame: int
+    frame : -1 for the selected one. keep : store the answer as the run's own and drop the frames after it,
+    which followed from the old one. A run that is being tracked is paused.
+    """
+
+    frame: int = -1
+    keep: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +93,9 @@ class Stop(Command):
 
 @dataclass(frozen=True, slots=True)
 class ChangeSettings(Command):
-    """Change knobs by name; checked, versioned, swapped between layers."""
+    """Change knobs by name; checked, versioned, swapped between layers.
+
+    While nothing is tracked the selected frame is annealed again at once, if it can be.
+    """
 
     changes: dict[str, bool | int | float | str] = field(default_factory=dict)

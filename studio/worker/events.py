@@ -1,6 +1,7 @@
-"""What the tracking process says. Newest wins where a watcher is slow; small values only, arrays go through the store
-except a layer's own cloud, which travels with `LayerFinished` so that it can be drawn at once."""
+"""What the tracking process says. Newest wins where a watcher is slow; small values only, arrays go through
+the store except a layer's own cloud, which travels with `LayerFinished` so that it can be drawn at once."""
 
+import math
 from dataclasses import dataclass, field
 
 from studio.tracking.tracker import FrameResult, LayerRecord
@@ -18,10 +19,13 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class StateChanged(Event):
-    """state : idle, compiling, tracking, paused, reannealing, finished, cancelled, failed, lost (process died).
+    """state : idle, compiling, tracking, paused, reannealing, finished, cancelled, failed, lost (process
+    died).
 
-    frame, layer : where the search stands. first, last : frames of the run, half open. done : frames finished.
-    frames_per_second and seconds_left : measured, NaN while unknown. message, hint : for failed and lost.
+    frame, layer : where the search stands. first, last : frames of the run, half open. done : frames
+    finished. frames_per_second and seconds_left : measured, NaN while unknown. message, hint : for failed and
+    lost. waiting : (session, run) names of the runs that are tracked after this one. selected : the frame
+    that re-anneal works on, -1 for none.
     """
 
     state: str
@@ -34,25 +38,35 @@ class StateChanged(Event):
     seconds_left: float
     message: str = ""
     hint: str = ""
+    waiting: tuple[tuple[str, str], ...] = ()
+    selected: int = -1
 
 
 @dataclass(frozen=True, slots=True)
 class Acknowledged(Event):
-    """A command was taken (ok) or refused (message, hint)."""
+    """A command was taken (ok) or refused (message, hint, and `code` of the StudioError)."""
 
     identifier: str
     command: str
     ok: bool
     message: str = ""
     hint: str = ""
+    code: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class LayerFinished(Event):
-    """reannealed : true for a what-if layer that is not stored."""
+    """reannealed : true for a what-if layer that is not stored.
+
+    asked_at : `time.monotonic()` when the person's command (a slider's event) came that this layer answers,
+    NaN where it answers none. left_at : when it left the process. The difference is the time that a person
+    waits.
+    """
 
     record: LayerRecord
     reannealed: bool = False
+    asked_at: float = math.nan
+    left_at: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +79,8 @@ class FrameFinished(Event):
 
 @dataclass(frozen=True, slots=True)
 class SettingsApplied(Event):
-    """The settings in use since (frame, layer). values : every knob by name. changed : the names that moved."""
+    """The settings in use since (frame, layer). values : every knob by name. changed : the names that
+    moved."""
 
     version: int
     frame: int

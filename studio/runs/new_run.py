@@ -1,0 +1,149 @@
+"""A new run of a session: what was not asked for is filled in, everything is checked, then it is written
+down.
+
+What is filled in comes from the session (body, subject, start pose, σ0, tracker, weighting) and else from the
+studio's defaults, so that a run's record says everything that its poses depend on.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import metadata, resources
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.model import BodyModel
+from studio.body.subject import Subject
+from studio.errors import BodyError, RunError
+from studio.runs.search_space import default_sigma, parameter_names
+from studio.sessions.manifest import now
+from studio.sessions.run_record import RunRecord
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.settings import changed_settings, default_settings, values
+
+Array = NDArray[np.float64]
+
+DEFAULT_TRACKER, DEFAULT_WEIGHTING = "annealed", "edge-region"
+DISTRIBUTION = "capture-studio"
+
+
+@dataclass(frozen=True, slots=True)
+class RunRequest:
+    """What a person asks of a new run; everything has a default.
+
+    tracker, weighting, body : names, "" for the session's own. subject : measures instead of the session's.
+    start_pose : (D,) radians and mm, instead of the session's; start_source : where it came from, in words.
+    first, last : frames, half open; last None means all. changes : knobs by flat name. name : "" for run-1,
+    run-2, …
+    """
+
+    tracker: str = ""
+    weighting: str = ""
+    body: str = ""
+    subject: Subject | None = None
+    start_pose: Array | None = None
+    start_source: str = ""
+    first: int = 0
+    last: int | None = None
+    seed: int = 0
+    changes: Mapping[str, object] = field(default_factory=dict)
+    name: str = ""
+
+
+def prepare_run(session: Session, request: RunRequest | None = None) -> StoredRun:
+    """Make a run's folder, ready to be tracked. Raises StudioError naming what is wrong; then nothing was
+    made."""
+    asked = request or RunRequest()
+    tracker = asked.tracker or session.manifest.tracker or DEFAULT_TRACKER
+    weighting = asked.weighting or session.manifest.weighting or DEFAULT_WEIGHTING
+    settings = changed_settings(default_settings(tracker, weighting), asked.changes)
+    first, last = checked_frames(session, asked.first, asked.last)
+    if not 0 <= asked.seed < 2**63:
+        raise RunError(f"The seed {asked.seed} cannot be used.", "Give a whole number of 0 or more.")
+    body, notes = session.body_with_notes(asked.body or None, asked.subject)
+    start, source = start_pose(session, body, asked.start_pose, asked.start_source)
+    sigma = session.sigma(session.manifest.fps, body)
+    record = RunRecord(
+        name=asked.name or session.free_run_name(),
+        session=session.name,
+        created=now(),
+        tracker=tracker,
+        weighting=weighting,
+        body=body.name,
+        dimensions=dict(body.dimensions),
+        parameters=parameter_names(body),
+        seed=asked.seed,
+        first=first,
+        last=last,
+        fps=session.manifest.fps,
+        settings=dict(values(settings)),
+        sigma=tuple(
+            float(value) for value in (default_sigma(body, session.manifest.fps) if sigma is None else sigma)
+        ),
+        start_pose=None if start is None else tuple(float(value) for value in start),
+        start_source=source,
+        software=software_version(),
+        notes=tuple(notes),
+    )
+    return session.new_run(record, _body_text(session, asked.body or body.name))
+
+
+def checked_frames(session: Session, first: int, last: int | None) -> tuple[int, int]:
+    """The frames of a run, half open. Raises RunError if any lies outside the footage, or there are none."""
+    count = session.manifest.frame_count
+    end = count if last is None else last
+    if not 0 <= first < end <= count:
+        raise RunError(
+            f"Frames {first}:{end} do not lie in the footage of '{session.name}'.",
+            f"It has frames 0:{count} (the last one not included).",
+        )
+    return first, end
+
+
+def start_pose(
+    session: Session, body: BodyModel, given: Array | None, given_source: str = ""
+) -> tuple[Array | None, str]:
+    """The pose that the first frame starts from, and where it came from.
+
+    None, where neither the request nor the session has one and every parameter has limits: then the search
+    starts uniformly between them (Fig. 12a). Raises RunError without start pose and limits, BodyError for a
+    wrong one.
+    """
+    if given is not None:
+        pose = np.asarray(given, dtype=np.float64)
+        if pose.shape != (len(body.parameters),) or not np.isfinite(pose).all():
+            raise BodyError(
+                f"A start pose of {body.name} has {len(body.parameters)} finite numbers, this one does not.",
+                "Give radians and mm in the order of the body's parameters.",
+            )
+        return pose, given_source or "given"
+    stored = session.start_pose(body)
+    if stored is not None:
+        return stored, "the session's start pose"
+    limited = all(np.isfinite(entry.lower) and np.isfinite(entry.upper) for entry in body.parameters)
+    if not limited:
+        raise RunError(
+            f"Session '{session.name}' has no start pose.",
+            "Give one with --start-pose FILE (a CSV row, or a TRC), or set it in the studio.",
+        )
+    return None, "uniform over the limits"
+
+
+def software_version() -> str:
+    """The studio's version, for records."""
+    try:
+        return metadata.version(DISTRIBUTION)
+    except metadata.PackageNotFoundError:
+        return "not installed"
+
+
+def _body_text(session: Session, name: str) -> str:
+    """The body's file as it is now, so that a later version of it cannot change what a run means."""
+    if name.endswith(".toml"):
+        return Path(name).read_text(encoding="utf-8")
+    for folder in session.body_folders:
+        if (folder / f"{name}.toml").is_file():
+            return (folder / f"{name}.toml").read_text(encoding="utf-8")
+    return (resources.files("studio.body") / "models" / f"{name}.toml").read_text(encoding="utf-8")

@@ -1,0 +1,155 @@
+"""Frames of a session as functions of poses: footage → evidence → weighting, with the last few kept.
+
+Annealing a frame again, or looking at it, decodes and computes nothing twice: evidence is kept by frame and
+evidence settings, problems by frame and all settings that they depend on. With an executor the next frame is
+made ready while this one is searched.
+"""
+
+import threading
+from collections import OrderedDict
+from collections.abc import Hashable
+from concurrent.futures import CancelledError, Executor, Future
+from typing import Any, TypeVar
+
+from studio.body.model import BodyModel
+from studio.evidence.backgrounds import Backgrounds
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.evidence.pipeline import EvidenceMaker
+from studio.geometry.camera import Camera
+from studio.sessions.session import Session
+from studio.settings import RunSettings
+from studio.tracking.tracker import FrameProblem
+from studio.weighting.catalogue import WEIGHTINGS
+
+KEPT_FRAMES = 4
+"""Evidence kept: the frame at hand, the one made ready, and two to go back to."""
+KEPT_WEIGHERS = 2
+
+T = TypeVar("T")
+
+
+class ProblemSource:
+    """Every frame of a session for one body. May be used by several threads. Close it when done.
+
+    cameras : the run's snapshot, by default the session's. executor : makes the next frame ready; None:
+    nobody does. last : the frame after the last one that is worth making ready.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        body: BodyModel,
+        cameras: tuple[Camera, ...] | None = None,
+        *,
+        last: int | None = None,
+        executor: Executor | None = None,
+    ) -> None:
+        self.body = body
+        self.cameras = cameras or session.cameras()
+        self.footage = session.footage()
+        self._last = self.footage.frame_count if last is None else last
+        self._backgrounds = Backgrounds(self.footage)
+        self._executor = executor
+        self._making = threading.Lock()
+        self._coming: tuple[Hashable, Future[FrameProblem]] | None = None
+        self._evidence: OrderedDict[Hashable, FrameEvidence] = OrderedDict()
+        self._problems: OrderedDict[Hashable, FrameProblem] = OrderedDict()
+        self._weighers: OrderedDict[Hashable, Any] = OrderedDict()
+
+    def problem(self, frame: int, settings: RunSettings) -> FrameProblem:
+        """The frame as a function of poses. Raises FootageError, NotFoundError."""
+        self._await(_problem_key(frame, settings))
+        problem = self._problem(frame, settings)
+        if self._executor is not None and frame + 1 < self._last:
+            self._prepare(frame + 1, settings, self._executor)
+        return problem
+
+    def evidence(self, frame: int, settings: RunSettings) -> FrameEvidence:
+        """What is seen in the frame, as the settings' weighting wants it. Raises FootageError,
+        NotFoundError."""
+        key = _evidence_key(frame, settings)
+        with self._making:
+            found = _kept(self._evidence, key)
+            if found is None:
+                maker = EvidenceMaker(
+                    self.cameras,
+                    self.footage,
+                    self._backgrounds,
+                    settings.evidence,
+                    WEIGHTINGS[settings.weighting_name].edge_kind,
+                )
+                found = _keep(self._evidence, key, maker.evidence(frame), KEPT_FRAMES)
+            return found
+
+    def close(self) -> None:
+        """Let go of the footage and of everything kept."""
+        if self._coming is not None and not self._coming[1].cancel():
+            # The thread that makes the next frame ready must be out of the files before they close.
+            self._coming[1].exception()
+        self._coming = None
+        with self._making:
+            self._problems.clear()
+            self._evidence.clear()
+            self._weighers.clear()
+            self.footage.close()
+
+    def _problem(self, frame: int, settings: RunSettings) -> FrameProblem:
+        key = _problem_key(frame, settings)
+        with self._making:
+            found = _kept(self._problems, key)
+        if found is not None:
+            return found
+        evidence = self.evidence(frame, settings)
+        with self._making:
+            weigher = self._weigher(settings)
+            return _keep(self._problems, key, weigher.problem(evidence), KEPT_FRAMES)
+
+    def _weigher(self, settings: RunSettings) -> Any:  # noqa: ANN401 - each weighting has a type of its own
+        key = (settings.weighting_name, settings.weighting)
+        found = _kept(self._weighers, key)
+        if found is None:
+            weighting = WEIGHTINGS[settings.weighting_name]
+            made = weighting.prepare(self.body, self.cameras, settings.weighting)
+            found = _keep(self._weighers, key, made, KEPT_WEIGHERS)
+        return found
+
+    def _prepare(self, frame: int, settings: RunSettings, executor: Executor) -> None:
+        key = _problem_key(frame, settings)
+        if key in self._problems or (self._coming is not None and self._coming[0] == key):
+            return
+        if self._coming is not None and not self._coming[1].done():
+            return
+        self._coming = (key, executor.submit(self._problem, frame, settings))
+
+    def _await(self, key: Hashable) -> None:
+        """If this very frame is being made ready, wait for it; what went wrong comes up again where it is
+        used."""
+        coming = self._coming
+        if coming is not None and coming[0] == key:
+            self._coming = None
+            try:
+                coming[1].exception()
+            except CancelledError:
+                return
+
+
+def _evidence_key(frame: int, settings: RunSettings) -> Hashable:
+    return (frame, settings.evidence, WEIGHTINGS[settings.weighting_name].edge_kind)
+
+
+def _problem_key(frame: int, settings: RunSettings) -> Hashable:
+    return (frame, settings.evidence, settings.weighting_name, settings.weighting)
+
+
+def _kept(store: OrderedDict[Hashable, T], key: Hashable) -> T | None:
+    if key not in store:
+        return None
+    store.move_to_end(key)
+    return store[key]
+
+
+def _keep(store: OrderedDict[Hashable, T], key: Hashable, value: T, limit: int) -> T:
+    store[key] = value
+    while len(store) > limit:
+        store.popitem(last=False)
+    return value

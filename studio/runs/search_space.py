@@ -1,0 +1,38 @@
+"""What a tracker needs to know of a body: names, limits, σ0 and which parameters belong to one limb."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.model import BodyModel
+from studio.tracking.tracker import SearchSpace
+
+Array = NDArray[np.float64]
+
+SHARE_OF_MAX_STEP = 0.5
+"""σ0 as a share of the largest movement expected from one frame to the next (Deutscher & Reid 2005, 3.1)."""
+
+
+def default_sigma(body: BodyModel, fps: float) -> Array:
+    """(D,) σ0 from frame to frame: half of `max_step` (per second) times the time between two frames.
+
+    The paper gives the value as the diagonal of a covariance; it is read as a standard deviation.
+    """
+    return np.array([SHARE_OF_MAX_STEP * entry.max_step / fps for entry in body.parameters])
+
+
+def search_space(body: BodyModel, sigma: Array) -> SearchSpace:
+    """The body's pose vectors as a tracker sees them. sigma : (D,) σ0, mm and rad."""
+    limbs = [entry.limb for entry in body.parameters]
+    number = {limb: index for index, limb in enumerate(dict.fromkeys(limbs))}
+    return SearchSpace(
+        names=parameter_names(body),
+        lower=np.array([entry.lower for entry in body.parameters]),
+        upper=np.array([entry.upper for entry in body.parameters]),
+        sigma=sigma,
+        limb=np.array([number[limb] for limb in limbs], dtype=np.int64),
+    )
+
+
+def parameter_names(body: BodyModel) -> tuple[str, ...]:
+    """Names of the pose vector's entries, in order."""
+    return tuple(entry.name for entry in body.parameters)

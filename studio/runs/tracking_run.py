@@ -1,0 +1,270 @@
+"""A run, a layer at a time: searched, recorded, stopped, resumed and annealed again.
+
+What a layer depends on is all on disk before it runs: the particles that the frame before ended with (or the
+run's start pose), the settings with the layer at which they came into use, and the seed. So a run that is
+taken up again, after a pause inside a frame or after its process was killed, gives the same poses bit for bit
+as one that was never interrupted: settings that were already in use in an unfinished frame come into use
+again at the same layers.
+"""
+
+import dataclasses
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from studio.errors import NotFoundError, RunError
+from studio.runs.pace import Pace, Progress
+from studio.runs.search_space import search_space
+from studio.sessions.results_codec import particle_arrays, particles_from
+from studio.sessions.results_store import ResultsReader, ResultsWriter
+from studio.sessions.stored_run import StoredRun
+from studio.settings import RunSettings, SettingsEntry, SettingsHistory, settings_from_values, values
+from studio.tracking.catalogue import TRACKERS
+from studio.tracking.frame_loop import FrameSearch, SearchState, held_over
+from studio.tracking.tracker import Carried, FrameProblem, FrameResult, LayerRecord, ParticleSet
+
+# The newest settings and their version; asked before each layer.
+SettingsSource = Callable[[], tuple[int, RunSettings]]
+
+
+class Problems(Protocol):
+    """Where frames come from (`ProblemSource`, or a toy in tests)."""
+
+    def problem(self, frame: int, settings: RunSettings) -> FrameProblem:
+        """The frame as a function of poses."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stepped:
+    """What one layer brought. result : of the frame, if this was its last layer. version : of the settings in
+    use.
+
+    applied : the settings that came into use with this layer, None if they were in use before.
+    """
+
+    record: LayerRecord
+    result: FrameResult | None
+    applied: RunSettings | None
+
+
+class TrackingRun:
+    """The one who tracks a stored run; a second one for the same run is refused with RunError. Close it when
+    done."""
+
+    def __init__(self, run: StoredRun, problems: Problems) -> None:
+        self.run, self.record, self.problems = run, run.record, problems
+        self.tracker = TRACKERS[self.record.tracker]
+        self.space = search_space(run.body(), np.array(self.record.sigma))
+        self._writer = ResultsWriter(run.folder)
+        self._reader = ResultsReader(run.folder)
+        self._pace = Pace()
+        self._load()
+
+    def close(self) -> None:
+        """Save the frame at hand, if the search stands inside one, and free the run for others."""
+        self.save()
+        self._writer.close()
+        self._reader.close()
+
+    def _load(self) -> None:
+        """Take up the run where its store says it stands."""
+        self.history = SettingsHistory(tuple(self._reader.settings_history()))
+        self.settings_source: SettingsSource = self.latest_settings
+        self._settings: dict[int, RunSettings] = {}
+        if not self.history.entries:
+            recorded = settings_from_values(self.record.tracker, self.record.weighting, self.record.settings)
+            self._apply(1, recorded, self.record.first, 0)
+        frames = self._reader.frames()
+        self.next_frame = frames[-1] + 1 if frames else self.record.first
+        self.done = len(frames)
+        self._carried: tuple[int, Carried] | None = None
+        self._search: FrameSearch | None = None
+        self._layers: list[LayerRecord] = []
+        self._spent = 0.0
+        self._saved = True
+        self._take_up_partial()
+
+    def _take_up_partial(self) -> None:
+        partial = self._reader.partial()
+        if partial is None or partial.frame != self.next_frame:
+            return
+        numbers = partial.state["search_numbers"]
+        held = self._settings_at(partial.frame, 0)[1].tracker
+        particles = particles_from(partial.state)
+        state = SearchState(
+            layers_done=partial.next_layer,
+            layer_count=int(numbers[0]),
+            particles=particles,
+            settings=held,
+            settings_version=int(numbers[1]),
+            evaluations=int(numbers[2]),
+            milliseconds=float(numbers[3]),
+        )
+        self._search = self._new_search(partial.frame, state)
+        self._layers = self._reader.layers(partial.frame)
+
+    # ----------------------------------------------------------------- stepping
+
+    @property
+    def finished(self) -> bool:
+        """Whether every frame has a result."""
+        return self.next_frame >= self.record.last
+
+    @property
+    def layers_done(self) -> int:
+        """Layers done of the frame at hand; 0 between frames."""
+        return self._search.state.layers_done if self._search else 0
+
+    def step_layer(self) -> Stepped:
+        """Do one layer of the next frame; with its last layer the frame is stored. Raises RunError when
+        finished."""
+        if self.finished:
+            raise RunError(f"Run '{self.run.name}' has no frame left.", "Start a new run.")
+        began = time.perf_counter()
+        frame = self.next_frame
+        search = self._search or self._new_search(frame)
+        version, settings, is_new = self._settings_for(frame, search.state.layers_done)
+        problem = self.problems.problem(frame, self._held_in(frame, settings))
+        record = search.step(problem, version, settings.tracker)
+        self._search, self._saved = search, False
+        self._layers.append(record)
+        result = search.result(settings.tracker) if search.finished else None
+        if result is not None:
+            self._writer.write_frame(result, self._layers, settings.recording.record_particles)
+            self._next(result)
+        self._spent += time.perf_counter() - began
+        if result is not None:
+            self._pace.add(self._spent)
+            self._spent = 0.0
+        return Stepped(record, result, settings if is_new else None)
+
+    def _next(self, result: FrameResult) -> None:
+        self._carried = (result.frame, result.carried)
+        self._search, self._layers, self._saved = None, [], True
+        self.next_frame += 1
+        self.done += 1
+
+    def save(self) -> None:
+        """Store where the search stands inside a frame, whole, so that another process can go on from
+        there."""
+        if self._search is None or self._saved or self._search.state.particles is None:
+            return
+        state = self._search.state
+        assert state.particles is not None
+        numbers = [state.layer_count, state.settings_version, state.evaluations, state.milliseconds]
+        arrays = particle_arrays(state.particles) | {"search_numbers": np.array(numbers, dtype=np.float64)}
+        self._writer.write_partial(self.next_frame, state.layers_done, arrays, self._layers)
+        self._saved = True
+
+    def mark_cancelled(self) -> None:
+        """Note in the store that a person ended the run."""
+        self.save()
+        self._writer.mark_ended("cancelled")
+
+    def mark_going_on(self) -> None:
+        """Note that a cancelled run goes on after all."""
+        if self._reader.ended():
+            self._writer.mark_ended("")
+
+    def progress(self) -> Progress:
+        """How far the run got and how long the rest will take."""
+        return self._pace.progress(self.done, self.record.frame_count)
+
+    # ----------------------------------------------------------------- settings
+
+    def latest_settings(self) -> tuple[int, RunSettings]:
+        """The newest settings that this run has used, and their version."""
+        entry = self.history.entries[-1]
+        return entry.version, self._read(entry)
+
+    def _settings_for(self, frame: int, layer: int) -> tuple[int, RunSettings, bool]:
+        """The settings of a layer: new ones if there are, else those that the history has for it."""
+        version, settings = self.settings_source()
+        if version > self.history.entries[-1].version:
+            self._apply(version, settings, frame, layer)
+            return version, settings, True
+        return *self._settings_at(frame, layer), False
+
+    def _settings_at(self, frame: int, layer: int) -> tuple[int, RunSettings]:
+        entry = self.history.in_use(frame, layer) or self.history.entries[0]
+        return entry.version, self._read(entry)
+
+    def _held_in(self, frame: int, settings: RunSettings) -> RunSettings:
+        """The settings with what cannot change inside a frame as it was at its first layer."""
+        held = self._settings_at(frame, 0)[1]
+        return dataclasses.replace(
+            settings,
+            weighting=held_over(settings.weighting, held.weighting),
+            evidence=held_over(settings.evidence, held.evidence),
+        )
+
+    def _apply(self, version: int, settings: RunSettings, frame: int, layer: int) -> None:
+        self.history = self.history.with_applied(version, frame, layer, settings)
+        self._writer.write_settings(version, frame, layer, self.history.entries[-1].values)
+
+    def _read(self, entry: SettingsEntry) -> RunSettings:
+        """The settings of an entry; those in use are read once."""
+        if entry.version not in self._settings:
+            recorded = settings_from_values(self.record.tracker, self.record.weighting, entry.values)
+            self._settings[entry.version] = recorded
+        return self._settings[entry.version]
+
+    # ----------------------------------------------------------------- frames
+
+    def _new_search(self, frame: int, state: SearchState | None = None) -> FrameSearch:
+        repeats = 1
+        if frame == self.record.first:
+            repeats = self._settings_at(frame, 0)[1].tracker.start_repeats
+        return FrameSearch(
+            self.tracker,
+            self.carried_into(frame),
+            self.space,
+            seed=self.record.seed,
+            frame=frame,
+            repeats=repeats,
+            state=state,
+        )
+
+    def carried_into(self, frame: int) -> Carried:
+        """What a frame starts from: the end of the frame before, in the run's first frame its start pose."""
+        if frame == self.record.first:
+            return start_of(self.record.start_pose)
+        if self._carried is None or self._carried[0] != frame - 1:
+            self._carried = (frame - 1, self._reader.result(frame - 1).carried)
+        return self._carried[1]
+
+    def search_again(self, frame: int) -> FrameSearch:
+        """A new search of a frame that can be searched: same start and random keys; nothing of it is stored.
+
+        Raises NotFoundError for a frame outside the run, or one whose predecessor has no result.
+        """
+        if not self.record.first <= frame < min(self.next_frame + 1, self.record.last):
+            raise NotFoundError(
+                f"Frame {frame} of run '{self.run.name}' cannot be annealed yet.",
+                f"Choose a frame from {self.record.first} to {min(self.next_frame, self.record.last - 1)}.",
+            )
+        return self._new_search(frame)
+
+    def keep(
+        self, result: FrameResult, layers: list[LayerRecord], version: int, settings: RunSettings
+    ) -> None:
+        """Make a frame annealed again the run's own; later frames, which followed from the old one, are
+        dropped."""
+        self._writer.forget_from(result.frame)
+        self._writer.write_settings(version, result.frame, 0, values(settings))
+        self._writer.write_frame(result, layers, settings.recording.record_particles)
+        source = self.settings_source
+        self._load()
+        self.settings_source = source
+
+
+def start_of(pose: tuple[float, ...] | None) -> Carried:
+    """What a run starts from: one particle at the start pose, or (None) nothing, for a uniform start."""
+    if pose is None:
+        return Carried(None)
+    point = np.array(pose)
+    return Carried(ParticleSet(point[None], np.zeros(1)), point)

@@ -1,0 +1,115 @@
+"""The run that the process has in hand: its search, its settings mailbox, its footage, and a question being
+asked of a frame (re-annealing)."""
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+from studio.errors import RunError, StudioError
+from studio.runs.problem_source import ProblemSource
+from studio.runs.reannealing import Reannealing
+from studio.runs.tracking_run import Stepped, TrackingRun
+from studio.sessions.run_log import append_to_log
+from studio.sessions.session import Session
+from studio.settings import RunSettings
+from studio.worker.settings_mailbox import SettingsMailbox
+
+
+class OpenRun:
+    """One run, opened for tracking. Closing it saves it whole and frees its memory."""
+
+    def __init__(self, session_folder: str, run_folder: str) -> None:
+        self.session = Session(Path(session_folder))
+        self.stored = self.session.run(Path(run_folder).name)
+        record = self.stored.record
+        self._ahead = ThreadPoolExecutor(1, thread_name_prefix="next-frame")
+        self._problems = ProblemSource(
+            self.session, self.stored.body(), self.stored.cameras(), last=record.last, executor=self._ahead
+        )
+        try:
+            self.tracking = TrackingRun(self.stored, self._problems)
+        except StudioError:
+            self._problems.close()
+            self._ahead.shutdown()
+            raise
+        self.mailbox = SettingsMailbox(*self.tracking.latest_settings())
+        self.tracking.settings_source = self.mailbox.latest
+        self.selected = -1
+        self.question: Reannealing | None = None
+
+    @property
+    def session_name(self) -> str:
+        """Name of the session."""
+        return self.session.name
+
+    @property
+    def run_name(self) -> str:
+        """Name of the run."""
+        return self.stored.name
+
+    @property
+    def weighting(self) -> str:
+        """Name of the weighting, whose kernels compile when they are first used."""
+        return self.stored.record.weighting
+
+    def warm_up(self) -> None:
+        """Weigh one pose, so that what has to be compiled is compiled before a frame's time is taken."""
+        frame = min(self.tracking.next_frame, self.stored.record.last - 1)
+        problem = self._problems.problem(frame, self.mailbox.latest()[1])
+        start = self.stored.record.start_pose
+        pose = np.array(start) if start is not None else self.stored.body().neutral
+        problem.weigh(pose[None])
+
+    def step_layer(self) -> Stepped:
+        """Do the next layer of the run."""
+        return self.tracking.step_layer()
+
+    def target(self, frame: int = -1) -> int:
+        """The frame that a question is about: the one named, else the selected, else the unfinished or last
+        one."""
+        if frame >= 0:
+            return frame
+        if self.selected >= 0:
+            return self.selected
+        first = self.stored.record.first
+        if self.tracking.layers_done or self.tracking.next_frame == first:
+            return self.tracking.next_frame
+        return self.tracking.next_frame - 1
+
+    def ask(self, frame: int = -1) -> int:
+        """Begin to anneal a frame again with the newest settings; an unfinished question is dropped.
+
+        Returns the frame. Raises NotFoundError if it cannot be annealed yet.
+        """
+        target = self.target(frame)
+        version, settings = self.mailbox.latest()
+        self.question = Reannealing(self.tracking, target, version, settings)
+        return target
+
+    def keep_answer(self) -> RunSettings:
+        """Store the finished question's answer as the run's own. Raises RunError if there is none."""
+        if self.question is None:
+            raise RunError("Nothing was annealed again.", "Re-anneal a frame first.")
+        question, self.question = self.question, None
+        question.keep()
+        return question.settings
+
+    def select(self, frame: int) -> None:
+        """Make `frame` the one that questions are about. Raises NotFoundError if it cannot be annealed
+        yet."""
+        self.tracking.search_again(frame)
+        self.selected = frame
+
+    def log(self, level: str, text: str) -> None:
+        """Write a line into the run's log."""
+        append_to_log(self.stored.folder, level, text)
+
+    def close(self) -> None:
+        """Save the search where it stands and let go of files, pictures and threads."""
+        self.question = None
+        try:
+            self.tracking.close()
+        finally:
+            self._problems.close()
+            self._ahead.shutdown()
