@@ -1,0 +1,196 @@
+"""Background models: what a camera sees without the subject, and which pixels of a frame differ from it.
+
+`GaussianBackground` keeps a mean and a standard deviation for each pixel and colour (section 4.2.2 uses
+thresholded background subtraction). Its shadow test follows Horprasert et al. 1999: a pixel whose
+colour is the background's, only darker, is background. OpenCV's MOG2 and KNN models are trained on a
+fixed set of frames and then only applied (learning rate 0), so that a frame's mask is the same whatever
+was looked at before.
+"""
+
+import threading
+from collections.abc import Sequence
+from typing import Literal, Protocol
+
+import cv2
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from studio.evidence.settings import EvidenceSettings
+
+Bytes = NDArray[np.uint8]
+Floats = NDArray[np.float32]
+
+GAIN_STRIDE = 8
+GAIN_RANGE = (0.5, 2.0)
+GAIN_LEAST_LEVEL, GAIN_MOST_LEVEL = 20.0, 245.0
+GAIN_LEAST_PIXELS = 64
+GREY_SPREAD = 2.0
+"""A background whose colours differ by less than this on average is grey: no shadow can be told by
+colour."""
+BACKGROUND_SHARE = 0.7
+"""Weight of the mixture's Gaussians that are background; what covers a pixel more rarely is foreground."""
+FROZEN = {"mog2": 0.0, "knn": 1e-8}
+"""Learning rates that change nothing any more: OpenCV's KNN takes 0 for "update now" and needs a tiny one. Applied to
+the training frames twice more, so that updates already due and the order of a mixture's Gaussians are settled."""
+
+
+class BackgroundModel(Protocol):
+    """One camera's background, fitted."""
+
+    def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Bytes:
+        """(H, W) uint8, 255 where the picture shows something else, before any clean-up."""
+        ...
+
+
+class GaussianBackground:
+    """A mean and a standard deviation for each pixel and colour."""
+
+    def __init__(self, mean: Floats, deviation: Floats) -> None:
+        """mean, deviation : (H, W, 3) grey levels, BGR."""
+        self.mean = np.ascontiguousarray(mean, dtype=np.float32)
+        self.variance = np.ascontiguousarray(deviation, dtype=np.float32) ** 2
+        self._samples = self.mean[::GAIN_STRIDE, ::GAIN_STRIDE]
+        self.is_grey = float(np.mean(np.ptp(self._samples, axis=2))) < GREY_SPREAD
+
+    def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Bytes:
+        """(H, W) uint8, 255 where the picture differs and is no shadow."""
+        gain = self.gain(picture) if settings.mask_gain_fit else np.ones(3, np.float32)
+        darkest = settings.mask_shadow_darkest if settings.mask_shadow_test and not self.is_grey else 2.0
+        return differing_pixels(
+            picture,
+            self.mean,
+            self.variance,
+            gain,
+            np.float32(settings.mask_threshold**2),
+            np.float32(settings.mask_noise**2),
+            np.float32(darkest),
+            np.float32(settings.mask_shadow_colour),
+        )
+
+    def gain(self, picture: Bytes) -> Floats:
+        """(3,) factor on each colour of the background that the median pixel asks for (people cover less than
+        half)."""
+        seen = picture[::GAIN_STRIDE, ::GAIN_STRIDE]
+        usable = (
+            (self._samples > GAIN_LEAST_LEVEL) & (self._samples < GAIN_MOST_LEVEL) & (seen < GAIN_MOST_LEVEL)
+        )
+        found = np.ones(3, np.float32)
+        for channel in range(3):
+            chosen = usable[:, :, channel]
+            if np.count_nonzero(chosen) >= GAIN_LEAST_PIXELS:
+                ratio = seen[:, :, channel][chosen] / self._samples[:, :, channel][chosen]
+                found[channel] = np.clip(np.median(ratio), *GAIN_RANGE)
+        return found
+
+
+class SubtractorBackground:
+    """OpenCV's MOG2 or KNN, trained once and then frozen."""
+
+    def __init__(self, kind: Literal["mog2", "knn"], training: Sequence[Bytes]) -> None:
+        """training : (H, W, 3) BGR pictures, in the order in which they are learned."""
+        count = len(training)
+        if kind == "mog2":
+            self._model = cv2.createBackgroundSubtractorMOG2(count, 16.0, True)
+            self._model.setBackgroundRatio(BACKGROUND_SHARE)
+        else:
+            self._model = cv2.createBackgroundSubtractorKNN(count, 400.0, True)
+        cv2.setRNGSeed(0)
+        for picture in training:
+            self._model.apply(picture)
+        self._rate = FROZEN[kind]
+        for picture in (*training, *training):
+            self._model.apply(picture, learningRate=self._rate)
+        self._lock = threading.Lock()
+
+    def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Bytes:
+        """(H, W) uint8, 255 for foreground; what OpenCV marks as shadow is background."""
+        with self._lock:
+            if isinstance(self._model, cv2.BackgroundSubtractorMOG2):
+                self._model.setVarThreshold(settings.mask_threshold**2)
+            else:
+                self._model.setDist2Threshold((settings.mask_threshold * settings.mask_noise) ** 2)
+            self._model.setDetectShadows(settings.mask_shadow_test)
+            self._model.setShadowThreshold(settings.mask_shadow_darkest)
+            marked = self._model.apply(picture, learningRate=self._rate)
+        return np.asarray(cv2.threshold(marked, 200, 255, cv2.THRESH_BINARY)[1], dtype=np.uint8)
+
+
+def gaussian_from_frames(frames: Sequence[Bytes]) -> GaussianBackground:
+    """Mean and standard deviation of an empty clip; a single picture gives a deviation of 0 (the noise knob
+    rules)."""
+    total = np.zeros(frames[0].shape, np.float64)
+    squares = np.zeros(frames[0].shape, np.float64)
+    for frame in frames:
+        total += frame
+        squares += np.square(frame, dtype=np.float64)
+    mean = total / len(frames)
+    variance = np.maximum(squares / len(frames) - mean * mean, 0.0)
+    return GaussianBackground(mean.astype(np.float32), np.sqrt(variance).astype(np.float32))
+
+
+def gaussian_from_median(frames: Sequence[Bytes]) -> GaussianBackground:
+    """Median over time and its robust deviation (1.4826 times the median distance from the median)."""
+    stack = np.stack(frames)
+    count = stack.shape[0]
+    flat = stack.reshape(count, -1)
+    median, distance = median_and_distance(flat)
+    shape = frames[0].shape
+    deviation = np.minimum(1.4826 * distance, 20.0).astype(np.float32)
+    return GaussianBackground(median.reshape(shape), deviation.reshape(shape))
+
+
+@njit(cache=True, nogil=True)
+def median_and_distance(values):
+    """Median of each column and the median distance from it. values : (K, P) uint8. Returns two (P,)
+    float32."""
+    count, pixels = values.shape
+    median = np.empty(pixels, np.float32)
+    distance = np.empty(pixels, np.float32)
+    column = np.empty(count, np.float32)
+    for p in range(pixels):
+        for k in range(count):
+            column[k] = values[k, p]
+        median[p] = np.median(column)
+        for k in range(count):
+            column[k] = abs(values[k, p] - median[p])
+        distance[p] = np.median(column)
+    return median, distance
+
+
+@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+def differing_pixels(picture, mean, variance, gain, threshold, noise, darkest, colour):
+    """255 where a colour differs by more than sqrt(threshold) deviations and the pixel is no shadow.
+
+    picture : (H, W, 3) uint8. mean, variance : (H, W, 3) float32. noise : least variance. A shadow has darkest <=
+    brightness / background < 1 and a colour within `colour` of the background's, as a share of its brightness.
+    The first loop of a row vectorises over all its colours; the shadow test runs where something differs.
+    """
+    height, width = picture.shape[:2]
+    out = np.zeros((height, width), np.uint8)
+    gains = np.empty(3 * width, np.float32)
+    for k in range(3 * width):
+        gains[k] = gain[k % 3]
+    differs = np.empty(3 * width, np.uint8)
+    flat, means = picture.reshape(height, 3 * width), mean.reshape(height, 3 * width)
+    variances = variance.reshape(height, 3 * width)
+    for y in range(height):
+        seen, expected, spread, row = flat[y], means[y], variances[y], out[y]
+        for k in range(3 * width):
+            away = np.float32(seen[k]) - gains[k] * expected[k]
+            differs[k] = np.uint8(away * away > threshold * max(spread[k], noise))
+        for x in range(width):
+            k = 3 * x
+            if differs[k] | differs[k + 1] | differs[k + 2]:
+                dot, norm, square = np.float32(0.0), np.float32(0.0), np.float32(0.0)
+                for c in range(3):
+                    value, background = np.float32(seen[k + c]), gain[c] * expected[k + c]
+                    dot += value * background
+                    norm += background * background
+                    square += value * value
+                share = dot / max(norm, np.float32(1.0))
+                off_colour = square - share * dot
+                same_colour = off_colour < colour * colour * norm + noise
+                shadow = darkest <= share and share < np.float32(1.0) and same_colour
+                row[x] = np.uint8(0) if shadow else np.uint8(255)
+    return out

@@ -1,0 +1,112 @@
+"""The background models of a session's cameras: fitted once, on the first frame that needs them, and kept.
+
+What a model is fitted to: the plate picture or empty clip that came with a camera, else frames of the
+footage spread evenly over it (a subject that moves is then absent from the median; one that stays
+leaves a ghost).
+"""
+
+import threading
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.capture.footage import Footage
+from studio.capture.pictures import is_picture, read_picture
+from studio.capture.video import VideoReader, measure_video
+from studio.errors import FootageError
+from studio.evidence.background import (
+    BackgroundModel,
+    SubtractorBackground,
+    gaussian_from_frames,
+    gaussian_from_median,
+)
+
+Bytes = NDArray[np.uint8]
+FittedKind = Literal["gaussian", "median", "mog2", "knn"]
+
+CLIP_FRAMES = 60
+MEDIAN_FRAMES, FEWEST_FRAMES = 31, 3
+MEDIAN_BYTES = 200_000_000
+TRAINING_FRAMES = 40
+LARGEST_DIFFERENCE = 0.02
+
+
+class Backgrounds:
+    """Fitted models by camera and kind, for any number of evidence makers and threads."""
+
+    def __init__(self, footage: Footage) -> None:
+        self._footage = footage
+        self._fitted: dict[tuple[str, FittedKind], BackgroundModel] = {}
+        self._locks = {camera: threading.Lock() for camera in footage.cameras}
+
+    def model(self, camera: str, kind: FittedKind) -> BackgroundModel:
+        """The model of one camera; "gaussian" takes the footage's median where there is no plate or clip.
+
+        Raises FootageError if there is too little to fit it to.
+        """
+        with self._locks[camera]:
+            found = self._fitted.get((camera, kind))
+            if found is None:
+                found = self._fit(camera, kind)
+                self._fitted[camera, kind] = found
+            return found
+
+    def _fit(self, camera: str, kind: FittedKind) -> BackgroundModel:
+        path = self._footage.background_path(camera)
+        if kind == "median" or (kind == "gaussian" and path is None):
+            return gaussian_from_median(self._spread(camera, MEDIAN_FRAMES))
+        if kind == "gaussian" and path is not None:
+            return gaussian_from_frames(self._plate(camera, path, CLIP_FRAMES))
+        if path is not None and not is_picture(path):
+            return SubtractorBackground(_subtractor(kind), self._plate(camera, path, TRAINING_FRAMES))
+        return SubtractorBackground(_subtractor(kind), self._spread(camera, TRAINING_FRAMES))
+
+    def _spread(self, camera: str, most: int) -> list[Bytes]:
+        """Up to `most` frames of the footage, evenly spread, both ends included."""
+        count = self._footage.frame_count
+        if count < FEWEST_FRAMES:
+            raise FootageError(
+                f"Camera {camera} has no background picture and only {count} frames to take one from.",
+                "Give masks, a plate picture or an empty clip in 'background/'.",
+            )
+        size = self._footage.picture(camera, 0).nbytes
+        most = max(FEWEST_FRAMES, min(most, count, MEDIAN_BYTES // size))
+        chosen = np.unique(np.linspace(0, count - 1, most).round().astype(int))
+        return [self._footage.picture(camera, int(frame)) for frame in chosen]
+
+    def _plate(self, camera: str, path: Path, most: int) -> list[Bytes]:
+        """The plate picture, or up to `most` frames of the empty clip, of the footage's size."""
+        height, width = self._footage.picture(camera, 0).shape[:2]
+        if is_picture(path):
+            return [fitted_plate(read_picture(path), width, height, path.name)]
+        count = measure_video(path).frame_count
+        reader = VideoReader(path, count)
+        try:
+            chosen = np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))
+            return [fitted_plate(reader.read(int(frame)), width, height, path.name) for frame in chosen]
+        finally:
+            reader.close()
+
+
+def fitted_plate(plate: Bytes, width: int, height: int, name: str) -> Bytes:
+    """A background picture cut to the footage's size, evenly on both sides as the calibration's crop is
+    assumed.
+
+        Raises FootageError if it is smaller, or larger by more than 2 %.
+    """
+    tall, wide = plate.shape[:2]
+    if (wide, tall) == (width, height):
+        return plate
+    if wide < width or tall < height or max(wide / width, tall / height) > 1.0 + LARGEST_DIFFERENCE:
+        raise FootageError(
+            f"The background '{name}' is {wide}x{tall} pixels, the footage {width}x{height}.",
+            "Give a background of the footage's size.",
+        )
+    left, top = (wide - width) // 2, (tall - height) // 2
+    return np.ascontiguousarray(plate[top : top + height, left : left + width])
+
+
+def _subtractor(kind: FittedKind) -> Literal["mog2", "knn"]:
+    return "mog2" if kind == "mog2" else "knn"
