@@ -25,11 +25,13 @@ messages = Console(stderr=True, highlight=False, soft_wrap=True)
 def command(function: Callable[P, Mapping[str, object]]) -> Callable[P, None]:
     """Make a function that returns its result a command body: prints it, and turns errors into words.
 
-    The result is printed as one JSON object under `--json` (which this decorator adds), else as aligned lines;
-    a value under the key "text" is what a person reads instead.
+    The result is printed as one JSON object under `--json` (which this decorator adds), else as aligned
+    lines; a value under the key "text" is what a person reads instead.
     """
 
-    @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on standard output.")
+    @click.option(
+        "--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on standard output."
+    )
     @functools.wraps(function)
     def body(*arguments: P.args, **options: P.kwargs) -> None:
         as_json = bool(options.pop("as_json"))
@@ -47,7 +49,9 @@ def command(function: Callable[P, Mapping[str, object]]) -> Callable[P, None]:
         if as_json:
             click.echo(json.dumps(result, allow_nan=False, default=_plain_value))
         else:
-            click.echo(text if text is not None else "\n".join(f"{key:24} {value}" for key, value in result.items()))
+            click.echo(
+                text if text is not None else "\n".join(f"{key:24} {value}" for key, value in result.items())
+            )
 
     return body
 

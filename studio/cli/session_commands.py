@@ -1,0 +1,116 @@
+"""`studio import`, `synthesize`, `bodies` and `runs`."""
+
+from pathlib import Path
+
+import click
+
+from studio.body.catalogue import list_bodies, load_body
+from studio.cli.output import command, note, progress
+from studio.sessions.importers.catalogue import import_source
+from studio.sessions.workspace import Workspace
+from studio.synthesis.recipes import synthesize
+
+INTO_HELP = "Name of the new session in the workspace, or a path."
+
+
+@click.command("import")
+@click.argument("source", type=click.Path(path_type=Path))
+@click.option("--into", required=True, metavar="SESSION", help=INTO_HELP)
+@click.option(
+    "--calibration", type=click.Path(path_type=Path), help="The file to take where there are several."
+)
+@click.option("--fps", type=float, help="Frames per second, where the footage does not say (pictures).")
+@click.option(
+    "--copy/--reference", default=True, help="Copy the footage (default), or refer to it where it lies."
+)
+@command
+def import_command(
+    source: Path, into: str, calibration: Path | None, fps: float | None, copy: bool
+) -> dict[str, object]:
+    """Make a session from a folder of footage and calibration, checking one against the other."""
+    place = Workspace().place_for(into)
+    with progress("Importing") as report:
+        told = import_source(source, place, calibration=calibration, fps=fps, copy=copy, progress=report)
+    for line in (*told.notes, *(f"Warning: {warning}" for warning in told.warnings)):
+        note(line)
+    return {
+        "session": str(place),
+        "cameras": [f"{match.footage} → {match.camera} ({match.how})" for match in told.matches],
+        "notes": list(told.notes),
+        "warnings": list(told.warnings),
+        "text": "\n".join(
+            [
+                f"Session {place.name} in {place}",
+                *(f"  {match.footage} → {match.camera}" for match in told.matches),
+            ]
+        ),
+    }
+
+
+@click.command("synthesize")
+@click.argument("recipe")
+@click.option("--into", required=True, metavar="SESSION", help=INTO_HELP)
+@command
+def synthesize_command(recipe: str, into: str) -> dict[str, object]:
+    """Render footage with exact truth from a RECIPE (a TOML file, or the name of one that is shipped)."""
+    place = Workspace().place_for(into)
+    with progress("Rendering") as report:
+        synthesize(recipe, place, progress=report)
+    return {"session": str(place), "text": f"Session {place.name} in {place}"}
+
+
+@click.command()
+@command
+def bodies() -> dict[str, object]:
+    """List the bodies that are shipped and those of the workspace."""
+    folders = tuple(folder for folder in (Workspace().root / "bodies",) if folder.is_dir())
+    entries: list[dict[str, object]] = []
+    for name in list_bodies(folders):
+        body = load_body(name, folders)
+        entries.append(
+            {
+                "name": body.name,
+                "title": body.title,
+                "parameters": len(body.parameters),
+                "limbs": len(body.drawn),
+                "markers": [marker.name for marker in body.markers],
+            }
+        )
+    lines = [
+        f"{entry['name']:18} {entry['parameters']:>3} parameters {entry['limbs']:>3} limbs   {entry['title']}"
+        for entry in entries
+    ]
+    return {"bodies": entries, "text": "\n".join(lines)}
+
+
+@click.command()
+@click.argument("session", required=False)
+@command
+def runs(session: str | None) -> dict[str, object]:
+    """List the runs of a SESSION, or of all sessions in the workspace."""
+    workspace = Workspace()
+    if session:
+        opened = workspace.resolve(session)
+        found = [(opened.name, run.summary()) for run in opened.runs()]
+    else:
+        found = [(entry.name, run) for entry in workspace.sessions() for run in entry.runs]
+    entries: list[dict[str, object]] = [
+        {
+            "session": name,
+            "run": run.name,
+            "tracker": run.tracker,
+            "weighting": run.weighting,
+            "body": run.body,
+            "seed": run.seed,
+            "frames": [run.first, run.last],
+            "done": run.done,
+            "status": run.status,
+        }
+        for name, run in found
+    ]
+    lines = [
+        f"{entry['session']:18} {entry['run']:12} {entry['tracker']:14} {entry['weighting']:14} "
+        f"{entry['done']:>5} of {run.last - run.first} frames  {entry['status']}"
+        for entry, (_, run) in zip(entries, found, strict=True)
+    ]
+    return {"workspace": str(workspace.root), "runs": entries, "text": "\n".join(lines) or "No runs yet."}

@@ -1,0 +1,205 @@
+"""`studio track`, `evaluate` and `bench`."""
+
+import csv
+import dataclasses
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import click
+import numpy as np
+
+from studio.body.subject import read_subject
+from studio.capture.trc import read_trc
+from studio.cli.output import command, note, progress
+from studio.errors import RunError, SettingsError, TruthError
+from studio.evaluation.errors import evaluate
+from studio.experiments.benchmark import run_benchmark
+from studio.knobs import allowed
+from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.start_pose_file import start_pose_from_file
+from studio.sessions.stored_run import StoredRun
+from studio.sessions.workspace import Workspace
+from studio.settings import knob_table
+from studio.tracking.catalogue import TRACKERS
+from studio.weighting.catalogue import WEIGHTINGS
+from studio.worker.batch import BatchResult, track_to_end
+
+OPTION_KNOBS = ("particles", "layers", "survival", "crossover")
+
+
+def _knob_options(function: Callable[..., object]) -> Callable[..., object]:
+    """The options of the knobs that have one of their own, made from their declarations."""
+    declared = {entry.name: entry for entry in reversed(knob_table())}
+    for name in reversed(OPTION_KNOBS):
+        entry = declared[name]
+        text = f"{entry.help} ({allowed(entry)})"
+        function = click.option(f"--{name}", metavar=entry.kind.__name__.upper(), help=text)(function)
+    return function
+
+
+@click.command()
+@click.argument("session")
+@click.option(
+    "--tracker", type=click.Choice(sorted(TRACKERS)), help="Default: the session's own, else annealed."
+)
+@click.option(
+    "--weighting", type=click.Choice(sorted(WEIGHTINGS)), help="Default: the session's own, else edge-region."
+)
+@click.option(
+    "--body", default="", metavar="NAME", help="Kinematic tree; the session's subject still scales it."
+)
+@click.option(
+    "--subject", type=click.Path(path_type=Path), help="subject.toml to use instead of the session's."
+)
+@click.option(
+    "--start-pose", type=click.Path(path_type=Path), help="A CSV row, or a TRC met by inverse kinematics."
+)
+@_knob_options
+@click.option("--frames", metavar="A:B", default=":", help="Half open, from 0; default: all.")
+@click.option("--seed", type=int, default=0, show_default=True, help="The same seed gives the same run.")
+@click.option(
+    "--set", "changes", multiple=True, metavar="KNOB=VALUE", help="Any other knob; the guide lists them."
+)
+@click.option("--poses", type=click.Path(path_type=Path), help="Write the poses as CSV.")
+@click.option("--name", default="", help="Name of the run; default: numbered.")
+@command
+def track(
+    session: str,
+    tracker: str | None,
+    weighting: str | None,
+    body: str,
+    subject: Path | None,
+    start_pose: Path | None,
+    frames: str,
+    seed: int,
+    changes: tuple[str, ...],
+    poses: Path | None,
+    name: str,
+    **knobs: str | None,
+) -> dict[str, object]:
+    """Track a SESSION and store the run; Ctrl-C cancels, what was tracked stays."""
+    opened = Workspace().resolve(session)
+    first, last = _frame_range(frames)
+    measures = read_subject(subject) if subject else None
+    request = RunRequest(
+        tracker=tracker or "",
+        weighting=weighting or "",
+        body=body,
+        subject=measures,
+        first=first,
+        last=last,
+        seed=seed,
+        changes=_changes(changes) | {key: value for key, value in knobs.items() if value is not None},
+        name=name,
+    )
+    if start_pose:
+        scaled = opened.body(body or None, measures)
+        pose, source = start_pose_from_file(start_pose, scaled, first, opened.manifest.fps)
+        request = dataclasses.replace(request, start_pose=pose, start_source=source)
+    run = prepare_run(opened, request)
+    for line in run.record.notes:
+        note(line)
+    with progress(f"{opened.name} / {run.name}") as report:
+        result = track_to_end(opened, run, report)
+    if poses:
+        _write_poses(run, poses)
+    text = (
+        f"{opened.name} / {run.name}: {run.record.frame_count} frames in {result.seconds:.1f} s, seed {seed}"
+    )
+    return {**_told(run, result), "text": text}
+
+
+def _told(run: StoredRun, result: BatchResult) -> dict[str, object]:
+    """What `--json` prints of a run."""
+    record = run.record
+    told: dict[str, object] = {
+        "session": run.session_name,
+        "run": run.name,
+        "tracker": record.tracker,
+        "weighting": record.weighting,
+        "body": record.body,
+        "seed": record.seed,
+        "frames": record.frame_count,
+        "evaluations_per_frame": result.evaluations_per_frame,
+        "seconds": round(result.seconds, 3),
+        "start_pose": record.start_source,
+    }
+    if record.tracker == "condensation":
+        told["likelihood_scale"] = result.last_beta
+    return told
+
+
+def _frame_range(text: str) -> tuple[int, int | None]:
+    """A:B as numbers; either side may be left out. Raises RunError."""
+    first, colon, last = text.partition(":")
+    try:
+        return int(first or 0), int(last) if last else (None if colon else int(first) + 1)
+    except ValueError:
+        raise RunError(
+            f"Frames '{text}' cannot be understood.", "Write A:B, half open from 0, like 0:150."
+        ) from None
+
+
+def _changes(assignments: tuple[str, ...]) -> dict[str, str]:
+    """KNOB=VALUE pairs. Raises SettingsError where there is no '='."""
+    changes: dict[str, str] = {}
+    for assignment in assignments:
+        name, equals, value = assignment.partition("=")
+        if not equals:
+            raise SettingsError(f"--set '{assignment}' has no value.", "Write --set knob=value.")
+        changes[name.strip()] = value.strip()
+    return changes
+
+
+def _write_poses(run: StoredRun, path: Path) -> None:
+    """CSV: frame, then one column a parameter in the body's order, radians and mm."""
+    reader = run.results()
+    try:
+        frames, rows = reader.poses()
+    finally:
+        reader.close()
+    try:
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(["frame", *run.record.parameters])
+            writer.writerows(
+                [int(frame), *map(repr, map(float, row))] for frame, row in zip(frames, rows, strict=True)
+            )
+    except OSError as error:
+        raise RunError(
+            f"'{path}' cannot be written ({error.strerror}).", "Choose another place; the run is stored."
+        ) from None
+
+
+@click.command("evaluate")
+@click.argument("session")
+@click.argument("run")
+@click.option("--truth", type=click.Path(path_type=Path), help="TRC file; default: the session's own truth.")
+@command
+def evaluate_command(session: str, run: str, truth: Path | None) -> Mapping[str, object]:
+    """Measure a RUN against the true markers: mm without alignment, root-aligned, after Procrustes."""
+    opened = Workspace().resolve(session)
+    stored = opened.run(run)
+    path = truth or opened.truth_path
+    if path is None:
+        raise TruthError(f"Session '{opened.name}' has no truth.", "Give one with --truth FILE.trc.")
+    reader = stored.results()
+    try:
+        frames, poses = reader.poses()
+    finally:
+        reader.close()
+    found = evaluate(np.asarray(poses), frames, stored.body(), read_trc(path), stored.record.fps)
+    told = {key: value for key, value in dataclasses.asdict(found).items()}
+    text = (
+        f"mean {found.mean_mm:.1f} mm, worst frame {found.worst_mm:.1f} mm, frames with a lost limb "
+        f"{found.lost_frames} (marker off by more than 150 mm), no alignment, {len(frames)} frames"
+    )
+    return {**told, "text": text}
+
+
+@click.command()
+@command
+def bench() -> dict[str, object]:
+    """Measure the weighting kernels against the speed of bare memory loads, in the same run."""
+    with progress("Measuring") as report:
+        return dict(run_benchmark(progress=report))

@@ -1,0 +1,51 @@
+"""A start pose from a file: a CSV row of parameters, or a TRC whose markers are met by inverse kinematics."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.inverse_kinematics import pose_from_markers
+from studio.body.model import BodyModel
+from studio.capture.trc import read_trc
+from studio.errors import RunError, TruthError
+from studio.runs.search_space import parameter_names
+from studio.sessions.named_rows import read_pose
+
+Array = NDArray[np.float64]
+
+FEWEST_MARKERS = 4
+
+
+def start_pose_from_file(path: Path, body: BodyModel, frame: int, fps: float) -> tuple[Array, str]:
+    """The pose (D,), radians and mm, that a file gives for a frame, and in words where it came from.
+
+    A CSV has one row, its header the body's parameters. Of a TRC the row whose `Time` × fps is the frame is
+    taken (its first row is frame 0) and the body is fitted to the markers that both know. Raises RunError,
+    BodyError, TruthError naming the file.
+    """
+    if not path.is_file():
+        raise RunError(
+            f"There is no start pose file '{path}'.", "Give a CSV with one row of parameters, or a TRC."
+        )
+    if path.suffix.lower() != ".trc":
+        return read_pose(path, parameter_names(body)), f"file {path.name}"
+    motion = read_trc(path)
+    rows = np.rint((motion.times - motion.times[0]) * fps).astype(int)
+    found = np.flatnonzero(rows == frame)
+    if not found.size:
+        raise TruthError(
+            f"'{path.name}' has no row for frame {frame} at {fps:g} frames per second.",
+            f"Its rows are frames {rows.min()} to {rows.max()}.",
+        )
+    known = {marker.name for marker in body.markers}
+    points = motion.positions[found[0]]
+    kept = [at for at, name in enumerate(motion.names) if name in known and np.isfinite(points[at]).all()]
+    if len(kept) < FEWEST_MARKERS:
+        raise TruthError(
+            f"'{path.name}' has {len(kept)} markers that body '{body.name}' knows in frame {frame}.",
+            f"Name at least {FEWEST_MARKERS} of: {', '.join(sorted(known)) or 'the body has no markers'}.",
+        )
+    names = tuple(motion.names[at] for at in kept)
+    pose, error = pose_from_markers(body, names, points[kept], body.neutral)
+    return pose, f"{len(kept)} markers of {path.name}, met to {error:.0f} mm"

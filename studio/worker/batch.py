@@ -1,0 +1,49 @@
+"""A run tracked to its end in this process, for commands and scripts; Ctrl-C ends it and keeps what is done."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.worker.open_run import OpenRun
+
+# Called with a step in words, frames done and frames in all.
+Report = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class BatchResult:
+    """evaluations_per_frame : poses weighed in the last frame (a frame after the first, where there is one).
+
+    last_beta : exponent of the last layer. seconds : from opening to the last result, compilation included.
+    """
+
+    evaluations_per_frame: int
+    last_beta: float
+    seconds: float
+
+
+def track_to_end(session: Session, run: StoredRun, report: Report) -> BatchResult:
+    """Track a prepared or interrupted run to its last frame.
+
+    Raises StudioError; KeyboardInterrupt is passed on after the run was marked as cancelled.
+    """
+    began = time.perf_counter()
+    total = run.record.frame_count
+    opened = OpenRun(str(session.path), str(run.folder))
+    evaluations, beta = 0, float("nan")
+    try:
+        report("compiling kernels, once", opened.tracking.done, total)
+        opened.warm_up()
+        while not opened.tracking.finished:
+            stepped = opened.step_layer()
+            if stepped.result is not None:
+                evaluations, beta = stepped.result.evaluations, stepped.record.beta
+                report(f"{session.name} / {run.name}", opened.tracking.done, total)
+    except KeyboardInterrupt:
+        opened.tracking.mark_cancelled()
+        raise
+    finally:
+        opened.close()
+    return BatchResult(evaluations, beta, time.perf_counter() - began)
