@@ -1,4 +1,4 @@
-"""A run tracked to its end in this process, for commands and scripts; Ctrl-C ends it and keeps what is done."""
+"""A run tracked to its end in this process, for commands and scripts; Ctrl-C keeps what is done."""
 
 import time
 from collections.abc import Callable
