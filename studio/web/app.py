@@ -5,19 +5,28 @@ things (the scene, the tracking process, the stream of events) start and stop wi
 """
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 
 from fastapi import FastAPI
 from starlette.staticfiles import StaticFiles
 
+from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.workspace import Workspace
 from studio.web import (
     event_stream,
     guide_routes,
+    import_routes,
     page_routes,
+    picture_routes,
+    result_routes,
+    run_routes,
     scene_relay,
+    scene_routes,
+    session_routes,
+    settings_routes,
+    upload_routes,
 )
 from studio.web.access import AccessGuard, HostRule, binding_rule
 from studio.web.body_limit import BodyLimit
@@ -25,15 +34,26 @@ from studio.web.content_policy import PolicyHeaders
 from studio.web.doors import Control, Doors, Stage
 from studio.web.error_responses import ErrorsInWords, add_error_handlers
 from studio.web.event_stream import EventStream
+from studio.web.presets import Preset
+from studio.web.schemas import ErrorAnswer
 
 DESCRIPTION = (
     "Sessions, runs, settings and results of the capture studio. Every answer that is no success is "
     "`{code, message, hint, status}`. Requests carry the cookie that the printed address sets, or the token "
-    "as `Authorization: Bearer`. Lengths in mm, angles in radians, NaN as null. Events: WebSocket `/api/events`."
+    "as `Authorization: Bearer`. Lengths in mm, angles in radians, NaN as null. "
+    "Events: WebSocket `/api/events`."
 )
 ROUTERS = (
     page_routes.router,
     guide_routes.router,
+    session_routes.router,
+    import_routes.router,
+    upload_routes.router,
+    run_routes.router,
+    settings_routes.router,
+    result_routes.router,
+    picture_routes.router,
+    scene_routes.router,
     scene_relay.router,
     event_stream.router,
 )
@@ -47,17 +67,19 @@ def build_app(
     *,
     hosts: HostRule | None = None,
     footage_roots: tuple[Path, ...] = (),
+    presets: Sequence[Preset] = (),
     log_path: Path | None = None,
 ) -> FastAPI:
     """The application. Serving it starts `stage`, and ends `stage` and `control` when it stops.
 
     token : what lets a browser in. hosts : the Host headers that are answered (default: this machine's
-    loopback). footage_roots : folders from which footage may be imported by path. log_path : named in
-    answers to unforeseen errors.
+    loopback). presets : the studio's own. footage_roots : folders from which footage may be imported by
+    path. log_path : named in answers to unforeseen errors.
     """
-    doors = Doors(workspace, control, stage, EventStream(control), footage_roots, log_path)
+    doors = Doors(workspace, control, stage, EventStream(control), footage_roots, presets, log_path)
     app = FastAPI(
         title="Capture studio",
+        responses={status: {"model": ErrorAnswer} for status in (403, 404, 409, 422, 500)},
         description=DESCRIPTION,
         lifespan=_lifespan,
         docs_url=None,
@@ -88,5 +110,6 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     finally:
         doors.scene_port = 0
         await doors.events.stop()
+        await asyncio.to_thread(forget_composers)
         await asyncio.to_thread(doors.stage.stop)
         await asyncio.to_thread(doors.control.close)

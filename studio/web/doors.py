@@ -5,8 +5,8 @@ lie.
 brings them together.
 """
 
-import queue
-from collections.abc import Mapping
+import asyncio
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
@@ -15,8 +15,11 @@ from fastapi import Request
 
 from studio.sessions.workspace import Workspace
 from studio.web.event_stream import EventStream
+from studio.web.presets import Preset
+from studio.web.schemas import ImportState
 from studio.worker.commands import Command
-from studio.worker.events import Event, StateChanged
+from studio.worker.events import StateChanged
+from studio.worker.watchers import Subscription
 
 Value = bool | int | float | str
 
@@ -31,7 +34,7 @@ class Control(Protocol):
         """Where the search stands, or stood when the process was last heard of."""
         ...
 
-    def send(self, command: Command) -> None:
+    def send(self, command: Command) -> object:
         """Post a command; an `Acknowledged` event follows."""
         ...
 
@@ -39,8 +42,8 @@ class Control(Protocol):
         """Change knobs of the open run. Raises SettingsError."""
         ...
 
-    def subscribe(self) -> "queue.Queue[Event]":
-        """A queue that every event is put into."""
+    def subscribe(self) -> Subscription:
+        """All events from now on."""
         ...
 
     def restart(self) -> None:
@@ -63,6 +66,10 @@ class Stage(Protocol):
         """Close it."""
         ...
 
+    def show(self, **wish: object) -> None:
+        """Change what is shown: session, run, frame, layer, look_through, dark."""
+        ...
+
     def relay_headers(self) -> Mapping[str, str]:
         """The secret that the scene asks of whoever connects."""
         ...
@@ -73,7 +80,8 @@ class Doors:
     """Everything a route may use, kept in `app.state.doors`.
 
     scene_port : of the inner viser server, 0 while it is not running. footage_roots : folders that may be
-    imported from. log_path : the server's log file.
+    imported from. presets : the studio's own. log_path : the server's log file. imports, uploads : those
+    under way, by their identifiers.
     """
 
     workspace: Workspace
@@ -81,9 +89,12 @@ class Doors:
     stage: Stage
     events: EventStream
     footage_roots: tuple[Path, ...] = ()
+    presets: Sequence[Preset] = ()
     log_path: Path | None = None
     scene_port: int = 0
-    imports: dict[str, object] = field(default_factory=dict)
+    imports: dict[str, ImportState] = field(default_factory=dict)
+    uploads: dict[str, dict[str, int]] = field(default_factory=dict)
+    jobs: set[asyncio.Task[None]] = field(default_factory=set)
 
     @property
     def state_folder(self) -> Path:

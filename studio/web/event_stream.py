@@ -8,13 +8,14 @@ nothing and slows nobody.
 
 import asyncio
 import queue
-from collections import OrderedDict
+from collections import OrderedDict, deque
 from typing import TYPE_CHECKING
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
 from studio.web.event_encoding import as_json, key_of, message_of
-from studio.worker.events import Event, SettingsApplied, StateChanged
+from studio.worker.events import Event, LogLine, SettingsApplied, StateChanged
+from studio.worker.watchers import Subscription
 
 if TYPE_CHECKING:
     from studio.web.doors import Control
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 router = APIRouter(tags=["events"])
 
 LIMIT = 256
-POLL_SECONDS = 0.25
+LOG_LINES, LOGS = 500, 32
 
 
 class Watcher:
@@ -64,6 +65,7 @@ class EventStream:
         self._control = control
         self._watchers: set[Watcher] = set()
         self._settings: dict[str, object] | None = None
+        self._logs: OrderedDict[tuple[str, str], deque[dict[str, object]]] = OrderedDict()
         self._task: asyncio.Task[None] | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
 
@@ -73,7 +75,7 @@ class EventStream:
         self._task = asyncio.create_task(self._pump(self._control.subscribe()))
 
     async def stop(self) -> None:
-        """End within `POLL_SECONDS`."""
+        """End at once."""
         if self._task is not None:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
@@ -82,10 +84,15 @@ class EventStream:
     def watch(self) -> Watcher:
         """A new watcher, greeted with the present state and settings."""
         watcher = Watcher()
-        hello = {"type": "hello", "session": "", "run": "", "state": message_of(self._control.state)}
-        watcher.offer(None, as_json(hello | {"settings": self._settings}))
+        for message in (message_of(self._control.state), self._settings):
+            if message is not None:
+                watcher.offer(key_of(message), as_json(message))
         self._watchers.add(watcher)
         return watcher
+
+    def log_of(self, session: str, run: str) -> list[dict[str, object]]:
+        """The last `LOG_LINES` lines of a run's log, as far as this server heard them."""
+        return list(self._logs.get((session, run), ()))
 
     def leave(self, watcher: Watcher) -> None:
         """Forget a watcher."""
@@ -109,26 +116,33 @@ class EventStream:
             self._settings = message
         elif isinstance(event, StateChanged) and event.state == "idle":
             self._settings = None
+        elif isinstance(event, LogLine):
+            self._remember(message)
         self._offer(message)
 
-    async def _pump(self, source: "queue.Queue[Event]") -> None:
-        while True:
-            try:
-                event = await asyncio.to_thread(source.get, True, POLL_SECONDS)
-            except queue.Empty:
-                continue
-            self._take(event)
-            # What came meanwhile is taken without another thread's turn.
+    def _remember(self, line: dict[str, object]) -> None:
+        key = (str(line["session"]), str(line["run"]))
+        kept = self._logs.setdefault(key, deque(maxlen=LOG_LINES))
+        kept.append(line)
+        self._logs.move_to_end(key)
+        if len(self._logs) > LOGS:
+            self._logs.popitem(last=False)
+
+    async def _pump(self, source: Subscription) -> None:
+        try:
             while True:
-                try:
-                    self._take(source.get_nowait())
-                except queue.Empty:
-                    break
+                self._take(await source.next())
+                # A flood of events must not keep the loop from everything else.
+                await asyncio.sleep(0)
+        except queue.Empty:
+            return
+        finally:
+            source.close()
 
 
 @router.websocket("/api/events")
 async def events(socket: WebSocket) -> None:
-    """Every event as one JSON text message, `hello` first; what a browser sends is ignored."""
+    """Every event as one JSON text message, state and settings first; what a browser sends is ignored."""
     stream: EventStream = socket.app.state.doors.events
     await socket.accept()
     watcher = stream.watch()

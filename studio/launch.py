@@ -1,0 +1,178 @@
+"""Builds workspace, worker, scene and web, opens them in order, and closes them all when told to."""
+
+import logging
+import logging.handlers
+import re
+import socket
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+import uvicorn
+
+from studio.errors import StudioError
+from studio.runs.new_run import RunRequest, prepare_run
+from studio.scene.presets import PRESETS
+from studio.scene.stage import SceneStage
+from studio.sessions.session import Session
+from studio.sessions.workspace import Workspace
+from studio.web.access import binding_rule, new_token
+from studio.web.app import build_app
+from studio.web.doors import STATE_NAME
+from studio.web.safe_paths import default_footage_roots
+from studio.web.samples import install_sample
+from studio.worker.commands import Open, Start
+from studio.worker.control import StudioControl
+
+Announce = Callable[[str], None]
+
+PORT = 8642
+LOG_NAME = "server.log"
+LOG_BYTES, LOG_FILES = 2_000_000, 3
+SECONDS_TO_CLOSE = 2
+TOKEN_IN_ADDRESS = re.compile(r"(token=)[A-Za-z0-9_%-]+")
+
+
+class PortTakenError(StudioError):
+    """Something else listens where the studio should."""
+
+    status, code = 409, "port"
+
+
+def serve(
+    workspace_root: Path,
+    host: str = "127.0.0.1",
+    port: int = PORT,
+    allow_remote: bool = False,
+    open_session: str | None = None,
+    *,
+    open_run: str | None = None,
+    track: bool = False,
+    announce: Announce = click.echo,
+) -> None:
+    """Serve the studio on a workspace until Ctrl-C.
+
+    port : 0 takes a free one. open_session, open_run : what the printed address shows first; with `track`
+    the run is tracked at once. announce : is told the address, once. Raises StudioError for a host that
+    needs `allow_remote`, a port that is taken, or a workspace that cannot be written.
+    """
+    hosts = binding_rule(host, allow_remote)
+    workspace = Workspace(workspace_root)
+    log_path = _log_to_file(workspace.root / STATE_NAME)
+    token = new_token()
+    with _listening(host, port) as listener:
+        control = StudioControl(workspace)
+        try:
+            app = build_app(
+                workspace,
+                control,
+                SceneStage(workspace, control),
+                token,
+                hosts=hosts,
+                footage_roots=default_footage_roots(workspace.root),
+                presets=PRESETS,
+                log_path=log_path,
+            )
+            if track and open_session and open_run:
+                _track(control, workspace.session(open_session), open_run)
+            announce(f"Open {address(host, listener.getsockname()[1], token, open_session, open_run)}")
+            _serve_until_stopped(app, listener)
+        finally:
+            control.close()
+
+
+def demo(workspace_root: Path, port: int = 0, *, announce: Announce = click.echo) -> None:
+    """The bundled walk in the browser, being tracked as the page opens; until Ctrl-C."""
+    session = prepare_demo(workspace_root)
+    runs = session.runs()
+    unfinished = [run for run in runs if run.summary().status in ("new", "interrupted")]
+    run = unfinished[-1] if unfinished else prepare_run(session, RunRequest(seed=len(runs)))
+    serve(
+        workspace_root, port=port, open_session=session.name, open_run=run.name, track=True, announce=announce
+    )
+
+
+def prepare_demo(workspace_root: Path) -> Session:
+    """The bundled walk as a session of the workspace, copied there if it is absent."""
+    return install_sample(Workspace(workspace_root), "walk")
+
+
+def address(host: str, port: int, token: str, session: str | None = None, run: str | None = None) -> str:
+    """The address to open; it holds the token."""
+    name = {"0.0.0.0": socket.gethostname(), "::": socket.gethostname(), "": socket.gethostname()}.get(
+        host, host
+    )
+    shown = f"[{name}]" if ":" in name else name
+    wish = f"&session={session}" if session else ""
+    wish += f"&run={run}" if session and run else ""
+    return f"http://{shown}:{port}/?token={token}{wish}"
+
+
+def _track(control: StudioControl, session: Session, run: str) -> None:
+    control.send(Open("launch-open", str(session.path), str(session.run(run).folder)))
+    control.send(Start("launch-start"))
+
+
+def _listening(host: str, port: int) -> socket.socket:
+    """A socket that listens, so that the port is known (and ours) before anything else starts."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((host.strip("[]"), port))
+        listener.listen(128)
+    except OSError as error:
+        listener.close()
+        raise PortTakenError(
+            f"The studio cannot listen on '{host}' port {port} ({error.strerror or error}).",
+            "Choose another port with --port, or 0 for a free one.",
+        ) from None
+    return listener
+
+
+def _serve_until_stopped(app: object, listener: socket.socket) -> None:
+    """Serve until a signal; open sockets get a moment to say goodbye."""
+    config = uvicorn.Config(
+        app,  # pyright: ignore[reportArgumentType] - any ASGI application
+        log_config=None,
+        access_log=False,
+        server_header=False,
+        ws="websockets-sansio",
+        ws_max_size=64 << 20,
+        ws_per_message_deflate=False,
+        timeout_graceful_shutdown=SECONDS_TO_CLOSE,
+    )
+    try:
+        uvicorn.Server(config).run(sockets=[listener])
+    except KeyboardInterrupt:
+        return
+
+
+def _log_to_file(folder: Path) -> Path:
+    """Warnings and errors of all rooms go to a file that never holds a token; returns where it is."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        handler = logging.handlers.RotatingFileHandler(
+            folder / LOG_NAME, maxBytes=LOG_BYTES, backupCount=LOG_FILES, encoding="utf-8", delay=True
+        )
+    except OSError as error:
+        raise StudioError(
+            f"The workspace '{folder.parent}' cannot be written ({error.strerror}).",
+            "Choose another with --workspace.",
+        ) from None
+    handler.setLevel(logging.WARNING)
+    handler.setFormatter(RedactedFormatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
+    root = logging.getLogger()
+    for old in [entry for entry in root.handlers if isinstance(entry.formatter, RedactedFormatter)]:
+        root.removeHandler(old)
+        old.close()
+    root.addHandler(handler)
+    return folder / LOG_NAME
+
+
+class RedactedFormatter(logging.Formatter):
+    """Takes tokens out of whatever is logged, tracebacks included."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """The line without tokens."""
+        return TOKEN_IN_ADDRESS.sub(r"\1…", super().format(record))

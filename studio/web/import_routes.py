@@ -1,0 +1,160 @@
+"""Importing sessions: from a folder of this machine, from an upload, or the sample that travels with the
+studio.
+
+An import takes as long as the footage takes to be decoded once, so it runs in the background and tells how
+far it is (`GET /api/imports/{identifier}` and `import` events). Nothing appears in the workspace before all
+of it was read.
+"""
+
+import asyncio
+import secrets
+import shutil
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Query
+
+from studio.errors import NotFoundError, StudioError
+from studio.sessions.importers.catalogue import import_source
+from studio.web.archives import unpack_zip
+from studio.web.doors import Doors, doors_of
+from studio.web.error_responses import UnforeseenError, log
+from studio.web.safe_paths import PathRefused, folder_to_import
+from studio.web.samples import install_sample
+from studio.web.schemas import (
+    CameraMatching,
+    FolderView,
+    ImportRequest,
+    ImportState,
+    NewName,
+    SampleRequest,
+)
+from studio.web.upload_routes import forget, upload_folder
+
+router = APIRouter(prefix="/api", tags=["importing"])
+
+Door = Annotated[Doors, Depends(doors_of)]
+
+KEPT = 50
+FOLDERS_SHOWN = 1000
+
+
+@router.post("/imports", status_code=202)
+async def begin_import(wish: ImportRequest, doors: Door) -> ImportState:
+    """Begin an import; the name must be free. Ask for its state, or wait for `import` events."""
+    if (wish.source is None) == (wish.upload is None):
+        raise PathRefused("An import needs either 'source' or 'upload'.", "Give a folder, or upload one.")
+    into = await asyncio.to_thread(doors.workspace.place_for, wish.name)
+    if wish.source is not None:
+        source = await asyncio.to_thread(folder_to_import, wish.source, doors.footage_roots)
+    else:
+        source = upload_folder(doors, wish.upload or "")
+    state = ImportState(identifier=secrets.token_hex(8), name=wish.name, state="running", step="reading")
+    doors.imports[state.identifier] = state
+    while len(doors.imports) > KEPT:
+        doors.imports.pop(next(iter(doors.imports)))
+    job = asyncio.create_task(asyncio.to_thread(_import, doors, state.identifier, wish, source, into))
+    doors.jobs.add(job)
+    job.add_done_callback(doors.jobs.discard)
+    return state
+
+
+@router.get("/imports/{identifier}")
+def import_state(identifier: str, doors: Door) -> ImportState:
+    """How an import stands."""
+    state = doors.imports.get(identifier)
+    if state is None:
+        raise NotFoundError(f"There is no import '{identifier[:40]}'.", "Begin a new one.")
+    return state
+
+
+@router.post("/samples", status_code=201)
+def add_sample(wish: SampleRequest, doors: Door) -> NewName:
+    """Copy a sample session into the workspace (if it is not there) and return its name."""
+    session = install_sample(doors.workspace, wish.name)
+    doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
+    return NewName(name=session.name)
+
+
+@router.get("/folders")
+def folders(
+    doors: Door, path: Annotated[str, Query(description="A full path; empty: the roots.")] = ""
+) -> FolderView:
+    """Folders inside a folder, for choosing one to import; only where footage may be taken from."""
+    if not path.strip():
+        return FolderView(path="", parent=None, folders=[str(root) for root in doors.footage_roots])
+    place = folder_to_import(path, doors.footage_roots)
+    try:
+        found = sorted(entry.name for entry in place.iterdir() if entry.is_dir() and entry.name[:1] != ".")
+    except PermissionError:
+        raise PathRefused(f"'{place}' may not be read.", "Check the folder's permissions.") from None
+    inside = any(place.parent.is_relative_to(root) for root in doors.footage_roots)
+    return FolderView(
+        path=str(place), parent=str(place.parent) if inside else "", folders=found[:FOLDERS_SHOWN]
+    )
+
+
+def _import(doors: Doors, identifier: str, wish: ImportRequest, source: Path, into: Path) -> None:
+    """Do the import in this thread, keeping its state up to date; never raises."""
+    lock = threading.Lock()
+
+    def tell(**changes: object) -> None:
+        with lock:
+            state = doors.imports.get(identifier)
+            if state is not None:
+                doors.imports[identifier] = state = state.model_copy(update=changes)
+                doors.events.publish({"type": "import", "session": wish.name, "run": ""} | state.model_dump())
+
+    try:
+        folder = _unpacked(source, tell) if wish.upload else source
+        report = import_source(
+            folder,
+            into,
+            calibration=wish.calibration,
+            fps=wish.fps,
+            copy=wish.copy_footage or wish.upload is not None,
+            progress=lambda step, done, total: tell(step=step, done=done, total=total),
+        )
+    except StudioError as error:
+        tell(state="failed", code=error.code, message=error.message, hint=error.hint)
+        return
+    except Exception as error:
+        log.exception("import of '%s' failed", source)
+        wrong = UnforeseenError(f"The import failed: {type(error).__name__}.", f"See '{doors.log_path}'.")
+        tell(state="failed", code=wrong.code, message=wrong.message, hint=wrong.hint)
+        return
+    if wish.upload:
+        forget(doors, wish.upload)
+    tell(
+        state="done",
+        notes=list(report.notes),
+        warnings=list(report.warnings),
+        matching=[CameraMatching.model_validate(match) for match in report.matching],
+    )
+    doors.events.publish({"type": "sessions", "session": wish.name, "run": ""})
+
+
+def _unpacked(folder: Path, tell: Callable[..., None]) -> Path:
+    """The uploaded folder itself: out of its zip, and without the folders that only wrap it."""
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    if len(files) == 1 and files[0].suffix.lower() == ".zip":
+        tell(step="unpacking")
+        unpacked = folder / "unpacked"
+        unpacked.mkdir()
+        try:
+            unpack_zip(files[0], unpacked)
+        except StudioError:
+            shutil.rmtree(unpacked, ignore_errors=True)
+            raise
+        files[0].unlink()
+        folder = unpacked
+    while (
+        len(inside := [path for path in folder.iterdir() if path.name != "__MACOSX"]) == 1
+        and inside[0].is_dir()
+    ):
+        if inside[0].name.lower() in ("videos", "calibration"):
+            break
+        folder = inside[0]
+    return folder

@@ -1,0 +1,67 @@
+"""Camera pictures as JPEG, upright, bare or with what was seen and projected drawn over them."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+
+from studio.errors import NotFoundError
+from studio.runs.overlay_drawing import encode_jpeg
+from studio.runs.overlay_pictures import compose_view
+from studio.sessions.session import Session
+from studio.web.run_routes import RUN, OpenRun
+from studio.web.session_routes import OpenSession
+
+router = APIRouter(prefix="/api", tags=["pictures"])
+
+VIEW = "/frames/{frame}/views/{camera}.jpg"
+Height = Annotated[
+    int | None, Query(ge=16, le=4320, description="Of the picture as shown; empty: as stored.")
+]
+Show = Annotated[
+    str, Query(max_length=200, description="outline, truth, mask, edges, samples, particles; with commas.")
+]
+
+
+@router.get("/sessions/{session}" + VIEW, response_class=Response)
+def picture(
+    session: OpenSession, frame: int, camera: str, show: Show = "", height: Height = None
+) -> Response:
+    """What a camera saw in a frame; without a run, masks and edges are made with the default settings."""
+    _check_view(session, frame, camera)
+    return _jpeg(encode_jpeg(compose_view(session, None, frame, camera, _layers(show), height=height)))
+
+
+@router.get(RUN + VIEW, response_class=Response)
+def overlay(
+    session: OpenSession,
+    run: OpenRun,
+    frame: int,
+    camera: str,
+    show: Show = "outline",
+    height: Height = None,
+) -> Response:
+    """What a camera saw in a frame, with the run's answer and evidence over it at choice."""
+    _check_view(session, frame, camera)
+    return _jpeg(encode_jpeg(compose_view(session, run, frame, camera, _layers(show), height=height)))
+
+
+def _layers(show: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(word.strip() for word in show.split(",") if word.strip()))
+
+
+def _check_view(session: Session, frame: int, camera: str) -> None:
+    """Raise NotFoundError for what the session does not have, before any footage is opened."""
+    if not 0 <= frame < session.manifest.frame_count:
+        raise NotFoundError(
+            f"Session '{session.name}' has no frame {frame}.",
+            f"It has frames 0 to {session.manifest.frame_count - 1}.",
+        )
+    names = [source.name for source in session.manifest.footage.cameras]
+    if camera not in names:
+        raise NotFoundError(
+            f"Session '{session.name}' has no camera '{camera[:64]}'.", f"It has {', '.join(names)}."
+        )
+
+
+def _jpeg(content: bytes) -> Response:
+    return Response(content, media_type="image/jpeg", headers={"cache-control": "no-store"})

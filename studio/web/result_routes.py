@@ -1,0 +1,209 @@
+"""Results: the timeline, any stored frame with all its layers, the particles of a layer, CSV, the error.
+
+Everything is read from the store, also while it is being written.
+"""
+
+import csv
+import io
+from typing import Annotated, Literal
+
+import numpy as np
+from fastapi import APIRouter, Depends, Query, Response
+
+from studio.errors import NotFoundError, StudioError
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.settings import SettingsHistory
+from studio.tracking.tracker import LayerRecord
+from studio.web.doors import Doors, doors_of
+from studio.web.event_encoding import layer_summary
+from studio.web.result_schemas import (
+    EvaluationView,
+    FrameDetail,
+    FrameLine,
+    FramesSummary,
+    LayerView,
+    ParticlesView,
+)
+from studio.web.run_errors import evaluation_of
+from studio.web.run_routes import RUN, OpenRun
+from studio.web.session_routes import OpenSession
+from studio.web.session_views import describe, parameter_views
+from studio.web.setting_schemas import SettingsChange
+
+router = APIRouter(prefix="/api", tags=["results"])
+
+Door = Annotated[Doors, Depends(doors_of)]
+MOMENTS = (
+    ("weighed", "variance_weighed"),
+    ("before_diffusion", "variance_resampled"),
+    ("after_diffusion", "variance_diffused"),
+)
+
+
+@router.get(RUN + "/frames")
+def frames(session: OpenSession, run: OpenRun) -> FramesSummary:
+    """Weight, time and (with truth) error of every finished frame, and where settings changed."""
+    record = run.record
+    with run.results() as results:
+        timeline, partial = results.timeline(), results.partial()
+        history = SettingsHistory(tuple(results.settings_history()))
+    lines = [
+        FrameLine(
+            frame=int(timeline.frames[at]),
+            log_weight=float(timeline.log_weights[at]),
+            milliseconds=float(timeline.milliseconds[at]),
+            evaluations=int(timeline.evaluations[at]),
+            layers=int(timeline.layers[at]),
+            settings_version=int(timeline.settings_versions[at]),
+        )
+        for at in range(len(timeline.frames))
+    ]
+    changes = [
+        SettingsChange(version=entry.version, frame=entry.frame, layer=entry.layer, changed=list(names))
+        for entry, names in zip(history.entries, history.changes(), strict=True)
+    ]
+    times = timeline.milliseconds
+    summary = FramesSummary(
+        first=record.first,
+        last=record.last,
+        fps=record.fps,
+        describe=describe(record),
+        frames=lines,
+        settings_changes=changes[1:],
+        partial=partial.frame if partial else None,
+        mean_milliseconds=float(times.mean()) if len(times) else None,
+    )
+    return _with_errors(summary, session, run)
+
+
+@router.get(RUN + "/frames/{frame}")
+def frame_detail(run: OpenRun, frame: int) -> FrameDetail:
+    """A frame with all its layers; of the frame in progress those that are done."""
+    with run.results() as results:
+        layers = results.layers(frame)
+        finished = frame in results.frames()
+        result = results.result(frame) if finished else None
+        history = SettingsHistory(tuple(results.settings_history()))
+    entry = history.in_use(frame, layers[-1].layer)
+    estimate = result.estimate if result else None
+    return FrameDetail(
+        frame=frame,
+        finished=finished,
+        parameters=parameter_views(run.body()),
+        layers=[LayerView.model_validate(layer_summary(layer)) for layer in layers],
+        pose=estimate.pose.tolist() if estimate else None,
+        mean=estimate.mean.tolist() if estimate else None,
+        mode=estimate.mode.tolist() if estimate else None,
+        log_weight=estimate.log_weight if estimate else None,
+        evaluations=result.evaluations if result else sum(len(layer.poses) for layer in layers),
+        milliseconds=result.milliseconds if result else sum(layer.milliseconds for layer in layers),
+        settings_version=layers[-1].settings_version,
+        settings=dict(entry.values if entry else run.record.settings),
+    )
+
+
+@router.get(RUN + "/frames/{frame}/layers/{layer}")
+def layer_detail(run: OpenRun, frame: int, layer: int) -> LayerView:
+    """One layer without its particles."""
+    with run.results() as results:
+        return LayerView.model_validate(layer_summary(results.layer(frame, layer)))
+
+
+@router.get(RUN + "/frames/{frame}/layers/{layer}/particles", response_model=ParticlesView)
+def particles(
+    run: OpenRun,
+    frame: int,
+    layer: int,
+    form: Annotated[Literal["json", "float32"], Query(alias="format")] = "json",
+) -> Response | ParticlesView:
+    """The particles of a layer as they were weighed.
+
+    format=float32: little-endian numbers, N rows of D pose entries and the raw log-weight; headers
+    X-Studio-Rows and X-Studio-Columns give N and D + 1.
+    """
+    with run.results() as results:
+        record = results.layer(frame, layer)
+    if form == "float32":
+        return _binary(record)
+    return ParticlesView(
+        frame=frame,
+        layer=layer,
+        beta=record.beta,
+        parameters=list(run.record.parameters),
+        poses=record.poses.tolist(),
+        log_weights=record.log_weights,
+    )
+
+
+@router.get(RUN + "/frames/{frame}/variance.csv", response_class=Response)
+def variance_csv(run: OpenRun, frame: int) -> Response:
+    """The variances of a frame: one row a layer and moment, one column a parameter (mm² and rad²)."""
+    with run.results() as results:
+        layers = results.layers(frame)
+    rows = [
+        [frame, record.layer, moment, *(f"{value:.9g}" for value in getattr(record, name))]
+        for record in layers
+        for moment, name in MOMENTS
+    ]
+    return _csv(
+        ["frame", "layer", "moment", *run.record.parameters], rows, f"{run.name}-frame{frame}-variance.csv"
+    )
+
+
+@router.get(RUN + "/poses.csv", response_class=Response)
+def poses_csv(session: OpenSession, run: OpenRun) -> Response:
+    """All poses: frame, then one column per parameter in the body's order (radians and mm)."""
+    with run.results() as results:
+        numbers, poses = results.poses()
+    rows = [
+        [int(number), *(repr(float(value)) for value in pose)]
+        for number, pose in zip(numbers, poses, strict=True)
+    ]
+    return _csv(["frame", *run.record.parameters], rows, f"{session.name}-{run.name}-poses.csv")
+
+
+@router.get(RUN + "/evaluation")
+def evaluation(session: OpenSession, run: OpenRun) -> EvaluationView:
+    """The error of all finished frames. 404 without a truth or before the first frame."""
+    measured = evaluation_of(session, run)
+    if measured is None:
+        raise NotFoundError(
+            f"There is nothing to measure run '{run.name}' against, or no frame yet.",
+            "Import the session with a truth/*.trc, and track it.",
+        )
+    return EvaluationView.model_validate(measured)
+
+
+def _with_errors(summary: FramesSummary, session: Session, run: StoredRun) -> FramesSummary:
+    """The summary with each frame's error; a truth that cannot be used is named, not fatal."""
+    try:
+        measured = evaluation_of(session, run)
+    except StudioError as error:
+        return summary.model_copy(update={"truth_problem": str(error)})
+    if measured is None:
+        return summary
+    errors = dict(zip(measured.frames, measured.per_frame_mm, strict=True))
+    lost = set(measured.lost_frames)
+    lines = [
+        line.model_copy(update={"error_mm": errors.get(line.frame), "lost": line.frame in lost})
+        for line in summary.frames
+    ]
+    return summary.model_copy(
+        update={"frames": lines, "mean_mm": measured.mean_mm, "worst_mm": measured.worst_mm}
+    )
+
+
+def _binary(record: LayerRecord) -> Response:
+    table = np.column_stack([record.poses, record.log_weights]).astype("<f4")
+    headers = {"x-studio-rows": str(table.shape[0]), "x-studio-columns": str(table.shape[1])}
+    return Response(table.tobytes(), media_type="application/octet-stream", headers=headers)
+
+
+def _csv(head: list[str], rows: list[list[object]], name: str) -> Response:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(head)
+    writer.writerows(rows)
+    headers = {"content-disposition": f'attachment; filename="{name}"'}
+    return Response(text.getvalue(), media_type="text/csv; charset=utf-8", headers=headers)

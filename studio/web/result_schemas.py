@@ -1,0 +1,102 @@
+"""Results, as OpenAPI shows them."""
+
+from pydantic import Field
+
+from studio.web.schemas import Answer, Number, Numbers, ParameterView, Value
+from studio.web.setting_schemas import SettingsChange
+
+
+class FrameLine(Answer):
+    """A finished frame in the timeline. lost: whether a limb is off by more than 150 mm (with truth only)."""
+
+    frame: int
+    log_weight: Number
+    milliseconds: Number
+    evaluations: int
+    layers: int
+    settings_version: int
+    error_mm: Number = None
+    lost: bool = False
+
+
+class FramesSummary(Answer):
+    """A run's frames. first, last: half open. truth_problem: why the error cannot be measured though there
+    is a truth.
+    """
+
+    first: int
+    last: int
+    fps: float
+    describe: str
+    frames: list[FrameLine]
+    settings_changes: list[SettingsChange]
+    partial: int | None = Field(None, description="The frame in which the search stands, if it does.")
+    mean_mm: Number = None
+    worst_mm: Number = None
+    mean_milliseconds: Number = None
+    truth_problem: str = ""
+
+
+class LayerView(Answer):
+    """One layer without its particles; the same entries as a `layer` event."""
+
+    frame: int
+    layer: int
+    settings_version: int
+    beta: Number
+    alpha_wanted: Number
+    alpha_reached: Number
+    variance_weighed: Numbers
+    variance_resampled: Numbers
+    variance_diffused: Numbers
+    best: Numbers
+    mean: Numbers
+    best_log_weight: Number
+    log_weight_quantiles: Numbers
+    effective_share: Number
+    particles: int
+    milliseconds: Number
+
+
+class FrameDetail(Answer):
+    """A frame with all its layers. pose, mean, mode and log_weight are null in a frame that is not
+    finished.
+    """
+
+    frame: int
+    finished: bool
+    parameters: list[ParameterView]
+    layers: list[LayerView]
+    pose: Numbers | None
+    mean: Numbers | None
+    mode: Numbers | None
+    log_weight: Number
+    evaluations: int
+    milliseconds: Number
+    settings_version: int
+    settings: dict[str, Value]
+
+
+class ParticlesView(Answer):
+    """The particles of a layer as they were weighed. log_weights: raw, before β."""
+
+    frame: int
+    layer: int
+    beta: Number
+    parameters: list[str]
+    poses: list[Numbers]
+    log_weights: Numbers
+
+
+class EvaluationView(Answer):
+    """A run against the session's truth, in mm, without alignment unless said."""
+
+    frames: list[int]
+    mean_mm: Number
+    worst_mm: Number
+    lost_frames: int
+    per_marker_mm: dict[str, Number]
+    per_frame_mm: Numbers
+    root_aligned_mm: Number
+    procrustes_mm: Number
+    unmatched_markers: list[str]

@@ -1,0 +1,53 @@
+"""How far a run's poses are from the session's truth, measured again only when there is more to measure."""
+
+import threading
+from collections import OrderedDict
+from functools import lru_cache
+from pathlib import Path
+
+from studio.capture.trc import MarkerMotion, read_trc
+from studio.evaluation.errors import Evaluation, evaluate
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+
+KEPT = 64
+
+_lock = threading.Lock()
+_evaluations: OrderedDict[tuple[Path, int, int], Evaluation] = OrderedDict()
+
+
+def evaluation_of(session: Session, run: StoredRun) -> Evaluation | None:
+    """The errors of all finished frames; None without a truth or before the first frame.
+
+    Raises TruthError, BodyError.
+    """
+    path = session.truth_path
+    if path is None:
+        return None
+    stamp = path.stat().st_mtime_ns
+    with run.results() as results:
+        frames, poses = results.poses()
+    if not len(frames):
+        return None
+    key = (run.folder, len(frames), stamp)
+    with _lock:
+        if key in _evaluations:
+            return _evaluations[key]
+    found = evaluate(poses, frames, run.body(), _truth(path, stamp), run.record.fps)
+    with _lock:
+        _evaluations[key] = found
+        if len(_evaluations) > KEPT:
+            _evaluations.popitem(last=False)
+    return found
+
+
+def mean_error(session: Session, run: StoredRun, done: int) -> float | None:
+    """The mean marker error in mm; None where there is nothing to measure."""
+    measured = evaluation_of(session, run) if done else None
+    return None if measured is None else measured.mean_mm
+
+
+@lru_cache(maxsize=8)
+def _truth(path: Path, _stamp: int) -> MarkerMotion:
+    """The motion in a TRC; its time of change is part of the question, so that a new file is read."""
+    return read_trc(path)

@@ -1,0 +1,335 @@
+"""What the API takes and gives, as OpenAPI shows it. Lengths in mm, angles in radians, NaN as null."""
+
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+Value = bool | int | float | str
+NAME = r"^[A-Za-z0-9_-]{1,64}$"
+
+
+def _finite(value: object) -> object:
+    """NaN and infinities as None; numpy's numbers as Python's."""
+    number = value.item() if isinstance(value, np.generic) else value
+    return None if isinstance(number, float) and not math.isfinite(number) else number
+
+
+def _finite_list(values: object) -> object:
+    plain = values.tolist() if isinstance(values, np.ndarray) else values
+    return [_finite(value) for value in plain] if isinstance(plain, list | tuple) else plain
+
+
+Number = Annotated[float | None, BeforeValidator(_finite)]
+Numbers = Annotated[list[float | None], BeforeValidator(_finite_list)]
+RunName = Annotated[str, Field(pattern=NAME)]
+
+
+class Answer(BaseModel):
+    """An answer made from the studio's own values by their attributes."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+
+class Request(BaseModel):
+    """What a client sends; entries that nobody knows are refused."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+class ErrorAnswer(BaseModel):
+    """Every answer that is no success."""
+
+    code: str
+    message: str = Field(description="What is wrong, in one sentence.")
+    hint: str = Field(description="What to do, in one sentence.")
+    status: int
+
+
+class RunLine(Answer):
+    """A run in a list. status: new, tracking, interrupted, cancelled, finished or damaged."""
+
+    session: str
+    name: str
+    created: str
+    tracker: str
+    weighting: str
+    body: str
+    seed: int
+    first: int
+    last: int
+    done: int
+    tracked_to: int
+    status: str
+    describe: str = Field("", description="Tracker, layers and particles in a few words.")
+    mean_mm: Number = Field(None, description="Mean marker error where the session has a truth.")
+
+
+class SessionLine(Answer):
+    """A session in a list; runs newest first. thumbnail: address of a JPEG. problem: why it cannot be
+    opened.
+    """
+
+    name: str
+    title: str
+    created: str
+    body: str
+    tracker: str
+    weighting: str
+    cameras: int
+    camera_names: list[str]
+    frame_count: int
+    fps: float
+    has_truth: bool
+    thumbnail: str
+    notes: list[str]
+    warnings: list[str]
+    runs: list[RunLine]
+    problem: str = ""
+
+
+class SessionList(Answer):
+    """All sessions of the workspace, by name."""
+
+    sessions: list[SessionLine]
+
+
+class CameraView(Answer):
+    """A calibrated camera and its footage."""
+
+    name: str
+    width: int
+    height: int
+    quarter_turns: int = Field(description="Clockwise quarter turns that show the picture upright.")
+    matrix: list[list[float]]
+    distortion: Numbers
+    rotation: list[list[float]]
+    translation: Numbers
+    centre: Numbers
+    picture_width: int
+    picture_height: int
+    frame_count: int
+    has_masks: bool
+    has_background: bool
+
+
+class CameraMatching(Answer):
+    """Which calibrated camera a piece of footage was taken for."""
+
+    footage: str
+    camera: str
+    how: str
+
+
+class ParameterView(Answer):
+    """One entry of the pose vector. unit: mm or rad; limits null where there are none."""
+
+    name: str
+    label: str
+    unit: str
+    lower: Number
+    upper: Number
+    max_step: Number
+    neutral: float
+    limb: str
+
+
+class BodyView(Answer):
+    """A body as tables: parameters in the order of the pose vector."""
+
+    name: str
+    title: str
+    parameters: list[ParameterView]
+    limbs: list[str]
+    markers: list[str]
+    dimensions: dict[str, float]
+
+
+class SubjectView(Answer):
+    """The person's measures, mm."""
+
+    body: str
+    height_mm: Number
+    lengths_mm: dict[str, float]
+
+
+class SessionDetail(Answer):
+    """Everything about a session but its pictures."""
+
+    name: str
+    title: str
+    created: str
+    fps: float
+    frame_count: int
+    body: BodyView
+    cameras: list[CameraView]
+    subject: SubjectView | None
+    has_truth: bool
+    has_start_pose: bool
+    tracker: str
+    weighting: str
+    calibration_source: str
+    imported_from: str
+    matching: list[CameraMatching]
+    assumptions: list[str]
+    notes: list[str]
+    warnings: list[str]
+    runs: list[RunLine]
+
+
+class SessionChange(Request):
+    """New words for a session; both may change at once."""
+
+    name: RunName | None = None
+    title: str | None = Field(None, max_length=200)
+
+
+class NewName(Request):
+    """A name; null lets the studio find a free one."""
+
+    name: RunName | None = None
+
+
+class SampleRequest(Request):
+    """A session that travels with the studio."""
+
+    name: Literal["walk"] = "walk"
+
+
+class TrashEntry(Answer):
+    """Something in the trash. name: what it was called; restorable: whether it is a whole session."""
+
+    id: str
+    name: str
+    restorable: bool
+
+
+class TrashList(Answer):
+    """What lies in the trash, oldest first."""
+
+    entries: list[TrashEntry]
+
+
+class TrashChoice(Request):
+    """An entry of the trash by its id."""
+
+    entry: RunName
+
+
+class ImportRequest(Request):
+    """What is to be imported, from a folder of this machine or from an upload."""
+
+    name: RunName = Field(description="What the session will be called.")
+    source: str | None = Field(None, max_length=4096, description="Folder on the server's machine.")
+    upload: RunName | None = Field(None, description="Identifier of a finished upload.")
+    calibration: str | None = Field(None, max_length=4096, description="Which file, if there are several.")
+    fps: float | None = Field(None, gt=0, le=10_000)
+    copy_footage: bool = Field(True, alias="copy", description="False: refer to it where it lies.")
+
+
+class ImportState(Answer):
+    """How an import stands; code, message and hint say why it failed."""
+
+    identifier: str
+    name: str
+    state: Literal["running", "done", "failed"]
+    step: str = ""
+    done: int = 0
+    total: int = 0
+    code: str = ""
+    message: str = ""
+    hint: str = ""
+    notes: list[str] = []
+    warnings: list[str] = []
+    matching: list[CameraMatching] = []
+
+
+class UploadState(Answer):
+    """An unfinished upload: its files with the bytes received of each."""
+
+    identifier: str
+    files: dict[str, int]
+    total: int
+    limit: int
+
+
+class FileState(Answer):
+    """One file of an upload. received: its bytes; total: bytes of the whole upload."""
+
+    path: str
+    received: int
+    total: int
+
+
+class FolderView(Answer):
+    """Folders of the server's machine that footage may be imported from."""
+
+    path: str
+    parent: str | None
+    folders: list[str]
+
+
+class RunRequest(Request):
+    """A new run; what is left out is the session's own or the studio's default."""
+
+    name: RunName | None = None
+    tracker: RunName | None = None
+    weighting: RunName | None = None
+    body: RunName | None = None
+    first: int = Field(0, ge=0)
+    last: int | None = Field(None, ge=1, description="Frame after the last one; null: all.")
+    seed: int = Field(0, ge=0, le=2**63 - 1)
+    settings: dict[str, Value] = {}
+    start_pose: list[float] | None = Field(None, description="Radians and mm, in the body's order.")
+
+
+class Frame(Request):
+    """A frame by its number."""
+
+    frame: int = Field(ge=0)
+
+
+class Posted(Answer):
+    """A command that was handed to the tracking process; an `acknowledged` event with its identifier
+    follows.
+    """
+
+    identifier: str
+    command: str
+
+
+class RunList(Answer):
+    """The runs of a session, newest first."""
+
+    runs: list[RunLine]
+
+
+class RunDetail(Answer):
+    """What a run was asked to do. settings: at its start; parameters: of its pose vector, as sigma and
+    start_pose.
+    """
+
+    run: RunLine
+    settings: dict[str, Value]
+    parameters: list[ParameterView]
+    sigma: Numbers
+    start_pose: Numbers | None
+    start_source: str
+    software: str
+    fps: float
+    notes: list[str]
+
+
+class LogEntry(Answer):
+    """One line of a run's log. time: seconds since the epoch."""
+
+    level: str
+    time: float
+    text: str
+
+
+class LogLines(Answer):
+    """What the tracking process said, oldest first."""
+
+    lines: list[LogEntry]

@@ -1,0 +1,208 @@
+"""Knobs, the settings of a run, and presets.
+
+What is changed here goes the way of the sliders: `StudioControl.change_settings`, the mailbox, the next
+layer. What is in use comes back as a `settings` event.
+"""
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, Depends
+
+from studio.body.catalogue import list_bodies, load_body
+from studio.errors import SettingsError, StudioError
+from studio.knobs import Knob
+from studio.runs.new_run import DEFAULT_TRACKER, DEFAULT_WEIGHTING
+from studio.sessions.stored_run import StoredRun
+from studio.settings import (
+    RunSettings,
+    SettingsHistory,
+    all_knobs,
+    changed_settings,
+    default_settings,
+    json_schema,
+    settings_from_values,
+    values,
+)
+from studio.tracking.catalogue import TRACKERS
+from studio.web.doors import Doors, doors_of
+from studio.web.presets import all_presets, drop_preset, keep_preset, preset
+from studio.web.run_routes import RUN, OpenRun, ensure_open
+from studio.web.session_routes import OpenSession
+from studio.web.setting_schemas import (
+    BodyChoice,
+    Choice,
+    Choices,
+    KnobList,
+    KnobView,
+    PresetChoice,
+    PresetList,
+    PresetRequest,
+    ResetRequest,
+    SettingsChange,
+    SettingsInUse,
+)
+from studio.weighting.catalogue import WEIGHTINGS
+
+router = APIRouter(prefix="/api", tags=["settings"])
+
+Door = Annotated[Doors, Depends(doors_of)]
+Value = bool | int | float | str
+
+
+@router.get("/choices")
+def choices(doors: Door) -> Choices:
+    """Trackers, weightings, bodies and presets that a new run can be made of."""
+    folder = doors.workspace.root / "bodies"
+    folders = (folder,) if folder.is_dir() else ()
+    stamp = tuple((path.name, path.stat().st_mtime_ns) for path in sorted(folder.glob("*.toml")))
+    return Choices(
+        trackers=[Choice(name=name, label=_title(entry.settings_type)) for name, entry in TRACKERS.items()],
+        weightings=[Choice(name=name, label=entry.label) for name, entry in WEIGHTINGS.items()],
+        bodies=list(_bodies(folders, stamp)),
+        presets=all_presets(doors.presets, doors.state_folder),
+        default_tracker=DEFAULT_TRACKER,
+        default_weighting=DEFAULT_WEIGHTING,
+    )
+
+
+@router.get("/knobs")
+def knobs(tracker: str = DEFAULT_TRACKER, weighting: str = DEFAULT_WEIGHTING) -> KnobList:
+    """Every knob of a tracker with a weighting, with its default."""
+    settings = default_settings(tracker, weighting)
+    return KnobList(
+        tracker=tracker,
+        weighting=weighting,
+        knobs=knob_views(settings),
+        values=values(settings),
+        json_schema=json_schema(settings),
+    )
+
+
+@router.get(RUN + "/settings")
+def settings_in_use(run: OpenRun, doors: Door) -> SettingsInUse:
+    """The run's newest settings, since when they are in use, and every change before."""
+    return _in_use(doors, run)
+
+
+@router.patch(RUN + "/settings")
+def change_settings(
+    session: OpenSession, run: OpenRun, changes: dict[str, Value], doors: Door
+) -> SettingsInUse:
+    """Change knobs by name, all or none; a `settings` event says from which layer on they are used."""
+    return _change(doors, session.path.as_posix(), run, changes)
+
+
+@router.post(RUN + "/settings/reset")
+def reset_settings(session: OpenSession, run: OpenRun, wish: ResetRequest, doors: Door) -> SettingsInUse:
+    """Bring knobs back to their defaults."""
+    settings = default_settings(run.record.tracker, run.record.weighting)
+    defaults = {entry.name: entry.default for entry in all_knobs(settings)}
+    for name in wish.names:
+        if name not in defaults:
+            raise SettingsError(
+                f"There is no setting '{name[:64]}'.", f"Known: {', '.join(sorted(defaults))}."
+            )
+    movable = [entry.name for entry in all_knobs(settings) if entry.takes_effect != "new run"]
+    changes = {name: defaults[name] for name in wish.names or movable}
+    return _change(doors, session.path.as_posix(), run, changes)
+
+
+@router.post(RUN + "/settings/preset")
+def use_preset(session: OpenSession, run: OpenRun, wish: PresetChoice, doors: Door) -> SettingsInUse:
+    """Change the knobs that a preset sets."""
+    chosen = preset(wish.name, doors.presets, doors.state_folder)
+    return _change(doors, session.path.as_posix(), run, chosen.values)
+
+
+@router.get("/presets")
+def presets(doors: Door) -> PresetList:
+    """The studio's presets, then a person's own."""
+    return PresetList(presets=all_presets(doors.presets, doors.state_folder))
+
+
+@router.put("/presets/{name}")
+def put_preset(name: str, wish: PresetRequest, doors: Door) -> PresetList:
+    """Keep settings under a name."""
+    keep_preset(name, wish.help, wish.values, doors.presets, doors.state_folder)
+    return presets(doors)
+
+
+@router.delete("/presets/{name}")
+def delete_preset(name: str, doors: Door) -> PresetList:
+    """Delete a preset of a person's own."""
+    drop_preset(name, doors.state_folder)
+    return presets(doors)
+
+
+def knob_views(settings: RunSettings) -> list[KnobView]:
+    """The knobs of settings, group after group."""
+    return [_knob_view(entry) for entry in all_knobs(settings)]
+
+
+def _knob_view(entry: Knob) -> KnobView:
+    return KnobView(
+        name=entry.name,
+        label=entry.label,
+        kind=entry.kind.__name__,
+        default=entry.default,
+        low=entry.low,
+        high=entry.high,
+        step=entry.step,
+        unit=entry.unit,
+        choices=list(entry.choices),
+        takes_effect=entry.takes_effect,
+        help=entry.help,
+        group=entry.group,
+    )
+
+
+def _change(doors: Doors, session: str, run: StoredRun, changes: dict[str, Value]) -> SettingsInUse:
+    """Check the changes here (the run may not be open yet), then hand them to the tracking process."""
+    now = _in_use(doors, run).values
+    changed_settings(settings_from_values(run.record.tracker, run.record.weighting, now), changes)
+    ensure_open(doors, session, run)
+    doors.control.change_settings(**changes)
+    return _in_use(doors, run)
+
+
+def _in_use(doors: Doors, run: StoredRun) -> SettingsInUse:
+    record = run.record
+    with run.results() as results:
+        history = SettingsHistory(tuple(results.settings_history()))
+    defaults = default_settings(record.tracker, record.weighting)
+    changes = [
+        SettingsChange(version=entry.version, frame=entry.frame, layer=entry.layer, changed=list(names))
+        for entry, names in zip(history.entries, history.changes(), strict=True)
+    ]
+    now = history.entries[-1] if history.entries else None
+    return SettingsInUse(
+        tracker=record.tracker,
+        weighting=record.weighting,
+        version=now.version if now else 1,
+        frame=now.frame if now else record.first,
+        layer=now.layer if now else 0,
+        values=dict(now.values if now else record.settings),
+        knobs=knob_views(defaults),
+        changes=changes[1:],
+    )
+
+
+@lru_cache(maxsize=4)
+def _bodies(folders: tuple[Path, ...], _stamp: tuple[tuple[str, int], ...]) -> tuple[BodyChoice, ...]:
+    """The bodies that can be read; one that cannot is told where it is used."""
+    found: list[BodyChoice] = []
+    for name in list_bodies(folders):
+        try:
+            body = load_body(name, folders)
+        except StudioError:
+            continue
+        found.append(
+            BodyChoice(name=name, label=body.title, parameters=len(body.parameters), limbs=len(body.drawn))
+        )
+    return tuple(found)
+
+
+def _title(settings_type: type) -> str:
+    return getattr(settings_type, "title", settings_type.__name__)
