@@ -170,6 +170,11 @@ class TrackingRun:
         if self._reader.ended():
             self._writer.mark_ended("")
 
+    @property
+    def ended(self) -> str:
+        """ "cancelled" if a person ended the run, else ""."""
+        return self._reader.ended()
+
     def progress(self) -> Progress:
         """How far the run got and how long the rest will take."""
         return self._pace.progress(self.done, self.record.frame_count)

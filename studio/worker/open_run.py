@@ -6,13 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from studio.errors import RunError, StudioError
+from studio.errors import StudioError
 from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
 from studio.runs.tracking_run import Stepped, TrackingRun
 from studio.sessions.run_log import append_to_log
 from studio.sessions.session import Session
-from studio.settings import RunSettings
 from studio.worker.settings_mailbox import SettingsMailbox
 
 
@@ -87,23 +86,15 @@ class OpenRun:
         self.question = Reannealing(self.tracking, target, version, settings)
         return target
 
-    def keep_answer(self) -> RunSettings:
-        """Store the finished question's answer as the run's own. Raises RunError if there is none."""
-        if self.question is None:
-            raise RunError("Nothing was annealed again.", "Re-anneal a frame first.")
-        question, self.question = self.question, None
-        question.keep()
-        return question.settings
-
     def select(self, frame: int) -> None:
         """Make `frame` the one that questions are about. Raises NotFoundError if it cannot be annealed
         yet."""
         self.tracking.search_again(frame)
         self.selected = frame
 
-    def log(self, level: str, text: str) -> None:
-        """Write a line into the run's log."""
-        append_to_log(self.stored.folder, level, text)
+    def log(self, level: str, text: str) -> float:
+        """Write a line into the run's log; returns its time, seconds since the epoch."""
+        return append_to_log(self.stored.folder, level, text).time
 
     def close(self) -> None:
         """Save the search where it stands and let go of files, pictures and threads."""

@@ -1,0 +1,250 @@
+"""The tracking process as its owner sees it: started when first needed, watched, and started again after a
+death.
+
+Commands go down a pipe, events come up another into one subscription for each watcher. However the process
+dies, all are told so by a `StateChanged` with state "lost", and `restart` opens the run again where its store
+says it stands.
+"""
+
+import dataclasses
+import logging
+import math
+import threading
+from pathlib import Path
+
+from studio.errors import (
+    BodyError,
+    CalibrationError,
+    FootageError,
+    NotFoundError,
+    RunError,
+    SessionError,
+    SettingsError,
+    StudioError,
+)
+from studio.sessions.workspace import Workspace
+from studio.worker import commands
+from studio.worker.events import Acknowledged, Event, StateChanged
+from studio.worker.owned_process import LOST_HINT, SILENT_SECONDS, OwnedProcess, ending
+from studio.worker.watchers import Subscription, Watchers
+
+ANSWER_SECONDS = 60.0
+"""How long an acknowledgement may take: as long as the first compilation of the kernels."""
+CLOSING_SECONDS = 5.0
+REFUSALS = (RunError, SettingsError, NotFoundError, SessionError, BodyError, CalibrationError, FootageError)
+
+Value = bool | int | float | str
+
+logger = logging.getLogger(__name__)
+
+
+class StudioControl:
+    """Owns the tracking process of a workspace. All methods may be called from any thread."""
+
+    def __init__(self, workspace: Workspace) -> None:
+        self.workspace = workspace
+        self._watchers = Watchers()
+        self._lock = threading.RLock()
+        self._process: OwnedProcess | None = None
+        self._answers: dict[str, _Answer] = {}
+        self._said = nothing_open()
+        self._state = self._said
+        self._places: dict[tuple[str, str], tuple[str, str]] = {}
+        self._changing: dict[str, commands.ChangeSettings] = {}
+        self._changes: dict[str, Value] = {}
+
+    @property
+    def state(self) -> StateChanged:
+        """Where the search stands, or stood when the process was last heard of."""
+        return self._state
+
+    @property
+    def process_identifier(self) -> int | None:
+        """The process's id, None while there is none."""
+        process = self._process
+        return process.identifier if process else None
+
+    def subscribe(self) -> Subscription:
+        """Every event from now on, newest wins; close it when done."""
+        return self._watchers.subscribe()
+
+    # ------------------------------------------------------------------ asking
+
+    def send(self, command: commands.Command) -> None:
+        """Post a command; an `Acknowledged` event follows. Raises RunError if the process has died."""
+        with self._lock:
+            self._note(command)
+            if self._process is None:
+                self._process = OwnedProcess(self)
+            process = self._process
+        process.send(command)
+
+    def request(self, command: commands.Command, timeout: float = ANSWER_SECONDS) -> Acknowledged:
+        """Post a command and wait until it is acknowledged.
+
+        Raises what the process refused it with (RunError, SettingsError, …), RunError if no answer came in
+        time.
+        """
+        answer = _Answer()
+        with self._lock:
+            self._answers[command.identifier] = answer
+        try:
+            self.send(command)
+            answer.arrived.wait(timeout)
+        finally:
+            with self._lock:
+                self._answers.pop(command.identifier, None)
+        if answer.event is None:
+            raise RunError(
+                f"The tracking process did not answer '{type(command).__name__}'.",
+                "Wait until it has compiled, or restart it.",
+            )
+        if not answer.event.ok:
+            raise _refusal(answer.event)
+        return answer.event
+
+    def open_run(self, session: str, run: str) -> Acknowledged:
+        """Make a run of the workspace the current one. Raises NotFoundError, RunError."""
+        folders = self._folders(session, run)
+        return self.request(commands.Open(session=folders[0], run=folders[1]))
+
+    def enqueue(self, session: str, run: str) -> Acknowledged:
+        """Track a run of the workspace, now or after those that are tracked already. Raises NotFoundError."""
+        folders = self._folders(session, run)
+        return self.request(commands.Enqueue(session=folders[0], run=folders[1]))
+
+    def change_settings(self, **changes: Value) -> Acknowledged:
+        """Change knobs of the open run by name. Raises SettingsError naming what is allowed."""
+        return self.request(commands.ChangeSettings(changes=changes))
+
+    # ------------------------------------------------------------------ the process
+
+    def start(self) -> None:
+        """Start the process ahead of the first command, so that nobody waits for it."""
+        with self._lock:
+            if self._process is None:
+                self._process = OwnedProcess(self)
+
+    def restart(self, resume: bool = True) -> None:
+        """Start the process again and open the run that was open; runs that waited wait again.
+
+        resume : track on if it was tracking. Settings that were changed and not yet in use are changed again.
+        Raises StudioError if the run cannot be opened.
+        """
+        with self._lock:
+            said, changes, old = self._said, dict(self._changes), self._process
+            self._process = None
+            self._said = self._state = nothing_open()
+            self._changes.clear()
+        if old is not None:
+            old.end(0.0)
+        self.start()
+        place = self._places.get((said.session, said.run))
+        if place is not None:
+            self.request(commands.Open(session=place[0], run=place[1]))
+            if resume and said.state in ("tracking", "compiling"):
+                self.request(commands.Start())
+            if changes:
+                self.request(commands.ChangeSettings(changes=changes))
+        for names in said.waiting:
+            session, run = self._places[names]
+            self.request(commands.Enqueue(session=session, run=run))
+
+    def close(self) -> None:
+        """End the process, its search saved where it stands, and all subscriptions."""
+        with self._lock:
+            process, self._process = self._process, None
+        if process is not None:
+            process.end(CLOSING_SECONDS)
+        self._watchers.close()
+
+    # ------------------------------------------------------------------ hearing (see owned_process.Listener)
+
+    def heard(self, process: OwnedProcess, event: Event) -> None:
+        """Pass an event on to all who watch."""
+        if process is not self._process:
+            return
+        if isinstance(event, StateChanged):
+            if (event.session, event.run) != (self._said.session, self._said.run):
+                self._changes.clear()
+            self._said = event
+            self._publish(event)
+            return
+        self._watchers.publish(event)
+        if isinstance(event, Acknowledged):
+            with self._lock:
+                changing = self._changing.pop(event.identifier, None)
+                answer = self._answers.get(event.identifier)
+            if changing is not None and event.ok:
+                self._changes.update(changing.changes)
+            if answer is not None:
+                answer.give(event)
+
+    def silent(self, process: OwnedProcess, silent: bool) -> None:
+        """Say that the process does not speak, or that it speaks again."""
+        if process is not self._process:
+            return
+        if silent:
+            self._lose(f"The tracking process has been silent for {SILENT_SECONDS:g} seconds.")
+        else:
+            self._publish(self._said)
+
+    def ended(self, process: OwnedProcess) -> None:
+        """Say that the process is gone, unless it was asked to go; whoever waits for an answer gets one."""
+        with self._lock:
+            if process is not self._process:
+                return
+            answers = dict(self._answers)
+            if process.exit_code == 0:
+                self._process = None
+                self._said = nothing_open()
+        if process.exit_code == 0:
+            self._publish(self._said)
+        else:
+            self._lose(f"The tracking process died ({ending(process.exit_code)}).")
+        text = "The tracking process died before it answered."
+        for identifier, answer in answers.items():
+            answer.give(Acknowledged("", "", identifier, "", False, text, LOST_HINT, "run"))
+
+    def _lose(self, message: str) -> None:
+        logger.error("%s", message)
+        self._publish(dataclasses.replace(self._said, state="lost", message=message, hint=LOST_HINT))
+
+    def _publish(self, state: StateChanged) -> None:
+        self._state = state
+        self._watchers.publish(state)
+
+    def _note(self, command: commands.Command) -> None:
+        """Remember what a restart has to bring back."""
+        if isinstance(command, commands.Open):
+            names = (Path(command.session).name, Path(command.run).name)
+            self._places[names] = (command.session, command.run)
+        elif isinstance(command, commands.ChangeSettings):
+            self._changing[command.identifier] = command
+
+    def _folders(self, session: str, run: str) -> tuple[str, str]:
+        stored = self.workspace.session(session).run(run)
+        return str(stored.folder.parent.parent), str(stored.folder)
+
+
+class _Answer:
+    """Where one request waits for its acknowledgement."""
+
+    def __init__(self) -> None:
+        self.arrived = threading.Event()
+        self.event: Acknowledged | None = None
+
+    def give(self, event: Acknowledged) -> None:
+        self.event = event
+        self.arrived.set()
+
+
+def nothing_open() -> StateChanged:
+    """The state of a process with no run open."""
+    return StateChanged("", "", "idle", 0, 0, 0, 0, 0, math.nan, math.nan)
+
+
+def _refusal(event: Acknowledged) -> StudioError:
+    """The error that a command was refused with, of the kind that it had in the process."""
+    kinds: dict[str, type[StudioError]] = {kind.code: kind for kind in REFUSALS}
+    return kinds.get(event.code, RunError)(event.message, event.hint)

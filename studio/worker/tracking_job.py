@@ -1,0 +1,300 @@
+"""What the process is doing: one open run, those that wait, and what each command does to them.
+
+`serve` takes a command, `advance` does one layer; the process's loop calls them in turn, so that every
+command works between two layers of a frame. Everything that is to be known comes out as events.
+"""
+
+import contextlib
+import math
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from studio.errors import RunError, StudioError
+from studio.worker import commands
+from studio.worker.events import Acknowledged, Event, FrameFinished, LayerFinished
+from studio.worker.open_run import OpenRun
+from studio.worker.reporter import Reporter, names_of
+
+COMPILING, TRACKING, PAUSED, REANNEALING = "compiling", "tracking", "paused", "reannealing"
+FINISHED, CANCELLED, FAILED = "finished", "cancelled", "failed"
+RUN_ON, TO_FRAME_END, ONE_LAYER = "run on", "to the frame's end", "one layer"
+
+
+class TrackingJob:
+    """The process's work. post : takes each event; it never waits."""
+
+    def __init__(self, post: Callable[[Event], None]) -> None:
+        self.stopped = False
+        self._say = Reporter(post)
+        self._run: OpenRun | None = None
+        self._goal = RUN_ON
+        self._asked_at = math.nan
+        self._keep_answer = self._ask_again = False
+        self._waiting: list[tuple[str, str]] = []
+        self._compiled: set[str] = set()
+        self._actions: dict[type[commands.Command], Callable[[Any], None]] = {
+            commands.Open: lambda asked: self._open(asked.session, asked.run),
+            commands.Enqueue: self._enqueue,
+            commands.Dequeue: self._dequeue,
+            commands.Start: lambda asked: self._begin(RUN_ON, asked.asked_at),
+            commands.StepFrame: lambda asked: self._begin(TO_FRAME_END, asked.asked_at),
+            commands.StepLayer: lambda asked: self._begin(ONE_LAYER, asked.asked_at),
+            commands.Pause: self._pause,
+            commands.Seek: self._seek,
+            commands.Reanneal: self._reanneal,
+            commands.Cancel: self._cancel,
+            commands.ChangeSettings: self._change_settings,
+            commands.Stop: self._stop,
+        }
+
+    @property
+    def busy(self) -> bool:
+        """Whether `advance` has something to do."""
+        return self._run is not None and (self._tracking or self._run.question is not None)
+
+    @property
+    def _tracking(self) -> bool:
+        return self._say.state_name == TRACKING
+
+    def serve(self, command: commands.Command) -> None:
+        """Do what a command says and acknowledge it; a refusal says why."""
+        refusal = ("", "", "")
+        try:
+            self._actions[type(command)](command)
+        except StudioError as error:
+            refusal = (error.message, error.hint, error.code)
+        except Exception as error:
+            self._say.log(self._run, "error", traceback.format_exc())
+            refusal = (_unforeseen(error), "See the log.", "fault")
+        name = type(command).__name__
+        ok = not refusal[2]
+        self._say.post(Acknowledged(*names_of(self._run), command.identifier, name, ok, *refusal))
+
+    def advance(self) -> None:
+        """Do one layer of what is being done. What goes wrong becomes an event."""
+        run = self._run
+        if run is None:
+            return
+        try:
+            self._warm_up(run)
+            if run.question is not None:
+                self._advance_question(run)
+            else:
+                self._advance_tracking(run)
+        except StudioError as error:
+            self._fail(run, error.message, error.hint)
+        except Exception as error:
+            self._say.log(run, "error", traceback.format_exc())
+            self._fail(run, _unforeseen(error), "See the log; 'start' tries the frame again.")
+
+    def close(self) -> None:
+        """Save and close the open run."""
+        run, self._run = self._run, None
+        if run is not None:
+            run.close()
+
+    # ------------------------------------------------------------------ one layer
+
+    def _warm_up(self, run: OpenRun) -> None:
+        """Say that kernels are compiled, the first time that a weighting is used in this process."""
+        if run.weighting in self._compiled:
+            return
+        state = self._say.state_name
+        self._state(COMPILING)
+        try:
+            run.warm_up()
+        finally:
+            self._state(state)
+        self._compiled.add(run.weighting)
+
+    def _advance_tracking(self, run: OpenRun) -> None:
+        stepped = run.step_layer()
+        record, result = stepped.record, stepped.result
+        if stepped.applied is not None:
+            self._say.settings(run, record.settings_version, stepped.applied, record.frame, record.layer)
+        self._say.post(LayerFinished(*names_of(run), record, False, self._asked_at))
+        if result is not None:
+            self._say.post(FrameFinished(*names_of(run), result))
+        if run.tracking.finished:
+            self._say.log(run, "info", f"Finished: {run.tracking.done} frames.")
+            self._state(FINISHED)
+            self._begin_waiting()
+        elif self._goal == ONE_LAYER or (self._goal == TO_FRAME_END and result is not None):
+            run.tracking.save()
+            self._state(PAUSED)
+        elif result is not None:
+            self._state(TRACKING)
+
+    def _advance_question(self, run: OpenRun) -> None:
+        question = run.question
+        assert question is not None
+        record = question.step_layer()
+        if record.layer == 0:
+            self._say.settings(run, question.version, question.settings, question.frame, 0)
+        self._say.post(LayerFinished(*names_of(run), record, True, self._asked_at))
+        if not question.finished:
+            return
+        result, kept = question.result(), self._keep_answer
+        if kept:
+            question.keep()
+        run.question, self._keep_answer = None, False
+        self._say.post(FrameFinished(*names_of(run), result, not kept))
+        if self._ask_again:
+            self._ask_again = False
+            run.ask(question.frame)
+        else:
+            self._state(self._resting(run))
+
+    # ------------------------------------------------------------------ commands
+
+    def _open(self, session: str, run_folder: str) -> None:
+        opened = self._run
+        if opened is not None and opened.stored.folder == Path(run_folder).resolve():
+            if self._tracking:
+                self._settle(opened)
+            return
+        # The new one is opened before the old one is let go, so that a refusal changes nothing.
+        following = OpenRun(session, run_folder)
+        self.close()
+        self._run = following
+        version, settings = following.mailbox.latest()
+        entry = following.tracking.history.entries[-1]
+        self._say.settings(following, version, settings, entry.frame, entry.layer)
+        self._state(self._resting(following))
+
+    def _enqueue(self, asked: commands.Enqueue) -> None:
+        place, run = (asked.session, asked.run), self._run
+        if not self._tracking:
+            self._open(*place)
+            self._begin(RUN_ON)
+            return
+        if run is not None and run.stored.folder == Path(asked.run).resolve():
+            raise RunError(f"Run '{run.run_name}' is being tracked already.", "Wait for its end.")
+        if place not in self._waiting:
+            self._waiting.append(place)
+        self._state(TRACKING)
+
+    def _dequeue(self, asked: commands.Dequeue) -> None:
+        place = (asked.session, asked.run)
+        if place not in self._waiting:
+            raise RunError(
+                f"Run '{Path(asked.run).name}' does not wait.", "Cancel it if it is being tracked."
+            )
+        self._waiting.remove(place)
+        self._state(self._say.state_name)
+
+    def _begin(self, goal: str, asked_at: float = math.nan) -> None:
+        run = self._opened()
+        if run.tracking.finished:
+            raise RunError(
+                f"Run '{run.run_name}' has no frame left.", "Re-anneal a frame, or start a new run."
+            )
+        self._drop_question(run)
+        run.tracking.mark_going_on()
+        self._goal, self._asked_at = goal, asked_at if goal == ONE_LAYER else math.nan
+        if goal == RUN_ON:
+            self._say.log(run, "info", f"Tracking from frame {run.tracking.next_frame}.")
+        self._state(TRACKING)
+
+    def _pause(self, _: commands.Pause) -> None:
+        run = self._opened()
+        self._drop_question(run)
+        if self._say.state_name in (TRACKING, REANNEALING):
+            self._settle(run)
+
+    def _seek(self, asked: commands.Seek) -> None:
+        self._opened().select(asked.frame)
+        self._state(self._say.state_name)
+
+    def _reanneal(self, asked: commands.Reanneal) -> None:
+        run = self._opened()
+        run.selected = run.ask(asked.frame)
+        run.tracking.save()
+        self._keep_answer, self._ask_again, self._asked_at = asked.keep, False, asked.asked_at
+        self._state(REANNEALING)
+
+    def _cancel(self, _: commands.Cancel) -> None:
+        run = self._opened()
+        if run.tracking.finished:
+            raise RunError(f"Run '{run.run_name}' is finished.", "Delete it if it is not wanted.")
+        self._drop_question(run)
+        run.tracking.mark_cancelled()
+        self._say.log(run, "info", f"Cancelled at frame {run.tracking.next_frame}.")
+        self._state(CANCELLED)
+        self._begin_waiting()
+
+    def _change_settings(self, asked: commands.ChangeSettings) -> None:
+        run = self._opened()
+        moved = run.mailbox.change(asked.changes)
+        if not moved:
+            return
+        changes = ", ".join(f"{name} = {asked.changes[name]}" for name in moved)
+        self._say.log(run, "info", f"Settings: {changes}")
+        if self._tracking:
+            return
+        self._asked_at = asked.asked_at
+        if run.question is None:
+            run.ask()
+            self._state(REANNEALING)
+        else:
+            # The answer on its way is let out first: a slider that is dragged would else never show one.
+            self._ask_again = True
+
+    def _stop(self, _: commands.Stop) -> None:
+        self.close()
+        self.stopped = True
+
+    # ------------------------------------------------------------------ in common
+
+    def _opened(self) -> OpenRun:
+        if self._run is None:
+            raise RunError("No run is open.", "Open one, or start a new one.")
+        return self._run
+
+    def _drop_question(self, run: OpenRun) -> None:
+        run.question, self._ask_again, self._keep_answer = None, False, False
+
+    def _settle(self, run: OpenRun) -> None:
+        """Stop where the search stands, saved whole."""
+        run.tracking.save()
+        self._state(self._resting(run))
+
+    def _resting(self, run: OpenRun) -> str:
+        if run.tracking.finished:
+            return FINISHED
+        return run.tracking.ended or PAUSED
+
+    def _begin_waiting(self) -> None:
+        """Track the first of those that wait that can be tracked."""
+        while self._waiting:
+            session, run = self._waiting.pop(0)
+            try:
+                self._open(session, run)
+                self._begin(RUN_ON)
+                return
+            except StudioError as error:
+                self._say.log(self._run, "error", f"Run '{Path(run).name}' could not start: {error}")
+
+    def _fail(self, run: OpenRun, message: str, hint: str) -> None:
+        """Say that the layer could not be done; what is stored stays, and the search stands before that
+        layer."""
+        self._say.log(run, "error", f"{message} {hint}".strip())
+        if run.question is not None:
+            self._drop_question(run)
+            self._state(self._resting(run), message, hint)
+            return
+        with contextlib.suppress(StudioError):
+            run.tracking.save()
+        self._state(FAILED, message, hint)
+        self._begin_waiting()
+
+    def _state(self, name: str, message: str = "", hint: str = "") -> None:
+        waiting = tuple((Path(session).name, Path(run).name) for session, run in self._waiting)
+        self._say.state(self._run, name, waiting, message, hint)
+
+
+def _unforeseen(error: Exception) -> str:
+    """A fault of the program in one sentence."""
+    return f"The tracking process met a fault it does not know: {type(error).__name__}: {error}."
