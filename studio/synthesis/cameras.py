@@ -1,0 +1,103 @@
+"""Cameras for made-up footage: a rig in the corners of the room, cameras put down by hand, rays for the renderer."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.errors import CalibrationError
+from studio.geometry.camera import Camera
+
+Array = NDArray[np.float64]
+
+CORNERS = (
+    (2720.0, 2330.0, 2480.0),
+    (-2650.0, 2300.0, 2530.0),
+    (-2700.0, -2280.0, 2440.0),
+    (2620.0, -2360.0, 2510.0),
+)
+CORNER_TARGET = (0.0, 0.0, 820.0)
+CORNER_FOCAL = 0.78
+RIG_LENS = (-0.22, 0.08, 0.0006, -0.0004, 0.0)
+UNDISTORT_ROUNDS = 40
+
+
+def placed_camera(
+    name: str,
+    position: tuple[float, float, float],
+    look_at: tuple[float, float, float],
+    *,
+    size: tuple[int, int],
+    focal_px: float,
+    roll: float = 0.0,
+    distortion: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0),
+    principal: tuple[float, float] | None = None,
+) -> Camera:
+    """A camera at `position` (mm) looking at a point, `roll` radians clockwise about its axis.
+
+    Raises CalibrationError when it would look straight along the vertical or at itself.
+    """
+    ahead = np.subtract(look_at, position).astype(float)
+    right = np.cross(ahead, (0.0, 0.0, 1.0))
+    if np.linalg.norm(right) < 1e-6 * max(float(np.linalg.norm(ahead)), 1e-9) or not ahead.any():
+        raise CalibrationError(
+            f"Camera '{name}' looks straight up, down or at itself.",
+            "Move its look_at point off the vertical.",
+        )
+    ahead, right = ahead / np.linalg.norm(ahead), right / np.linalg.norm(right)
+    down = np.cross(ahead, right)
+    cosine, sine = np.cos(roll), np.sin(roll)
+    rotation = np.stack([cosine * right + sine * down, -sine * right + cosine * down, ahead])
+    cx, cy = principal or ((size[0] - 1) / 2.0, (size[1] - 1) / 2.0)
+    matrix = np.array([[focal_px, 0.0, cx], [0.0, focal_px, cy], [0.0, 0.0, 1.0]])
+    return Camera(
+        name,
+        size[0],
+        size[1],
+        matrix,
+        np.array(distortion),
+        rotation,
+        -rotation @ np.array(position, dtype=float),
+    )
+
+
+def corner_rig(size: tuple[int, int], rng: np.random.Generator) -> tuple[Camera, ...]:
+    """Four cameras under the ceiling of the room's corners, slightly rolled, with barrel distortion as webcams have."""
+    cameras = []
+    for index, place in enumerate(CORNERS):
+        focal = CORNER_FOCAL * size[0] * float(1.0 + rng.normal(0.0, 0.01))
+        middle = np.array([(size[0] - 1) / 2.0, (size[1] - 1) / 2.0]) + rng.normal(0.0, 0.008, 2) * size[0]
+        camera = placed_camera(
+            f"cam{index + 1}",
+            place,
+            CORNER_TARGET,
+            size=size,
+            focal_px=focal,
+            roll=float(rng.normal(0.0, 0.02)),
+            distortion=RIG_LENS,
+            principal=(float(middle[0]), float(middle[1])),
+        )
+        cameras.append(camera)
+    return tuple(cameras)
+
+
+def pixel_rays(camera: Camera, samples: int) -> NDArray[np.float32]:
+    """(H * samples, W * samples, 3) unit directions in the world through a regular grid of points in every pixel.
+
+    The lens model is inverted by fixed-point iteration (as OpenCV's undistortPoints does, to convergence).
+    """
+    step = 1.0 / samples
+    columns = (np.arange(camera.width * samples) + 0.5) * step - 0.5
+    rows = (np.arange(camera.height * samples) + 0.5) * step - 0.5
+    u, v = np.meshgrid(columns, rows)
+    m = camera.matrix
+    yd = (v - m[1, 2]) / m[1, 1]
+    xd = (u - m[0, 2] - m[0, 1] * yd) / m[0, 0]
+    x, y = xd.copy(), yd.copy()
+    k1, k2, p1, p2, k3 = camera.distortion
+    for _ in range(UNDISTORT_ROUNDS if camera.distortion.any() else 0):
+        r2 = x * x + y * y
+        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        dx = 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
+        dy = p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+        x, y = (xd - dx) / radial, (yd - dy) / radial
+    ahead = np.stack([x, y, np.ones_like(x)], axis=-1) @ camera.rotation
+    return (ahead / np.linalg.norm(ahead, axis=-1, keepdims=True)).astype(np.float32)

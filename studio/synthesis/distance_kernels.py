@@ -1,0 +1,158 @@
+"""The person as a signed distance field: swept spheres, melted within a group, folded where they are cloth.
+
+Distances (mm) are lower bounds of the true ones up to the folds' depth, so marching at SAFETY × distance never
+passes through. Smooth union: I. Quilez, "Smooth minimum" (quadratic polynomial). Piece columns: see `flesh.py`.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from studio.synthesis.flesh import (
+    AXES,
+    BOUND,
+    BOUND_RADIUS,
+    BULGE,
+    FOLD,
+    FOLD_PERIOD,
+    FOLD_PHASE,
+    LENGTH,
+    RADIUS_END,
+    RADIUS_START,
+    SCALE_X,
+    SCALE_Y,
+    START,
+)
+
+MELT_WITHIN, MELT_BETWEEN = 26.0, 8.0
+FAR = 1e9
+
+
+@njit(cache=True, inline="always")
+def soft_minimum(a, b, width):
+    """The smaller of two distances, rounded off where they differ by less than `width`."""
+    gap = max(width - abs(a - b), 0.0) / width
+    return min(a, b) - gap * gap * width * 0.25
+
+
+@njit(cache=True)
+def local_point(px, py, pz, piece):
+    """A world point in the piece's frame: x forward, y sideways, z along it."""
+    x, y, z = px - piece[START], py - piece[START + 1], pz - piece[START + 2]
+    return (
+        piece[AXES] * x + piece[AXES + 1] * y + piece[AXES + 2] * z,
+        piece[AXES + 3] * x + piece[AXES + 4] * y + piece[AXES + 5] * z,
+        piece[AXES + 6] * x + piece[AXES + 7] * y + piece[AXES + 8] * z,
+    )
+
+
+@njit(cache=True)
+def piece_distance(px, py, pz, piece):
+    """Signed distance from a world point to one piece."""
+    x, y, z = local_point(px, py, pz, piece)
+    length = piece[LENGTH]
+    share = min(max(z / length, 0.0), 1.0) if length > 0.0 else 0.0
+    early = share * (1.6 - 0.6 * share)
+    radius = piece[RADIUS_START] + (piece[RADIUS_END] - piece[RADIUS_START]) * share
+    radius += piece[BULGE] * 4.0 * early * (1.0 - early)
+    sx, sy = piece[SCALE_X], piece[SCALE_Y]
+    across, side, beyond = x / sx, y / sy, z - share * length
+    distance = (math.sqrt(across * across + side * side + beyond * beyond) - radius) * min(sx, sy, 1.0)
+    if piece[FOLD] > 0.0 and distance < 4.0 * piece[FOLD]:
+        turn = 2.0 * math.pi / piece[FOLD_PERIOD]
+        wave = math.sin(turn * (z + 0.6 * x) + piece[FOLD_PHASE]) * math.sin(
+            turn * (0.9 * y - 0.35 * z) + 1.3
+        )
+        distance -= (
+            0.5 * piece[FOLD] * (wave + 0.5 * math.sin(2.3 * turn * (y - 0.8 * z) + piece[FOLD_PHASE]))
+        )
+    return distance
+
+
+@njit(cache=True)
+def body_distance(px, py, pz, pieces, labels, active, count):
+    """Signed distance to the union of the first `count` pieces named in `active` (in order of their groups)."""
+    total, group_distance, group = FAR, FAR, -1
+    for index in range(count):
+        piece = active[index]
+        distance = piece_distance(px, py, pz, pieces[piece])
+        if labels[piece, 1] == group:
+            group_distance = soft_minimum(group_distance, distance, MELT_WITHIN)
+        else:
+            total = soft_minimum(total, group_distance, MELT_BETWEEN)
+            group_distance, group = distance, labels[piece, 1]
+    return soft_minimum(total, group_distance, MELT_BETWEEN)
+
+
+@njit(cache=True)
+def nearest_piece(px, py, pz, pieces, active, count):
+    """The piece whose own surface is closest: it lends its material."""
+    best, found = FAR, -1
+    for index in range(count):
+        distance = piece_distance(px, py, pz, pieces[active[index]])
+        if distance < best:
+            best, found = distance, active[index]
+    return found
+
+
+@njit(cache=True)
+def gather(ox, oy, oz, dx, dy, dz, pieces, margin, active):
+    """The pieces that a ray may touch. Fills `active`; returns their count and the ray's stretch near them."""
+    count, first, last = 0, FAR, 0.0
+    for piece in range(len(pieces)):
+        x, y, z = pieces[piece, BOUND] - ox, pieces[piece, BOUND + 1] - oy, pieces[piece, BOUND + 2] - oz
+        along = x * dx + y * dy + z * dz
+        reach = pieces[piece, BOUND_RADIUS] + margin
+        left = reach * reach - (x * x + y * y + z * z - along * along)
+        if left > 0.0:
+            half = math.sqrt(left)
+            if along + half > 0.0:
+                active[count] = piece
+                count += 1
+                first, last = min(first, along - half), max(last, along + half)
+    return count, max(first, 0.0), last
+
+
+@njit(cache=True)
+def body_normal(px, py, pz, pieces, labels, active, count):
+    """Outward unit normal by four samples on a tetrahedron."""
+    step = 1.5
+    one = body_distance(px + step, py - step, pz - step, pieces, labels, active, count)
+    two = body_distance(px - step, py - step, pz + step, pieces, labels, active, count)
+    three = body_distance(px - step, py + step, pz - step, pieces, labels, active, count)
+    four = body_distance(px + step, py + step, pz + step, pieces, labels, active, count)
+    x, y, z = one - two - three + four, -one - two + three + four, -one + two - three + four
+    size = math.sqrt(x * x + y * y + z * z) + 1e-12
+    return x / size, y / size, z / size
+
+
+@njit(cache=True)
+def light_share(px, py, pz, light, light_radius, pieces, labels, active):
+    """How much of a round lamp a point sees past the person: 0 in full shadow, 1 in the open.
+
+    Distance over distance marched, against the lamp's angular size: I. Quilez, "Soft shadows in raymarched SDFs".
+    """
+    x, y, z = light[0] - px, light[1] - py, light[2] - pz
+    reach = math.sqrt(x * x + y * y + z * z)
+    x, y, z = x / reach, y / reach, z / reach
+    spread = light_radius / reach
+    count, first, last = gather(px, py, pz, x, y, z, pieces, 260.0, active)
+    if count == 0:
+        return 1.0
+    seen, t, last = 1.0, max(first, 14.0), min(last, reach)
+    for _ in range(48):
+        if t >= last:
+            break
+        distance = body_distance(px + t * x, py + t * y, pz + t * z, pieces, labels, active, count)
+        seen = min(seen, 0.5 + 0.5 * distance / (spread * t))
+        if seen <= 0.0:
+            return 0.0
+        t += max(0.8 * distance, 6.0)
+    return seen * seen * (3.0 - 2.0 * seen)
+
+
+@njit(cache=True)
+def no_pieces(pieces):
+    """Room for the indices that `gather` writes."""
+    return np.zeros(len(pieces), np.int64)

@@ -1,0 +1,267 @@
+"""The clothed person: rounded pieces laid around the skeleton, their cloth, skin and hair.
+
+Each piece is a sphere swept along a line in one segment's frame, its radius running from one end to the other with a
+muscle's bulge between, its cross-section elliptical, its surface folded where it is cloth. The pieces of a group
+(trunk and head, each arm, each leg) melt into each other; groups barely do, so that an arm beside the trunk stays
+apart. Nothing here is a truncated cone, and no number comes from a tracker's body file.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.synthesis.person import SIDES, PersonMotion, Skeleton, joint_points
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Point = tuple[float, float, float]
+
+SKIN, SHIRT, TROUSERS, SHOE, HAIR = range(5)
+TRUNK, LEFT_ARM, RIGHT_ARM, LEFT_LEG, RIGHT_LEG = range(5)
+
+# Columns of the piece table that the kernels read.
+START, AXES, LENGTH, RADIUS_START, RADIUS_END, BULGE, SCALE_X, SCALE_Y = 0, 3, 12, 13, 14, 15, 16, 17
+FOLD, FOLD_PERIOD, FOLD_PHASE, BOUND, BOUND_RADIUS, COLUMNS = 18, 19, 20, 21, 24, 25
+
+REFERENCE_HEIGHT = 1760.0
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """One swept sphere. start, end : mm in the segment's frame, from the segment's joint. radius : mm at both ends.
+    scale : of the cross-section forward and sideways. fold : depth of cloth folds, mm, with period `fold_period`."""
+
+    segment: str
+    group: int
+    material: int
+    start: Point
+    end: Point
+    radius: tuple[float, float]
+    bulge: float = 0.0
+    scale: tuple[float, float] = (1.0, 1.0)
+    fold: float = 0.0
+    fold_period: float = 110.0
+
+
+def clothed_pieces(bones: Skeleton) -> tuple[Piece, ...]:
+    """All pieces of a person in a short-sleeved shirt, long trousers and shoes. Girths grow with the height."""
+    pieces = [*_trunk(bones), *_head(bones)]
+    for index, side in enumerate(SIDES):
+        pieces += _arm(bones, side, index) + _leg(bones, side, index)
+    scale = bones.height / REFERENCE_HEIGHT
+    return tuple(sorted((_grown(piece, scale) for piece in pieces), key=lambda piece: piece.group))
+
+
+def piece_tables(motion: PersonMotion, pieces: tuple[Piece, ...]) -> tuple[Array, IntArray]:
+    """The pieces in the world: (F, P, COLUMNS) floats as the column names above say, and (P, 2) material and group."""
+    joints = joint_points(motion)
+    tables = np.zeros((motion.frame_count, len(pieces), COLUMNS))
+    for index, piece in enumerate(pieces):
+        start, end = np.array(piece.start), np.array(piece.end)
+        length = float(np.linalg.norm(end - start))
+        axis = (end - start) / length if length > 0.0 else np.array([0.0, 0.0, 1.0])
+        turn, joint = motion.turns[piece.segment], joints[piece.segment]
+        table = tables[:, index]
+        table[:, START : START + 3] = joint + turn @ start
+        world_from_piece = turn @ _upright_frame(axis)
+        table[:, AXES : AXES + 9] = np.swapaxes(world_from_piece, 1, 2).reshape(-1, 9)
+        table[:, LENGTH] = length
+        table[:, RADIUS_START], table[:, RADIUS_END] = piece.radius
+        table[:, BULGE] = piece.bulge
+        table[:, SCALE_X], table[:, SCALE_Y] = piece.scale
+        table[:, FOLD], table[:, FOLD_PERIOD], table[:, FOLD_PHASE] = (
+            piece.fold,
+            piece.fold_period,
+            1.7 * index,
+        )
+        table[:, BOUND : BOUND + 3] = joint + turn @ (0.5 * (start + end))
+        widest = max(piece.radius) + piece.bulge + piece.fold
+        table[:, BOUND_RADIUS] = 0.5 * length + widest * max(1.0, *piece.scale)
+    return tables, np.array([(piece.material, piece.group) for piece in pieces])
+
+
+def _upright_frame(axis: Array) -> Array:
+    """(3, 3) frame in the segment's: z along the piece, x as forward as that allows."""
+    ahead = np.array([1.0, 0.0, 0.0]) if abs(axis[0]) < 0.8 else np.array([0.0, 0.0, 1.0])
+    x = ahead - (ahead @ axis) * axis
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(axis, x), axis], axis=-1)
+
+
+def _grown(piece: Piece, scale: float) -> Piece:
+    """The piece with its girth scaled."""
+    return Piece(
+        piece.segment,
+        piece.group,
+        piece.material,
+        piece.start,
+        piece.end,
+        (piece.radius[0] * scale, piece.radius[1] * scale),
+        piece.bulge * scale,
+        piece.scale,
+        piece.fold,
+        piece.fold_period,
+    )
+
+
+def _trunk(bones: Skeleton) -> list[Piece]:
+    """Pelvis and seat in trousers, belly, chest and shoulders in the shirt."""
+    up, wide = bones.trunk, bones.hip_half_width
+    shoulder, low = bones.shoulder[1], up + bones.shoulder[2]
+    return [
+        Piece("pelvis", TRUNK, TROUSERS, (-8, -0.7 * wide, 5), (-8, 0.7 * wide, 5), (106, 106), fold=2.0),
+        Piece("pelvis", TRUNK, TROUSERS, (-4, 0, 20), (0, 0, 0.16 * up), (138, 132), scale=(0.76, 1.1)),
+        Piece(
+            "thorax",
+            TRUNK,
+            SHIRT,
+            (-2, 0, 0.16 * up),
+            (0, 0, 0.48 * up),
+            (136, 132),
+            4,
+            (0.78, 1.04),
+            6.0,
+            130.0,
+        ),
+        Piece(
+            "thorax",
+            TRUNK,
+            SHIRT,
+            (2, 0, 0.48 * up),
+            (-6, 0, 0.76 * up),
+            (138, 136),
+            6,
+            (0.80, 1.08),
+            4.0,
+            150.0,
+        ),
+        Piece(
+            "thorax",
+            TRUNK,
+            SHIRT,
+            (-12, -0.62 * shoulder, low - 18),
+            (-12, 0.62 * shoulder, low - 18),
+            (80, 80),
+        ),
+        Piece(
+            "thorax",
+            TRUNK,
+            SHIRT,
+            (-14, -0.25 * shoulder, up - 36),
+            (-14, 0.25 * shoulder, up - 36),
+            (56, 56),
+        ),
+    ]
+
+
+def _head(bones: Skeleton) -> list[Piece]:
+    """Neck, skull, face, nose, hair. The crown of the hair lies at the head-top marker."""
+    top = bones.head
+    return [
+        Piece("thorax", TRUNK, SKIN, (-8, 0, bones.trunk - 40), (6, 0, bones.trunk + 0.32 * top), (58, 54)),
+        Piece("head", TRUNK, SKIN, (8, 0, 0.44 * top), (2, 0, 0.66 * top), (66, 80), scale=(1.12, 0.95)),
+        Piece("head", TRUNK, SKIN, (86, 0, 0.46 * top), (82, 0, 0.56 * top), (13, 9)),
+        Piece("head", TRUNK, HAIR, (-12, 0, 0.66 * top), (-14, 0, 0.685 * top), (84, 83), scale=(1.1, 0.98)),
+        Piece("head", TRUNK, HAIR, (-36, 0, 0.42 * top), (-28, 0, 0.62 * top), (56, 70)),
+    ]
+
+
+def _arm(bones: Skeleton, side: str, index: int) -> list[Piece]:
+    """Shoulder and sleeve, bare upper arm and forearm, hand and fingers."""
+    group = LEFT_ARM if side == "left" else RIGHT_ARM
+    inward = -1.0 if side == "left" else 1.0
+    upper, fore, hand = bones.upper_arm[index], bones.forearm[index], bones.hand
+    return [
+        Piece(
+            f"{side}_clavicle",
+            group,
+            SHIRT,
+            (-4, -0.55 * inward * bones.shoulder[1], bones.shoulder[2] - 10),
+            (0, -0.98 * inward * bones.shoulder[1], bones.shoulder[2] - 2),
+            (66, 62),
+        ),
+        Piece(
+            f"{side}_upper_arm",
+            group,
+            SHIRT,
+            (0, 0, 4),
+            (0, 0, -0.62 * upper),
+            (62, 58),
+            3,
+            fold=4.0,
+            fold_period=90.0,
+        ),
+        Piece(f"{side}_upper_arm", group, SKIN, (0, 0, -0.35 * upper), (0, 0, -upper), (48, 42), 5),
+        Piece(f"{side}_forearm", group, SKIN, (0, 0, 0), (0, 0, -fore), (42, 29), 7),
+        Piece(f"{side}_hand", group, SKIN, (0, 0, 4), (0, 0, -0.50 * hand), (30, 42), scale=(1.0, 0.62)),
+        Piece(
+            f"{side}_hand",
+            group,
+            SKIN,
+            (4, 0, -0.50 * hand),
+            (14, 0, -0.90 * hand),
+            (40, 18),
+            scale=(1.0, 0.5),
+        ),
+        Piece(
+            f"{side}_hand",
+            group,
+            SKIN,
+            (22, 4 * inward, -0.15 * hand),
+            (52, 8 * inward, -0.48 * hand),
+            (16, 11),
+        ),
+    ]
+
+
+def _leg(bones: Skeleton, side: str, index: int) -> list[Piece]:
+    """Seat, thigh and shin in trousers with a cuff, shoe."""
+    group = LEFT_LEG if side == "left" else RIGHT_LEG
+    outward = 1.0 if side == "left" else -1.0
+    thigh, shin, foot, sole = bones.thigh[index], bones.shin[index], bones.foot, bones.ankle_height
+    return [
+        Piece(f"{side}_thigh", group, TROUSERS, (-34, 0, 5), (-22, 0, -0.16 * thigh), (88, 82)),
+        Piece(
+            f"{side}_thigh",
+            group,
+            TROUSERS,
+            (0, 4 * outward, 0),
+            (2, 0, -thigh),
+            (92, 70),
+            5,
+            fold=4.0,
+            fold_period=120.0,
+        ),
+        Piece(
+            f"{side}_shin",
+            group,
+            TROUSERS,
+            (2, 0, 0),
+            (-4, 0, -0.90 * shin),
+            (70, 60),
+            6,
+            fold=5.0,
+            fold_period=100.0,
+        ),
+        Piece(
+            f"{side}_shin",
+            group,
+            TROUSERS,
+            (-6, 0, -0.84 * shin),
+            (-2, 0, -0.95 * shin),
+            (63, 64),
+            fold=4.0,
+            fold_period=60.0,
+        ),
+        Piece(f"{side}_foot", group, SHOE, (-30, 0, 42 - sole), (0.38 * foot, 0, 36 - sole), (42, 36), 4),
+        Piece(
+            f"{side}_foot",
+            group,
+            SHOE,
+            (0.34 * foot, 0, 35 - sole),
+            (0.62 * foot, 0, 27 - sole),
+            (42, 27),
+            scale=(0.85, 1.15),
+        ),
+    ]

@@ -1,0 +1,172 @@
+"""Steps along a path: where the feet stand, how they swing, and legs that reach them.
+
+A gait is written as smooth parametric curves: the pelvis follows a path at its speed and bobs; each foot stands
+still for a share of the step cycle (`duty`) and travels to its next footprint along an eased arc for the rest, the
+ankle turning about the ball of the foot at the end of the stance. Hips and knees then follow from the ankles.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.geometry.rotations import axis_turn
+from studio.synthesis.person import Skeleton
+
+Array = NDArray[np.float64]
+Path = Callable[[Array], tuple[Array, Array]]
+
+
+@dataclass(frozen=True, slots=True)
+class Gait:
+    """The numbers of a way of walking or running.
+
+    speed : mm/s. cadence : steps per second (of both feet together). duty : share of a foot's cycle on the floor
+    (> 0.5 walking, < 0.5 running). foot_spacing : lateral distance between footprints, mm. lift : height of the
+    ankle's arc in swing, mm. heel_rise : turn of the foot about its ball at push-off, radians.
+    """
+
+    speed: float
+    cadence: float
+    duty: float
+    foot_spacing: float
+    lift: float
+    heel_rise: float
+
+    @property
+    def cycle(self) -> float:
+        """Seconds from one stance of a foot to its next."""
+        return 2.0 / self.cadence
+
+
+def eased(share: Array) -> Array:
+    """Minimum-jerk progress: 0 to 1 with neither speed nor acceleration at both ends."""
+    s = np.clip(share, 0.0, 1.0)
+    return s * s * s * (10.0 + s * (6.0 * s - 15.0))
+
+
+def swung(share: Array) -> Array:
+    """Progress of a foot in the air: 0 to 1, at rest at both ends, without the haste of a minimum-jerk curve."""
+    s = np.clip(share, 0.0, 1.0)
+    return s * s * (3.0 - 2.0 * s)
+
+
+def circle_path(radius: float, start_angle: float = 0.0, turn: float = 1.0) -> Path:
+    """A circle about the origin: distance (mm) to position (F, 2) and heading (F,). turn : 1 left, -1 right."""
+
+    def at(distance: Array) -> tuple[Array, Array]:
+        angle = start_angle + turn * distance / radius
+        position = radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        return position, angle + turn * np.pi / 2
+
+    return at
+
+
+def line_path(start: tuple[float, float], heading: float) -> Path:
+    """A straight line: distance (mm) to position (F, 2) and heading (F,)."""
+
+    def at(distance: Array) -> tuple[Array, Array]:
+        along = np.array([np.cos(heading), np.sin(heading)])
+        return np.array(start) + np.asarray(distance)[..., None] * along, np.full(np.shape(distance), heading)
+
+    return at
+
+
+def winding_path(radius: float, sway: float, waves: float, start_angle: float = 0.0) -> Path:
+    """A circle whose radius swings by `sway` mm, `waves` times a round: turns of changing sharpness."""
+
+    def place(distance: Array) -> Array:
+        angle = start_angle + distance / radius
+        reach = radius + sway * np.sin(waves * (angle - start_angle))
+        return reach[..., None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+    def at(distance: Array) -> tuple[Array, Array]:
+        distance = np.asarray(distance, dtype=float)
+        ahead = place(distance + 1.0) - place(distance - 1.0)
+        return place(distance), np.unwrap(np.arctan2(ahead[..., 1], ahead[..., 0]))
+
+    return at
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FootTrack:
+    """One foot over time. ankle : (F, 3) mm. turn : (F, 3, 3) world_from_foot. swing : (F,) 0 on the floor, 0...1 in
+    the air."""
+
+    ankle: Array
+    turn: Array
+    swing: Array
+
+
+def foot_track(
+    gait: Gait,
+    path: Path,
+    times: Array,
+    skeleton: Skeleton,
+    *,
+    left: bool,
+    obstacle: Callable[[Array], Array] | None = None,
+) -> FootTrack:
+    """The foot's journey over footprints laid beside the path.
+
+    times : (F,) seconds. obstacle : extra height that the ankle must keep above points (F, 2), mm.
+    """
+    ankle_height, foot_length = skeleton.ankle_height, skeleton.foot
+    phase = times / gait.cycle + (0.0 if left else 0.5)
+    count, share = np.floor(phase), phase - np.floor(phase)
+    swing = np.clip((share - gait.duty) / (1.0 - gait.duty), 0.0, 1.0)
+    flat, heading = _footprint(gait, path, count + swung(swing), left)
+    # Push-off turns the foot about its ball in the last third of the stance; the swing brings it back and ends with
+    # the toes raised a little, for the heel to land first.
+    push = eased((share / gait.duty - 0.62) / 0.38) * np.where(swing > 0.0, 1.0 - eased(swing / 0.7), 1.0)
+    land = eased((swing - 0.6) / 0.4) * (swing > 0.0) + (1.0 - eased(share / (0.18 * gait.duty))) * (
+        swing == 0.0
+    )
+    pitch = gait.heel_rise * push - 0.28 * land
+    ball = np.array([0.60 * foot_length, 0.0, -ankle_height])
+    heel = np.array([-0.20 * foot_length, 0.0, -ankle_height])
+    level, tilted = axis_turn(2, heading), axis_turn(2, heading) @ axis_turn(1, pitch)
+    pivot = np.where((pitch > 0.0)[:, None], ball, heel)
+    ground = np.concatenate([flat, np.full((len(times), 1), ankle_height)], axis=1)
+    ankle = ground + (level @ pivot[..., None])[..., 0] - (tilted @ pivot[..., None])[..., 0]
+    ankle[:, 2] += gait.lift * np.sin(np.pi * swung(swing)) ** 2
+    if obstacle is not None:
+        ankle[:, 2] += np.sin(np.pi * np.clip(swing, 0.0, 1.0)) ** 0.8 * obstacle(flat)
+    return FootTrack(ankle, tilted, swing)
+
+
+def _footprint(gait: Gait, path: Path, count: Array, left: bool) -> tuple[Array, Array]:
+    """Where the foot stands in its `count`-th stance: under the hip in the middle of that stance. Fractions lie between
+    two footprints along the path."""
+    middle = (count + 0.5 * gait.duty - (0.0 if left else 0.5)) * gait.cycle
+    centre, heading = path(gait.speed * middle)
+    side = 0.5 * gait.foot_spacing * (1.0 if left else -1.0)
+    return centre + side * np.stack([-np.sin(heading), np.cos(heading)], axis=-1), heading
+
+
+def leg_to_ankle(hip: Array, ankle: Array, forward: Array, thigh: float, shin: float) -> tuple[Array, Array]:
+    """Rotations of thigh and shin, (F, 3, 3) each, that put the ankle where it is wanted, the knee pointing forward.
+
+    hip, ankle : (F, 3) mm. forward : (F, 3) the direction in which the knee bends. An ankle out of reach (0.2 % of
+    the leg is always kept bent) is approached as far as the leg goes.
+    """
+    reach = ankle - hip
+    distance = np.minimum(np.linalg.norm(reach, axis=1), 0.998 * (thigh + shin))
+    along = reach / np.linalg.norm(reach, axis=1, keepdims=True)
+    ahead = forward - np.sum(forward * along, axis=1, keepdims=True) * along
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    cosine = (thigh**2 + distance**2 - shin**2) / (2.0 * thigh * distance)
+    offset = np.arccos(np.clip(cosine, -1.0, 1.0))[:, None]
+    knee = hip + thigh * (np.cos(offset) * along + np.sin(offset) * ahead)
+    end = hip + distance[:, None] * along
+    lateral = np.cross(-along, ahead)
+    return _hanging_frame(knee - hip, lateral), _hanging_frame(end - knee, lateral)
+
+
+def _hanging_frame(down: Array, lateral: Array) -> Array:
+    """(F, 3, 3) frames whose -z runs along `down` and whose y is `lateral`."""
+    z = -down / np.linalg.norm(down, axis=1, keepdims=True)
+    x = np.cross(lateral, z)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    return np.stack([x, np.cross(z, x), z], axis=-1)

@@ -1,0 +1,201 @@
+"""The motions that footage can be made of, each a set of smooth curves on the synthetic skeleton.
+
+A motion takes the skeleton, the frame times (F,) in seconds and its options, and returns a `PersonMotion`. All were
+written for this project; none is recorded from a person.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.errors import StudioError
+from studio.geometry.rotations import axis_turn
+from studio.synthesis.gait import (
+    FootTrack,
+    Gait,
+    Path,
+    circle_path,
+    foot_track,
+    leg_to_ankle,
+    line_path,
+    winding_path,
+)
+from studio.synthesis.handstand import handstand
+from studio.synthesis.person import SIDES, PersonMotion, Skeleton, yaw_pitch_roll
+
+Array = NDArray[np.float64]
+Options = dict[str, float]
+MotionMaker = Callable[[Skeleton, Array, Options], PersonMotion]
+
+
+def walk(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
+    """A walk in a circle with turns: options radius_mm, sway_mm (how far the path leaves the circle), speed_mm_s,
+    cadence, start_degrees."""
+    radius = options.get("radius_mm", 950.0)
+    path = winding_path(
+        radius, options.get("sway_mm", 80.0), 2.0, np.radians(options.get("start_degrees", -120.0))
+    )
+    gait = Gait(
+        speed=options.get("speed_mm_s", 900.0),
+        cadence=options.get("cadence", 1.85),
+        duty=0.60,
+        foot_spacing=0.09 * skeleton.height,
+        lift=35.0,
+        heel_rise=0.45,
+    )
+    return _along(skeleton, times, gait, path, swing=0.33, elbow=0.40, lean=0.05)
+
+
+def run(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
+    """A run in a circle: options radius_mm, speed_mm_s, cadence, start_degrees."""
+    path = circle_path(options.get("radius_mm", 1150.0), np.radians(options.get("start_degrees", -150.0)))
+    gait = Gait(options.get("speed_mm_s", 2200.0), options.get("cadence", 2.7), 0.36, 110.0, 210.0, 0.6)
+    return _along(skeleton, times, gait, path, swing=0.62, elbow=1.35, lean=0.13)
+
+
+def box(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
+    """Walking straight and stepping over a box at the origin: options height_mm of the box, speed_mm_s."""
+    speed = options.get("speed_mm_s", 800.0)
+    gait = Gait(speed, 1.6, 0.60, 0.11 * skeleton.height, 50.0, 0.45)
+    # The footprints fall 1.25 s x speed apart; this start puts one 0.3 m before the box's middle, one 0.2 m behind.
+    start = -300.0 - speed * gait.cycle * (0.5 * gait.duty + 0.5)
+    clearance = options.get("height_mm", 160.0) + 70.0
+
+    def obstacle(places: Array) -> Array:
+        return clearance * np.exp(-((places[:, 0] / 420.0) ** 4))
+
+    return _along(
+        skeleton,
+        times,
+        gait,
+        line_path((start, 0.0), 0.0),
+        swing=0.28,
+        elbow=0.5,
+        lean=0.07,
+        obstacle=obstacle,
+    )
+
+
+def stand(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
+    """Standing still with the sway of a standing person: options heading_degrees, sway_mm."""
+    count, sway = len(times), options.get("sway_mm", 6.0)
+    heading = np.full(count, np.radians(options.get("heading_degrees", 30.0)))
+    zero = np.zeros(count)
+    root = np.stack([sway * np.sin(1.7 * times), sway * np.sin(1.1 * times + 1.0), zero], axis=-1)
+    root[:, 2] = skeleton.standing_hip_height - 9.0
+    turns = _trunk(heading, zero, 0.02 * np.sin(1.3 * times), zero)
+    forward = turns["pelvis"][:, :, 0]
+    for index, side in enumerate(SIDES):
+        sign = 1.0 if side == "left" else -1.0
+        outward = np.stack([-np.sin(heading), np.cos(heading), zero], axis=-1)
+        hip = root + sign * skeleton.hip_half_width * turns["pelvis"][:, :, 1]
+        ankle = sign * 0.065 * skeleton.height * outward + np.array([0.0, 0.0, skeleton.ankle_height])
+        thigh, shin = leg_to_ankle(hip, ankle, forward, skeleton.thigh[index], skeleton.shin[index])
+        turns |= {f"{side}_thigh": thigh, f"{side}_shin": shin}
+        turns[f"{side}_foot"] = axis_turn(2, heading + sign * 0.15)
+        _add_arm(turns, side, 0.04 * np.sin(1.5 * times), np.full(count, 0.2), np.full(count, 0.35))
+    return PersonMotion(skeleton, _rate(times), root, turns)
+
+
+MOTIONS: dict[str, MotionMaker] = {
+    "walk": walk,
+    "run": run,
+    "box": box,
+    "handstand": handstand,
+    "stand": stand,
+}
+
+
+def make_motion(name: str, skeleton: Skeleton, frames: int, fps: float, options: Options) -> PersonMotion:
+    """The motion called `name`, `frames` long. Raises StudioError naming the motions there are."""
+    if name not in MOTIONS:
+        raise StudioError(f"There is no motion called '{name}'.", f"Choose one of {', '.join(MOTIONS)}.")
+    return MOTIONS[name](skeleton, np.arange(frames) / fps, options)
+
+
+def _along(
+    skeleton: Skeleton,
+    times: Array,
+    gait: Gait,
+    path: Path,
+    *,
+    swing: float,
+    elbow: float,
+    lean: float,
+    obstacle: Callable[[Array], Array] | None = None,
+) -> PersonMotion:
+    """A gait along a path, arms swinging against the legs (`swing`, `elbow`, `lean` in radians)."""
+    phase = 2.0 * np.pi * times / gait.cycle
+    stride = np.cos(phase + 0.1)
+    place, heading = path(gait.speed * times)
+    sideways = 0.016 * skeleton.height * np.sin(phase - 0.4)
+    root = np.concatenate([place, _bobbing(skeleton, gait, phase)[:, None]], axis=1)
+    root[:, 0] -= sideways * np.sin(heading)
+    root[:, 1] += sideways * np.cos(heading)
+    turns = _trunk(
+        heading - 0.09 * stride, lean + 0.015 * np.cos(2.0 * phase), 0.16 * stride, 0.03 * np.sin(phase)
+    )
+    feet = [foot_track(gait, path, times, skeleton, left=side == "left", obstacle=obstacle) for side in SIDES]
+    root[:, 2] += _room_to_reach(skeleton, root, turns["pelvis"], feet)
+    for side, track in zip(SIDES, feet, strict=True):
+        sign, index = (1.0, 0) if side == "left" else (-1.0, 1)
+        hip = root + sign * skeleton.hip_half_width * turns["pelvis"][:, :, 1]
+        ahead = turns["pelvis"][:, :, 0] + track.turn[:, :, 0]
+        thigh, shin = leg_to_ankle(hip, track.ankle, ahead, skeleton.thigh[index], skeleton.shin[index])
+        turns |= {f"{side}_thigh": thigh, f"{side}_shin": shin, f"{side}_foot": track.turn}
+        forward = 0.05 - sign * swing * stride
+        bend = elbow + 0.45 * swing * (1.0 - sign * np.cos(phase - 0.3))
+        _add_arm(turns, side, forward, np.full(len(times), 0.24), bend)
+    return PersonMotion(skeleton, _rate(times), root, turns)
+
+
+def _bobbing(skeleton: Skeleton, gait: Gait, phase: Array) -> Array:
+    """Height of the pelvis about its mean: highest over the standing leg in a walk, lowest there in a run."""
+    amplitude = (0.009 if gait.duty > 0.5 else -0.018) * skeleton.height
+    return amplitude * np.cos(2.0 * phase - 2.0 * np.pi * gait.duty)
+
+
+def _room_to_reach(skeleton: Skeleton, root: Array, pelvis: Array, feet: list[FootTrack]) -> float:
+    """The mean pelvis height at which both ankles are reached in every frame without quite straightening a knee."""
+    highest = []
+    for sign, index, track in ((1.0, 0, feet[0]), (-1.0, 1, feet[1])):
+        leg = 0.994 * (skeleton.thigh[index] + skeleton.shin[index])
+        hip = root + sign * skeleton.hip_half_width * pelvis[:, :, 1]
+        across = np.linalg.norm((track.ankle - hip)[:, :2], axis=1)
+        highest.append(track.ankle[:, 2] + np.sqrt(np.maximum(leg**2 - across**2, 0.0)) - hip[:, 2])
+    return float(np.min(highest))
+
+
+def _trunk(
+    heading: Array, pitch: Array | float, twist: Array | float, roll: Array | float
+) -> dict[str, Array]:
+    """Pelvis, thorax (twisted against the pelvis about its own axis) and head, which looks where the person goes."""
+    level = np.zeros_like(heading)
+    pelvis = yaw_pitch_roll(heading, level + 0.6 * pitch, level + roll)
+    thorax = pelvis @ axis_turn(1, level + 0.4 * pitch) @ axis_turn(2, level + twist)
+    head = thorax @ yaw_pitch_roll(-0.55 * (level + twist), level + 0.10, -0.6 * (level + roll))
+    return {"pelvis": pelvis, "thorax": thorax, "head": head}
+
+
+def _add_arm(turns: dict[str, Array], side: str, forward: Array, outward: Array, bend: Array) -> None:
+    """An arm swung `forward`, held `outward` and bent by `bend` at the elbow, radians; the clavicle gives way to it a
+    little. Adds clavicle, upper arm, forearm and hand."""
+    sign = 1.0 if side == "left" else -1.0
+    clavicle = turns["thorax"] @ axis_turn(2, -sign * 0.08 * forward) @ axis_turn(0, sign * 0.06 * outward)
+    upper = (
+        turns["thorax"]
+        @ axis_turn(1, -forward)
+        @ axis_turn(0, sign * outward)
+        @ axis_turn(2, -sign * 0.25 + 0.0 * bend)
+    )
+    forearm = upper @ axis_turn(1, -bend)
+    turns |= {f"{side}_clavicle": clavicle, f"{side}_upper_arm": upper, f"{side}_forearm": forearm}
+    turns[f"{side}_hand"] = (
+        forearm @ axis_turn(2, -sign * 0.5 + 0.0 * bend) @ axis_turn(1, -0.15 + 0.0 * bend)
+    )
+
+
+def _rate(times: Array) -> float:
+    """Frames per second of evenly spaced times."""
+    return float(1.0 / (times[1] - times[0])) if len(times) > 1 else 60.0

@@ -1,0 +1,80 @@
+"""A rendered person's footage as files: a video a camera, empty clips or plates, masks."""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+
+import cv2
+
+from studio.geometry.camera import Camera
+from studio.synthesis.clips import ClipWriter
+from studio.synthesis.person import PersonMotion
+from studio.synthesis.recipe_file import Picture, Recipe
+from studio.synthesis.renderer import Renderer
+from studio.synthesis.room import furnished_room
+
+Progress = Callable[[int, int], None]
+
+STEPPED_OVER, STEPPED_OVER_HEIGHT = "box", 160.0
+
+
+def render_person(
+    recipe: Recipe, motion: PersonMotion, cameras: tuple[Camera, ...], source: Path, progress: Progress | None
+) -> None:
+    """Write videos/, and background/ and masks/ as the recipe includes them, into `source`."""
+    height = recipe.options.get("height_mm", STEPPED_OVER_HEIGHT) if recipe.motion == STEPPED_OVER else 0.0
+    picture = recipe.picture
+    renderer = Renderer(
+        furnished_room(height),
+        cameras,
+        motion,
+        noise=picture.noise,
+        samples=picture.samples,
+        seed=recipe.seed,
+    )
+    with ExitStack() as open_clips:
+        footage = _writers(source / "videos", cameras, recipe.fps, picture.quality, open_clips)
+        masks = (
+            _writers(source / "masks", cameras, recipe.fps, 0.0, open_clips) if recipe.include.masks else []
+        )
+        for frame in range(motion.frame_count):
+            shadow = renderer.shadow(frame)
+            for index in range(len(cameras)):
+                seen, mask = renderer.picture(index, frame, shadow)
+                footage[index].add(seen)
+                if masks:
+                    masks[index].add(mask)
+            if progress is not None:
+                progress(frame + 1, motion.frame_count)
+    if recipe.include.background != "none":
+        (source / "background").mkdir()
+        for index, camera in enumerate(cameras):
+            _write_background(
+                renderer, index, camera, source / "background", recipe.include.background, picture
+            )
+
+
+def _writers(
+    folder: Path, cameras: tuple[Camera, ...], fps: float, quality: float, open_clips: ExitStack
+) -> list[ClipWriter]:
+    """One open clip a camera."""
+    folder.mkdir()
+    return [
+        open_clips.enter_context(
+            ClipWriter(folder / f"{camera.name}.mp4", (camera.width, camera.height), fps, quality)
+        )
+        for camera in cameras
+    ]
+
+
+def _write_background(
+    renderer: Renderer, index: int, camera: Camera, folder: Path, kind: str, picture: Picture
+) -> None:
+    """The empty room: a short clip with the sensor's noise, or one picture."""
+    if kind == "picture":
+        cv2.imwrite(str(folder / f"{camera.name}.png"), renderer.empty(index, 0))
+        return
+    size = (camera.width, camera.height)
+    with ClipWriter(folder / f"{camera.name}.mp4", size, 60.0, picture.quality) as clip:
+        for frame in range(picture.empty_frames):
+            clip.add(renderer.empty(index, frame))

@@ -1,0 +1,157 @@
+"""What footage is to be made: the entries of a recipe file (TOML), checked, and the recipes that come along."""
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from studio.errors import StudioError
+from studio.geometry.camera import Camera
+from studio.synthesis.cameras import corner_rig, placed_camera
+
+RECIPES = Path(__file__).parent / "recipe_files"
+SUFFIX = ".toml"
+
+
+class Picture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Pictures. noise : standard deviation of the sensor's noise at mid grey, levels. samples : rays along a pixel's
+    side. quality : x264's constant rate factor of the footage. empty_frames : length of the empty clip."""
+
+    width: int = 640
+    height: int = 480
+    noise: float = 2.0
+    samples: int = 2
+    quality: float = 24.0
+    empty_frames: int = 12
+
+
+class Placed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A camera put down by hand: mm, degrees, pixels."""
+
+    name: str
+    position: tuple[float, float, float]
+    look_at: tuple[float, float, float]
+    focal_px: float
+    roll_degrees: float = 0.0
+    distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class Cameras(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Which cameras: "corners" (four made-up ones), a calibration file or folder, or `placed` ones."""
+
+    rig: str = ""
+    calibration: str = ""
+    placed: tuple[Placed, ...] = ()
+
+
+class Include(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What goes into the session beside footage and calibration. background : "clip", "picture" or "none".
+    start_pose_noise_mm : how far the markers are moved (normal, each coordinate) before the start pose is fitted."""
+
+    background: str = "clip"
+    masks: bool = False
+    truth: bool = True
+    subject: bool = True
+    start_pose: bool = True
+    start_pose_noise_mm: float = 2.0
+
+
+class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Footage to be made. motion : "walk", "run", "box", "handstand", "stand"; or "arm", which shows `body` itself,
+    seen by one camera, as in Deutscher & Reid 6.1. options : numbers of the motion. tracker, weighting : what runs of
+    the session use by default."""
+
+    title: str
+    motion: str
+    frames: int
+    fps: float = 60.0
+    seed: int = 1
+    body: str = "human31"
+    height_mm: float = 1760.0
+    weighting: str = ""
+    options: dict[str, float] = {}
+    cameras: Cameras = Cameras()
+    picture: Picture = Picture()
+    include: Include = Include()
+
+
+def find_recipe(name_or_path: str | Path) -> Path:
+    """The recipe's file: a path, or the name of one that comes along. Raises StudioError listing those."""
+    path = Path(name_or_path)
+    if path.is_file():
+        return path
+    bundled = RECIPES / f"{name_or_path}{SUFFIX}"
+    if bundled.parent == RECIPES and bundled.is_file():
+        return bundled
+    raise StudioError(
+        f"There is no recipe '{name_or_path}'.",
+        f"Give a TOML file or one of {', '.join(recipe_names())}.",
+    )
+
+
+def recipe_names() -> tuple[str, ...]:
+    """The recipes that come along."""
+    return tuple(sorted(path.stem for path in RECIPES.glob(f"*{SUFFIX}")))
+
+
+def read_recipe(path: Path) -> Recipe:
+    """The recipe in a file. Raises StudioError naming file, entry and remedy."""
+    try:
+        recipe = msgspec.toml.decode(path.read_bytes(), type=Recipe)
+    except OSError as problem:
+        raise StudioError(
+            f"Recipe '{path}' cannot be read ({problem.strerror}).", "Check the path."
+        ) from None
+    except (msgspec.DecodeError, UnicodeDecodeError) as problem:
+        cause = f"Recipe '{path.name}': {str(problem).replace('`', chr(39))}."
+        raise StudioError(cause, "Correct the entry; the bundled recipes are examples.") from None
+    problem = _problem(recipe)
+    if problem:
+        raise StudioError(f"Recipe '{path.name}': {problem}.", "Correct the entry.")
+    return recipe
+
+
+def recipe_cameras(recipe: Recipe, rng: np.random.Generator) -> tuple[Camera, ...]:
+    """The cameras that are made up or put down by hand (those of a calibration file are read by the caller)."""
+    size = (recipe.picture.width, recipe.picture.height)
+    if recipe.cameras.placed:
+        return tuple(
+            placed_camera(
+                entry.name,
+                entry.position,
+                entry.look_at,
+                size=size,
+                focal_px=entry.focal_px,
+                roll=float(np.radians(entry.roll_degrees)),
+                distortion=entry.distortion,
+            )
+            for entry in recipe.cameras.placed
+        )
+    return corner_rig(size, rng)
+
+
+def _problem(recipe: Recipe) -> str:
+    """What is wrong with a recipe whose entries have the right types, "" when nothing is."""
+    picture, include, cameras = recipe.picture, recipe.include, recipe.cameras
+    checks = (
+        (not 1 <= recipe.frames <= 100_000, f"frames is {recipe.frames}, not 1 to 100000"),
+        (not 1.0 <= recipe.fps <= 1000.0, f"fps is {recipe.fps:g}, not 1 to 1000"),
+        (not 300.0 <= recipe.height_mm <= 3000.0, f"height_mm is {recipe.height_mm:g}, not 300 to 3000"),
+        (not 16 <= picture.width <= 8192, f"picture.width is {picture.width}, not 16 to 8192"),
+        (not 16 <= picture.height <= 8192, f"picture.height is {picture.height}, not 16 to 8192"),
+        (bool(picture.width % 2 or picture.height % 2), "picture sides must be even for H.264"),
+        (not 0.0 <= picture.noise <= 40.0, f"picture.noise is {picture.noise:g}, not 0 to 40"),
+        (not 1 <= picture.samples <= 4, f"picture.samples is {picture.samples}, not 1 to 4"),
+        (not 0.0 <= picture.quality <= 51.0, f"picture.quality is {picture.quality:g}, not 0 to 51"),
+        (picture.empty_frames < 1, "picture.empty_frames must be 1 or more"),
+        (cameras.rig not in ("", "corners"), f"cameras.rig is '{cameras.rig}', not 'corners'"),
+        (
+            sum(map(bool, (cameras.rig, cameras.calibration, cameras.placed))) != 1,
+            "[cameras] must hold one of rig, calibration, placed",
+        ),
+        (
+            include.background not in ("clip", "picture", "none"),
+            f"include.background is '{include.background}', not clip, picture or none",
+        ),
+    )
+    return next((words for wrong, words in checks if wrong), "")

@@ -1,0 +1,107 @@
+"""From a recipe to a session: footage rendered, truth beside it, imported like anybody's footage."""
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from studio.body.catalogue import load_body
+from studio.body.inverse_kinematics import pose_from_markers
+from studio.body.subject import Subject, fit_subject, write_subject
+from studio.capture.calibration_files import read_calibration, write_calibration
+from studio.capture.trc import MarkerMotion, write_trc
+from studio.geometry.camera import Camera
+from studio.sessions.importers.catalogue import import_source
+from studio.sessions.manifest import read_manifest, write_manifest
+from studio.sessions.named_rows import write_pose
+from studio.synthesis.arm_footage import render_arm
+from studio.synthesis.motions import make_motion
+from studio.synthesis.person import PersonMotion, marker_lengths, marker_motion, skeleton_of_height
+from studio.synthesis.person_footage import render_person
+from studio.synthesis.recipe_file import Recipe, find_recipe, read_recipe, recipe_cameras
+
+Progress = Callable[[int, int], None]
+
+ARM = "arm"
+RECIPE_COPY = "recipe.toml"
+
+
+def synthesize(recipe: Path | str, into: Path, progress: Progress | None = None) -> Path:
+    """Render a recipe's footage and make a session of it; returns the session's folder.
+
+    recipe : a TOML file or the name of a bundled recipe. into : the session folder to be made. progress : called with
+    frames done and frames in all. The same recipe gives the same pictures on any number of threads. Raises StudioError
+    for a recipe that cannot be followed and what `import_source` raises for `into`.
+    """
+    path = find_recipe(recipe)
+    wanted = read_recipe(path)
+    with tempfile.TemporaryDirectory(prefix="studio-synthesis-") as folder:
+        source = Path(folder) / into.name
+        source.mkdir()
+        render_source(wanted, path.parent, source, progress)
+        import_source(source, into, fps=wanted.fps)
+    manifest = read_manifest(into)
+    changed = msgspec.structs.replace(
+        manifest, title=wanted.title, weighting=wanted.weighting, imported_from=f"recipe {path.name}"
+    )
+    write_manifest(into, changed)
+    (into / RECIPE_COPY).write_bytes(path.read_bytes())
+    return into
+
+
+def render_source(
+    recipe: Recipe, recipe_folder: Path, source: Path, progress: Progress | None = None
+) -> None:
+    """Write the folder that `import` understands: videos, background, masks, calibration, truth, subject, start pose.
+
+    recipe_folder : where a relative `cameras.calibration` starts. source : an empty folder.
+    """
+    rng = np.random.default_rng(recipe.seed)
+    if recipe.motion == ARM:
+        cameras = _cameras(recipe, recipe_folder, rng)
+        truth = render_arm(recipe, cameras[0], source, progress)
+        cameras, subject = cameras[:1], Subject(body=recipe.body)
+    else:
+        skeleton = skeleton_of_height(recipe.height_mm, rng)
+        cameras = _cameras(recipe, recipe_folder, rng)
+        motion = make_motion(recipe.motion, skeleton, recipe.frames, recipe.fps, recipe.options)
+        truth, subject = marker_motion(motion), person_subject(recipe, motion)
+        render_person(recipe, motion, cameras, source, progress)
+    (source / "calibration").mkdir()
+    write_calibration(cameras, source / "calibration" / "rendered.toml")
+    if recipe.include.truth and len(truth.names):
+        (source / "truth").mkdir(exist_ok=True)
+        write_trc(source / "truth" / f"{recipe.motion}.trc", truth)
+    if recipe.include.subject:
+        write_subject(subject, source / "subject.toml")
+    if recipe.include.start_pose and recipe.motion != ARM:
+        _write_start_pose(recipe, subject, truth, rng, source / "start_pose.csv")
+
+
+def person_subject(recipe: Recipe, motion: PersonMotion) -> Subject:
+    """What a tape measure says of the rendered person: height and the distances between neighbouring markers."""
+    lengths = {pair: round(length, 1) for pair, length in marker_lengths(motion).items()}
+    return Subject(body=recipe.body, height_mm=recipe.height_mm, lengths_mm=lengths)
+
+
+def _cameras(recipe: Recipe, recipe_folder: Path, rng: np.random.Generator) -> tuple[Camera, ...]:
+    """Made-up cameras, or those of the calibration that the recipe names."""
+    if recipe.cameras.calibration:
+        return read_calibration(recipe_folder / recipe.cameras.calibration).cameras
+    return recipe_cameras(recipe, rng)
+
+
+def _write_start_pose(
+    recipe: Recipe, subject: Subject, truth: MarkerMotion, rng: np.random.Generator, path: Path
+) -> None:
+    """The subject's pose in frame 0 as a person would find it: inverse kinematics on the true markers, each coordinate
+    moved by normal noise of `start_pose_noise_mm` (so it is close to the truth, not the truth)."""
+    body, _ = fit_subject(load_body(recipe.body), subject)
+    known = {marker.name for marker in body.markers}
+    kept = [index for index, name in enumerate(truth.names) if name in known]
+    points = truth.positions[0, kept]
+    points = points + rng.normal(0.0, recipe.include.start_pose_noise_mm, points.shape)
+    pose, _ = pose_from_markers(body, tuple(truth.names[index] for index in kept), points, body.neutral)
+    write_pose(path, tuple(entry.name for entry in body.parameters), pose)

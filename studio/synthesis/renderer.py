@@ -1,0 +1,175 @@
+"""Pictures of the person in the room, with their exact masks.
+
+The room is traced once a camera; in each frame the person's shadow on the floor is computed once for all cameras and
+the person is traced inside the window that can hold them. A picture is then the room, darkened by the shadow, under
+the person, softened as by a lens, with sensor noise that depends only on seed, camera and frame.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.geometry.camera import Camera
+from studio.geometry.projection import project
+from studio.synthesis.cameras import pixel_rays
+from studio.synthesis.flesh import BOUND, BOUND_RADIUS, clothed_pieces, piece_tables
+from studio.synthesis.noise_kernels import add_sensor_noise
+from studio.synthesis.person import PersonMotion
+from studio.synthesis.room import Room, block_tables
+from studio.synthesis.room_kernels import trace_room
+from studio.synthesis.tracing_kernels import floor_shadow, trace_person
+
+Array = NDArray[np.float64]
+Floats = NDArray[np.float32]
+Bytes = NDArray[np.uint8]
+
+WARDROBE = np.array(
+    [
+        (0.78, 0.57, 0.46),  # skin
+        (0.22, 0.34, 0.46),  # shirt
+        (0.27, 0.25, 0.24),  # trousers
+        (0.12, 0.12, 0.13),  # shoes
+        (0.15, 0.10, 0.07),  # hair
+        (0.52, 0.56, 0.58),  # the shirt's stripes
+    ]
+)
+SHADOW_REACH, SHADOW_CELL = 2600.0, 26.0
+EXPOSURE, LENS_BLUR = 1.8, 0.55
+STREAMS_PER_FRAME = 64
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _View:
+    """One camera's fixed things. shadow_place : (H, W, 2) float32 column and row in the shadow's grid."""
+
+    camera: Camera
+    rays: Floats
+    key: Floats
+    ambient: Floats
+    depth: Floats
+    shadow_place: Floats
+
+
+class Renderer:
+    """Renders any frame of one motion for any camera; frames are independent of each other."""
+
+    def __init__(
+        self,
+        room: Room,
+        cameras: tuple[Camera, ...],
+        motion: PersonMotion,
+        *,
+        noise: float,
+        samples: int,
+        seed: int,
+    ) -> None:
+        self._room, self._noise, self._samples, self._seed = room, noise, samples, seed
+        self._tables, self._labels = piece_tables(motion, clothed_pieces(motion.skeleton))
+        self._views = tuple(_view(room, camera, samples) for camera in cameras)
+
+    def empty(self, camera: int, frame: int) -> Bytes:
+        """(H, W, 3) BGR picture of the room alone; its noise is that of frame -1 - `frame`, which no other has."""
+        view = self._views[camera]
+        return self._developed(view.key + view.ambient, camera, -1 - frame)
+
+    def shadow(self, frame: int) -> tuple[Floats, Floats]:
+        """The person's shadow of the lamp and of the surroundings on the floor's grid, (n, n) each, 1 = no shadow."""
+        count = int(2 * SHADOW_REACH / SHADOW_CELL) + 1
+        key, ambient = np.ones((count, count), np.float32), np.ones((count, count), np.float32)
+        left = -SHADOW_REACH
+        floor_shadow(
+            left, left, SHADOW_CELL, self._tables[frame], self._labels, self._room.lights, key, ambient
+        )
+        return key, ambient
+
+    def picture(self, camera: int, frame: int, shadow: tuple[Floats, Floats]) -> tuple[Bytes, Bytes]:
+        """(H, W, 3) BGR picture and (H, W) mask, 255 where the person covers half a pixel or more."""
+        view = self._views[camera]
+        key, ambient = (_at_places(grid, view.shadow_place) for grid in shadow)
+        light = view.key * key[..., None] + view.ambient * ambient[..., None]
+        mask = np.zeros(view.depth.shape, np.uint8)
+        window = _window(view.camera, self._tables[frame])
+        if window is not None:
+            rows, columns = window
+            person, coverage = self._person(view, frame, rows, columns)
+            light[rows, columns] = light[rows, columns] * (1.0 - coverage[..., None]) + person
+            mask[rows, columns] = np.where(coverage >= 0.5, 255, 0)
+        return self._developed(light, camera, frame), mask
+
+    def _person(self, view: _View, frame: int, rows: slice, columns: slice) -> tuple[Floats, Floats]:
+        """Light (h, w, 3) and coverage (h, w) of the person inside a window."""
+        s = self._samples
+        rays = view.rays[rows.start * s : rows.stop * s, columns.start * s : columns.stop * s]
+        depth = np.ascontiguousarray(view.depth[rows, columns])
+        light, coverage = np.zeros((*depth.shape, 3), np.float32), np.zeros(depth.shape, np.float32)
+        trace_person(
+            view.camera.centre,
+            np.ascontiguousarray(rays),
+            s,
+            depth,
+            self._tables[frame],
+            self._labels,
+            self._room.lights,
+            WARDROBE,
+            light,
+            coverage,
+        )
+        return light, coverage
+
+    def _developed(self, light: Floats, camera: int, frame: int) -> Bytes:
+        """What the sensor makes of linear light: lens blur, exposure, noise, BGR bytes."""
+        soft = cv2.GaussianBlur(np.ascontiguousarray(light[..., ::-1], np.float32), (0, 0), LENS_BLUR)
+        exposed = np.asarray(255.0 * (1.0 - np.exp(-EXPOSURE * soft)), np.float32)
+        out = np.zeros(exposed.shape, np.uint8)
+        stream = (self._seed * 1_000_003 + frame) * STREAMS_PER_FRAME + camera
+        add_sensor_noise(exposed, self._noise, stream, out)
+        return out
+
+
+def _view(room: Room, camera: Camera, samples: int) -> _View:
+    """Trace the empty room for one camera."""
+    shape = (camera.height, camera.width)
+    rays = pixel_rays(camera, samples)
+    key, ambient, depth = np.zeros((*shape, 3)), np.zeros((*shape, 3)), np.zeros(shape)
+    blocks, patterns = block_tables(room)
+    size = np.array([*room.half, room.height])
+    trace_room(camera.centre, rays, samples, size, room.lights, blocks, patterns, key, ambient, depth)
+    middle = rays if samples == 1 else pixel_rays(camera, 1)
+    points = camera.centre + depth[..., None] * middle
+    lamp = room.lights[0]
+    on_floor = lamp + (points - lamp) * (lamp[2] / np.maximum(lamp[2] - points[..., 2], 1.0))[..., None]
+    places = (on_floor[..., :2] + SHADOW_REACH) / SHADOW_CELL
+    single = np.float32
+    return _View(
+        camera, rays, key.astype(single), ambient.astype(single), depth.astype(single), places.astype(single)
+    )
+
+
+def _at_places(grid: Floats, places: Floats) -> Floats:
+    """The grid's values at (H, W, 2) places, 1 outside."""
+    return cv2.remap(
+        grid,
+        places[..., 0],
+        places[..., 1],
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_CONSTANT,
+        borderValue=(1.0,),
+    ).astype(np.float32)
+
+
+def _window(camera: Camera, table: Array) -> tuple[slice, slice] | None:
+    """Rows and columns that can hold the person, None when they are out of the picture."""
+    pixels, depth = project(camera, table[:, BOUND : BOUND + 3])
+    ahead = depth > 100.0
+    if not ahead.any():
+        return None
+    reach = 1.25 * camera.matrix[0, 0] * table[ahead, BOUND_RADIUS] / depth[ahead] + 4.0
+    low, high = (pixels[ahead] - reach[:, None]).min(axis=0), (pixels[ahead] + reach[:, None]).max(axis=0)
+    left, top = (int(max(np.floor(value), 0)) for value in low)
+    right, bottom = (
+        int(min(np.ceil(high[0]) + 1, camera.width)),
+        int(min(np.ceil(high[1]) + 1, camera.height)),
+    )
+    return (slice(top, bottom), slice(left, right)) if right > left and bottom > top else None

@@ -1,0 +1,163 @@
+"""Rays through the person's distance field: pictures, true coverage, and shadows on the floor."""
+
+import math
+
+import numpy as np
+from numba import njit, prange
+
+from studio.synthesis.distance_kernels import (
+    body_distance,
+    body_normal,
+    gather,
+    light_share,
+    local_point,
+    nearest_piece,
+    no_pieces,
+)
+from studio.synthesis.flesh import HAIR, SHIRT, SHOE, TROUSERS
+from studio.synthesis.noise_kernels import value_noise
+
+SAFETY, TOUCH, STEPS = 0.85, 0.8, 72
+OCCLUSION_REACH = 70.0
+
+
+@njit(cache=True)
+def cloth_colour(material, x, y, z, wardrobe):
+    """(red, green, blue) of a point in its piece's frame, so that the pattern moves with the limb.
+
+    wardrobe : (6, 3) skin, shirt, trousers, shoe, hair, and the shirt's stripe.
+    """
+    grain = value_noise(x / 9.0, y / 9.0, z / 9.0) - 0.5
+    patch = value_noise(x / 55.0 + 7.0, y / 55.0, z / 55.0) - 0.5
+    r, g, b = wardrobe[material, 0], wardrobe[material, 1], wardrobe[material, 2]
+    tone = 1.0 + 0.10 * patch + 0.06 * grain
+    if material == SHIRT:
+        stripe = 0.5 + 0.5 * math.sin(2.0 * math.pi * z / 74.0)
+        stripe = min(max((stripe - 0.72) / 0.10, 0.0), 1.0)
+        r += stripe * (wardrobe[5, 0] - r)
+        g += stripe * (wardrobe[5, 1] - g)
+        b += stripe * (wardrobe[5, 2] - b)
+        tone = 1.0 + 0.12 * patch + 0.10 * grain
+    elif material == TROUSERS:
+        tone = 1.0 + 0.22 * patch + 0.16 * grain
+        if abs(x + 0.1 * y) < 3.0:
+            tone *= 0.78
+    elif material == SHOE:
+        tone = 1.0 + 0.25 * grain
+    elif material == HAIR:
+        tone = 1.0 + 0.5 * (value_noise(x / 5.0, y / 5.0, z / 30.0) - 0.5)
+    return r * tone, g * tone, b * tone
+
+
+@njit(cache=True)
+def shaded(px, py, pz, dx, dy, dz, pieces, labels, active, count, shadow_active, lights, wardrobe, out):
+    """Light that a point of the person sends to the camera, written to `out` (3,), 0...1.
+
+    lights : (4, 3) lamp position, (lamp radius, -, -), lamp colour, ambient colour.
+    """
+    nx, ny, nz = body_normal(px, py, pz, pieces, labels, active, count)
+    piece = nearest_piece(px, py, pz, pieces, active, count)
+    x, y, z = local_point(px, py, pz, pieces[piece])
+    material = labels[piece, 0]
+    red, green, blue = cloth_colour(material, x, y, z, wardrobe)
+    lx, ly, lz = lights[0, 0] - px, lights[0, 1] - py, lights[0, 2] - pz
+    size = math.sqrt(lx * lx + ly * ly + lz * lz)
+    facing = (nx * lx + ny * ly + nz * lz) / size
+    key = 0.0
+    if facing > 0.0:
+        key = facing * light_share(px, py, pz, lights[0], lights[1, 0], pieces, labels, shadow_active)
+    close = body_distance(
+        px + OCCLUSION_REACH * nx,
+        py + OCCLUSION_REACH * ny,
+        pz + OCCLUSION_REACH * nz,
+        pieces,
+        labels,
+        active,
+        count,
+    )
+    openness = 0.45 + 0.55 * min(max(close / OCCLUSION_REACH, 0.0), 1.0)
+    sky = openness * (0.62 + 0.38 * nz)
+    fill = 0.16 * max(-(nx * dx + ny * dy + nz * dz), 0.0) * openness
+    out[0] = red * (key * lights[2, 0] + sky * lights[3, 0] + fill)
+    out[1] = green * (key * lights[2, 1] + sky * lights[3, 1] + fill)
+    out[2] = blue * (key * lights[2, 2] + sky * lights[3, 2] + fill)
+
+
+@njit(cache=True)
+def first_touch(origin, dx, dy, dz, pieces, labels, active):
+    """Distance along a ray to the person and the number of active pieces; (-1, n) when it misses."""
+    count, t, last = gather(origin[0], origin[1], origin[2], dx, dy, dz, pieces, 12.0, active)
+    if count == 0:
+        return -1.0, count
+    for _ in range(STEPS):
+        if t > last:
+            return -1.0, count
+        distance = body_distance(
+            origin[0] + t * dx, origin[1] + t * dy, origin[2] + t * dz, pieces, labels, active, count
+        )
+        if distance < TOUCH:
+            return t, count
+        t += SAFETY * distance
+    return (t, count) if distance < 6.0 * TOUCH else (-1.0, count)
+
+
+@njit(cache=True, parallel=True)
+def trace_person(origin, rays, samples, room_depth, pieces, labels, lights, wardrobe, light, coverage):
+    """The person as seen through a window of the picture.
+
+    origin : (3,) camera centre. rays : (h * samples, w * samples, 3) unit directions. room_depth : (h, w) distance
+    to what stands in the room, mm. Fills light (h, w, 3), premultiplied by coverage (h, w), both 0...1.
+    """
+    height, width = coverage.shape
+    for row in prange(height):
+        active, shadow_active, colour = no_pieces(pieces), no_pieces(pieces), np.zeros(3)
+        for column in range(width):
+            hits = 0
+            for sample in range(samples * samples):
+                ray = rays[row * samples + sample // samples, column * samples + sample % samples]
+                dx, dy, dz = np.float64(ray[0]), np.float64(ray[1]), np.float64(ray[2])
+                t, count = first_touch(origin, dx, dy, dz, pieces, labels, active)
+                if t < 0.0 or t > room_depth[row, column]:
+                    continue
+                hits += 1
+                px, py, pz = origin[0] + t * dx, origin[1] + t * dy, origin[2] + t * dz
+                shaded(
+                    px,
+                    py,
+                    pz,
+                    dx,
+                    dy,
+                    dz,
+                    pieces,
+                    labels,
+                    active,
+                    count,
+                    shadow_active,
+                    lights,
+                    wardrobe,
+                    colour,
+                )
+                for channel in range(3):
+                    light[row, column, channel] += colour[channel] / (samples * samples)
+            coverage[row, column] = hits / (samples * samples)
+
+
+@njit(cache=True, parallel=True)
+def floor_shadow(left, near, cell, pieces, labels, lights, key, ambient):
+    """What the person leaves of the lamp and of the room's light on the floor.
+
+    Cell (j, i) of the (n, n) outputs lies at x = left + i * cell, y = near + j * cell, mm; 1 = nothing taken away.
+    """
+    rows, columns = key.shape
+    for row in prange(rows):
+        active = no_pieces(pieces)
+        for column in range(columns):
+            x, y = left + column * cell, near + row * cell
+            key[row, column] = light_share(x, y, 0.0, lights[0], lights[1, 0], pieces, labels, active)
+            count, _, _ = gather(x, y, -1.0, 0.0, 0.0, 1.0, pieces, 160.0, active)
+            taken = 0.0
+            if count > 0:
+                for height, weight in ((30.0, 0.45), (110.0, 0.30)):
+                    distance = body_distance(x, y, height, pieces, labels, active, count)
+                    taken += weight * min(max(1.0 - distance / (1.4 * height), 0.0), 1.0)
+            ambient[row, column] = 1.0 - taken
