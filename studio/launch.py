@@ -109,8 +109,8 @@ def address(host: str, port: int, token: str, session: str | None = None, run: s
 
 
 def _track(control: StudioControl, session: Session, run: str) -> None:
-    control.send(Open("launch-open", str(session.path), str(session.run(run).folder)))
-    control.send(Start("launch-start"))
+    control.send(Open(session=str(session.path), run=str(session.run(run).folder)))
+    control.send(Start())
 
 
 def _listening(host: str, port: int) -> socket.socket:
@@ -137,7 +137,7 @@ def _serve_until_stopped(app: object, listener: socket.socket) -> None:
         log_config=None,
         access_log=False,
         server_header=False,
-        ws="websockets-sansio",
+        ws="auto",
         ws_max_size=64 << 20,
         ws_per_message_deflate=False,
         timeout_graceful_shutdown=SECONDS_TO_CLOSE,

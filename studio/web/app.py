@@ -106,6 +106,8 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     try:
         doors.scene_port = await asyncio.to_thread(doors.stage.start)
         doors.events.start()
+        scene_routes.tell_moves(doors)
+        await asyncio.to_thread(doors.control.start)
         yield
     finally:
         doors.scene_port = 0

@@ -6,7 +6,7 @@ brings them together.
 """
 
 import asyncio
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
@@ -15,8 +15,8 @@ from fastapi import Request
 
 from studio.sessions.workspace import Workspace
 from studio.web.event_stream import EventStream
+from studio.web.import_schemas import ImportState
 from studio.web.presets import Preset
-from studio.web.schemas import ImportState
 from studio.worker.commands import Command
 from studio.worker.events import StateChanged
 from studio.worker.watchers import Subscription
@@ -34,25 +34,40 @@ class Control(Protocol):
         """Where the search stands, or stood when the process was last heard of."""
         ...
 
-    def send(self, command: Command) -> object:
-        """Post a command; an `Acknowledged` event follows."""
+    def start(self) -> None:
+        """Start the process ahead of the first command."""
+        ...
+
+    def send(self, command: Command) -> None:
+        """Post a command; an `Acknowledged` event follows. Raises RunError if the process has died."""
         ...
 
     def change_settings(self, **changes: Value) -> object:
-        """Change knobs of the open run. Raises SettingsError."""
+        """Change knobs of the open run and wait for the answer. Raises SettingsError, RunError."""
         ...
 
     def subscribe(self) -> Subscription:
         """All events from now on."""
         ...
 
-    def restart(self) -> None:
-        """Start the process again after it died."""
+    def restart(self, resume: bool = True) -> None:
+        """Start the process again after it died; resume : track on if it was tracking."""
         ...
 
     def close(self) -> None:
         """End the process."""
         ...
+
+
+class Shown(Protocol):
+    """What the scene shows, when its own controls moved it."""
+
+    session: str
+    run: str
+    frame: int | None
+    layer: int | None
+    look_through: str | None
+    follow: bool
 
 
 class Stage(Protocol):
@@ -66,12 +81,38 @@ class Stage(Protocol):
         """Close it."""
         ...
 
-    def show(self, **wish: object) -> None:
-        """Change what is shown: session, run, frame, layer, look_through, dark."""
-        ...
-
     def relay_headers(self) -> Mapping[str, str]:
         """The secret that the scene asks of whoever connects."""
+        ...
+
+    def watch(self, callback: Callable[[Shown], None]) -> None:
+        """Hear of every move that the scene's own controls make."""
+        ...
+
+    def show_run(
+        self, session: str, run: str = "", frame: int | None = None, layer: int | None = None
+    ) -> None:
+        """Show a session, a run of it, a frame, a layer's cloud."""
+        ...
+
+    def show_frame(self, frame: int) -> None:
+        """Show a stored frame."""
+        ...
+
+    def show_layer(self, layer: int | None) -> None:
+        """Show one layer's cloud, or all."""
+        ...
+
+    def look_through(self, camera: str | None) -> None:
+        """Put the viewers into a camera's place, or back."""
+        ...
+
+    def set_options(self, **changes: object) -> None:
+        """Change what is drawn. Raises SettingsError for a name that is none."""
+        ...
+
+    def play(self, playing: bool) -> None:
+        """Play stored frames, or stop."""
         ...
 
 

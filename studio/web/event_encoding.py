@@ -38,11 +38,18 @@ def as_json(message: dict[str, object]) -> str:
     return msgspec.json.encode(message, enc_hook=_plain).decode()
 
 
+def plain(message: dict[str, object]) -> dict[str, object]:
+    """A message as JSON's own types, NaN as None."""
+    return msgspec.json.decode(as_json(message))
+
+
 def message_of(event: Event) -> dict[str, object]:
     """An event as a flat dictionary."""
     head: dict[str, object] = {"type": TYPES[type(event)], "session": event.session, "run": event.run}
     if isinstance(event, LayerFinished):
-        return head | {"reannealed": event.reannealed} | layer_summary(event.record)
+        waited = 1000.0 * (event.left_at - event.asked_at)
+        more = {"reannealed": event.reannealed, "waited_milliseconds": waited}
+        return head | more | layer_summary(event.record)
     if isinstance(event, FrameFinished):
         return head | {"reannealed": event.reannealed} | frame_summary(event.result)
     return head | {entry.name: getattr(event, entry.name) for entry in dataclasses.fields(event)[2:]}

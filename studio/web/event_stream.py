@@ -8,13 +8,13 @@ nothing and slows nobody.
 
 import asyncio
 import queue
-from collections import OrderedDict, deque
+from collections import OrderedDict
 from typing import TYPE_CHECKING
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
 from studio.web.event_encoding import as_json, key_of, message_of
-from studio.worker.events import Event, LogLine, SettingsApplied, StateChanged
+from studio.worker.events import Event, SettingsApplied, StateChanged
 from studio.worker.watchers import Subscription
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 router = APIRouter(tags=["events"])
 
 LIMIT = 256
-LOG_LINES, LOGS = 500, 32
 
 
 class Watcher:
@@ -65,7 +64,6 @@ class EventStream:
         self._control = control
         self._watchers: set[Watcher] = set()
         self._settings: dict[str, object] | None = None
-        self._logs: OrderedDict[tuple[str, str], deque[dict[str, object]]] = OrderedDict()
         self._task: asyncio.Task[None] | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
 
@@ -90,10 +88,6 @@ class EventStream:
         self._watchers.add(watcher)
         return watcher
 
-    def log_of(self, session: str, run: str) -> list[dict[str, object]]:
-        """The last `LOG_LINES` lines of a run's log, as far as this server heard them."""
-        return list(self._logs.get((session, run), ()))
-
     def leave(self, watcher: Watcher) -> None:
         """Forget a watcher."""
         self._watchers.discard(watcher)
@@ -116,17 +110,7 @@ class EventStream:
             self._settings = message
         elif isinstance(event, StateChanged) and event.state == "idle":
             self._settings = None
-        elif isinstance(event, LogLine):
-            self._remember(message)
         self._offer(message)
-
-    def _remember(self, line: dict[str, object]) -> None:
-        key = (str(line["session"]), str(line["run"]))
-        kept = self._logs.setdefault(key, deque(maxlen=LOG_LINES))
-        kept.append(line)
-        self._logs.move_to_end(key)
-        if len(self._logs) > LOGS:
-            self._logs.popitem(last=False)
 
     async def _pump(self, source: Subscription) -> None:
         try:

@@ -21,16 +21,10 @@ from studio.sessions.importers.catalogue import import_source
 from studio.web.archives import unpack_zip
 from studio.web.doors import Doors, doors_of
 from studio.web.error_responses import UnforeseenError, log
+from studio.web.import_schemas import FolderView, ImportRequest, ImportState
 from studio.web.safe_paths import PathRefused, folder_to_import
 from studio.web.samples import install_sample
-from studio.web.schemas import (
-    CameraMatching,
-    FolderView,
-    ImportRequest,
-    ImportState,
-    NewName,
-    SampleRequest,
-)
+from studio.web.schemas import CameraMatching, NewName, SampleRequest
 from studio.web.upload_routes import forget, upload_folder
 
 router = APIRouter(prefix="/api", tags=["importing"])
@@ -105,7 +99,8 @@ def _import(doors: Doors, identifier: str, wish: ImportRequest, source: Path, in
             state = doors.imports.get(identifier)
             if state is not None:
                 doors.imports[identifier] = state = state.model_copy(update=changes)
-                doors.events.publish({"type": "import", "session": wish.name, "run": ""} | state.model_dump())
+                message: dict[str, object] = {"type": "import", "session": wish.name, "run": ""}
+                doors.events.publish(message | state.model_dump())
 
     try:
         folder = _unpacked(source, tell) if wish.upload else source

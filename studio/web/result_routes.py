@@ -13,7 +13,6 @@ from fastapi import APIRouter, Depends, Query, Response
 from studio.errors import NotFoundError, StudioError
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.settings import SettingsHistory
 from studio.tracking.tracker import LayerRecord
 from studio.web.doors import Doors, doors_of
 from studio.web.event_encoding import layer_summary
@@ -29,7 +28,7 @@ from studio.web.run_errors import evaluation_of
 from studio.web.run_routes import RUN, OpenRun
 from studio.web.session_routes import OpenSession
 from studio.web.session_views import describe, parameter_views
-from studio.web.setting_schemas import SettingsChange
+from studio.web.setting_views import changes_of, history_of
 
 router = APIRouter(prefix="/api", tags=["results"])
 
@@ -47,7 +46,6 @@ def frames(session: OpenSession, run: OpenRun) -> FramesSummary:
     record = run.record
     with run.results() as results:
         timeline, partial = results.timeline(), results.partial()
-        history = SettingsHistory(tuple(results.settings_history()))
     lines = [
         FrameLine(
             frame=int(timeline.frames[at]),
@@ -59,10 +57,6 @@ def frames(session: OpenSession, run: OpenRun) -> FramesSummary:
         )
         for at in range(len(timeline.frames))
     ]
-    changes = [
-        SettingsChange(version=entry.version, frame=entry.frame, layer=entry.layer, changed=list(names))
-        for entry, names in zip(history.entries, history.changes(), strict=True)
-    ]
     times = timeline.milliseconds
     summary = FramesSummary(
         first=record.first,
@@ -70,7 +64,7 @@ def frames(session: OpenSession, run: OpenRun) -> FramesSummary:
         fps=record.fps,
         describe=describe(record),
         frames=lines,
-        settings_changes=changes[1:],
+        settings_changes=changes_of(history_of(run)),
         partial=partial.frame if partial else None,
         mean_milliseconds=float(times.mean()) if len(times) else None,
     )
@@ -84,8 +78,7 @@ def frame_detail(run: OpenRun, frame: int) -> FrameDetail:
         layers = results.layers(frame)
         finished = frame in results.frames()
         result = results.result(frame) if finished else None
-        history = SettingsHistory(tuple(results.settings_history()))
-    entry = history.in_use(frame, layers[-1].layer)
+    entry = history_of(run).in_use(frame, layers[-1].layer)
     estimate = result.estimate if result else None
     return FrameDetail(
         frame=frame,
@@ -132,7 +125,7 @@ def particles(
         beta=record.beta,
         parameters=list(run.record.parameters),
         poses=record.poses.tolist(),
-        log_weights=record.log_weights,
+        log_weights=record.log_weights.tolist(),
     )
 
 

@@ -4,22 +4,25 @@ Commands are posted and answered at once with an identifier; an `acknowledged` e
 event stream. A command for a run that is not the open one opens it first.
 """
 
-import secrets
 from typing import Annotated
 
 import numpy as np
 from fastapi import APIRouter, Depends
 
+from studio.errors import RunError
 from studio.runs.new_run import RunRequest as NewRun
 from studio.runs.new_run import prepare_run
+from studio.sessions.run_log import read_log
 from studio.sessions.stored_run import StoredRun
 from studio.web.doors import Doors, doors_of
-from studio.web.event_encoding import message_of
+from studio.web.event_encoding import message_of, plain
 from studio.web.schemas import (
     Frame,
+    LogEntry,
     LogLines,
     NewName,
     Posted,
+    ReannealRequest,
     RunDetail,
     RunLine,
     RunList,
@@ -34,6 +37,7 @@ from studio.worker import commands
 router = APIRouter(prefix="/api", tags=["runs"])
 
 Door = Annotated[Doors, Depends(doors_of)]
+SEARCHING = ("tracking", "compiling")
 RUN = "/sessions/{session}/runs/{run}"
 
 
@@ -108,90 +112,121 @@ def delete_run(session: OpenSession, run: OpenRun, doors: Door) -> TrashEntry:
 
 
 @router.get(RUN + "/log")
-def log_of(session: OpenSession, run: OpenRun, doors: Door) -> LogLines:
+def log_of(run: OpenRun) -> LogLines:
     """What the tracking process said of this run, oldest first."""
-    return LogLines(lines=doors.events.log_of(session.name, run.name))
+    return LogLines(lines=[LogEntry.model_validate(line) for line in read_log(run.folder)])
 
 
 @router.get("/worker")
 def worker_state(doors: Door) -> dict[str, object]:
     """The tracking process's state, as the `state` events carry it."""
-    return message_of(doors.control.state)
+    return plain(message_of(doors.control.state))
 
 
 @router.post("/worker/restart", status_code=202)
 def restart_worker(doors: Door) -> dict[str, object]:
-    """Start the tracking process again after it died."""
+    """Start the tracking process again after it died, and resume what it tracked."""
     doors.control.restart()
-    return message_of(doors.control.state)
+    return plain(message_of(doors.control.state))
 
 
 @router.post(RUN + "/open", status_code=202)
-def open_run(session: OpenSession, run: OpenRun, doors: Door) -> Posted:
+def open_run(run: OpenRun, doors: Door) -> Posted:
     """Make the run the one that the other commands and the sliders are about."""
-    return _post(doors, commands.Open(new_identifier(), str(session.path), str(run.folder)))
+    return _post(doors, _about(commands.Open, run))
 
 
 @router.post(RUN + "/start", status_code=202)
-def start(session: OpenSession, run: OpenRun, doors: Door) -> Posted:
-    """Track on from the first frame that has no result; also after the process died (resume)."""
-    return _post_for(doors, session.path.as_posix(), run, commands.Start(new_identifier()))
+def start(run: OpenRun, doors: Door) -> Posted:
+    """Track on from the first frame that has no result; also after the process died (resume).
+
+    While another run is being tracked this one waits for its turn.
+    """
+    if _another_is_tracked(doors, run):
+        return _post(doors, _about(commands.Enqueue, run))
+    return _post_for(doors, run, commands.Start())
+
+
+@router.post(RUN + "/dequeue", status_code=202)
+def dequeue(run: OpenRun, doors: Door) -> Posted:
+    """Take the run out of those that wait to be tracked."""
+    return _post(doors, _about(commands.Dequeue, run))
 
 
 @router.post(RUN + "/pause", status_code=202)
-def pause(session: OpenSession, run: OpenRun, doors: Door) -> Posted:
+def pause(run: OpenRun, doors: Door) -> Posted:
     """Stop after the layer in progress."""
-    return _post_for(doors, session.path.as_posix(), run, commands.Pause(new_identifier()))
+    return _post_for(doors, run, commands.Pause())
 
 
 @router.post(RUN + "/step-layer", status_code=202)
-def step_layer(session: OpenSession, run: OpenRun, doors: Door) -> Posted:
+def step_layer(run: OpenRun, doors: Door) -> Posted:
     """One layer, then pause inside the frame."""
-    return _post_for(doors, session.path.as_posix(), run, commands.StepLayer(new_identifier()))
+    return _post_for(doors, run, commands.StepLayer())
 
 
 @router.post(RUN + "/step-frame", status_code=202)
-def step_frame(session: OpenSession, run: OpenRun, doors: Door) -> Posted:
+def step_frame(run: OpenRun, doors: Door) -> Posted:
     """Finish the frame at hand or do the next, then pause."""
-    return _post_for(doors, session.path.as_posix(), run, commands.StepFrame(new_identifier()))
+    return _post_for(doors, run, commands.StepFrame())
 
 
 @router.post(RUN + "/seek", status_code=202)
-def seek(session: OpenSession, run: OpenRun, where: Frame, doors: Door) -> Posted:
+def seek(run: OpenRun, where: Frame, doors: Door) -> Posted:
     """Choose the frame that re-annealing works on."""
-    return _post_for(doors, session.path.as_posix(), run, commands.Seek(new_identifier(), where.frame))
+    return _post_for(doors, run, commands.Seek(frame=where.frame))
 
 
 @router.post(RUN + "/reanneal", status_code=202)
-def reanneal(session: OpenSession, run: OpenRun, where: Frame, doors: Door) -> Posted:
-    """Anneal a stored frame again with the knobs as they are; the stored answer stays."""
-    return _post_for(doors, session.path.as_posix(), run, commands.Reanneal(new_identifier(), where.frame))
+def reanneal(run: OpenRun, where: ReannealRequest, doors: Door) -> Posted:
+    """Anneal a frame again with the knobs as they are; the stored answer stays, unless `keep` replaces it."""
+    return _post_for(doors, run, commands.Reanneal(frame=where.frame, keep=where.keep))
 
 
 @router.post(RUN + "/cancel", status_code=202)
-def cancel(session: OpenSession, run: OpenRun, doors: Door) -> Posted:
+def cancel(run: OpenRun, doors: Door) -> Posted:
     """End the run; what was tracked stays."""
-    return _post_for(doors, session.path.as_posix(), run, commands.Cancel(new_identifier()))
+    return _post_for(doors, run, commands.Cancel())
 
 
-def new_identifier() -> str:
-    """A command's identifier."""
-    return secrets.token_hex(8)
+def ensure_open(doors: Doors, run: StoredRun) -> None:
+    """Open a run unless it is the open one; revive the process if it died.
+
+    Raises RunError while another run is being tracked, which this one would interrupt.
+    """
+    if _another_is_tracked(doors, run):
+        state = doors.control.state
+        raise RunError(
+            f"Run '{state.run}' of session '{state.session}' is being tracked.", "Pause it first, or wait."
+        )
+    if doors.control.state.state == "lost":
+        doors.control.restart(resume=False)
+    if not _is_open(doors, run):
+        doors.control.send(_about(commands.Open, run))
 
 
-def _post_for(doors: Doors, session: str, run: StoredRun, command: commands.Command) -> Posted:
-    ensure_open(doors, session, run)
-    return _post(doors, command)
-
-
-def ensure_open(doors: Doors, session: str, run: StoredRun) -> None:
-    """Open a run unless it is the open one; revive the process if it died."""
+def _is_open(doors: Doors, run: StoredRun) -> bool:
     state = doors.control.state
-    if state.state == "lost":
-        doors.control.restart()
-    elif (state.session, state.run) == (run.record.session, run.name):
-        return
-    doors.control.send(commands.Open(new_identifier(), session, str(run.folder)))
+    return (state.session, state.run) == (session_name(run), run.name)
+
+
+def _another_is_tracked(doors: Doors, run: StoredRun) -> bool:
+    return doors.control.state.state in SEARCHING and not _is_open(doors, run)
+
+
+def session_name(run: StoredRun) -> str:
+    """The name of the session that a run lies in, as events carry it."""
+    return run.folder.parent.parent.name
+
+
+def _about(kind: type[commands.Open], run: StoredRun) -> commands.Open:
+    """A command that names a run by its folders."""
+    return kind(session=str(run.folder.parent.parent), run=str(run.folder))
+
+
+def _post_for(doors: Doors, run: StoredRun, command: commands.Command) -> Posted:
+    ensure_open(doors, run)
+    return _post(doors, command)
 
 
 def _post(doors: Doors, command: commands.Command) -> Posted:

@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends
 from pydantic import Field
 
-from studio.web.doors import Doors, doors_of
+from studio.web.doors import Doors, Shown, doors_of
 from studio.web.schemas import Request, RunName
 
 router = APIRouter(prefix="/api/scene", tags=["scene"])
@@ -16,7 +16,9 @@ Door = Annotated[Doors, Depends(doors_of)]
 class SceneWish(Request):
     """What is to be shown; what is left out stays as it is.
 
-    layer: null shows all layers together. look_through: a camera's name, "" for the free view.
+    With `session` the whole moment is named: `run` left out shows the session alone, `layer` left out
+    all layers. look_through: a camera's name, null or "" for the free view. options: what is drawn, by the
+    names of the scene's own view options (body, truth, particles, trails, cameras, pictures, overlays, colour_by, …).
     """
 
     session: RunName | None = None
@@ -25,19 +27,56 @@ class SceneWish(Request):
     layer: int | None = Field(None, ge=0)
     look_through: str | None = Field(None, max_length=128)
     dark: bool | None = None
+    playing: bool | None = None
+    options: dict[str, bool | int | float | str | list[str] | None] = Field(default_factory=dict)
 
 
 @router.post("/show", status_code=204)
 def show(wish: SceneWish, doors: Door) -> None:
     """Show a moment of a run (or a session without one). Names are checked before anything changes."""
+    stage, given = doors.stage, wish.model_fields_set
     if wish.session is not None:
         session = doors.workspace.session(wish.session)
-        if wish.run is not None:
-            session.run(wish.run)
-    doors.stage.show(**{name: getattr(wish, name) for name in wish.model_fields_set})
+        run = session.run(wish.run).name if wish.run else ""
+        stage.show_run(session.name, run, wish.frame, wish.layer)
+    else:
+        if wish.frame is not None:
+            stage.show_frame(wish.frame)
+        if "layer" in given:
+            stage.show_layer(wish.layer)
+    if "look_through" in given:
+        stage.look_through(wish.look_through or None)
+    options = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in wish.options.items()
+    }
+    if wish.dark is not None:
+        options["dark"] = wish.dark
+    if options:
+        stage.set_options(**options)
+    if wish.playing is not None:
+        stage.play(wish.playing)
 
 
 @router.post("/view", status_code=204)
 def view(wish: SceneWish, doors: Door) -> None:
     """The same under a name that says what it is for: the theme, the camera looked through."""
     show(wish, doors)
+
+
+def tell_moves(doors: Doors) -> None:
+    """From now on, tell all watchers of the moves that the scene's own controls make (`scene` events)."""
+
+    def moved(shown: Shown) -> None:
+        doors.events.publish(
+            {
+                "type": "scene",
+                "session": shown.session,
+                "run": shown.run,
+                "frame": shown.frame,
+                "layer": shown.layer,
+                "look_through": shown.look_through,
+                "follow": shown.follow,
+            }
+        )
+
+    doors.stage.watch(moved)

@@ -217,59 +217,6 @@ class TrashChoice(Request):
     entry: RunName
 
 
-class ImportRequest(Request):
-    """What is to be imported, from a folder of this machine or from an upload."""
-
-    name: RunName = Field(description="What the session will be called.")
-    source: str | None = Field(None, max_length=4096, description="Folder on the server's machine.")
-    upload: RunName | None = Field(None, description="Identifier of a finished upload.")
-    calibration: str | None = Field(None, max_length=4096, description="Which file, if there are several.")
-    fps: float | None = Field(None, gt=0, le=10_000)
-    copy_footage: bool = Field(True, alias="copy", description="False: refer to it where it lies.")
-
-
-class ImportState(Answer):
-    """How an import stands; code, message and hint say why it failed."""
-
-    identifier: str
-    name: str
-    state: Literal["running", "done", "failed"]
-    step: str = ""
-    done: int = 0
-    total: int = 0
-    code: str = ""
-    message: str = ""
-    hint: str = ""
-    notes: list[str] = []
-    warnings: list[str] = []
-    matching: list[CameraMatching] = []
-
-
-class UploadState(Answer):
-    """An unfinished upload: its files with the bytes received of each."""
-
-    identifier: str
-    files: dict[str, int]
-    total: int
-    limit: int
-
-
-class FileState(Answer):
-    """One file of an upload. received: its bytes; total: bytes of the whole upload."""
-
-    path: str
-    received: int
-    total: int
-
-
-class FolderView(Answer):
-    """Folders of the server's machine that footage may be imported from."""
-
-    path: str
-    parent: str | None
-    folders: list[str]
-
-
 class RunRequest(Request):
     """A new run; what is left out is the session's own or the studio's default."""
 
@@ -288,6 +235,13 @@ class Frame(Request):
     """A frame by its number."""
 
     frame: int = Field(ge=0)
+
+
+class ReannealRequest(Request):
+    """Which frame (-1: the selected one), and whether the answer replaces the stored one."""
+
+    frame: int = Field(-1, ge=-1)
+    keep: bool = False
 
 
 class Posted(Answer):

@@ -4,20 +4,18 @@ What is changed here goes the way of the sliders: `StudioControl.change_settings
 layer. What is in use comes back as a `settings` event.
 """
 
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Depends, Query
 
 from studio.body.catalogue import list_bodies, load_body
 from studio.errors import SettingsError, StudioError
-from studio.knobs import Knob
 from studio.runs.new_run import DEFAULT_TRACKER, DEFAULT_WEIGHTING
 from studio.sessions.stored_run import StoredRun
 from studio.settings import (
-    RunSettings,
-    SettingsHistory,
     all_knobs,
     changed_settings,
     default_settings,
@@ -28,22 +26,21 @@ from studio.settings import (
 from studio.tracking.catalogue import TRACKERS
 from studio.web.doors import Doors, doors_of
 from studio.web.presets import all_presets, drop_preset, keep_preset, preset
-from studio.web.run_routes import RUN, OpenRun, ensure_open
-from studio.web.session_routes import OpenSession
+from studio.web.run_routes import RUN, SEARCHING, OpenRun, ensure_open
 from studio.web.setting_schemas import (
     BodyChoice,
     Choice,
     Choices,
     KnobList,
-    KnobView,
     PresetChoice,
     PresetList,
     PresetRequest,
     ResetRequest,
-    SettingsChange,
     SettingsInUse,
 )
+from studio.web.setting_views import knob_views, settings_of
 from studio.weighting.catalogue import WEIGHTINGS
+from studio.worker import commands
 
 router = APIRouter(prefix="/api", tags=["settings"])
 
@@ -81,21 +78,27 @@ def knobs(tracker: str = DEFAULT_TRACKER, weighting: str = DEFAULT_WEIGHTING) ->
 
 
 @router.get(RUN + "/settings")
-def settings_in_use(run: OpenRun, doors: Door) -> SettingsInUse:
+def settings_in_use(run: OpenRun) -> SettingsInUse:
     """The run's newest settings, since when they are in use, and every change before."""
-    return _in_use(doors, run)
+    return settings_of(run)
 
 
 @router.patch(RUN + "/settings")
 def change_settings(
-    session: OpenSession, run: OpenRun, changes: dict[str, Value], doors: Door
+    run: OpenRun,
+    changes: dict[str, Value],
+    doors: Door,
+    frame: Annotated[int | None, Query(ge=0, description="The frame that is shown.")] = None,
 ) -> SettingsInUse:
-    """Change knobs by name, all or none; a `settings` event says from which layer on they are used."""
-    return _change(doors, session.path.as_posix(), run, changes)
+    """Change knobs by name, all or none; a `settings` event says from which layer on they are used.
+
+    While nothing is being tracked, `frame` (else the one annealed last) is annealed again at once.
+    """
+    return _change(doors, run, changes, frame)
 
 
 @router.post(RUN + "/settings/reset")
-def reset_settings(session: OpenSession, run: OpenRun, wish: ResetRequest, doors: Door) -> SettingsInUse:
+def reset_settings(run: OpenRun, wish: ResetRequest, doors: Door) -> SettingsInUse:
     """Bring knobs back to their defaults."""
     settings = default_settings(run.record.tracker, run.record.weighting)
     defaults = {entry.name: entry.default for entry in all_knobs(settings)}
@@ -106,14 +109,14 @@ def reset_settings(session: OpenSession, run: OpenRun, wish: ResetRequest, doors
             )
     movable = [entry.name for entry in all_knobs(settings) if entry.takes_effect != "new run"]
     changes = {name: defaults[name] for name in wish.names or movable}
-    return _change(doors, session.path.as_posix(), run, changes)
+    return _change(doors, run, changes)
 
 
 @router.post(RUN + "/settings/preset")
-def use_preset(session: OpenSession, run: OpenRun, wish: PresetChoice, doors: Door) -> SettingsInUse:
+def use_preset(run: OpenRun, wish: PresetChoice, doors: Door) -> SettingsInUse:
     """Change the knobs that a preset sets."""
     chosen = preset(wish.name, doors.presets, doors.state_folder)
-    return _change(doors, session.path.as_posix(), run, chosen.values)
+    return _change(doors, run, chosen.values)
 
 
 @router.get("/presets")
@@ -136,57 +139,17 @@ def delete_preset(name: str, doors: Door) -> PresetList:
     return presets(doors)
 
 
-def knob_views(settings: RunSettings) -> list[KnobView]:
-    """The knobs of settings, group after group."""
-    return [_knob_view(entry) for entry in all_knobs(settings)]
-
-
-def _knob_view(entry: Knob) -> KnobView:
-    return KnobView(
-        name=entry.name,
-        label=entry.label,
-        kind=entry.kind.__name__,
-        default=entry.default,
-        low=entry.low,
-        high=entry.high,
-        step=entry.step,
-        unit=entry.unit,
-        choices=list(entry.choices),
-        takes_effect=entry.takes_effect,
-        help=entry.help,
-        group=entry.group,
-    )
-
-
-def _change(doors: Doors, session: str, run: StoredRun, changes: dict[str, Value]) -> SettingsInUse:
+def _change(
+    doors: Doors, run: StoredRun, changes: Mapping[str, Value], frame: int | None = None
+) -> SettingsInUse:
     """Check the changes here (the run may not be open yet), then hand them to the tracking process."""
-    now = _in_use(doors, run).values
+    now = settings_of(run).values
     changed_settings(settings_from_values(run.record.tracker, run.record.weighting, now), changes)
-    ensure_open(doors, session, run)
+    ensure_open(doors, run)
+    if frame is not None and doors.control.state.state not in SEARCHING:
+        doors.control.send(commands.Seek(frame=frame))
     doors.control.change_settings(**changes)
-    return _in_use(doors, run)
-
-
-def _in_use(doors: Doors, run: StoredRun) -> SettingsInUse:
-    record = run.record
-    with run.results() as results:
-        history = SettingsHistory(tuple(results.settings_history()))
-    defaults = default_settings(record.tracker, record.weighting)
-    changes = [
-        SettingsChange(version=entry.version, frame=entry.frame, layer=entry.layer, changed=list(names))
-        for entry, names in zip(history.entries, history.changes(), strict=True)
-    ]
-    now = history.entries[-1] if history.entries else None
-    return SettingsInUse(
-        tracker=record.tracker,
-        weighting=record.weighting,
-        version=now.version if now else 1,
-        frame=now.frame if now else record.first,
-        layer=now.layer if now else 0,
-        values=dict(now.values if now else record.settings),
-        knobs=knob_views(defaults),
-        changes=changes[1:],
-    )
+    return settings_of(run)
 
 
 @lru_cache(maxsize=4)

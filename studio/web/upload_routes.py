@@ -18,8 +18,8 @@ from studio.errors import NotFoundError, SessionError, StudioError
 from studio.sessions.names import inside
 from studio.web.doors import Doors, doors_of
 from studio.web.error_responses import TooLargeError
+from studio.web.import_schemas import FileState, UploadState
 from studio.web.safe_paths import place_in, relative_path
-from studio.web.schemas import FileState, UploadState
 
 router = APIRouter(prefix="/api/uploads", tags=["importing"])
 

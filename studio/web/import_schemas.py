@@ -1,0 +1,60 @@
+"""Importing and uploading, as OpenAPI shows them."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from studio.web.schemas import Answer, CameraMatching, Request, RunName
+
+
+class ImportRequest(Request):
+    """What is to be imported, from a folder of this machine or from an upload."""
+
+    name: RunName = Field(description="What the session will be called.")
+    source: str | None = Field(None, max_length=4096, description="Folder on the server's machine.")
+    upload: RunName | None = Field(None, description="Identifier of a finished upload.")
+    calibration: str | None = Field(None, max_length=4096, description="Which file, if there are several.")
+    fps: float | None = Field(None, gt=0, le=10_000)
+    copy_footage: bool = Field(True, alias="copy", description="False: refer to it where it lies.")
+
+
+class ImportState(Answer):
+    """How an import stands; code, message and hint say why it failed."""
+
+    identifier: str
+    name: str
+    state: Literal["running", "done", "failed"]
+    step: str = ""
+    done: int = 0
+    total: int = 0
+    code: str = ""
+    message: str = ""
+    hint: str = ""
+    notes: list[str] = Field(default_factory=list)
+    warnings: list[str] = Field(default_factory=list)
+    matching: list[CameraMatching] = Field(default_factory=list)
+
+
+class UploadState(Answer):
+    """An unfinished upload: its files with the bytes received of each."""
+
+    identifier: str
+    files: dict[str, int]
+    total: int
+    limit: int
+
+
+class FileState(Answer):
+    """One file of an upload. received: its bytes; total: bytes of the whole upload."""
+
+    path: str
+    received: int
+    total: int
+
+
+class FolderView(Answer):
+    """Folders of the server's machine that footage may be imported from."""
+
+    path: str
+    parent: str | None
+    folders: list[str]
