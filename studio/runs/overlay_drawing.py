@@ -1,0 +1,164 @@
+"""Drawing on a camera's picture what was seen and what was projected (OpenCV; pictures are BGR).
+
+Silhouettes are coloured as in the paper's figures: red observed only, blue projected only, yellow both.
+Everything is drawn for pictures resized by `scale`; pixel (0, 0) is the centre of the top-left pixel at
+every scale.
+"""
+
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.evidence.frame_evidence import ViewEvidence
+from studio.runs.colour_tokens import Colour, ColourTokens
+
+Array = NDArray[np.float64]
+Bytes = NDArray[np.uint8]
+
+OVERLAYS = ("outline", "truth", "mask", "edges", "samples", "particles")
+
+_SHIFT = 4
+_MASK_SHARE = 0.5
+_HALO = (12, 12, 12)
+_FARTHEST = 1.0e5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ViewMarks:
+    """What is projected into one camera, in pixels of the stored picture; NaN where a point is behind the
+    camera.
+
+    outlines : (L, 4, 2) corners A0 A1 B1 B0 of each limb. sides : (L,) "left", "right" or "middle".
+    edge_samples, region_samples : (K, 2). clouds : one (points (K, 2), colour) a layer, drawn in order.
+    truth : (S, 2, 2) ends of the lines of the reference's stick figure.
+    """
+
+    outlines: Array
+    sides: tuple[str, ...]
+    edge_samples: Array
+    region_samples: Array
+    clouds: tuple[tuple[Array, Colour], ...] = ()
+    truth: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
+
+
+NO_MARKS = ViewMarks(np.zeros((0, 4, 2)), (), np.zeros((0, 2)), np.zeros((0, 2)))
+
+
+def draw_view(
+    view: ViewEvidence, marks: ViewMarks, layers: tuple[str, ...], tokens: ColourTokens, *, scale: float = 1.0
+) -> Bytes:
+    """(h, w, 3) BGR: the view's picture with the chosen layers of `OVERLAYS` over it, from the ground up."""
+    picture = _resized(_three_channels(view.picture), scale)
+    if "mask" in layers:
+        picture = _with_mask(picture, view.mask, marks.outlines, tokens, scale)
+    if "edges" in layers:
+        strength = _resized(view.edges, scale)[:, :, None].astype(np.float32) / 255.0
+        tint = np.array(_bgr(tokens["edge-map"]), dtype=np.float32)
+        picture = np.round(picture * (1.0 - strength) + tint * strength).astype(np.uint8)
+    if "particles" in layers:
+        for points, colour in marks.clouds:
+            picture = _with_dots(picture, points, colour, scale, radius=0.9)
+    if "outline" in layers:
+        picture = _with_outlines(picture, marks, tokens, scale)
+    if "truth" in layers:
+        picture = _with_lines(picture, marks.truth, tokens["truth"], scale)
+    if "samples" in layers:
+        picture = _with_dots(picture, marks.region_samples, tokens["sample-region"], scale, radius=0.8)
+        picture = _with_dots(picture, marks.edge_samples, tokens["sample-edge"], scale, radius=0.8)
+    return picture
+
+
+def projected_silhouette(outlines: Array, height: int, width: int, scale: float = 1.0) -> Bytes:
+    """(h, w) uint8, 255 inside any limb's outline."""
+    filled = np.zeros((height, width), dtype=np.uint8)
+    for corners in _drawable(outlines):
+        cv2.fillPoly(filled, [_fixed_point(corners, scale)], (255,), shift=_SHIFT)
+    return filled
+
+
+def encode_jpeg(picture: Bytes, quality: int = 85) -> bytes:
+    """A BGR picture as a JPEG file."""
+    _, encoded = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    return encoded.tobytes()
+
+
+def upright(picture: Bytes, quarter_turns: int) -> Bytes:
+    """The picture turned clockwise by so many times 90 degrees."""
+    return np.ascontiguousarray(np.rot90(picture, -quarter_turns))
+
+
+def _three_channels(picture: Bytes) -> Bytes:
+    return picture if picture.ndim == 3 else np.repeat(picture[:, :, None], 3, axis=2)
+
+
+def _resized(picture: Bytes, scale: float) -> Bytes:
+    if scale == 1.0:
+        return picture.copy()
+    size = (max(1, round(picture.shape[1] * scale)), max(1, round(picture.shape[0] * scale)))
+    method = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_LINEAR
+    return np.asarray(cv2.resize(picture, size, interpolation=method), dtype=np.uint8)
+
+
+def _with_mask(picture: Bytes, mask: Bytes, outlines: Array, tokens: ColourTokens, scale: float) -> Bytes:
+    observed = _resized(mask, scale) > 127
+    height, width = picture.shape[:2]
+    projected = projected_silhouette(outlines, height, width, scale) > 0
+    tint = picture.astype(np.float32)
+    for region, token in (
+        (observed & ~projected, "silhouette-observed"),
+        (projected & ~observed, "silhouette-projected"),
+        (observed & projected, "silhouette-both"),
+    ):
+        tint[region] = (1.0 - _MASK_SHARE) * tint[region] + _MASK_SHARE * np.array(_bgr(tokens[token]))
+    return np.round(tint).astype(np.uint8)
+
+
+def _with_outlines(picture: Bytes, marks: ViewMarks, tokens: ColourTokens, scale: float) -> Bytes:
+    thin = max(1, round(1.2 * scale))
+    for colours, thickness in ((None, thin + 2), (tokens, thin)):
+        for corners, side in zip(marks.outlines, marks.sides, strict=True):
+            for drawable in _drawable(corners[None]):
+                colour = _HALO if colours is None else _bgr(colours[f"limb-{side}"])
+                cv2.polylines(
+                    picture, [_fixed_point(drawable, scale)], True, colour, thickness, cv2.LINE_AA, _SHIFT
+                )
+    return picture
+
+
+def _with_lines(picture: Bytes, lines: Array, colour: Colour, scale: float) -> Bytes:
+    thin = max(1, round(1.2 * scale))
+    for shade, thickness in ((_HALO, thin + 2), (_bgr(colour), thin)):
+        for ends in _drawable(lines):
+            pixels = _fixed_point(ends, scale)
+            cv2.polylines(picture, [pixels], False, shade, thickness, cv2.LINE_AA, _SHIFT)
+    return picture
+
+
+def _with_dots(picture: Bytes, points: Array, colour: Colour, scale: float, *, radius: float) -> Bytes:
+    # A point behind the camera is NaN, and NaN is not nearer than anything.
+    inside = (np.abs(points) < _FARTHEST).all(axis=1)
+    size = max(1, round(radius * max(scale, 1.0) * (1 << _SHIFT)))
+    for column, row in _fixed_point(points[inside], scale):
+        cv2.circle(picture, (int(column), int(row)), size, _bgr(colour), -1, cv2.LINE_AA, _SHIFT)
+    return picture
+
+
+def _drawable(outlines: Array) -> Array:
+    """The outlines all of whose corners lie before the camera and near enough to be drawn."""
+    if not len(outlines):
+        return outlines
+    finite = np.isfinite(outlines).all(axis=(1, 2))
+    near = np.nan_to_num(np.abs(outlines), nan=np.inf).max(axis=(1, 2)) < _FARTHEST
+    return outlines[finite & near]
+
+
+def _fixed_point(points: Array, scale: float) -> NDArray[np.int32]:
+    """Pixels of the stored picture to OpenCV's fixed-point pixels of the resized one."""
+    return np.round(((points + 0.5) * scale - 0.5) * (1 << _SHIFT)).astype(np.int32)
+
+
+def _bgr(colour: Colour) -> Colour:
+    red, green, blue = colour
+    return blue, green, red

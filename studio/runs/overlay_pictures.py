@@ -1,0 +1,247 @@
+"""A session's pictures with what was seen and what was projected drawn over them, for the scene and the
+page.
+
+A composer opens a session's footage once and keeps it; `compose_view` keeps the composers last used, so
+that a route can ask for one picture after another.
+"""
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.forward_kinematics import limb_ends
+from studio.body.model import BodyModel
+from studio.capture.footage import Footage
+from studio.capture.trc import MarkerMotion, read_trc
+from studio.errors import NotFoundError, StudioError
+from studio.evidence.backgrounds import Backgrounds
+from studio.evidence.frame_evidence import ViewEvidence
+from studio.evidence.pipeline import EvidenceMaker
+from studio.geometry.camera import Camera
+from studio.geometry.projection import project
+from studio.runs.colour_tokens import colour_tokens
+from studio.runs.marker_lines import marker_links
+from studio.runs.overlay_drawing import NO_MARKS, OVERLAYS, ViewMarks, draw_view, upright
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.settings import RunSettings, default_settings, settings_from_values
+from studio.tracking.tracker import LayerRecord
+from studio.weighting.catalogue import WEIGHTINGS
+from studio.weighting.overlay import overlay_points
+
+Array = NDArray[np.float64]
+Bytes = NDArray[np.uint8]
+Found = TypeVar("Found")
+
+_NEED_EVIDENCE = {"mask", "edges"}
+_KEPT_COMPOSERS = 3
+
+
+class ViewComposer:
+    """One session's pictures, one run's body and settings. Safe for several threads, a picture at a time."""
+
+    def __init__(
+        self, session: Session, run: StoredRun | None = None, settings: RunSettings | None = None
+    ) -> None:
+        self.body: BodyModel = run.body() if run else session.body()
+        self.cameras: dict[str, Camera] = {camera.name: camera for camera in session.cameras()}
+        self._footage: Footage = session.footage()
+        self._backgrounds = Backgrounds(self._footage)
+        self._settings = settings or _settings_of(run)
+        self._truth = _truth_of(session)
+        self._lock = threading.RLock()
+
+    def use(self, settings: RunSettings) -> None:
+        """Make masks, edge maps and samples with these settings from now on."""
+        with self._lock:
+            self._settings = settings
+
+    def compose(
+        self,
+        frame: int,
+        camera: str,
+        layers: Sequence[str] = ("outline",),
+        *,
+        pose: Array | None = None,
+        clouds: Sequence[LayerRecord] = (),
+        limbs: Sequence[int] = (),
+        height: int | None = None,
+    ) -> Bytes:
+        """(h, w, 3) BGR picture of a camera as stored (not turned), with layers of `OVERLAYS` over it.
+
+        pose : (D,) whose limbs are projected, None for none. clouds : the layers whose particles are drawn,
+        at the far ends of `limbs` (indices of drawn limbs; none: all). height : of the result, None for the
+        stored size. Raises NotFoundError for a camera or frame that does not exist, StudioError for an
+        unknown layer.
+        """
+        _check_layers(layers)
+        with self._lock:
+            view = self._view(frame, camera, layers)
+            marks = self._marks(camera, frame, layers, pose, clouds, limbs)
+        scale = 1.0 if height is None else height / view.picture.shape[0]
+        return draw_view(view, marks, tuple(layers), colour_tokens(dark=True), scale=scale)
+
+    def close(self) -> None:
+        """Let go of the footage."""
+        with self._lock:
+            self._footage.close()
+
+    def _view(self, frame: int, camera: str, layers: Sequence[str]) -> ViewEvidence:
+        if camera not in self.cameras:
+            raise NotFoundError(
+                f"There is no camera '{camera}' in this session.", f"It has {', '.join(self.cameras)}."
+            )
+        if not _NEED_EVIDENCE & set(layers):
+            nothing = np.zeros((0, 0), dtype=np.uint8)
+            return ViewEvidence(camera, self._footage.picture(camera, frame), nothing, nothing)
+        kind = WEIGHTINGS[self._settings.weighting_name].edge_kind if "edges" in layers else "none"
+        lenses = tuple(self.cameras.values())
+        maker = EvidenceMaker(lenses, self._footage, self._backgrounds, self._settings.evidence, kind)
+        return maker.view(camera, frame)
+
+    def _marks(
+        self,
+        camera: str,
+        frame: int,
+        layers: Sequence[str],
+        pose: Array | None,
+        clouds: Sequence[LayerRecord],
+        limbs: Sequence[int],
+    ) -> ViewMarks:
+        lens = self.cameras[camera]
+        truth = self._truth_lines(lens, frame) if "truth" in layers else NO_MARKS.truth
+        dots = self._dots(lens, clouds, limbs) if "particles" in layers else ()
+        if pose is None or not {"outline", "mask", "samples"} & set(layers):
+            return ViewMarks(
+                NO_MARKS.outlines, (), NO_MARKS.edge_samples, NO_MARKS.region_samples, dots, truth
+            )
+        seen = overlay_points(self.body, (lens,), pose, self._settings.weighting)[0]
+        return ViewMarks(
+            np.asarray(seen.outlines, dtype=np.float64),
+            tuple(limb.side for limb in self.body.drawn),
+            np.asarray(seen.edge_samples, dtype=np.float64).reshape(-1, 2),
+            np.asarray(seen.region_samples, dtype=np.float64).reshape(-1, 2),
+            dots,
+            truth,
+        )
+
+    def _dots(
+        self, camera: Camera, clouds: Sequence[LayerRecord], limbs: Sequence[int]
+    ) -> tuple[tuple[Array, tuple[int, int, int]], ...]:
+        tokens = colour_tokens(dark=True)
+        count = max((record.layer for record in clouds), default=0) + 1
+        chosen = list(limbs) or list(range(len(self.body.drawn)))
+        drawn = []
+        for record in sorted(clouds, key=lambda entry: entry.layer):
+            ends = limb_ends(self.body, record.poses)[:, chosen, 1].reshape(-1, 3)
+            drawn.append((project(camera, ends)[0], tokens.layer(record.layer, count)))
+        return tuple(drawn)
+
+    def _truth_lines(self, camera: Camera, frame: int) -> Array:
+        if self._truth is None:
+            return NO_MARKS.truth
+        rows = np.round((self._truth.times - self._truth.times[0]) * self._footage.fps).astype(np.int64)
+        place = int(np.searchsorted(rows, frame))
+        links = marker_links(self.body, self._truth.names)
+        if place >= len(rows) or rows[place] != frame or not links:
+            return NO_MARKS.truth
+        return project(camera, self._truth.positions[place][np.array(links)])[0]
+
+
+_composers: OrderedDict[tuple[Path, str], ViewComposer] = OrderedDict()
+_composers_lock = threading.Lock()
+
+
+def compose_view(
+    session: Session,
+    run: StoredRun | None,
+    frame: int,
+    camera: str,
+    layers: Sequence[str] = ("outline",),
+    pose: Array | None = None,
+    *,
+    height: int | None = None,
+    turned: bool = True,
+    settings: RunSettings | None = None,
+) -> Bytes:
+    """(h, w, 3) BGR: what a camera saw in a frame, upright (`turned`), with layers of `OVERLAYS` over it.
+
+    pose : (D,) instead of the run's stored answer. height : of the picture as shown. settings : other than
+    the run's, for masks and samples in the making. Raises StudioError for what does not exist.
+    """
+    composer = _composer(session, run)
+    composer.use(settings or _settings_of(run))
+    if camera not in composer.cameras:
+        raise NotFoundError(
+            f"There is no camera '{camera}' in this session.", f"It has {', '.join(composer.cameras)}."
+        )
+    records: Sequence[LayerRecord] = ()
+    if run is not None:
+        with run.results() as results:
+            pose = _or_none(lambda: results.result(frame).estimate.pose) if pose is None else pose
+            records = (_or_none(lambda: results.layers(frame)) or ()) if "particles" in layers else ()
+    lens = composer.cameras[camera]
+    turns = lens.quarter_turns % 4 if turned else 0
+    stored_height = None
+    if height is not None:
+        stored_height = round(height * lens.height / lens.width) if turns % 2 else height
+    picture = composer.compose(frame, camera, layers, pose=pose, clouds=records, height=stored_height)
+    return upright(picture, turns)
+
+
+def forget_composers() -> None:
+    """Close the footage that `compose_view` keeps open (before a session is moved or deleted, and at the
+    end).
+    """
+    with _composers_lock:
+        for composer in _composers.values():
+            composer.close()
+        _composers.clear()
+
+
+def _composer(session: Session, run: StoredRun | None) -> ViewComposer:
+    key = (session.path, run.name if run else "")
+    with _composers_lock:
+        if key not in _composers:
+            _composers[key] = ViewComposer(session, run)
+        _composers.move_to_end(key)
+        while len(_composers) > _KEPT_COMPOSERS:
+            _composers.popitem(last=False)[1].close()
+        return _composers[key]
+
+
+def _settings_of(run: StoredRun | None) -> RunSettings:
+    if run is None:
+        return default_settings()
+    with run.results() as results:
+        history = results.settings_history()
+    values: Mapping[str, object] = history[-1].values if history else run.record.settings
+    return settings_from_values(run.record.tracker, run.record.weighting, values)
+
+
+def _truth_of(session: Session) -> MarkerMotion | None:
+    path = session.truth_path
+    if path is None:
+        return None
+    try:
+        return read_trc(path)
+    except StudioError:
+        return None
+
+
+def _or_none(find: Callable[[], Found]) -> Found | None:
+    try:
+        return find()
+    except NotFoundError:
+        return None
+
+
+def _check_layers(layers: Sequence[str]) -> None:
+    for layer in layers:
+        if layer not in OVERLAYS:
+            raise StudioError(f"There is no overlay '{layer}'.", f"Choose among {', '.join(OVERLAYS)}.")

@@ -1,0 +1,46 @@
+"""A viser server that only our own relay can talk to.
+
+viser has no authentication and no check of origins, listens on every address unless told otherwise and lets
+any client open a public tunnel. Here it listens on the loopback address at a free port, refuses sockets
+that do not carry a secret header (which only the web application's relay knows), and never opens a tunnel.
+"""
+
+import hmac
+import secrets
+
+import viser
+from viser.infra import WebsockClientConnection
+
+RELAY_HEADER = "X-Studio-Relay"
+_POLICY_VIOLATION = 1008
+
+
+class GuardedServer(viser.ViserServer):
+    """viser on 127.0.0.1 at a free port, behind a secret. Building it blocks for some milliseconds: use a
+    thread.
+    """
+
+    def __init__(self) -> None:
+        self._relay_secret = secrets.token_urlsafe(32)
+        super().__init__(host="127.0.0.1", port=0, label="Capture studio", verbose=False)
+        # Appended after viser's own callbacks, all of which run before the first message is sent or read.
+        self._websock_server.on_client_connect(self._refuse_strangers)
+        # A client that slipped in before the guard stood would be dropped here, and refused when it comes
+        # back.
+        self._websock_server.disconnect_all_clients()
+
+    def relay_headers(self) -> dict[str, str]:
+        """What the relay must send when it opens the socket; never written to a log or a page."""
+        return {RELAY_HEADER: self._relay_secret}
+
+    def request_share_url(self, verbose: bool = True) -> str | None:
+        """None: the scene is never published, whoever asks."""
+        return None
+
+    async def _refuse_strangers(self, client: WebsockClientConnection) -> None:
+        connection = self._websock_server._live_connections.get(client.client_id)
+        if connection is None or connection.request is None:
+            return
+        shown = connection.request.headers.get(RELAY_HEADER, "")
+        if not hmac.compare_digest(shown.encode(), self._relay_secret.encode()):
+            await connection.close(_POLICY_VIOLATION, "This socket is for the studio's relay only.")

@@ -1,0 +1,59 @@
+"""What there is to draw of one moment: the pose, what stands beside it, and the clouds."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from numpy import float64
+from numpy.typing import NDArray
+
+from studio.scene.live_search import LiveSearch
+from studio.scene.opened_run import OpenedRun
+from studio.tracking.tracker import LayerRecord
+
+Array = NDArray[float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Moment:
+    """frame : None while there is nothing. pose : (D,) drawn as the body. beside : (D,) the stored answer
+    while a re-annealed one is shown. records : the layers whose clouds are drawn. layer_count : how many
+    layers the frame takes. truth : (M, 3) mm.
+    """
+
+    frame: int | None
+    pose: Array | None
+    beside: Array | None
+    records: Sequence[LayerRecord]
+    layer_count: int
+    truth: Array | None
+
+
+def moment_of(
+    opened: OpenedRun, frame: int | None, live: LiveSearch, *, edited: Array | None = None, layers: int = 0
+) -> Moment:
+    """The moment at `frame`: stored, in progress, annealed again, or the start pose being edited.
+
+    live : used where it is about this frame. edited : the start pose under the sliders, shown instead of an
+    answer. layers : how many layers a frame takes with the settings in use (for the colours of a frame in
+    progress).
+    """
+    truth = None if frame is None else opened.truth_at(frame)
+    if edited is not None:
+        return Moment(frame, edited, None, (), 0, truth)
+    stored = None if frame is None else opened.result(frame)
+    if frame is not None and live.frame == frame and (live.reannealed or stored is None):
+        beside = stored.estimate.pose if stored is not None and live.reannealed else None
+        count = live.result.layers if live.result is not None else layers
+        return Moment(frame, live.pose, beside, live.records, max(count, _layers_in(live.records)), truth)
+    if frame is not None and stored is not None:
+        records = opened.layers(frame)
+        return Moment(
+            frame, stored.estimate.pose, None, records, max(stored.layers, _layers_in(records)), truth
+        )
+    records = [] if frame is None else opened.layers(frame)
+    pose = records[-1].mean if records else opened.start_pose()
+    return Moment(frame, pose, None, records, max(layers, _layers_in(records)), truth)
+
+
+def _layers_in(records: Sequence[LayerRecord]) -> int:
+    return max((record.layer for record in records), default=-1) + 1

@@ -1,0 +1,133 @@
+"""A session and one of its runs, opened for looking: everything the scene draws comes from here."""
+
+from collections import OrderedDict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.model import BodyModel
+from studio.capture.trc import MarkerMotion, read_trc
+from studio.errors import NotFoundError, StudioError
+from studio.geometry.camera import Camera
+from studio.sessions.results_store import ResultsReader
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.settings import RunSettings, default_settings, settings_from_values
+from studio.tracking.tracker import FrameResult, LayerRecord
+
+Array = NDArray[np.float64]
+
+_KEPT_FRAMES = 8
+
+
+class OpenedRun:
+    """run : None shows the session alone (cameras, pictures, start pose, truth). Used by one thread at a
+    time.
+    """
+
+    def __init__(self, session: Session, run: StoredRun | None) -> None:
+        self.session = session
+        self.run = run
+        self.body: BodyModel = run.body() if run else session.body()
+        self.cameras: tuple[Camera, ...] = session.cameras()
+        self.fps: float = session.manifest.footage.fps
+        self.results: ResultsReader | None = run.results() if run else None
+        self.truth, self.truth_problem = _truth_of(session)
+        self._results: OrderedDict[int, FrameResult] = OrderedDict()
+        self._layers: OrderedDict[int, list[LayerRecord]] = OrderedDict()
+
+    @property
+    def span(self) -> tuple[int, int]:
+        """The frames to be looked at, half open: the run's, else the footage's."""
+        if self.run is not None:
+            return self.run.record.first, self.run.record.last
+        return 0, self.session.manifest.footage.frame_count
+
+    def frames(self) -> list[int]:
+        """The finished frames, ascending."""
+        return self.results.frames() if self.results else []
+
+    def result(self, frame: int) -> FrameResult | None:
+        """The stored result of a frame, None while there is none."""
+        if frame not in self._results:
+            if self.results is None:
+                return None
+            try:
+                _keep(self._results, frame, self.results.result(frame))
+            except NotFoundError:
+                return None
+        return self._results[frame]
+
+    def layers(self, frame: int) -> list[LayerRecord]:
+        """The stored layers of a frame; those of an unfinished frame are read anew each time."""
+        if frame in self._layers:
+            return self._layers[frame]
+        if self.results is None:
+            return []
+        try:
+            found = self.results.layers(frame)
+        except NotFoundError:
+            return []
+        if self.result(frame) is not None:
+            _keep(self._layers, frame, found)
+        return found
+
+    def forget(self, frame: int) -> None:
+        """Read a frame anew when it is asked for again."""
+        self._results.pop(frame, None)
+        self._layers.pop(frame, None)
+
+    def poses(self) -> tuple[NDArray[np.int64], Array]:
+        """The finished frames (K,) and their poses (K, D)."""
+        if self.results is None:
+            return np.zeros(0, dtype=np.int64), np.zeros((0, len(self.body.parameters)))
+        return self.results.poses()
+
+    def truth_at(self, frame: int) -> Array | None:
+        """(M, 3) mm: the truth's markers at a frame (rows by time × fps, the first row being frame 0), else
+        None.
+        """
+        if self.truth is None:
+            return None
+        rows = np.round((self.truth.times - self.truth.times[0]) * self.fps).astype(np.int64)
+        place = int(np.searchsorted(rows, frame))
+        return self.truth.positions[place] if place < len(rows) and rows[place] == frame else None
+
+    def start_pose(self) -> Array:
+        """(D,) where the search starts: the run's own start, the session's, else the body's rest pose."""
+        if self.run is not None and self.run.record.start_pose is not None:
+            return np.array(self.run.record.start_pose)
+        stored = self.session.start_pose(self.body)
+        return self.body.neutral if stored is None else stored
+
+    def settings(self) -> RunSettings:
+        """The settings last in use in the run, else the defaults."""
+        if self.run is None or self.results is None:
+            return default_settings()
+        record = self.run.record
+        history = self.results.settings_history()
+        return settings_from_values(
+            record.tracker, record.weighting, history[-1].values if history else record.settings
+        )
+
+    def close(self) -> None:
+        """Let go of the files."""
+        if self.results is not None:
+            self.results.close()
+
+
+def _truth_of(session: Session) -> tuple[MarkerMotion | None, str]:
+    """The session's truth, or the reason why it cannot be shown."""
+    path = session.truth_path
+    if path is None:
+        return None, ""
+    try:
+        return read_trc(path), ""
+    except StudioError as problem:
+        return None, str(problem)
+
+
+def _keep(store: OrderedDict, key: int, value: object) -> None:
+    store[key] = value
+    while len(store) > _KEPT_FRAMES:
+        store.popitem(last=False)

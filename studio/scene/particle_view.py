@@ -1,0 +1,137 @@
+"""The particle clouds: every layer's own particles through forward kinematics, as points at chosen limb
+ends.
+
+Layers are coloured from cool (first) to warm (last), or particles by their weight within what is shown; one
+handle a layer, so that showing one layer alone is a matter of visibility.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from studio.body.forward_kinematics import limb_ends
+from studio.body.model import BodyModel
+from studio.runs.colour_tokens import ColourTokens
+from studio.scene.limb_meshes import METRES_PER_MM
+from studio.tracking.tracker import LayerRecord
+
+Array = NDArray[np.float64]
+Bytes = NDArray[np.uint8]
+
+FAR_END = 1
+
+
+@dataclass(frozen=True, slots=True)
+class CloudStyle:
+    """limbs : indices into the body's drawn limbs whose far ends are shown. colour_by : "layer" or "weight".
+    layer : the only layer to show, None for all. layer_count : how many layers a frame takes (colours)."""
+
+    limbs: tuple[int, ...]
+    colour_by: str
+    layer: int | None
+    layer_count: int
+    point_size: float
+
+
+def extremities(body: BodyModel) -> tuple[int, ...]:
+    """Indices of the drawn limbs on which no other drawn limb's joint hangs: hands, feet, head, tips."""
+    carried: set[int] = set()
+    for limb in body.drawn:
+        above = body.joints[limb.joint].parent
+        while above >= 0:
+            carried.add(above)
+            above = body.joints[above].parent
+    return tuple(index for index, limb in enumerate(body.drawn) if limb.joint not in carried)
+
+
+def cloud_points(body: BodyModel, poses: Array, limbs: Sequence[int]) -> Array:
+    """(N, D) poses to (N * len(limbs), 3) metres: the far end of each chosen limb, particle by particle."""
+    ends = limb_ends(body, np.ascontiguousarray(poses, dtype=np.float64))[:, list(limbs), FAR_END]
+    return ends.reshape(-1, 3) * METRES_PER_MM
+
+
+def weight_shares(log_weights: Array, low: float, high: float) -> Array:
+    """(N,) log-weights to 0..1 between the lowest and the highest shown; 1 where all are equal."""
+    spread = high - low
+    return np.ones_like(log_weights) if spread <= 0.0 else np.clip((log_weights - low) / spread, 0.0, 1.0)
+
+
+class ParticleView:
+    """The clouds of one frame."""
+
+    def __init__(self, server: viser.ViserServer, body: BodyModel) -> None:
+        self._server = server
+        self._body = body
+        self.handles: list[viser.PointCloudHandle] = []
+
+    def show(self, records: Sequence[LayerRecord], style: CloudStyle, tokens: ColourTokens) -> None:
+        """Draw the layers' clouds; layers that are not in `records` vanish."""
+        by_layer = {record.layer: record for record in records if len(record.poses)}
+        low, high = _weight_range(list(by_layer.values()), style.layer)
+        with self._server.atomic():
+            self._provide(max(by_layer, default=-1) + 1)
+            for layer, handle in enumerate(self.handles):
+                record = by_layer.get(layer)
+                visible = record is not None and style.layer in (None, layer) and bool(style.limbs)
+                if visible and record is not None:
+                    self._draw(handle, record, style, tokens, (low, high))
+                handle.visible = visible
+
+    def clear(self) -> None:
+        """Hide all clouds."""
+        for handle in self.handles:
+            handle.visible = False
+
+    def remove(self) -> None:
+        """Take the clouds out of the scene."""
+        for handle in self.handles:
+            handle.remove()
+        self.handles = []
+
+    def _provide(self, count: int) -> None:
+        while len(self.handles) < count:
+            self.handles.append(
+                self._server.scene.add_point_cloud(
+                    f"/particles/layer {len(self.handles)}",
+                    np.zeros((1, 3), dtype=np.float32),
+                    (255, 255, 255),
+                    precision="float32",
+                    point_shape="circle",
+                    point_shading="flat",
+                    visible=False,
+                )
+            )
+
+    def _draw(
+        self,
+        handle: viser.PointCloudHandle,
+        record: LayerRecord,
+        style: CloudStyle,
+        tokens: ColourTokens,
+        weights: tuple[float, float],
+    ) -> None:
+        points = cloud_points(self._body, record.poses, style.limbs)
+        if style.colour_by == "weight":
+            shares = weight_shares(record.log_weights, *weights)
+            colours = np.repeat(tokens.ramp(shares), len(style.limbs), axis=0)
+        else:
+            colours = np.array(tokens.layer(record.layer, style.layer_count), dtype=np.uint8)
+        # A new colour array of another length must never meet the old points: the single colour goes in
+        # between.
+        if handle.points.shape != points.shape:
+            handle.colors = np.array(tokens["ghost"], dtype=np.uint8)
+        handle.points = points.astype(np.float32)
+        handle.colors = colours
+        handle.point_size = style.point_size
+
+
+def _weight_range(records: Sequence[LayerRecord], layer: int | None) -> tuple[float, float]:
+    shown = [record.log_weights for record in records if layer in (None, record.layer)]
+    finite = [values[np.isfinite(values)] for values in shown]
+    finite = [values for values in finite if len(values)]
+    if not finite:
+        return 0.0, 0.0
+    return min(float(values.min()) for values in finite), max(float(values.max()) for values in finite)

@@ -1,0 +1,70 @@
+"""Ready-made settings, by name. Each is a handful of knobs; the others stay as they are.
+
+A preset is offered where the tracker and weighting in use have every knob that it sets.
+"""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+Value = bool | int | float | str
+
+
+@dataclass(frozen=True, slots=True)
+class Preset:
+    """name : words on screen. help : what it is for, one sentence. values : knobs by flat name."""
+
+    name: str
+    help: str
+    values: dict[str, Value]
+
+
+_IMPROVED: dict[str, Value] = {
+    "adaptive_diffusion": True,
+    "diffusion_form": "shrink",
+    "diffusion_fraction": 0.4,
+    "crossover": 0.5,
+    "crossover_by": "limbs",
+}
+
+PRESETS = (
+    Preset(
+        "improved filter",
+        "Adaptive diffusion with shrinkage and crossover by limbs, 10 × 200.",
+        _IMPROVED | {"survival": 0.5, "layers": 10, "particles": 200},
+    ),
+    Preset(
+        "paper, Eq. 13",
+        "The annealed filter without its improvements: a fixed plan of noise, no crossover, 10 × 200.",
+        {
+            "adaptive_diffusion": False,
+            "diffusion_decay": "variance",
+            "crossover": 0.0,
+            "survival": 0.5,
+            "layers": 10,
+            "particles": 200,
+        },
+    ),
+    Preset(
+        "paper, Eq. 18 and 19",
+        "Adaptive diffusion without shrinkage and crossover by parameters, as the paper writes them.",
+        {
+            "adaptive_diffusion": True,
+            "diffusion_form": "paper",
+            "crossover": 0.5,
+            "crossover_by": "parameters",
+            "layers": 10,
+            "particles": 200,
+        },
+    ),
+    Preset("fast preview", "A quarter of the work: 5 × 100.", _IMPROVED | {"layers": 5, "particles": 100}),
+    Preset(
+        "careful",
+        "More layers, more particles and slower annealing: 15 × 400.",
+        _IMPROVED | {"survival": 0.5, "layers": 15, "particles": 400},
+    ),
+)
+
+
+def offered(knob_names: Collection[str]) -> tuple[Preset, ...]:
+    """The presets whose knobs all exist among `knob_names`."""
+    return tuple(preset for preset in PRESETS if all(name in knob_names for name in preset.values))

@@ -1,0 +1,84 @@
+"""One opened run as it stands in the scene: its data, its handles, its pictures, its settings."""
+
+import bisect
+import time
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.knobs import Value
+from studio.runs.search_space import parameter_names
+from studio.scene.live_search import LiveSearch
+from studio.scene.moment import Moment, moment_of
+from studio.scene.opened_run import OpenedRun
+from studio.scene.scene_drawing import SceneDrawing
+from studio.scene.view_options import ViewOptions
+from studio.scene.view_pictures import ViewPictures
+from studio.sessions.named_rows import write_pose
+from studio.sessions.session import START_POSE_NAME
+from studio.settings import changed_settings
+
+Array = NDArray[np.float64]
+
+_TRAIL_SECONDS = 1.0
+
+
+class ShownRun:
+    """Used by the presenter's thread only; `frames` is replaced whole and may be read by any."""
+
+    def __init__(self, drawing: SceneDrawing, opened: OpenedRun) -> None:
+        self.drawing, self.opened = drawing, opened
+        self.pictures = ViewPictures(opened)
+        self.settings = opened.settings()
+        self.frames: tuple[int, ...] = tuple(opened.frames())
+        self._trails_read = float("-inf")
+        self._trails_stale = True
+
+    def moment(self, frame: int | None, live: LiveSearch, edited: Array | None) -> Moment:
+        """What there is to draw at a frame."""
+        return moment_of(self.opened, frame, live, edited=edited, layers=self._layers_wanted)
+
+    def layer_count(self, frame: int | None, live: LiveSearch) -> int:
+        """How many layers the shown frame takes."""
+        return self.moment(frame, live, None).layer_count
+
+    def draw(self, moment: Moment, options: ViewOptions, layer: int | None) -> None:
+        """Bring everything but the pictures to a moment."""
+        now = time.monotonic()
+        if options.trails and self._trails_stale and now - self._trails_read >= _TRAIL_SECONDS:
+            self.drawing.read_poses()
+            self._trails_read, self._trails_stale = now, False
+        self.drawing.draw(moment, options, layer)
+
+    def hang(self, moment: Moment, options: ViewOptions, layer: int | None) -> None:
+        """Compose the pictures of a moment and hang them on the cameras."""
+        limbs = self.drawing.chosen_limbs(options)
+        self.drawing.hang(self.pictures.compose(moment, options, limbs, layer))
+
+    def apply(self, values: Mapping[str, Value]) -> None:
+        """Take settings that came into use."""
+        self.settings = changed_settings(self.settings, values)
+        self.pictures.use(self.settings)
+
+    def frame_finished(self, frame: int) -> None:
+        """Take note of a new stored result."""
+        self.opened.forget(frame)
+        place = bisect.bisect_left(self.frames, frame)
+        if place == len(self.frames) or self.frames[place] != frame:
+            self.frames = (*self.frames[:place], frame, *self.frames[place:])
+        self._trails_stale = True
+
+    def save_start_pose(self, pose: Array) -> None:
+        """Store a pose as the session's start pose (radians and mm, under the parameters' names)."""
+        write_pose(self.opened.session.path / START_POSE_NAME, parameter_names(self.opened.body), pose)
+
+    def close(self) -> None:
+        """Take the run out of the scene and let go of its files."""
+        self.drawing.remove()
+        self.pictures.close()
+        self.opened.close()
+
+    @property
+    def _layers_wanted(self) -> int:
+        return int(getattr(self.settings.tracker, "layers", 1))
