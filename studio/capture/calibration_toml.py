@@ -41,11 +41,18 @@ class AssumedCrop:
 
     def words(self, camera: str) -> str:
         """The assumption as a sentence."""
+        sides = {"left": self.left, "right": self.right, "top": self.top, "bottom": self.bottom}
+        cut = [f"{pixels:g} px at the {side}" for side, pixels in sides.items() if pixels > 0.0]
+        added = [f"{-pixels:g} px at the {side}" for side, pixels in sides.items() if pixels < 0.0]
+        what = " and ".join(
+            f"{', '.join(parts)} {verb}"
+            for parts, verb in ((cut, "were cut off"), (added, "were added"))
+            if parts
+        )
         return (
-            f"Camera {camera}: assumed that {self.left:g} px at the left, {self.right:g} px at the right,"
-            f" {self.top:g} px at the top and {self.bottom:g} px at the bottom of the calibrated"
-            f" {self.calibrated[0]}x{self.calibrated[1]} picture were cut off (a centred crop);"
-            f" the principal point is moved by ({-self.left:g}, {-self.top:g}) px."
+            f"Camera {camera}: assumed that of the calibrated {self.calibrated[0]}x{self.calibrated[1]} pixels"
+            f" {what} (a centred crop); the principal point is moved by"
+            f" ({0.0 - self.left:g}, {0.0 - self.top:g}) px."
         )
 
 

@@ -31,8 +31,8 @@ colour."""
 BACKGROUND_SHARE = 0.7
 """Weight of the mixture's Gaussians that are background; what covers a pixel more rarely is foreground."""
 FROZEN = {"mog2": 0.0, "knn": 1e-8}
-"""Learning rates that change nothing any more: OpenCV's KNN takes 0 for "update now" and needs a tiny one. Applied to
-the training frames twice more, so that updates already due and the order of a mixture's Gaussians are settled."""
+"""Learning rates that change nothing (0 means "now" to OpenCV's KNN). Both models then see the training
+frames twice more, so that updates already due and the order of a mixture's Gaussians are settled."""
 
 
 class BackgroundModel(Protocol):
@@ -162,8 +162,9 @@ def median_and_distance(values):
 def differing_pixels(picture, mean, variance, gain, threshold, noise, darkest, colour):
     """255 where a colour differs by more than sqrt(threshold) deviations and the pixel is no shadow.
 
-    picture : (H, W, 3) uint8. mean, variance : (H, W, 3) float32. noise : least variance. A shadow has darkest <=
-    brightness / background < 1 and a colour within `colour` of the background's, as a share of its brightness.
+    picture : (H, W, 3) uint8. mean, variance : (H, W, 3) float32. noise : least variance. A shadow has
+    darkest <= brightness / background < 1 and a colour within `colour` of the background's, as a share of its
+    brightness.
     The first loop of a row vectorises over all its colours; the shadow test runs where something differs.
     """
     height, width = picture.shape[:2]

@@ -90,20 +90,23 @@ class Backgrounds:
             reader.close()
 
 
-def fitted_plate(plate: Bytes, width: int, height: int, name: str) -> Bytes:
-    """A background picture cut to the footage's size, evenly on both sides as the calibration's crop is
-    assumed.
-
-        Raises FootageError if it is smaller, or larger by more than 2 %.
-    """
-    tall, wide = plate.shape[:2]
-    if (wide, tall) == (width, height):
-        return plate
+def check_plate_size(plate: tuple[int, int], footage: tuple[int, int], name: str) -> None:
+    """Raises FootageError if a background of (width, height) is smaller than the footage or 2 % larger."""
+    (wide, tall), (width, height) = plate, footage
     if wide < width or tall < height or max(wide / width, tall / height) > 1.0 + LARGEST_DIFFERENCE:
         raise FootageError(
             f"The background '{name}' is {wide}x{tall} pixels, the footage {width}x{height}.",
             "Give a background of the footage's size.",
         )
+
+
+def fitted_plate(plate: Bytes, width: int, height: int, name: str) -> Bytes:
+    """A background picture cut evenly on both sides to the footage's size, as the calibration's crop is.
+
+    Raises FootageError as `check_plate_size` does.
+    """
+    tall, wide = plate.shape[:2]
+    check_plate_size((wide, tall), (width, height), name)
     left, top = (wide - width) // 2, (tall - height) // 2
     return np.ascontiguousarray(plate[top : top + height, left : left + width])
 

@@ -1,1 +1,1 @@
-"""Readers of foreign session folders."""
+"""Footage and calibration of others' making, turned into sessions."""

@@ -1,0 +1,83 @@
+"""A folder of PARSEC's bodytrack benchmark: CAM1.. with pictures, FG1.. with masks, CALIB with .cal files.
+
+`BodyShapeParameters.txt` gives the subject's 58 dimensions, `InitialPose.txt` the 31 parameters of the
+start pose and the first 31 numbers of `PoseParameters.txt` the standard deviations from frame to frame at
+60 Hz (its limits belong to another branch of the angles and are not used). Every file but pictures and
+calibration may be missing.
+"""
+
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.catalogue import load_body
+from studio.body.subject import subject_from_shape
+from studio.capture.naming import natural_key
+from studio.errors import BodyError
+from studio.sessions.importers.folder_layout import choose_calibration
+from studio.sessions.importers.plan import SourcePlan
+
+Array = NDArray[np.float64]
+
+BODY = "human31"
+RATE = 60.0
+SHAPE, START, PARAMETERS = "BodyShapeParameters.txt", "InitialPose.txt", "PoseParameters.txt"
+SIGMA_MIN_MAX = 3
+
+
+def is_bodytrack(source: Path) -> bool:
+    """Whether a folder has the benchmark's layout."""
+    return (source / "CALIB").is_dir() and bool(_folders(source, "CAM"))
+
+
+def plan_bodytrack(source: Path, calibration: Path | str | None) -> SourcePlan:
+    """What such a folder holds. Raises BodyError for parameter files that do not fit the body."""
+    body = load_body(BODY)
+    count = len(body.parameters)
+    shape = _numbers(source / SHAPE)
+    sigma = _numbers(source / PARAMETERS, SIGMA_MIN_MAX * count)
+    return SourcePlan(
+        source=source,
+        calibration=choose_calibration(source, calibration),
+        footage=_folders(source, "CAM"),
+        masks=_folders(source, "FG"),
+        fps=RATE,
+        subject=None if shape is None else subject_from_shape(body, shape),
+        start_pose=_numbers(source / START, count),
+        sigma=None if sigma is None else sigma[:count],
+        sigma_fps=RATE,
+        notes=(
+            "A bodytrack folder: 60 frames per second are taken for granted unless --fps says otherwise.",
+        ),
+    )
+
+
+def _folders(source: Path, prefix: str) -> tuple[Path, ...]:
+    """CAM1, CAM2, ... in natural order."""
+    found = [
+        path
+        for path in source.iterdir()
+        if path.is_dir() and re.fullmatch(rf"{prefix}\d+", path.name.upper())
+    ]
+    return tuple(sorted(found, key=lambda path: natural_key(path.name)))
+
+
+def _numbers(path: Path, count: int | None = None) -> Array | None:
+    """The flat list of numbers in a file, None where there is no such file."""
+    if not path.is_file():
+        return None
+    try:
+        values = np.array([float(word) for word in path.read_text(encoding="utf-8").split()])
+    except (OSError, UnicodeDecodeError, ValueError) as problem:
+        raise BodyError(
+            f"'{path.name}' is not a list of numbers ({problem}).", "Copy the file again."
+        ) from None
+    if not np.all(np.isfinite(values)) or (count is not None and len(values) != count):
+        wanted = f"{count} finite numbers" if count is not None else "finite numbers"
+        raise BodyError(
+            f"'{path.name}' does not hold {wanted} but {np.count_nonzero(np.isfinite(values))}.",
+            "Copy the file again.",
+        )
+    return values

@@ -1,0 +1,114 @@
+"""Importing: any source that one of the importers knows, checked as a whole, becomes a session or nothing."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from studio.capture.calibration_files import read_calibration
+from studio.errors import FootageError, SessionError
+from studio.sessions.atomic_files import discard, move_into_place, new_folder_beside
+from studio.sessions.importers.bodytrack import is_bodytrack, plan_bodytrack
+from studio.sessions.importers.folder_layout import plan_folder
+from studio.sessions.importers.measuring import measure_source
+from studio.sessions.importers.plan import ImportCancelled, Progress, SourcePlan
+from studio.sessions.importers.writing import check_person, check_room, write_session
+from studio.sessions.manifest import CameraMatch
+from studio.sessions.session import Session
+
+FASTEST = 10_000.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImportReport:
+    """What became of a source. matching : footage to cameras, shown to the user. warnings : what to check."""
+
+    session: Session
+    matching: tuple[CameraMatch, ...]
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def matches(self) -> tuple[CameraMatch, ...]:
+        """The matching."""
+        return self.matching
+
+
+def import_source(
+    source: Path,
+    into: Path,
+    *,
+    calibration: Path | str | None = None,
+    fps: float | None = None,
+    copy: bool = True,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> ImportReport:
+    """Make a session at `into` from a source folder; `folder_layout` and `bodytrack` say what is understood.
+
+    calibration : which one to take where there are several. fps : frame rate, before any other. copy : False
+    refers to the footage where it lies. cancelled : asked often; True stops the import with ImportCancelled.
+    All is checked before anything is written; whatever fails, nothing is left and nothing that was stored is
+    touched. Raises StudioError.
+    """
+    report = _watched(progress, cancelled)
+    _check_request(source, into, fps)
+    source = source.resolve()
+    try:
+        plan = _plan(source, calibration)
+        read = read_calibration(plan.calibration)
+        person = check_person(plan)
+        if copy:
+            check_room(plan, into)
+        measured = measure_source(plan, read, fps, report)
+        folder = new_folder_beside(into)
+        try:
+            manifest = write_session(
+                folder, into.name, plan, read, measured, person, copy=copy, progress=report
+            )
+            report("finishing", 1, 1)
+            move_into_place(folder, into)
+        finally:
+            discard(folder)
+    except FileExistsError:
+        raise _taken(into) from None
+    except OSError as problem:
+        raise SessionError(
+            f"The import into '{into.name}' failed: {problem}.", "Check the disk's room and permissions."
+        ) from None
+    return ImportReport(Session(into), manifest.matching, manifest.notes, manifest.warnings)
+
+
+def _plan(source: Path, calibration: Path | str | None) -> SourcePlan:
+    """The parts of the source, by the importer that knows its layout."""
+    return plan_bodytrack(source, calibration) if is_bodytrack(source) else plan_folder(source, calibration)
+
+
+def _check_request(source: Path, into: Path, fps: float | None) -> None:
+    """What can be refused before looking into the source."""
+    if not source.is_dir():
+        raise FootageError(
+            f"There is no folder '{source}'.", "Give the folder that holds the footage and its calibration."
+        )
+    if into.exists():
+        raise _taken(into)
+    if fps is not None and not (math.isfinite(fps) and 0.0 < fps <= FASTEST):
+        raise FootageError(f"{fps:g} is no frame rate.", "Give frames per second, such as --fps 60.")
+
+
+def _watched(progress: Progress | None, cancelled: Callable[[], bool] | None) -> Progress:
+    """A progress callback that also stops a cancelled import."""
+
+    def report(step: str, done: int, total: int) -> None:
+        if cancelled is not None and cancelled():
+            raise ImportCancelled("The import was cancelled.", "Start it again when you like.")
+        if progress is not None:
+            progress(step, done, total)
+
+    return report
+
+
+def _taken(into: Path) -> SessionError:
+    return SessionError(
+        f"There is something at '{into}' already.", "Choose another name, or delete that session first."
+    )

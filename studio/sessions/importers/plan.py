@@ -1,0 +1,52 @@
+"""What was found in a source, before anything of it is opened or copied."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.subject import Subject
+from studio.errors import SessionError
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+"""progress(step in words, done, total); total is 0 where it is unknown."""
+
+
+class ImportCancelled(SessionError):
+    """The import was stopped by whoever asked for it; nothing of it is left."""
+
+    code = "cancelled"
+
+
+@dataclass(frozen=True, slots=True)
+class SourcePlan:
+    """The parts of a source.
+
+    calibration : a file, or the folder of several .cal files. footage, masks : videos and folders of
+    pictures. backgrounds : pictures and clips. fps : known frame rate or None. subject, start_pose, sigma :
+    values where the layout gives them in a form of its own; the files of the same names otherwise.
+    sigma_fps : the rate at which sigma was measured. tracker, weighting : what runs of the session use unless
+    told otherwise, "" for the default.
+    """
+
+    source: Path
+    calibration: Path
+    footage: tuple[Path, ...]
+    masks: tuple[Path, ...] = ()
+    backgrounds: tuple[Path, ...] = ()
+    truth: tuple[Path, ...] = ()
+    bodies: tuple[Path, ...] = ()
+    fps: float | None = None
+    subject: Subject | None = None
+    subject_file: Path | None = None
+    start_pose: Array | None = None
+    start_pose_file: Path | None = None
+    sigma: Array | None = None
+    sigma_fps: float = 0.0
+    sigma_file: Path | None = None
+    tracker: str = ""
+    weighting: str = ""
+    notes: tuple[str, ...] = ()

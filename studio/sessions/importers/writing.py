@@ -1,0 +1,203 @@
+"""A measured source written as a session: into a hidden folder beside its place, then renamed into it."""
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+from studio.body.catalogue import load_body
+from studio.body.subject import DEFAULT_BODY, fit_subject, read_subject, write_subject
+from studio.capture.calibration_files import Calibration, write_calibration
+from studio.capture.calibration_toml import is_canonical
+from studio.capture.footage_source import CameraSource, FootageSource
+from studio.capture.pictures import list_pictures
+from studio.capture.sanity import sanity_notes
+from studio.capture.trc import read_trc
+from studio.errors import SessionError
+from studio.sessions.importers.measuring import MeasuredSource
+from studio.sessions.importers.plan import Progress, SourcePlan
+from studio.sessions.manifest import CameraMatch, SessionManifest, now, write_manifest
+from studio.sessions.named_rows import read_pose, read_sigma, write_pose, write_sigma
+from studio.sessions.names import free_name, name_from
+
+COPY_CHUNK = 8_000_000
+SPARE_BYTES = 50_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedPerson:
+    """What is known of the person, read once and found good. notes : of the subject's fit."""
+
+    body: str
+    parameters: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def check_person(plan: SourcePlan) -> CheckedPerson:
+    """Read everything about the person and the truth. Raises BodyError, TruthError."""
+    subject = plan.subject
+    if subject is None and plan.subject_file is not None:
+        subject = read_subject(plan.subject_file)
+    folders = (plan.source / "bodies",) if plan.bodies else ()
+    body = load_body(subject.body if subject else DEFAULT_BODY, folders)
+    notes: tuple[str, ...] = ()
+    if subject is not None:
+        notes = fit_subject(body, subject, folders)[1]
+    names = tuple(entry.name for entry in body.parameters)
+    if plan.start_pose_file is not None:
+        read_pose(plan.start_pose_file, names)
+    if plan.sigma_file is not None:
+        read_sigma(plan.sigma_file, names, 1.0)
+    for path in plan.truth:
+        read_trc(path)
+    return CheckedPerson(body.name, names, notes)
+
+
+def check_room(plan: SourcePlan, into: Path) -> None:
+    """Raises SessionError if the disk has no room for a copy of the footage."""
+    parts = (*plan.footage, *plan.masks, *plan.backgrounds)
+    files = [file for part in parts for file in (list_pictures(part) if part.is_dir() else (part,))]
+    needed = sum(file.stat().st_size for file in files) + SPARE_BYTES
+    parent = next(folder for folder in into.absolute().parents if folder.exists())
+    free = shutil.disk_usage(parent).free
+    if free < needed:
+        raise SessionError(
+            f"The copy needs {needed / 1e6:.0f} MB and the disk has {free / 1e6:.0f} MB.",
+            "Make room, or refer to the footage with --reference.",
+        )
+
+
+def write_session(
+    folder: Path,
+    name: str,
+    plan: SourcePlan,
+    calibration: Calibration,
+    measured: MeasuredSource,
+    person: CheckedPerson,
+    *,
+    copy: bool,
+    progress: Progress,
+) -> SessionManifest:
+    """Fill `folder` with a session named `name`; the manifest comes last."""
+    footage = _write_footage(folder, measured, copy, progress)
+    _write_calibration(folder, calibration, measured)
+    _write_person(folder, plan, person)
+    cameras = tuple(entry.camera for entry in measured.cameras)
+    crops = [entry.crop.words(entry.camera.name) for entry in measured.cameras if entry.crop is not None]
+    manifest = SessionManifest(
+        name=name,
+        title=plan.source.name,
+        created=now(),
+        body=person.body,
+        footage=footage,
+        tracker=plan.tracker,
+        weighting=plan.weighting,
+        calibration_source=calibration.label,
+        imported_from=str(plan.source),
+        assumptions=(calibration.unit_note, *crops),
+        notes=(calibration.unit_note, *calibration.notes, *plan.notes, *person.notes),
+        warnings=(*measured.warnings, *sanity_notes(cameras)),
+        matching=tuple(CameraMatch(match.footage, match.camera, match.how) for match in measured.matching),
+    )
+    write_manifest(folder, manifest)
+    return manifest
+
+
+def _write_footage(folder: Path, measured: MeasuredSource, copy: bool, progress: Progress) -> FootageSource:
+    """Copy or refer to all footage, masks and backgrounds; returns their description."""
+    sources: list[CameraSource] = []
+    taken: set[str] = set()
+    for entry in measured.cameras:
+        plain = free_name(name_from(entry.camera.name, "camera"), taken)
+        taken.add(plain)
+        is_folder = entry.footage.is_dir()
+        place = f"pictures/{plain}" if is_folder else f"videos/{_file_name(entry.footage, plain)}"
+        masks = background = ""
+        if entry.masks is not None:
+            suffix = "" if entry.masks.is_dir() else entry.masks.suffix.lower()
+            masks = _put(entry.masks, folder, f"masks/{plain}{suffix}", copy, progress)
+        if entry.background is not None:
+            target = f"background/{plain}{entry.background.suffix.lower()}"
+            background = _put(entry.background, folder, target, copy, progress)
+        sources.append(
+            CameraSource(
+                entry.camera.name,
+                "pictures" if is_folder else "video",
+                _put(entry.footage, folder, place, copy, progress),
+                entry.found.width,
+                entry.found.height,
+                entry.found.frame_count,
+                masks,
+                background,
+            )
+        )
+    return FootageSource(measured.fps, measured.frame_count, tuple(sources))
+
+
+def _put(source: Path, folder: Path, place: str, copy: bool, progress: Progress) -> str:
+    """Copy a file or a folder's pictures to `place`; returns where the session finds it."""
+    if not copy:
+        return str(source.resolve())
+    target = folder / place
+    if source.is_dir():
+        pictures = list_pictures(source)
+        target.mkdir(parents=True)
+        for number, path in enumerate(pictures, 1):
+            shutil.copyfile(path, target / path.name)
+            progress(f"copying {source.name}", number, len(pictures))
+        return place
+    target.parent.mkdir(parents=True, exist_ok=True)
+    total, done = source.stat().st_size, 0
+    with source.open("rb") as reading, target.open("wb") as writing:
+        while chunk := reading.read(COPY_CHUNK):
+            writing.write(chunk)
+            done += len(chunk)
+            progress(f"copying {source.name} (kB)", done // 1000, total // 1000)
+    return place
+
+
+def _file_name(video: Path, plain: str) -> str:
+    """The video's own name where it is plain, so that other tools still find it."""
+    return video.name if name_from(video.stem) == video.stem else f"{plain}{video.suffix.lower()}"
+
+
+def _write_calibration(folder: Path, calibration: Calibration, measured: MeasuredSource) -> None:
+    """The imported files byte for byte, and the canonical one with the cameras that have footage."""
+    place = folder / "calibration"
+    place.mkdir()
+    sources = calibration.sources
+    if len(sources) == 1 and is_canonical(sources[0]):
+        # A session imported again: what its own import kept is the original.
+        kept = [path for path in sources[0].parent.glob("original*") if path.is_file()]
+        sources = tuple(kept) or sources
+        if (sources[0].parent / "original").is_dir():
+            sources = tuple(sorted((sources[0].parent / "original").iterdir()))
+    if len(sources) == 1:
+        shutil.copyfile(sources[0], place / f"original{sources[0].suffix}")
+    else:
+        (place / "original").mkdir()
+        for path in sources:
+            shutil.copyfile(path, place / "original" / path.name)
+    crops = {entry.camera.name: entry.crop for entry in measured.cameras if entry.crop is not None}
+    write_calibration(tuple(entry.camera for entry in measured.cameras), place / "cameras.toml", crops)
+
+
+def _write_person(folder: Path, plan: SourcePlan, person: CheckedPerson) -> None:
+    """Subject, start pose, σ, truth and bodies."""
+    if plan.subject is not None:
+        write_subject(plan.subject, folder / "subject.toml")
+    if plan.start_pose is not None:
+        write_pose(folder / "start_pose.csv", person.parameters, plan.start_pose)
+    if plan.sigma is not None:
+        write_sigma(folder / "sigma.csv", person.parameters, plan.sigma, plan.sigma_fps)
+    for path, name in (
+        (plan.subject_file, "subject.toml"),
+        (plan.start_pose_file, "start_pose.csv"),
+        (plan.sigma_file, "sigma.csv"),
+    ):
+        if path is not None and not (folder / name).exists():
+            shutil.copyfile(path, folder / name)
+    for files, place in ((plan.truth, folder / "truth"), (plan.bodies, folder / "bodies")):
+        if files:
+            place.mkdir()
+        for path in files:
+            shutil.copyfile(path, place / (f"{path.stem}.trc" if place.name == "truth" else path.name))
