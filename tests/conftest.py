@@ -4,6 +4,10 @@ import os
 from pathlib import Path
 
 import pytest
+from toy_session import make_session
+
+from studio.sessions.session import Session
+from studio.sessions.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -21,3 +25,10 @@ def real_data() -> Path:
 def _own_workspace(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
     """No test ever touches the user's own workspace."""
     monkeypatch.setenv("STUDIO_WORKSPACE", str(tmp_path_factory.mktemp("workspace")))
+
+
+@pytest.fixture
+def session_on_disk(_own_workspace: None) -> Session:
+    """A small session of a planar arm, named "toy", in this test's own workspace."""
+    workspace = Workspace()
+    return make_session(workspace.place_for("toy"))

@@ -21,7 +21,8 @@ class Command:
 class Open(Command):
     """Make a run the current one, where it stands. session, run : folder paths as text.
 
-    A run that is being tracked is paused first, saved whole inside its frame.
+    Another run that is being tracked is paused first, saved whole inside its frame; opening the open one changes
+    nothing.
     """
 
     session: str = ""

@@ -152,8 +152,7 @@ class TrackingJob:
     def _open(self, session: str, run_folder: str) -> None:
         opened = self._run
         if opened is not None and opened.stored.folder == Path(run_folder).resolve():
-            if self._tracking:
-                self._settle(opened)
+            self._state(self._say.state_name)
             return
         # The new one is opened before the old one is let go, so that a refusal changes nothing.
         following = OpenRun(session, run_folder)

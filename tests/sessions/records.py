@@ -1,0 +1,39 @@
+"""Made-up layers and results for tests of the store."""
+
+import numpy as np
+
+from studio.tracking.tracker import Carried, Estimate, FrameResult, LayerRecord, ParticleSet
+
+
+def layer_of(frame: int, layer: int, *, count: int = 12, size: int = 4) -> LayerRecord:
+    """A layer's record filled with numbers that belong to no other (frame, layer)."""
+    rng = np.random.default_rng((frame, layer))
+    vectors = rng.normal(size=(5, size))
+    return LayerRecord(
+        frame=frame,
+        layer=layer,
+        settings_version=1,
+        beta=float(rng.random()),
+        alpha_wanted=float("nan"),
+        alpha_reached=0.5,
+        variance_weighed=vectors[0],
+        variance_resampled=vectors[1],
+        variance_diffused=vectors[2],
+        best=vectors[3],
+        best_log_weight=-1.25,
+        mean=vectors[4],
+        poses=rng.normal(size=(count, size)),
+        log_weights=rng.normal(size=count),
+        milliseconds=3.5,
+    )
+
+
+def result_of(frame: int, *, count: int = 12, size: int = 4, layers: int = 3) -> FrameResult:
+    """A frame's result with a whole set at its end."""
+    rng = np.random.default_rng((frame, 99))
+    poses = rng.normal(size=(count, size))
+    particles = ParticleSet(
+        poses, rng.normal(size=count), rng.normal(size=count), {"velocities": rng.normal(size=(count, size))}
+    )
+    estimate = Estimate(poses[0], poses.mean(axis=0), poses[1], -0.5 - frame)
+    return FrameResult(frame, estimate, layers, layers * count, 1, 12.0, Carried(particles, poses[0], poses[2]))

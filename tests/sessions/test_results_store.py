@@ -1,0 +1,237 @@
+"""The store gives back every bit, while it is written, and stays readable when the writer dies."""
+
+import os
+import sqlite3
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import numpy as np
+import pytest
+from records import layer_of, result_of
+
+from studio.errors import NotFoundError, RunError, SessionError
+from studio.sessions.results_codec import kept_rows, particles_from
+from studio.sessions.results_store import FILE_NAME, ResultsReader, ResultsWriter, is_being_written
+from studio.tracking.tracker import LayerRecord
+
+ARRAYS = ("variance_weighed", "variance_resampled", "variance_diffused", "best", "mean", "poses", "log_weights")
+NUMBERS = ("frame", "layer", "settings_version", "beta", "alpha_reached", "best_log_weight", "milliseconds")
+
+
+def same_layer(one: LayerRecord, other: LayerRecord) -> bool:
+    equal = all(np.array_equal(getattr(one, name), getattr(other, name)) for name in ARRAYS)
+    equal &= all(getattr(one, name) == getattr(other, name) for name in NUMBERS)
+    return equal and np.isnan(one.alpha_wanted) == np.isnan(other.alpha_wanted)
+
+
+def write(writer: ResultsWriter, frame: int) -> None:
+    writer.write_frame(result_of(frame), [layer_of(frame, layer) for layer in range(3)])
+
+
+def test_every_bit_comes_back(tmp_path: Path) -> None:
+    with ResultsWriter(tmp_path) as writer, ResultsReader(tmp_path) as reader:
+        write(writer, 4)
+        found = reader.result(4)
+        wanted = result_of(4)
+        for name in ("pose", "mean", "mode"):
+            assert np.array_equal(getattr(found.estimate, name), getattr(wanted.estimate, name))
+        assert found.carried.particles is not None
+        assert wanted.carried.particles is not None
+        for name in ("poses", "log_weights", "raw_log_weights"):
+            assert np.array_equal(
+                getattr(found.carried.particles, name), getattr(wanted.carried.particles, name)
+            )
+        assert np.array_equal(
+            found.carried.particles.extra["velocities"], wanted.carried.particles.extra["velocities"]
+        )
+        assert np.array_equal(found.carried.previous_estimate, wanted.carried.previous_estimate)
+        assert (found.frame, found.layers, found.evaluations) == (4, 3, 36)
+        for layer, record in enumerate(reader.layers(4)):
+            assert same_layer(record, layer_of(4, layer))
+        assert same_layer(reader.layer(4, 2), layer_of(4, 2))
+
+
+def test_reader_sees_each_frame_as_soon_as_it_is_written(tmp_path: Path) -> None:
+    reader = ResultsReader(tmp_path)
+    assert reader.frames() == []
+    with ResultsWriter(tmp_path) as writer:
+        for frame in range(5):
+            write(writer, frame)
+            assert reader.frames() == list(range(frame + 1))
+            frames, poses = reader.poses()
+            assert frames.tolist() == list(range(frame + 1))
+            assert np.array_equal(poses[-1], result_of(frame).estimate.pose)
+    line = reader.timeline()
+    assert np.array_equal(line.log_weights, [-0.5, -1.5, -2.5, -3.5, -4.5])
+    assert line.evaluations.tolist() == [36] * 5
+    reader.close()
+
+
+def test_what_is_not_there_is_named(tmp_path: Path) -> None:
+    with ResultsWriter(tmp_path) as writer, ResultsReader(tmp_path) as reader:
+        write(writer, 0)
+        for ask in (lambda: reader.result(1), lambda: reader.layers(1), lambda: reader.layer(0, 3)):
+            with pytest.raises(NotFoundError, match="has no"):
+                ask()
+
+
+def test_fewer_particles_are_kept_the_heaviest_in_their_order_and_the_last_set_whole(tmp_path: Path) -> None:
+    with ResultsWriter(tmp_path) as writer, ResultsReader(tmp_path) as reader:
+        writer.write_frame(result_of(0), [layer_of(0, 0)], particles=5)
+        stored, whole = reader.layer(0, 0), layer_of(0, 0)
+        assert len(stored.poses) == 5
+        assert stored.log_weights.min() >= np.sort(whole.log_weights)[-5]
+        places = [int(np.flatnonzero((whole.poses == pose).all(axis=1))[0]) for pose in stored.poses]
+        assert places == sorted(places)
+        assert np.array_equal(stored.best, whole.best)
+        carried = reader.result(0).carried.particles
+        assert carried is not None
+        assert len(carried.poses) == 12
+
+
+@pytest.mark.parametrize("wanted", [0, 1, 3, 7, 100])
+def test_equal_weights_are_chosen_the_same_each_time(wanted: int) -> None:
+    rows = kept_rows(np.zeros(7), wanted)
+    assert rows.tolist() == list(range(min(wanted, 7)))
+
+
+def test_a_frame_left_in_the_middle_is_kept_whole_and_goes_when_the_frame_is_done(tmp_path: Path) -> None:
+    state = {"set_poses": np.ones((3, 4)), "set_log_weights": np.zeros(3), "set_raw_log_weights": np.zeros(0)}
+    with ResultsWriter(tmp_path) as writer, ResultsReader(tmp_path) as reader:
+        write(writer, 0)
+        writer.write_partial(1, 2, state, [layer_of(1, 0), layer_of(1, 1)])
+        partial = reader.partial()
+        assert partial is not None
+        assert (partial.frame, partial.next_layer) == (1, 2)
+        assert np.array_equal(particles_from(partial.state).poses, np.ones((3, 4)))
+        assert [record.layer for record in reader.layers(1)] == [0, 1]
+        assert same_layer(reader.layer(1, 1), layer_of(1, 1))
+        assert reader.frames() == [0]
+        write(writer, 1)
+        assert reader.partial() is None
+        assert len(reader.layers(1)) == 3
+
+
+def test_a_failed_frame_leaves_nothing_behind(tmp_path: Path) -> None:
+    with ResultsWriter(tmp_path) as writer, ResultsReader(tmp_path) as reader:
+        write(writer, 0)
+        with pytest.raises(SessionError):
+            writer.write_frame(result_of(1), [layer_of(1, 0), layer_of(1, 0)])
+        assert reader.frames() == [0]
+        with pytest.raises(NotFoundError):
+            reader.layers(1)
+        write(writer, 1)
+        assert reader.frames() == [0, 1]
+
+
+def test_settings_and_their_end(tmp_path: Path) -> None:
+    with ResultsWriter(tmp_path) as writer, ResultsReader(tmp_path) as reader:
+        writer.write_settings(1, 0, 0, {"survival": 0.5})
+        writer.write_settings(2, 3, 4, {"survival": 0.4, "carry": "mode", "on": True})
+        history = reader.settings_history()
+        assert [(entry.version, entry.frame, entry.layer) for entry in history] == [(1, 0, 0), (2, 3, 4)]
+        assert history[1].values == {"survival": 0.4, "carry": "mode", "on": True}
+        assert reader.ended() == ""
+        writer.mark_ended("cancelled")
+        assert reader.ended() == "cancelled"
+
+
+def test_later_frames_can_be_dropped(tmp_path: Path) -> None:
+    with ResultsWriter(tmp_path) as writer, ResultsReader(tmp_path) as reader:
+        writer.write_settings(1, 0, 0, {})
+        writer.write_settings(2, 2, 1, {})
+        for frame in range(4):
+            write(writer, frame)
+        writer.forget_from(2)
+        assert reader.frames() == [0, 1]
+        assert [entry.version for entry in reader.settings_history()] == [1]
+
+
+def test_only_one_writer(tmp_path: Path) -> None:
+    with ResultsWriter(tmp_path):
+        assert is_being_written(tmp_path)
+        with pytest.raises(RunError, match="another process"):
+            ResultsWriter(tmp_path)
+    assert not is_being_written(tmp_path)
+    ResultsWriter(tmp_path).close()
+
+
+def test_a_writer_killed_in_the_middle_of_a_frame_leaves_whole_frames_only(tmp_path: Path) -> None:
+    """The process dies with a transaction half written; what it had finished is there, and the run is free."""
+    script = textwrap.dedent(
+        """
+        import os, signal, sys
+        from pathlib import Path
+        from records import layer_of, result_of
+        from studio.sessions.results_store import ResultsWriter
+
+        def layers(frame, deadly):
+            for layer in range(3):
+                yield layer_of(frame, layer)
+
+        class Deadly:
+            def __init__(self, connection): self.inner, self.count = connection, 0
+            def execute(self, sql, *values):
+                self.count += "INSERT INTO layers" in sql
+                if self.count == 8:
+                    os.kill(os.getpid(), signal.SIGKILL)
+                return self.inner.execute(sql, *values)
+
+        writer = ResultsWriter(Path(sys.argv[1]))
+        writer._connection = Deadly(writer._connection)
+        for frame in range(5):
+            writer.write_frame(result_of(frame), layers(frame, False))
+        """
+    )
+    paths = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(tmp_path)], env={**os.environ, "PYTHONPATH": paths}, check=False
+    )
+    assert done.returncode == -9
+    with ResultsReader(tmp_path) as reader:
+        assert reader.frames() == [0, 1]
+        assert same_layer(reader.layer(1, 2), layer_of(1, 2))
+        with pytest.raises(NotFoundError):
+            reader.layers(2)
+    with ResultsWriter(tmp_path) as writer:
+        write(writer, 2)
+
+
+def test_a_damaged_store_is_said_to_be_one(tmp_path: Path) -> None:
+    (tmp_path / FILE_NAME).write_bytes(b"not a database at all" * 100)
+    with ResultsReader(tmp_path) as reader, pytest.raises(SessionError, match="cannot be read"):
+        reader.frames()
+
+
+def test_a_damaged_blob_is_said_to_be_one_and_the_rest_stays_readable(tmp_path: Path) -> None:
+    with ResultsWriter(tmp_path) as writer:
+        write(writer, 0)
+        write(writer, 1)
+    connection = sqlite3.connect(tmp_path / FILE_NAME)
+    connection.execute("UPDATE layers SET blob = X'00FF00' WHERE frame = 0 AND layer = 1")
+    connection.commit()
+    connection.close()
+    with ResultsReader(tmp_path) as reader:
+        with pytest.raises(SessionError, match="damaged"):
+            reader.layers(0)
+        assert len(reader.layers(1)) == 3
+
+
+def test_another_process_reads_while_it_is_written(tmp_path: Path) -> None:
+    script = (
+        "import sys; from pathlib import Path; from studio.sessions.results_store import ResultsReader;"
+        "r = ResultsReader(Path(sys.argv[1])); print(r.frames(), float(r.layer(1, 2).poses.sum()))"
+    )
+    with ResultsWriter(tmp_path) as writer:
+        write(writer, 0)
+        write(writer, 1)
+        writer._connection.execute("BEGIN IMMEDIATE")
+        writer._connection.execute("DELETE FROM frames")
+        told = subprocess.run(
+            [sys.executable, "-c", script, str(tmp_path)], capture_output=True, text=True, check=True
+        )
+        writer._connection.execute("ROLLBACK")
+    assert told.stdout.split("]")[0] == "[0, 1"
+    assert float(told.stdout.split()[-1]) == float(layer_of(1, 2).poses.sum())
