@@ -1,4 +1,5 @@
-"""A tiny session on disk: the planar arm seen by one camera, drawn with OpenCV from a motion that is known."""
+"""A tiny session on disk: the planar arm seen by one camera, drawn with OpenCV from a motion that is
+known."""
 
 from pathlib import Path
 

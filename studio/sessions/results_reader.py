@@ -14,8 +14,6 @@ from studio.sessions.results_codec import unpack, unpack_layer, unpack_result
 from studio.tracking.tracker import FrameResult, LayerRecord
 
 Array = NDArray[np.float64]
-Value = bool | int | float | str
-
 FILE_NAME = "results.sqlite"
 
 
@@ -26,7 +24,7 @@ class SettingsEntry:
     version: int
     frame: int
     layer: int
-    values: dict[str, Value]
+    values: dict[str, bool | int | float | str]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

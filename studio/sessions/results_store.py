@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from studio.errors import RunError, SessionError
 from studio.sessions.results_codec import pack, pack_layer, pack_result
-from studio.sessions.results_reader import FILE_NAME, ResultsReader, SettingsEntry
+from studio.sessions.results_reader import FILE_NAME, ResultsReader
 from studio.tracking.tracker import FrameResult, LayerRecord
 
 Array = NDArray[np.float64]
 Value = bool | int | float | str
 
-__all__ = ["FILE_NAME", "ResultsReader", "ResultsWriter", "SettingsEntry", "is_being_written"]
+__all__ = ["ResultsReader", "ResultsWriter", "is_being_written"]
 
 LOCK_NAME = "results.lock"
 SCHEMA_VERSION = "1"

@@ -36,4 +36,6 @@ def result_of(frame: int, *, count: int = 12, size: int = 4, layers: int = 3) ->
         poses, rng.normal(size=count), rng.normal(size=count), {"velocities": rng.normal(size=(count, size))}
     )
     estimate = Estimate(poses[0], poses.mean(axis=0), poses[1], -0.5 - frame)
-    return FrameResult(frame, estimate, layers, layers * count, 1, 12.0, Carried(particles, poses[0], poses[2]))
+    return FrameResult(
+        frame, estimate, layers, layers * count, 1, 12.0, Carried(particles, poses[0], poses[2])
+    )

@@ -13,10 +13,19 @@ from records import layer_of, result_of
 
 from studio.errors import NotFoundError, RunError, SessionError
 from studio.sessions.results_codec import kept_rows, particles_from
-from studio.sessions.results_store import FILE_NAME, ResultsReader, ResultsWriter, is_being_written
+from studio.sessions.results_reader import FILE_NAME
+from studio.sessions.results_store import ResultsReader, ResultsWriter, is_being_written
 from studio.tracking.tracker import LayerRecord
 
-ARRAYS = ("variance_weighed", "variance_resampled", "variance_diffused", "best", "mean", "poses", "log_weights")
+ARRAYS = (
+    "variance_weighed",
+    "variance_resampled",
+    "variance_diffused",
+    "best",
+    "mean",
+    "poses",
+    "log_weights",
+)
 NUMBERS = ("frame", "layer", "settings_version", "beta", "alpha_reached", "best_log_weight", "milliseconds")
 
 
@@ -159,7 +168,8 @@ def test_only_one_writer(tmp_path: Path) -> None:
 
 
 def test_a_writer_killed_in_the_middle_of_a_frame_leaves_whole_frames_only(tmp_path: Path) -> None:
-    """The process dies with a transaction half written; what it had finished is there, and the run is free."""
+    """The process dies with a transaction half written; what it had finished is there, and the run is
+    free."""
     script = textwrap.dedent(
         """
         import os, signal, sys

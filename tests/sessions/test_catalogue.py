@@ -1,0 +1,87 @@
+"""The catalogue holds nothing of its own."""
+
+import msgspec
+import pytest
+from toy_session import make_session
+
+from studio.runs.search_space import default_sigma, parameter_names
+from studio.sessions.catalogue import FILE_NAME
+from studio.sessions.manifest import now
+from studio.sessions.run_record import RunRecord
+from studio.sessions.session import Session
+from studio.sessions.workspace import Workspace
+
+
+def record_of(session: Session, name: str) -> RunRecord:
+    """A run's record, made without the settings room."""
+    body = session.body()
+    return RunRecord(
+        name=name,
+        session=session.name,
+        created=now(),
+        tracker="annealed",
+        weighting="edge-region",
+        body=body.name,
+        dimensions=dict(body.dimensions),
+        parameters=parameter_names(body),
+        seed=3,
+        first=0,
+        last=8,
+        fps=60.0,
+        settings={"layers": 10},
+        sigma=tuple(default_sigma(body, 60.0).tolist()),
+    )
+
+
+@pytest.fixture
+def workspace(session_on_disk: Session) -> Workspace:
+    session_on_disk.new_run(record_of(session_on_disk, "first"))
+    session_on_disk.new_run(record_of(session_on_disk, "second"))
+    made = Workspace()
+    make_session(made.place_for("other"), frames=3)
+    return made
+
+
+def test_deleting_it_loses_nothing(workspace: Workspace) -> None:
+    before = workspace.sessions()
+    assert [entry.name for entry in before] == ["other", "toy"]
+    assert [run.name for run in before[1].runs] == ["first", "second"]
+    assert (workspace.root / FILE_NAME).exists()
+    workspace.catalogue.forget()
+    assert not (workspace.root / FILE_NAME).exists()
+    assert workspace.sessions() == before
+
+
+@pytest.mark.parametrize("damage", [b"", b"rubbish" * 1000])
+def test_damage_is_mended(workspace: Workspace, damage: bytes) -> None:
+    before = workspace.sessions()
+    workspace.catalogue.forget()
+    (workspace.root / FILE_NAME).write_bytes(damage)
+    assert workspace.sessions() == before
+
+
+def test_it_follows_what_happens_to_the_folders(workspace: Workspace) -> None:
+    workspace.sessions()
+    session = workspace.session("toy")
+    session.with_manifest(msgspec.structs.replace(session.manifest, title="Another title"))
+    workspace.trash_run("toy", "first")
+    workspace.trash("other")
+    (found,) = workspace.sessions()
+    assert found.title == "Another title"
+    assert [run.name for run in found.runs] == ["second"]
+
+
+def test_a_broken_manifest_is_listed_with_its_reason(workspace: Workspace) -> None:
+    (workspace.root / "other" / "session.json").write_text("{")
+    entries = {entry.name: entry for entry in workspace.sessions()}
+    assert "cannot be read" in entries["other"].problem
+    assert entries["toy"].problem == ""
+
+
+def test_links_out_of_the_workspace_are_not_listed(
+    workspace: Workspace, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    outside = tmp_path_factory.mktemp("outside") / "secret"
+    make_session(outside, frames=3)
+    (workspace.root / "leak").symlink_to(outside)
+    assert [entry.name for entry in workspace.sessions()] == ["other", "toy"]
