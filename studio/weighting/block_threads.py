@@ -1,0 +1,25 @@
+"""Blocks of sixteen poses shared among Numba's threads.
+
+Every kernel exists twice: `chunk`, which does the blocks first..last - 1 in the calling thread, and `all`, which hands
+equal chunks to threads. What comes out for a pose never depends on which.
+"""
+
+import threading
+from collections.abc import Callable
+
+import numba
+
+# Numba's plain thread pool aborts the process when two Python threads launch parallel kernels at once.
+_ONE_LAUNCH = threading.Lock()
+
+
+def run_blocks(
+    chunk: Callable[..., None], everything: Callable[..., None], blocks: int, *arguments: object
+) -> None:
+    """Run a kernel over all blocks, on as many threads as `numba.get_num_threads()` says."""
+    threads = min(int(numba.get_num_threads()), blocks)
+    if threads <= 1:
+        chunk(0, blocks, *arguments)
+        return
+    with _ONE_LAUNCH:
+        everything(threads, *arguments)

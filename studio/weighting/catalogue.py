@@ -1,0 +1,41 @@
+"""The weightings by name. A new one is one file and one line here."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from studio.body.model import BodyModel
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.geometry.camera import Camera
+from studio.weighting.edge_region import EdgeRegionSettings, EdgeRegionWeigher
+from studio.weighting.problem import FrameFunction
+
+
+class Weigher(Protocol):
+    """A weighting made ready for one body, some cameras and some settings."""
+
+    def problem(self, evidence: FrameEvidence) -> FrameFunction:
+        """One frame as a function of poses."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Weighting:
+    """One way of weighing poses. edge_kind : the edge map it reads: "proximity", "bodytrack" or "none".
+
+    settings_type : its knobs. prepare : (body, cameras, settings of that type) to a `Weigher`.
+    """
+
+    name: str
+    label: str
+    settings_type: type
+    edge_kind: str
+    prepare: Callable[[BodyModel, tuple[Camera, ...], Any], Weigher]
+
+
+WEIGHTINGS: dict[str, Weighting] = {
+    entry.name: entry
+    for entry in (
+        Weighting("edge-region", "Edges and region", EdgeRegionSettings, "proximity", EdgeRegionWeigher),
+    )
+}

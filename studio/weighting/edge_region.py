@@ -1,0 +1,204 @@
+"""Edge and region weighting of Deutscher & Reid 2005, section 4.2.
+
+    Σe = 1/N Σ (1 - p)²   over samples along the sides of the projected cones, p from the edge map     (Eq. 14)
+    Σr = 1/N Σ (1 - p)²   over samples within them, p from the foreground map                          (Eq. 15)
+    log w = - Σ over cameras of (a Σe + b Σr)                                                     (Eq. 16, 17)
+
+Eq. 17 is printed without the minus sign of Eq. 16; it belongs there, else the worst pose weighs most. The paper's
+weights are a = b = 1 ("an equal weighting to each component was determined empirically").
+
+Every limb has the same number of samples in every view, spread evenly: `edge_samples` on its two sides together,
+`region_samples` on three lines within (Fig. 6).
+
+**Where nothing is seen.** N is the same for every pose: a sample outside the picture, or of a limb that reaches behind
+a camera or out of its lens, reads p = 0, the worst there is. So no pose gains by leaving a picture, a view that sees
+nothing of the body costs a + b, and log w lies between -(a + b) × cameras and 0 for any finite pose.
+
+**Occlusion-aware edges.** A side that passes behind a nearer limb makes no edge in the picture. With the option on,
+such samples are left out of Eq. 14 and its N (of that view and pose) counts the others; if none is left, Σe = 1.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.model import BodyModel
+from studio.body.tables import kinematic_tables
+from studio.errors import FootageError
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.geometry.camera import Camera
+from studio.knobs import knob
+from studio.weighting.block_threads import run_blocks
+from studio.weighting.edge_region_kernels import (
+    CHUNK,
+    EDGE_LINES,
+    LANES,
+    PADDING,
+    REGION_LINES,
+    WORST,
+    all_sums,
+    chunk_sums,
+)
+from studio.weighting.evidence_check import check_views
+from studio.weighting.occlusion_kernels import all_hidden, chunk_hidden
+from studio.weighting.outlines import OutlineProjector
+from studio.weighting.problem import Limits
+
+Array = NDArray[np.float64]
+Bytes = NDArray[np.uint8]
+IntArray = NDArray[np.int64]
+
+# Pixel numbers are worked out in single precision, exact up to 2^24.
+LARGEST_PICTURE = 2**24 - PADDING
+
+
+@dataclass(frozen=True, slots=True)
+class EdgeRegionSettings:
+    """Knobs of the edge and region weighting. A frame's problem is made once, so all take effect with the next."""
+
+    title: ClassVar[str] = "Edge and region"
+
+    edge_weight: float = knob(
+        1.0,
+        0.0,
+        5.0,
+        0.05,
+        takes_effect="next frame",
+        help="Weight of the edge term, Eq. 14; the paper's is 1.",
+    )
+    region_weight: float = knob(
+        1.0,
+        0.0,
+        5.0,
+        0.05,
+        takes_effect="next frame",
+        help="Weight of the silhouette term, Eq. 15; the paper's is 1.",
+    )
+    edge_samples: int = knob(
+        32, 32, 128, 32, takes_effect="next frame", help="Edge samples a limb and view (to the nearest 32)."
+    )
+    region_samples: int = knob(
+        48, 48, 192, 48, takes_effect="next frame", help="Region samples a limb and view (to the nearest 48)."
+    )
+    occlusion_aware: bool = knob(
+        False,
+        takes_effect="next frame",
+        help="Leave out edge samples that nearer limbs hide; takes two to three times as long.",
+    )
+
+    @property
+    def edge_chunks(self) -> int:
+        """How many times sixteen samples lie on each side."""
+        return max(1, round(self.edge_samples / (EDGE_LINES * CHUNK)))
+
+    @property
+    def region_chunks(self) -> int:
+        """How many times sixteen samples lie on each inner line."""
+        return max(1, round(self.region_samples / (REGION_LINES * CHUNK)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WeightingMaps:
+    """All cameras' maps, one after another. values : flat bytes 255 (1 - p)². views : (V, 4) where the edge map and
+    the region map begin, width, height."""
+
+    values: Bytes
+    views: IntArray
+
+
+class EdgeRegionWeigher:
+    """Makes the problem of any frame; holds nothing that changes."""
+
+    def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: EdgeRegionSettings) -> None:
+        self.settings, self.cameras = settings, cameras
+        self.projector = OutlineProjector(kinematic_tables(body), cameras)
+        self.limits = Limits(body)
+        self.along_edge = places_along(settings.edge_chunks)
+        self.along_region = places_along(settings.region_chunks)
+        for camera in cameras:
+            if camera.width * camera.height > LARGEST_PICTURE:
+                size = f"{camera.width} × {camera.height}"
+                raise FootageError(
+                    f"Pictures of camera '{camera.name}' are {size}, more than 16.7 million pixels.",
+                    "Import the footage at a smaller size.",
+                )
+
+    @property
+    def samples_per_evaluation(self) -> int:
+        """Map reads that one pose costs."""
+        lines = EDGE_LINES * self.along_edge.size + REGION_LINES * self.along_region.size
+        return lines * self.projector.limb_count * len(self.cameras)
+
+    def problem(self, evidence: FrameEvidence) -> "EdgeRegionProblem":
+        """One frame as a function of poses. Raises FootageError where views do not fit the cameras."""
+        check_views(self.cameras, evidence)
+        return EdgeRegionProblem(self, weighting_maps(evidence))
+
+
+class EdgeRegionProblem:
+    """One frame as a function of poses."""
+
+    def __init__(self, weigher: EdgeRegionWeigher, maps: WeightingMaps) -> None:
+        self.weigher, self.maps = weigher, maps
+
+    def weigh(self, poses: Array, stage: int = 0) -> Array:
+        """(N, D) poses to (N,) log-weights, Eq. 17. Raises BodyError for poses that are no finite (N, D)."""
+        poses = np.asarray(poses, dtype=np.float64)
+        edge, region = self.terms(poses)
+        settings = self.weigher.settings
+        return -(settings.edge_weight * edge.sum(axis=1) + settings.region_weight * region.sum(axis=1))
+
+    def terms(self, poses: Array) -> tuple[Array, Array]:
+        """Σe and Σr, each (N, V), of poses (N, D)."""
+        weigher = self.weigher
+        outlines = weigher.projector.blocks(poses)
+        hidden = self.hidden(outlines)
+        blocks, views, limbs = outlines.shape[:3]
+        sums = np.zeros((blocks, views, LANES, 3), dtype=np.int64)
+        along = weigher.along_edge, weigher.along_region
+        run_blocks(
+            chunk_sums, all_sums, blocks, outlines, hidden, *along, self.maps.views, self.maps.values, sums
+        )
+        sums = sums.transpose(0, 2, 1, 3).reshape(blocks * LANES, views, 3)[: len(poses)]
+        counted = sums[..., 2]
+        edge = np.where(counted > 0, sums[..., 0] / (WORST * np.maximum(counted, 1)), 1.0)
+        region = sums[..., 1] / (WORST * limbs * REGION_LINES * weigher.along_region.size)
+        return edge, region
+
+    def hidden(self, outlines: NDArray[np.float32]) -> NDArray[np.uint64]:
+        """(B, V, L, 2, 16) a bit for each hidden edge sample; of no blocks where the option is off."""
+        blocks, views, limbs = outlines.shape[:3]
+        if not self.weigher.settings.occlusion_aware:
+            return np.zeros((0, views, limbs, EDGE_LINES, LANES), dtype=np.uint64)
+        hidden = np.empty((blocks, views, limbs, EDGE_LINES, LANES), dtype=np.uint64)
+        run_blocks(chunk_hidden, all_hidden, blocks, outlines, self.weigher.along_edge.size, hidden)
+        return hidden
+
+    def feasible(self, poses: Array) -> NDArray[np.bool_]:
+        """(N, D) poses to (N,) whether all parameters lie within the body's limits."""
+        return self.weigher.limits.hold(poses)
+
+
+def places_along(chunks: int) -> NDArray[np.float32]:
+    """(chunks, 16) the middles of equal parts of a line from 0 to 1."""
+    count = chunks * CHUNK
+    return ((np.arange(count) + 0.5) / count).astype(np.float32).reshape(chunks, CHUNK)
+
+
+def weighting_maps(evidence: FrameEvidence) -> WeightingMaps:
+    """Edge and foreground maps of all views as 255 (1 - p)², p = value / 255, each followed by its padding."""
+    table = np.round(WORST * (1.0 - np.arange(256) / 255.0) ** 2).astype(np.uint8)
+    sizes = [view.mask.size for view in evidence.views]
+    values = np.empty(2 * sum(size + PADDING for size in sizes), dtype=np.uint8)
+    views = np.zeros((len(sizes), 4), dtype=np.int64)
+    start = 0
+    for row, view, size in zip(views, evidence.views, sizes, strict=True):
+        for column, picture in enumerate((view.edges, view.mask)):
+            row[column] = start
+            np.take(table, picture.ravel(), out=values[start : start + size])
+            values[start + size : start + size + PADDING] = WORST, 0
+            start += size + PADDING
+        row[2], row[3] = view.mask.shape[1], view.mask.shape[0]
+    return WeightingMaps(values, views)
