@@ -84,7 +84,7 @@ def read_subject(path: Path) -> Subject:
     except OSError as problem:
         raise BodyError(f"Subject file {path} cannot be read ({problem}).", "Check the path.") from None
     except (msgspec.DecodeError, UnicodeDecodeError) as problem:
-        cause = f"Subject file {path.name}: {str(problem).replace('`', chr(39))}."
+        cause = f"Subject file {path.name}: {str(problem).replace('`$.', '`').replace('`', chr(39))}."
         hint = "It holds body, height_mm, [lengths_mm], [dimensions_mm] and [ratios], numbers in mm."
         raise BodyError(cause, hint) from None
     subject = Subject(**{key: getattr(entries, key) for key in _SubjectFile.__struct_fields__})

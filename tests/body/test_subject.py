@@ -1,0 +1,210 @@
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from studio.body.catalogue import load_body
+from studio.body.dimensions import with_dimensions
+from studio.body.forward_kinematics import marker_points
+from studio.body.model import BodyModel
+from studio.body.subject import Subject, fit_subject, read_subject, subject_from_shape, write_subject
+from studio.errors import BodyError
+
+HEIGHT = 1780.0
+LIMBS = (
+    ("RHip", "RKnee"), ("RKnee", "RAnkle"), ("LHip", "LKnee"), ("LKnee", "LAnkle"), ("RShoulder", "RElbow"),
+    ("RElbow", "RWrist"), ("LShoulder", "LElbow"), ("LElbow", "LWrist"),
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def human31() -> BodyModel:
+    return load_body("human31")
+
+
+def _distance(body: BodyModel, pair: str, seed: int | None = None) -> float:
+    """Between two markers, in the rest pose or in a random one."""
+    pose = body.neutral
+    if seed is not None:
+        pose = pose + np.random.default_rng(seed).uniform(-1.0, 1.0, len(pose))
+    points = dict(zip([marker.name for marker in body.markers], marker_points(body, pose)[0], strict=True))
+    one, two = pair.split("_")
+    return float(np.linalg.norm(points[one] - points[two]))
+
+
+@pytest.mark.parametrize("name", ["human31", "human29", "human34", "human25"])
+def test_lengths_are_met_in_every_pose(name: str) -> None:
+    rng = np.random.default_rng(2)
+    lengths = {f"{one}_{two}": float(rng.uniform(220, 480)) for one, two in LIMBS}
+    lengths |= {"Hip_Neck": 530.0, "Neck_Head": 250.0, "Neck_RShoulder": 190.0, "RHip_LHip": 210.0}
+    body, notes = fit_subject(load_body(name), Subject(name, HEIGHT, lengths))
+    bends = {"Hip_Neck"} if name == "human34" else set()
+    for pair, length in lengths.items():
+        seed = None if pair in bends else 5
+        assert _distance(body, pair, seed) == pytest.approx(length, abs=1e-3), pair
+    assert {note.split("'")[1] for note in notes} == bends
+
+
+def test_what_is_missing_follows_from_the_height_hands_and_feet_included(human31: BodyModel) -> None:
+    body, notes = fit_subject(human31, Subject(height_mm=HEIGHT, lengths_mm={"RHip_RKnee": 420.0}))
+    assert notes == ()
+    shares = {"left_foot_length": 0.152, "right_hand_length": 0.108, "left_forearm_length": 0.146,
+              "right_shin_length": 0.246, "left_thigh_length": 0.245}  # fmt: skip
+    for name, share in shares.items():
+        assert body.dimensions[name] == pytest.approx(share * HEIGHT)
+    assert body.dimensions["right_thigh_length"] == pytest.approx(420.0)
+    assert len(body.drawn) == 14
+    assert [limb.name for limb in body.drawn[10:]] == ["left foot", "right foot", "left hand", "right hand"]
+    assert marker_points(body, body.neutral)[0][:, 2].max() == pytest.approx(HEIGHT, abs=2.0)
+
+
+def test_hips_and_shoulders_share_one_length_evenly(human31: BodyModel) -> None:
+    lengths = {"LHip_RHip": 200.0, "LShoulder_RShoulder": 380.0}
+    for height in (HEIGHT, None):
+        body, notes = fit_subject(human31, Subject(height_mm=height, lengths_mm=lengths))
+        assert body.dimensions["left_hip_offset"] == pytest.approx(100.0)
+        assert body.dimensions["right_hip_offset"] == pytest.approx(100.0)
+        assert body.dimensions["left_clavicle_length"] == pytest.approx(
+            body.dimensions["right_clavicle_length"]
+        )
+        assert _distance(body, "LShoulder_RShoulder") == pytest.approx(380.0, abs=1e-3)
+        assert any("measured standing" in note for note in notes)
+
+
+def test_contradictions_are_met_in_the_least_squares(human31: BodyModel) -> None:
+    lengths = {"Hip_RHip": 90.0, "Hip_LHip": 90.0, "RHip_LHip": 210.0}
+    body, _ = fit_subject(human31, Subject(height_mm=HEIGHT, lengths_mm=lengths))
+    design = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
+    expected = np.linalg.lstsq(design, np.array([90.0, 90.0, 210.0]))[0]
+    found = [body.dimensions["right_hip_offset"], body.dimensions["left_hip_offset"]]
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+
+
+def test_a_length_that_no_pose_changes_outweighs_one_measured_standing(human31: BodyModel) -> None:
+    lengths = {"RHip_RKnee": 430.0, "RKnee_RAnkle": 420.0, "RHip_RAnkle": 900.0}
+    body, _ = fit_subject(human31, Subject(height_mm=HEIGHT, lengths_mm=lengths))
+    assert body.dimensions["right_thigh_length"] == pytest.approx(430.0, abs=0.1)
+    assert body.dimensions["right_shin_length"] == pytest.approx(420.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    "pair", ["RKnee_LWrist", "RKnee_LKnee", "RWrist_LWrist", "RBigToe_RHeel", "RHip", "RHip_RHip"]
+)
+def test_pairs_that_no_dimension_sets_are_ignored_with_a_note(human31: BodyModel, pair: str) -> None:
+    body, notes = fit_subject(human31, Subject(height_mm=HEIGHT, lengths_mm={pair: 300.0}))
+    plain, _ = fit_subject(human31, Subject(height_mm=HEIGHT))
+    assert body.dimensions == plain.dimensions
+    assert len(notes) == 1
+    assert f"'{pair}' was ignored" in notes[0]
+
+
+def test_without_height_it_follows_from_the_lengths(human31: BodyModel) -> None:
+    lengths = {"RHip_RKnee": 0.245 * 1600, "RKnee_RAnkle": 0.246 * 1600, "Neck_Head": 0.16 * 1600}
+    body, notes = fit_subject(human31, Subject(lengths_mm=lengths))
+    assert body.dimensions["left_foot_length"] == pytest.approx(0.152 * 1600)
+    assert "1600 mm follows" in notes[0]
+
+
+def test_nothing_known_leaves_the_body_as_it_is(human31: BodyModel) -> None:
+    body, notes = fit_subject(human31, Subject())
+    assert body.dimensions == human31.dimensions
+    assert notes == ()
+
+
+def test_dimensions_are_taken_as_they_are(human31: BodyModel) -> None:
+    given = {"left_foot_length": 0.0, "right_thigh_length": 400.0}
+    subject = Subject(
+        height_mm=HEIGHT, lengths_mm={"RHip_RKnee": 500.0}, dimensions_mm=given, ratios={"head_scale_y": 0.9}
+    )
+    body, notes = fit_subject(human31, subject)
+    assert body.dimensions["right_thigh_length"] == 400.0
+    assert body.dimensions["left_foot_length"] == 0.0
+    assert body.dimensions["head_scale_y"] == 0.9
+    assert len(body.drawn) == 13
+    assert "'RHip_RKnee' was ignored" in notes[0]
+
+
+def test_dimensions_of_one_body_size_another(human31: BodyModel) -> None:
+    rng = np.random.default_rng(8)
+    own = {
+        name: value * rng.uniform(0.9, 1.1)
+        for name, value in human31.dimensions.items()
+        if name.endswith("_length")
+    }
+    sized = with_dimensions(human31, own)
+    body, _ = fit_subject(load_body("human29"), Subject("human31", None, {}, own))
+    for one, two in LIMBS:
+        assert _distance(body, f"{one}_{two}", seed=1) == pytest.approx(
+            _distance(sized, f"{one}_{two}"), abs=1e-4
+        )
+    assert _distance(body, "Hip_Neck") == pytest.approx(sized.dimensions["torso_length"], rel=0.02)
+
+
+def test_a_dog_is_sized_by_its_own_markers() -> None:
+    dog = load_body("dog")
+    body, _ = fit_subject(dog, Subject("dog", None, {"Poll_Nose": dog.dimensions["head_length"] * 0.5}))
+    for one, two in itertools.combinations([marker.name for marker in dog.markers], 2):
+        # Proportions are written with four digits.
+        assert _distance(body, f"{one}_{two}") == pytest.approx(
+            0.5 * _distance(dog, f"{one}_{two}"), rel=2e-3, abs=0.1
+        )
+
+
+@pytest.mark.parametrize(("subject", "words"), [
+    (Subject(height_mm=float("nan")), "height_mm is nan"),
+    (Subject(height_mm=-1.0), "height_mm is -1"),
+    (Subject(lengths_mm={"RHip_RKnee": float("nan")}), "'RHip_RKnee' is nan"),
+    (Subject(lengths_mm={"RHip_RKnee": 0.0}), "'RHip_RKnee' is 0"),
+    (Subject(dimensions_mm={"tail_length": 3.0}), "no dimension 'tail_length'"),
+    (Subject(ratios={"head_scale_y": 0.0}), "'head_scale_y' is 0"),
+])  # fmt: skip
+def test_wrong_values_are_refused(human31: BodyModel, subject: Subject, words: str) -> None:
+    with pytest.raises(BodyError, match=words) as caught:
+        fit_subject(human31, subject)
+    assert caught.value.hint
+
+
+def test_a_subject_file_comes_back_as_written(tmp_path: Path) -> None:
+    path = tmp_path / "subject.toml"
+    for subject in (
+        Subject(),
+        Subject("dog", 600.0, {"Poll_Nose": 200.0}, {"tail_length": 10.0}, {"chest_scale": 1.0}),
+    ):
+        write_subject(subject, path)
+        assert read_subject(path) == subject
+
+
+def test_an_empty_subject_file_is_human31(tmp_path: Path) -> None:
+    path = tmp_path / "subject.toml"
+    path.write_text("")
+    assert read_subject(path) == Subject(body="human31")
+
+
+@pytest.mark.parametrize(("text", "words"), [
+    ("height_mm = 'tall'", "Expected 'float"),
+    ("hight_mm = 1780", "unknown field 'hight_mm'"),
+    ("height_mm = nan", "height_mm is nan"),
+    ("[lengths_mm]\nRHip_RKnee = -4", "'RHip_RKnee' is -4"),
+    ("height_mm = ", "subject.toml"),
+])  # fmt: skip
+def test_a_wrong_subject_file_is_named(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "subject.toml"
+    path.write_text(text)
+    with pytest.raises(BodyError) as caught:
+        read_subject(path)
+    assert "subject.toml" in caught.value.message
+    assert words in caught.value.message
+    assert caught.value.hint
+
+
+def test_a_missing_subject_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(BodyError, match="cannot be read"):
+        read_subject(tmp_path / "subject.toml")
+
+
+def test_a_shape_of_another_length_or_body_is_refused(human31: BodyModel) -> None:
+    with pytest.raises(BodyError, match="shape of 57 numbers"):
+        subject_from_shape(human31, np.ones(57))
+    with pytest.raises(BodyError, match="'planar_arm4'"):
+        subject_from_shape(load_body("planar_arm4"), np.ones(58))
