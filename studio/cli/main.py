@@ -1,15 +1,48 @@
 """The command line's front door."""
 
+import importlib
 import importlib.metadata
 
 import click
 
-from studio.cli.serving_commands import demo, serve
-from studio.cli.session_commands import bodies, import_command, runs, synthesize_command
-from studio.cli.tracking_commands import bench, evaluate_command, track
+# A command's module is imported when the command is asked for, so that none waits for what it does not use.
+COMMANDS = {
+    "demo": (
+        "serving_commands",
+        "demo",
+        "Track the bundled walk in the browser: prints the address to open.",
+    ),
+    "serve": ("serving_commands", "serve", "Open the studio on a workspace: prints the address to open."),
+    "import": ("session_commands", "import_command", "Make a session from footage and calibration."),
+    "track": ("tracking_commands", "track", "Track a session and store the run."),
+    "evaluate": ("evaluation_commands", "evaluate_command", "Measure a run against the true markers."),
+    "synthesize": ("synthesis_commands", "synthesize_command", "Render footage with exact truth."),
+    "bodies": ("session_commands", "bodies", "List the bodies."),
+    "runs": ("session_commands", "runs", "List the runs."),
+    "bench": ("evaluation_commands", "bench", "Measure the weighting kernels."),
+}
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+class _Commands(click.Group):
+    """A group whose members are imported when they are used."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        module, name, _ = COMMANDS[cmd_name]
+        return getattr(importlib.import_module(f"studio.cli.{module}"), name)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, summary) for name, (_, _, summary) in COMMANDS.items()])
+
+
+@click.group(
+    cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110}
+)
 @click.version_option(importlib.metadata.version("capture-studio"), prog_name="studio")
 def main() -> None:
     """Recover the motion of an articulated body from calibrated cameras, and watch the search do it.
@@ -17,7 +50,3 @@ def main() -> None:
     Start with `studio demo`. A SESSION is named by its path or by its name in the workspace
     (STUDIO_WORKSPACE, or your user data folder).
     """
-
-
-for entry in (demo, serve, import_command, track, evaluate_command, synthesize_command, bodies, runs, bench):
-    main.add_command(entry)

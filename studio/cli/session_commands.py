@@ -1,4 +1,4 @@
-"""`studio import`, `synthesize`, `bodies` and `runs`."""
+"""`studio import`, `bodies` and `runs`."""
 
 from pathlib import Path
 
@@ -8,7 +8,6 @@ from studio.body.catalogue import list_bodies, load_body
 from studio.cli.output import command, note, progress
 from studio.sessions.importers.catalogue import import_source
 from studio.sessions.workspace import Workspace
-from studio.synthesis.recipes import synthesize
 
 INTO_HELP = "Name of the new session in the workspace, or a path."
 
@@ -45,18 +44,6 @@ def import_command(
             ]
         ),
     }
-
-
-@click.command("synthesize")
-@click.argument("recipe")
-@click.option("--into", required=True, metavar="SESSION", help=INTO_HELP)
-@command
-def synthesize_command(recipe: str, into: str) -> dict[str, object]:
-    """Render footage with exact truth from a RECIPE (a TOML file, or the name of one that is shipped)."""
-    place = Workspace().place_for(into)
-    with progress("Rendering") as report:
-        synthesize(recipe, place, progress=report)
-    return {"session": str(place), "text": f"Session {place.name} in {place}"}
 
 
 @click.command()
