@@ -27,10 +27,10 @@ DISTORTION_NUMBERS = (4, 5)
 
 @dataclass(frozen=True, slots=True)
 class AssumedCrop:
-    """How footage is taken to have been cut from the calibrated picture.
+    """How footage is taken to have been made from the calibrated picture.
 
-    left, top, right, bottom : pixels cut off (negative: added), halves where the difference is odd.
-    calibrated : (width, height) that the calibration was made for.
+    calibrated : (width, height) that the calibration was made for. scale : what the whole picture was scaled
+    by first. left, top, right, bottom : pixels then cut off, negative where black bars were added.
     """
 
     left: float
@@ -38,21 +38,26 @@ class AssumedCrop:
     right: float
     bottom: float
     calibrated: tuple[int, int]
+    scale: float = 1.0
 
     def words(self, camera: str) -> str:
         """The assumption as a sentence."""
         sides = {"left": self.left, "right": self.right, "top": self.top, "bottom": self.bottom}
         cut = [f"{pixels:g} px at the {side}" for side, pixels in sides.items() if pixels > 0.0]
-        added = [f"{-pixels:g} px at the {side}" for side, pixels in sides.items() if pixels < 0.0]
-        what = " and ".join(
-            f"{', '.join(parts)} {verb}"
-            for parts, verb in ((cut, "were cut off"), (added, "were added"))
-            if parts
-        )
+        added = [f"{-pixels:.3g} px at the {side}" for side, pixels in sides.items() if pixels < 0.0]
+        what = [
+            *([f"a centred crop cut off {' and '.join(cut)}"] if cut else []),
+            *([f"{' and '.join(added)} were added around it"] if added else []),
+        ]
+        size = f"{self.calibrated[0]}x{self.calibrated[1]}"
+        if self.scale != 1.0:
+            return (
+                f"Camera {camera}: assumed crop: none (0 px), since the footage has black bars: the whole {size}"
+                f" picture was scaled by {self.scale:.4f} and {'; '.join(what)}."
+            )
         return (
-            f"Camera {camera}: assumed that of the calibrated {self.calibrated[0]}x{self.calibrated[1]} pixels"
-            f" {what} (a centred crop); the principal point is moved by"
-            f" ({0.0 - self.left:g}, {0.0 - self.top:g}) px."
+            f"Camera {camera}: assumed crop: of the calibrated {size} picture {'; '.join(what)};"
+            f" the principal point is moved by ({0.0 - self.left:g}, {0.0 - self.top:g}) px."
         )
 
 
@@ -127,6 +132,7 @@ def write_toml(cameras: tuple[Camera, ...], path: Path, crops: dict[str, Assumed
                 "right": crop.right,
                 "bottom": crop.bottom,
                 "calibrated": list(crop.calibrated),
+                "scale": crop.scale,
             }
         document[f"cam_{index:02d}"] = table
     document["metadata"] = {"format": CANONICAL, "unit": "mm"}
@@ -231,7 +237,8 @@ def _crop(where: str, table: dict[str, object]) -> AssumedCrop:
         float(_numbers(where, table, side, ())) for side in ("left", "top", "right", "bottom")
     )
     width, height = _numbers(where, table, "calibrated", (2,))
-    return AssumedCrop(left, top, right, bottom, (int(width), int(height)))
+    scale = float(_numbers(where, table, "scale", ())) if "scale" in table else 1.0
+    return AssumedCrop(left, top, right, bottom, (int(width), int(height)), scale)
 
 
 def _unit(metadata: dict[str, object]) -> str:

@@ -152,7 +152,7 @@ def upright_array(frame: av.VideoFrame) -> Bytes:
     """(H, W, 3) uint8 BGR, turned as the file's rotation says."""
     picture = frame.to_ndarray(format="bgr24").astype(np.uint8, copy=False)
     turns = round(frame.rotation / 90.0) % 4
-    return np.ascontiguousarray(np.rot90(picture, turns)) if turns else picture
+    return np.ascontiguousarray(np.rot90(picture, turns) if turns else picture)
 
 
 def _opened(path: Path) -> av.container.InputContainer:

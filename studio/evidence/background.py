@@ -58,7 +58,7 @@ class GaussianBackground:
         gain = self.gain(picture) if settings.mask_gain_fit else np.ones(3, np.float32)
         darkest = settings.mask_shadow_darkest if settings.mask_shadow_test and not self.is_grey else 2.0
         return differing_pixels(
-            picture,
+            np.ascontiguousarray(picture),
             self.mean,
             self.variance,
             gain,

@@ -9,6 +9,7 @@ import threading
 from pathlib import Path
 from typing import Literal
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,6 +32,7 @@ MEDIAN_FRAMES, FEWEST_FRAMES = 31, 3
 MEDIAN_BYTES = 200_000_000
 TRAINING_FRAMES = 40
 LARGEST_DIFFERENCE = 0.02
+GRADIENT_LIMIT = 100.0
 
 
 class Backgrounds:
@@ -78,14 +80,14 @@ class Backgrounds:
 
     def _plate(self, camera: str, path: Path, most: int) -> list[Bytes]:
         """The plate picture, or up to `most` frames of the empty clip, of the footage's size."""
-        height, width = self._footage.picture(camera, 0).shape[:2]
+        frame = self._footage.picture(camera, 0)
         if is_picture(path):
-            return [fitted_plate(read_picture(path), width, height, path.name)]
+            return [fitted_plate(read_picture(path), frame, path.name)]
         count = measure_video(path).frame_count
         reader = VideoReader(path, count)
         try:
             chosen = np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))
-            return [fitted_plate(reader.read(int(frame)), width, height, path.name) for frame in chosen]
+            return [fitted_plate(reader.read(int(number)), frame, path.name) for number in chosen]
         finally:
             reader.close()
 
@@ -100,15 +102,43 @@ def check_plate_size(plate: tuple[int, int], footage: tuple[int, int], name: str
         )
 
 
-def fitted_plate(plate: Bytes, width: int, height: int, name: str) -> Bytes:
-    """A background picture cut evenly on both sides to the footage's size, as the calibration's crop is.
+def fitted_plate(plate: Bytes, frame: Bytes, name: str) -> Bytes:
+    """A background picture made as large as the footage, the way that agrees best with one of its frames.
 
-    Raises FootageError as `check_plate_size` does.
+    Either cut evenly on both sides, or scaled as a whole and centred between black bars, as
+    `capture.footage_fit` has it. Raises FootageError as `check_plate_size` does.
     """
+    height, width = frame.shape[:2]
     tall, wide = plate.shape[:2]
     check_plate_size((wide, tall), (width, height), name)
-    left, top = (wide - width) // 2, (tall - height) // 2
-    return np.ascontiguousarray(plate[top : top + height, left : left + width])
+    if (wide, tall) == (width, height):
+        return plate
+    scaled = [
+        cv2.resize(plate, (round(wide * scale), round(tall * scale)), interpolation=cv2.INTER_AREA)
+        for scale in (1.0, width / wide, height / tall)
+    ]
+    candidates = [_centred(np.asarray(picture, dtype=np.uint8), width, height) for picture in scaled]
+    seen = _gradients(frame)
+    agreement = [np.corrcoef(_gradients(candidate), seen)[0, 1] for candidate in candidates]
+    return candidates[int(np.nanargmax(agreement))]
+
+
+def _centred(picture: Bytes, width: int, height: int) -> Bytes:
+    """A picture cut or surrounded by black to width x height, evenly on both sides."""
+    tall, wide = picture.shape[:2]
+    left, top = max(0, (wide - width) // 2), max(0, (tall - height) // 2)
+    inner = picture[top : top + height, left : left + width]
+    above, before = (height - inner.shape[0]) // 2, (width - inner.shape[1]) // 2
+    out = np.zeros((height, width, 3), np.uint8)
+    out[above : above + inner.shape[0], before : before + inner.shape[1]] = inner
+    return out
+
+
+def _gradients(picture: Bytes) -> NDArray[np.float32]:
+    """Strength of the gradient, limited so that no single edge decides, flat."""
+    level = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
+    across, along = cv2.Sobel(level, cv2.CV_32F, 1, 0), cv2.Sobel(level, cv2.CV_32F, 0, 1)
+    return np.minimum(cv2.magnitude(across, along), GRADIENT_LIMIT).astype(np.float32).ravel()
 
 
 def _subtractor(kind: FittedKind) -> Literal["mog2", "knn"]:

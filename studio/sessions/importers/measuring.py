@@ -6,16 +6,23 @@ from pathlib import Path
 
 from studio.capture.calibration_files import Calibration
 from studio.capture.calibration_toml import AssumedCrop
-from studio.capture.footage_fit import fit_camera
+from studio.capture.footage_fit import Margins, black_margins, fit_camera
 from studio.capture.naming import NameMatch, listed, match_names
-from studio.capture.pictures import PicturesMeasure, check_picture, is_picture, measure_pictures
-from studio.capture.video import VideoMeasure, measure_video
+from studio.capture.pictures import (
+    PictureReader,
+    PicturesMeasure,
+    check_picture,
+    is_picture,
+    measure_pictures,
+)
+from studio.capture.video import VideoMeasure, VideoReader, measure_video
 from studio.errors import CalibrationError, FootageError
 from studio.evidence.backgrounds import check_plate_size
 from studio.geometry.camera import Camera
 from studio.sessions.importers.plan import Progress, SourcePlan
 
 SAME_RATE = 0.005
+NO_BARS, BAR_FRAMES = (0, 0, 0, 0), 4
 TRIMMED_SHARE = 0.1
 """Frame counts that differ by up to this share are trimmed to the shortest; beyond, it is an error."""
 CENTRAL = (0.35, 0.65)
@@ -102,7 +109,10 @@ def _measure_camera(
     """Decode one camera's footage and fit its calibration to it."""
     found = _measure(footage, f"reading {footage.name}", progress)
     if calibration.sizes_known:
-        fitted, crop = fit_camera(camera, found.width, found.height)
+        bars = (
+            _bars(footage, found) if (found.width, found.height) != (camera.width, camera.height) else NO_BARS
+        )
+        fitted, crop = fit_camera(camera, found.width, found.height, bars)
         crop = crop or calibration.crops.get(camera.name)
     else:
         fitted, crop = _sized(camera, found.width, found.height), None
@@ -114,6 +124,16 @@ def _measure(path: Path, step: str, progress: Progress) -> VideoMeasure | Pictur
         progress(step, done, total)
 
     return measure_pictures(path, told) if path.is_dir() else measure_video(path, told)
+
+
+def _bars(footage: Path, found: VideoMeasure | PicturesMeasure) -> Margins:
+    """The black margins of the footage, seen in a few frames spread over it."""
+    count = found.frame_count
+    reader = PictureReader(footage, count) if footage.is_dir() else VideoReader(footage, count)
+    try:
+        return black_margins([reader.read(count * k // BAR_FRAMES) for k in range(BAR_FRAMES)])
+    finally:
+        reader.close()
 
 
 def _matched(parts: tuple[Path, ...], cameras: list[Camera], what: str) -> dict[str, Path]:
