@@ -3,13 +3,16 @@
 import re
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from studio.body.catalogue import load_body
-from studio.body.forward_kinematics import limb_ends
+from studio.body.forward_kinematics import limb_ends, limb_frames
 from studio.body.subject import fit_subject, subject_from_shape
+from studio.body.tables import kinematic_tables
 from studio.geometry.camera import Camera
+from studio.geometry.cones import limb_outlines
 from studio.geometry.projection import project
 
 pytestmark = pytest.mark.real_data
@@ -27,12 +30,12 @@ def _numbers(path: Path) -> np.ndarray:
     return np.array(path.read_text().split(), dtype=float)
 
 
-def _first_camera(lee_walk: Path) -> Camera:
-    values = _numbers(lee_walk / "CALIB" / "Camera1.cal")
+def _camera(lee_walk: Path, number: int = 1) -> Camera:
+    values = _numbers(lee_walk / "CALIB" / f"Camera{number}.cal")
     matrix = np.array(
         [[values[0], values[4] * values[0], values[2]], [0.0, values[1], values[3]], [0.0, 0.0, 1.0]]
     )
-    return Camera("1", 640, 480, matrix, values[5:10], values[10:19].reshape(3, 3), values[19:22])
+    return Camera(str(number), 640, 480, matrix, values[5:10], values[10:19].reshape(3, 3), values[19:22])
 
 
 def _printed_ends(lee_walk: Path) -> dict[str, np.ndarray]:
@@ -49,7 +52,7 @@ def _printed_ends(lee_walk: Path) -> dict[str, np.ndarray]:
 def test_end_points_and_pixels_are_those_of_the_data_dictionary(lee_walk: Path) -> None:
     body = load_body("human31")
     ends = limb_ends(body, _numbers(lee_walk / "InitialPose.txt"))[0]
-    pixels, _ = project(_first_camera(lee_walk), ends)
+    pixels, _ = project(_camera(lee_walk), ends)
     printed = _printed_ends(lee_walk)
     assert list(printed) == [limb.name for limb in body.drawn]
     for place, row in enumerate(printed.values()):
@@ -83,3 +86,25 @@ def test_the_shape_file_gives_the_bodys_own_dimensions(lee_walk: Path) -> None:
     np.testing.assert_allclose(np.ravel(radii), numbers[:40])
     other, _ = fit_subject(body, subject_from_shape(body, np.r_[numbers[:40], 2.0 * numbers[40:]]))
     assert other.drawn[0].length == pytest.approx(2.0 * numbers[40])
+
+
+@pytest.mark.parametrize(("number", "inside"), [(1, 0.978), (2, 0.962), (3, 0.946), (4, 0.922)])
+def test_outlines_lie_inside_the_masks_as_far_as_the_data_dictionary_says(
+    lee_walk: Path, number: int, inside: float
+) -> None:
+    body, camera = load_body("human31"), _camera(lee_walk, number)
+    frames = limb_frames(body, _numbers(lee_walk / "InitialPose.txt"))
+    corners, _ = project(camera, limb_outlines(kinematic_tables(body).limb_shape, frames, camera)[0])
+    mask = cv2.imread(str(lee_walk / f"FG{number}" / "image0000.bmp"), cv2.IMREAD_GRAYSCALE)
+    assert mask is not None
+    # A pixel is drawn when its centre lies in a quadrilateral; the printed shares are rounded to a thousandth.
+    rows, columns = np.mgrid[:480, :640]
+    drawn = np.zeros(mask.shape, bool)
+    for corner in corners:
+        along = np.roll(corner, -1, axis=0) - corner
+        turn = [
+            side[0] * (rows - start[1]) - side[1] * (columns - start[0])
+            for start, side in zip(corner, along, strict=True)
+        ]
+        drawn |= np.all(np.array(turn) >= 0.0, axis=0) | np.all(np.array(turn) <= 0.0, axis=0)
+    assert (mask[drawn] > 0).mean() == pytest.approx(inside, abs=0.0005)

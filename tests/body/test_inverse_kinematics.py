@@ -62,7 +62,7 @@ def test_noise_is_spread_not_followed() -> None:
     noise = 10.0 * np.random.default_rng(9).standard_normal(points.shape)
     pose, rms = pose_from_markers(body, _names(body), points + noise, body.neutral)
     size = np.sqrt((noise**2).sum(axis=1).mean())
-    # The truth leaves the whole noise: the best pose leaves no more, and is by the triangle at most twice it away.
+    # The truth leaves the whole noise: the best pose leaves no more, so it is at most twice that away.
     assert rms <= size
     away = marker_points(body, pose)[0] - points
     assert np.sqrt((away**2).sum(axis=1).mean()) <= 2.0 * size
