@@ -1,4 +1,6 @@
-"""Cameras for made-up footage: a rig in the corners of the room, cameras put down by hand, rays for the renderer."""
+"""Cameras for made-up footage: a rig in the corners of the room, cameras put down by hand, rays for the
+renderer.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +62,9 @@ def placed_camera(
 
 
 def corner_rig(size: tuple[int, int], rng: np.random.Generator) -> tuple[Camera, ...]:
-    """Four cameras under the ceiling of the room's corners, slightly rolled, with barrel distortion as webcams have."""
+    """Four cameras under the ceiling of the room's corners, slightly rolled, with barrel distortion as
+    webcams have.
+    """
     cameras = []
     for index, place in enumerate(CORNERS):
         focal = CORNER_FOCAL * size[0] * float(1.0 + rng.normal(0.0, 0.01))
@@ -80,7 +84,8 @@ def corner_rig(size: tuple[int, int], rng: np.random.Generator) -> tuple[Camera,
 
 
 def pixel_rays(camera: Camera, samples: int) -> NDArray[np.float32]:
-    """(H * samples, W * samples, 3) unit directions in the world through a regular grid of points in every pixel.
+    """(H * samples, W * samples, 3) unit directions in the world through a regular grid of points in every
+    pixel.
 
     The lens model is inverted by fixed-point iteration (as OpenCV's undistortPoints does, to convergence).
     """

@@ -1,7 +1,8 @@
 """The person as a signed distance field: swept spheres, melted within a group, folded where they are cloth.
 
-Distances (mm) are lower bounds of the true ones up to the folds' depth, so marching at SAFETY × distance never
-passes through. Smooth union: I. Quilez, "Smooth minimum" (quadratic polynomial). Piece columns: see `flesh.py`.
+Distances (mm) are lower bounds of the true ones up to the folds' depth, so marching at SAFETY × distance
+never passes through. Smooth union: I. Quilez, "Smooth minimum" (quadratic polynomial). Piece columns: see
+`flesh.py`.
 """
 
 import math
@@ -72,7 +73,9 @@ def piece_distance(px, py, pz, piece):
 
 @njit(cache=True)
 def body_distance(px, py, pz, pieces, labels, active, count):
-    """Signed distance to the union of the first `count` pieces named in `active` (in order of their groups)."""
+    """Signed distance to the union of the first `count` pieces named in `active` (in order of their
+    groups).
+    """
     total, group_distance, group = FAR, FAR, -1
     for index in range(count):
         piece = active[index]
@@ -98,7 +101,7 @@ def nearest_piece(px, py, pz, pieces, active, count):
 
 @njit(cache=True)
 def gather(ox, oy, oz, dx, dy, dz, pieces, margin, active):
-    """The pieces that a ray may touch. Fills `active`; returns their count and the ray's stretch near them."""
+    """The pieces that a ray may touch: fills `active`, returns their count and the ray's stretch."""
     count, first, last = 0, FAR, 0.0
     for piece in range(len(pieces)):
         x, y, z = pieces[piece, BOUND] - ox, pieces[piece, BOUND + 1] - oy, pieces[piece, BOUND + 2] - oz
@@ -131,7 +134,8 @@ def body_normal(px, py, pz, pieces, labels, active, count):
 def light_share(px, py, pz, light, light_radius, pieces, labels, active):
     """How much of a round lamp a point sees past the person: 0 in full shadow, 1 in the open.
 
-    Distance over distance marched, against the lamp's angular size: I. Quilez, "Soft shadows in raymarched SDFs".
+    Distance over distance marched, against the lamp's angular size: I. Quilez, "Soft shadows in
+    raymarched SDFs".
     """
     x, y, z = light[0] - px, light[1] - py, light[2] - pz
     reach = math.sqrt(x * x + y * y + z * z)

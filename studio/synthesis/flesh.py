@@ -1,9 +1,10 @@
 """The clothed person: rounded pieces laid around the skeleton, their cloth, skin and hair.
 
-Each piece is a sphere swept along a line in one segment's frame, its radius running from one end to the other with a
-muscle's bulge between, its cross-section elliptical, its surface folded where it is cloth. The pieces of a group
-(trunk and head, each arm, each leg) melt into each other; groups barely do, so that an arm beside the trunk stays
-apart. Nothing here is a truncated cone, and no number comes from a tracker's body file.
+Each piece is a sphere swept along a line in one segment's frame, its radius running from one end to the
+other with a muscle's bulge between, its cross-section elliptical, its surface folded where it is cloth. The
+pieces of a group (trunk and head, each arm, each leg) melt into each other; groups barely do, so that an
+arm beside the trunk stays apart. Nothing here is a truncated cone, and no number comes from a tracker's
+body file.
 """
 
 from dataclasses import dataclass
@@ -29,8 +30,11 @@ REFERENCE_HEIGHT = 1760.0
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """One swept sphere. start, end : mm in the segment's frame, from the segment's joint. radius : mm at both ends.
-    scale : of the cross-section forward and sideways. fold : depth of cloth folds, mm, with period `fold_period`."""
+    """One swept sphere.
+
+    start, end : mm in the segment's frame, from the segment's joint. radius : mm at both ends. scale : of
+    the cross-section forward and sideways. fold : depth of cloth folds, mm, with period `fold_period`.
+    """
 
     segment: str
     group: int
@@ -45,7 +49,10 @@ class Piece:
 
 
 def clothed_pieces(bones: Skeleton) -> tuple[Piece, ...]:
-    """All pieces of a person in a short-sleeved shirt, long trousers and shoes. Girths grow with the height."""
+    """All pieces of a person in a short-sleeved shirt, long trousers and shoes.
+
+    Girths grow with the height.
+    """
     pieces = [*_trunk(bones), *_head(bones)]
     for index, side in enumerate(SIDES):
         pieces += _arm(bones, side, index) + _leg(bones, side, index)
@@ -54,7 +61,9 @@ def clothed_pieces(bones: Skeleton) -> tuple[Piece, ...]:
 
 
 def piece_tables(motion: PersonMotion, pieces: tuple[Piece, ...]) -> tuple[Array, IntArray]:
-    """The pieces in the world: (F, P, COLUMNS) floats as the column names above say, and (P, 2) material and group."""
+    """The pieces in the world: (F, P, COLUMNS) floats as the column names above say, and (P, 2) material
+    and group.
+    """
     joints = joint_points(motion)
     tables = np.zeros((motion.frame_count, len(pieces), COLUMNS))
     for index, piece in enumerate(pieces):
@@ -110,17 +119,17 @@ def _trunk(bones: Skeleton) -> list[Piece]:
     up, wide = bones.trunk, bones.hip_half_width
     shoulder, low = bones.shoulder[1], up + bones.shoulder[2]
     return [
-        Piece("pelvis", TRUNK, TROUSERS, (-8, -0.7 * wide, 5), (-8, 0.7 * wide, 5), (106, 106), fold=2.0),
-        Piece("pelvis", TRUNK, TROUSERS, (-4, 0, 20), (0, 0, 0.16 * up), (138, 132), scale=(0.76, 1.1)),
+        Piece("pelvis", TRUNK, TROUSERS, (-8, -0.7 * wide, 5), (-8, 0.7 * wide, 5), (110, 110), fold=2.0),
+        Piece("pelvis", TRUNK, TROUSERS, (-4, 0, 20), (0, 0, 0.16 * up), (140, 138), scale=(0.82, 1.08)),
         Piece(
             "thorax",
             TRUNK,
             SHIRT,
             (-2, 0, 0.16 * up),
             (0, 0, 0.48 * up),
-            (136, 132),
-            4,
-            (0.78, 1.04),
+            (140, 138),
+            5,
+            (0.86, 1.04),
             6.0,
             130.0,
         ),
@@ -130,9 +139,9 @@ def _trunk(bones: Skeleton) -> list[Piece]:
             SHIRT,
             (2, 0, 0.48 * up),
             (-6, 0, 0.76 * up),
-            (138, 136),
+            (141, 136),
             6,
-            (0.80, 1.08),
+            (0.89, 1.07),
             4.0,
             150.0,
         ),
@@ -228,7 +237,7 @@ def _leg(bones: Skeleton, side: str, index: int) -> list[Piece]:
             TROUSERS,
             (0, 4 * outward, 0),
             (2, 0, -thigh),
-            (92, 70),
+            (94, 77),
             5,
             fold=4.0,
             fold_period=120.0,
@@ -239,8 +248,8 @@ def _leg(bones: Skeleton, side: str, index: int) -> list[Piece]:
             TROUSERS,
             (2, 0, 0),
             (-4, 0, -0.90 * shin),
-            (70, 60),
-            6,
+            (77, 65),
+            4,
             fold=5.0,
             fold_period=100.0,
         ),
@@ -250,7 +259,7 @@ def _leg(bones: Skeleton, side: str, index: int) -> list[Piece]:
             TROUSERS,
             (-6, 0, -0.84 * shin),
             (-2, 0, -0.95 * shin),
-            (63, 64),
+            (68, 69),
             fold=4.0,
             fold_period=60.0,
         ),

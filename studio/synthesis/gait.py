@@ -1,8 +1,9 @@
 """Steps along a path: where the feet stand, how they swing, and legs that reach them.
 
-A gait is written as smooth parametric curves: the pelvis follows a path at its speed and bobs; each foot stands
-still for a share of the step cycle (`duty`) and travels to its next footprint along an eased arc for the rest, the
-ankle turning about the ball of the foot at the end of the stance. Hips and knees then follow from the ankles.
+A gait is written as smooth parametric curves: the pelvis follows a path at its speed and bobs; each foot
+stands still for a share of the step cycle (`duty`) and travels to its next footprint along an eased arc for
+the rest, the ankle turning about the ball of the foot at the end of the stance. Hips and knees then follow
+from the ankles.
 """
 
 from collections.abc import Callable
@@ -22,9 +23,10 @@ Path = Callable[[Array], tuple[Array, Array]]
 class Gait:
     """The numbers of a way of walking or running.
 
-    speed : mm/s. cadence : steps per second (of both feet together). duty : share of a foot's cycle on the floor
-    (> 0.5 walking, < 0.5 running). foot_spacing : lateral distance between footprints, mm. lift : height of the
-    ankle's arc in swing, mm. heel_rise : turn of the foot about its ball at push-off, radians.
+    speed : mm/s. cadence : steps per second (of both feet together). duty : share of a foot's cycle on the
+    floor (> 0.5 walking, < 0.5 running). foot_spacing : lateral distance between footprints, mm. lift :
+    height of the ankle's arc in swing, mm. heel_rise : turn of the foot about its ball at push-off,
+    radians.
     """
 
     speed: float
@@ -47,13 +49,17 @@ def eased(share: Array) -> Array:
 
 
 def swung(share: Array) -> Array:
-    """Progress of a foot in the air: 0 to 1, at rest at both ends, without the haste of a minimum-jerk curve."""
+    """Progress of a foot in the air: 0 to 1, at rest at both ends, without the haste of a minimum-jerk
+    curve.
+    """
     s = np.clip(share, 0.0, 1.0)
     return s * s * (3.0 - 2.0 * s)
 
 
 def circle_path(radius: float, start_angle: float = 0.0, turn: float = 1.0) -> Path:
-    """A circle about the origin: distance (mm) to position (F, 2) and heading (F,). turn : 1 left, -1 right."""
+    """A circle about the origin: distance (mm) to position (F, 2) and heading (F,). turn : 1 left, -1
+    right.
+    """
 
     def at(distance: Array) -> tuple[Array, Array]:
         angle = start_angle + turn * distance / radius
@@ -91,8 +97,10 @@ def winding_path(radius: float, sway: float, waves: float, start_angle: float = 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FootTrack:
-    """One foot over time. ankle : (F, 3) mm. turn : (F, 3, 3) world_from_foot. swing : (F,) 0 on the floor, 0...1 in
-    the air."""
+    """One foot over time.
+
+    ankle : (F, 3) mm. turn : (F, 3, 3) world_from_foot. swing : (F,) 0 on the floor, 0...1 in the air.
+    """
 
     ankle: Array
     turn: Array
@@ -117,8 +125,8 @@ def foot_track(
     count, share = np.floor(phase), phase - np.floor(phase)
     swing = np.clip((share - gait.duty) / (1.0 - gait.duty), 0.0, 1.0)
     flat, heading = _footprint(gait, path, count + swung(swing), left)
-    # Push-off turns the foot about its ball in the last third of the stance; the swing brings it back and ends with
-    # the toes raised a little, for the heel to land first.
+    # Push-off turns the foot about its ball in the last third of the stance; the swing brings it back and
+    # ends with the toes raised a little, for the heel to land first.
     push = eased((share / gait.duty - 0.62) / 0.38) * np.where(swing > 0.0, 1.0 - eased(swing / 0.7), 1.0)
     land = eased((swing - 0.6) / 0.4) * (swing > 0.0) + (1.0 - eased(share / (0.18 * gait.duty))) * (
         swing == 0.0
@@ -137,8 +145,9 @@ def foot_track(
 
 
 def _footprint(gait: Gait, path: Path, count: Array, left: bool) -> tuple[Array, Array]:
-    """Where the foot stands in its `count`-th stance: under the hip in the middle of that stance. Fractions lie between
-    two footprints along the path."""
+    """Where the foot stands in its `count`-th stance: under the hip in the middle of that stance. Fractions
+    lie between two footprints along the path.
+    """
     middle = (count + 0.5 * gait.duty - (0.0 if left else 0.5)) * gait.cycle
     centre, heading = path(gait.speed * middle)
     side = 0.5 * gait.foot_spacing * (1.0 if left else -1.0)
@@ -146,10 +155,11 @@ def _footprint(gait: Gait, path: Path, count: Array, left: bool) -> tuple[Array,
 
 
 def leg_to_ankle(hip: Array, ankle: Array, forward: Array, thigh: float, shin: float) -> tuple[Array, Array]:
-    """Rotations of thigh and shin, (F, 3, 3) each, that put the ankle where it is wanted, the knee pointing forward.
+    """Rotations of thigh and shin, (F, 3, 3) each, that put the ankle where it is wanted, the knee pointing
+    forward.
 
-    hip, ankle : (F, 3) mm. forward : (F, 3) the direction in which the knee bends. An ankle out of reach (0.2 % of
-    the leg is always kept bent) is approached as far as the leg goes.
+    hip, ankle : (F, 3) mm. forward : (F, 3) the direction in which the knee bends. An ankle out of reach
+    (0.2 % of the leg is always kept bent) is approached as far as the leg goes.
     """
     reach = ankle - hip
     distance = np.minimum(np.linalg.norm(reach, axis=1), 0.998 * (thigh + shin))

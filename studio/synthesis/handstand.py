@@ -9,8 +9,9 @@ from studio.synthesis.person import SIDES, PersonMotion, Skeleton, joint_points
 
 Array = NDArray[np.float64]
 
-# Key poses: share of the motion's length; degrees from upright of pelvis and thorax leaning forward (180 = upside
-# down), of the arms' lean, of the thighs swung backwards from hanging straight down (180 = straight up), and knees.
+# Key poses: share of the motion's length; degrees from upright of pelvis and thorax leaning forward (180 =
+# upside down), of the arms' lean, of the thighs swung backwards from hanging straight down (180 = straight
+# up), and knees.
 KEYS = np.array(
     [
         # share pelvis thorax arms thigh_l thigh_r knee_l knee_r
@@ -58,7 +59,9 @@ def handstand(skeleton: Skeleton, times: Array, options: dict[str, float]) -> Pe
 def _add_supporting_arm(
     turns: dict[str, Array], skeleton: Skeleton, side: str, heading: Array, lean: Array, half_apart: float
 ) -> None:
-    """An arm that stands on its palm: nearly straight, spread so that the wrists are `half_apart` from the middle."""
+    """An arm that stands on its palm: nearly straight, spread so that the wrists are `half_apart` from the
+    middle.
+    """
     sign, index = (1.0, 0) if side == "left" else (-1.0, 1)
     turns[f"{side}_clavicle"] = turns["thorax"] @ axis_turn(0, np.full(len(lean), sign * 0.25))
     length = skeleton.upper_arm[index] + skeleton.forearm[index]

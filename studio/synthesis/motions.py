@@ -1,7 +1,7 @@
 """The motions that footage can be made of, each a set of smooth curves on the synthetic skeleton.
 
-A motion takes the skeleton, the frame times (F,) in seconds and its options, and returns a `PersonMotion`. All were
-written for this project; none is recorded from a person.
+A motion takes the skeleton, the frame times (F,) in seconds and its options, and returns a `PersonMotion`.
+All were written for this project; none is recorded from a person.
 """
 
 from collections.abc import Callable
@@ -30,8 +30,9 @@ MotionMaker = Callable[[Skeleton, Array, Options], PersonMotion]
 
 
 def walk(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
-    """A walk in a circle with turns: options radius_mm, sway_mm (how far the path leaves the circle), speed_mm_s,
-    cadence, start_degrees."""
+    """A walk in a circle with turns: options radius_mm, sway_mm (how far the path leaves the circle),
+    speed_mm_s, cadence, start_degrees.
+    """
     radius = options.get("radius_mm", 950.0)
     path = winding_path(
         radius, options.get("sway_mm", 80.0), 2.0, np.radians(options.get("start_degrees", -120.0))
@@ -58,7 +59,8 @@ def box(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
     """Walking straight and stepping over a box at the origin: options height_mm of the box, speed_mm_s."""
     speed = options.get("speed_mm_s", 800.0)
     gait = Gait(speed, 1.6, 0.60, 0.11 * skeleton.height, 50.0, 0.45)
-    # The footprints fall 1.25 s x speed apart; this start puts one 0.3 m before the box's middle, one 0.2 m behind.
+    # The footprints fall 1.25 s x speed apart; this start puts one 0.3 m before the box's middle, one 0.2 m
+    # behind.
     start = -300.0 - speed * gait.cycle * (0.5 * gait.duty + 0.5)
     clearance = options.get("height_mm", 160.0) + 70.0
 
@@ -157,7 +159,9 @@ def _bobbing(skeleton: Skeleton, gait: Gait, phase: Array) -> Array:
 
 
 def _room_to_reach(skeleton: Skeleton, root: Array, pelvis: Array, feet: list[FootTrack]) -> float:
-    """The mean pelvis height at which both ankles are reached in every frame without quite straightening a knee."""
+    """The mean pelvis height at which both ankles are reached in every frame without quite straightening a
+    knee.
+    """
     highest = []
     for sign, index, track in ((1.0, 0, feet[0]), (-1.0, 1, feet[1])):
         leg = 0.994 * (skeleton.thigh[index] + skeleton.shin[index])
@@ -170,7 +174,9 @@ def _room_to_reach(skeleton: Skeleton, root: Array, pelvis: Array, feet: list[Fo
 def _trunk(
     heading: Array, pitch: Array | float, twist: Array | float, roll: Array | float
 ) -> dict[str, Array]:
-    """Pelvis, thorax (twisted against the pelvis about its own axis) and head, which looks where the person goes."""
+    """Pelvis, thorax (twisted against the pelvis about its own axis) and head, which looks where the person
+    goes.
+    """
     level = np.zeros_like(heading)
     pelvis = yaw_pitch_roll(heading, level + 0.6 * pitch, level + roll)
     thorax = pelvis @ axis_turn(1, level + 0.4 * pitch) @ axis_turn(2, level + twist)
@@ -179,8 +185,9 @@ def _trunk(
 
 
 def _add_arm(turns: dict[str, Array], side: str, forward: Array, outward: Array, bend: Array) -> None:
-    """An arm swung `forward`, held `outward` and bent by `bend` at the elbow, radians; the clavicle gives way to it a
-    little. Adds clavicle, upper arm, forearm and hand."""
+    """An arm swung `forward`, held `outward` and bent by `bend` at the elbow, radians; the clavicle gives
+    way to it a little. Adds clavicle, upper arm, forearm and hand.
+    """
     sign = 1.0 if side == "left" else -1.0
     clavicle = turns["thorax"] @ axis_turn(2, -sign * 0.08 * forward) @ axis_turn(0, sign * 0.06 * outward)
     upper = (

@@ -41,8 +41,8 @@ def value_noise(x, y, z):
 def add_sensor_noise(picture, deviation, stream, out):
     """Gaussian noise by Box and Muller on hashed counters, then 8 bits.
 
-    picture : (H, W, 3) float32, 0...255. deviation : grey levels at mid grey (shot noise: grows with brightness).
-    stream : a number for camera, frame and seed. out : (H, W, 3) uint8.
+    picture : (H, W, 3) float32, 0...255. deviation : grey levels at mid grey (shot noise: grows with
+    brightness). stream : a number for camera, frame and seed. out : (H, W, 3) uint8.
     """
     height, width = picture.shape[0], picture.shape[1]
     for row in prange(height):

@@ -1,8 +1,8 @@
 """The skeleton inside the rendered person: lengths, segment frames over time, and the 15 markers.
 
-It is the synthesis's own, in no way derived from a tracker's body file. Segment frames have x forward, y to the
-person's left and z up when standing upright with hanging arms. Trunk: the neck's base lies on the thorax's z axis,
-which turns about the pelvis centre. Knees and elbows are hinges about y.
+It is the synthesis's own, in no way derived from a tracker's body file. Segment frames have x forward, y to
+the person's left and z up when standing upright with hanging arms. Trunk: the neck's base lies on the
+thorax's z axis, which turns about the pelvis centre. Knees and elbows are hinges about y.
 """
 
 from dataclasses import dataclass
@@ -32,8 +32,9 @@ MARKERS = (
     ),
 )
 
-# Segment lengths as shares of the body's height: Drillis & Contini (1966) as printed in Winter, Biomechanics and
-# Motor Control of Human Movement (2009), Fig. 4.1; trunk and head divide what lies above the hips (0.530) at C7.
+# Segment lengths as shares of the body's height: Drillis & Contini (1966) as printed in Winter,
+# Biomechanics and Motor Control of Human Movement (2009), Fig. 4.1; trunk and head divide what lies above
+# the hips (0.530) at C7.
 TRUNK, HEAD, HIP_HALF_WIDTH = 0.320, 0.150, 0.053
 THIGH, SHIN, FOOT = 0.245, 0.246, 0.152
 UPPER_ARM, FOREARM, HAND = 0.186, 0.146, 0.108
@@ -65,7 +66,9 @@ class Skeleton:
 
 
 def skeleton_of_height(height_mm: float, rng: np.random.Generator) -> Skeleton:
-    """A skeleton with published proportions and the small left-right differences that real people have (0.5 %)."""
+    """A skeleton with published proportions and the small left-right differences that real people have (0.5
+    %).
+    """
     pair = np.exp(rng.normal(0.0, 0.005, (4, 2)))
     thigh, shin, upper_arm, forearm = (
         (float(share * height_mm * two[0]), float(share * height_mm * two[1]))
@@ -89,7 +92,10 @@ def skeleton_of_height(height_mm: float, rng: np.random.Generator) -> Skeleton:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PersonMotion:
-    """A moving skeleton. root : (F, 3) pelvis centre, mm. turns : segment name to (F, 3, 3) world_from_segment."""
+    """A moving skeleton.
+
+    root : (F, 3) pelvis centre, mm. turns : segment name to (F, 3, 3) world_from_segment.
+    """
 
     skeleton: Skeleton
     fps: float
@@ -103,7 +109,8 @@ class PersonMotion:
 
 
 def joint_points(motion: PersonMotion) -> dict[str, Array]:
-    """Where each segment begins, and the ends of head, hands and feet (`head_top`, `left_fingers`, `left_toes`).
+    """Where each segment begins, and the ends of head, hands and feet (`head_top`, `left_fingers`,
+    `left_toes`).
 
     Each value is (F, 3) mm, world.
     """
@@ -166,7 +173,9 @@ def marker_motion(motion: PersonMotion) -> MarkerMotion:
 
 
 def marker_lengths(motion: PersonMotion) -> dict[str, float]:
-    """The subject's limb lengths as a tape measure gives them: marker pair to mm (they do not change over time)."""
+    """The subject's limb lengths as a tape measure gives them: marker pair to mm (they do not change over
+    time).
+    """
     markers = marker_motion(motion)
     index = {name: position for position, name in enumerate(markers.names)}
     pairs = [("Hip", "Neck"), ("Neck", "Head")]
@@ -182,5 +191,7 @@ def marker_lengths(motion: PersonMotion) -> dict[str, float]:
 
 
 def yaw_pitch_roll(yaw: Array, pitch: Array, roll: Array) -> Array:
-    """(..., 3, 3): heading about z, then leaning forward about y (positive), then to the right about x (positive)."""
+    """(..., 3, 3): heading about z, then leaning forward about y (positive), then to the right about x
+    (positive).
+    """
     return axis_turn(2, yaw) @ axis_turn(1, pitch) @ axis_turn(0, roll)

@@ -1,4 +1,6 @@
-"""What footage is to be made: the entries of a recipe file (TOML), checked, and the recipes that come along."""
+"""What footage is to be made: the entries of a recipe file (TOML), checked, and the recipes that come
+along.
+"""
 
 from pathlib import Path
 
@@ -14,8 +16,10 @@ SUFFIX = ".toml"
 
 
 class Picture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Pictures. noise : standard deviation of the sensor's noise at mid grey, levels. samples : rays along a pixel's
-    side. quality : x264's constant rate factor of the footage. empty_frames : length of the empty clip."""
+    """Pictures. noise : standard deviation of the sensor's noise at mid grey, levels. samples : rays along
+    a pixel's side. quality : x264's constant rate factor of the footage. empty_frames : length of the
+    empty clip.
+    """
 
     width: int = 640
     height: int = 480
@@ -45,8 +49,11 @@ class Cameras(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Include(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What goes into the session beside footage and calibration. background : "clip", "picture" or "none".
-    start_pose_noise_mm : how far the markers are moved (normal, each coordinate) before the start pose is fitted."""
+    """What goes into the session beside footage and calibration.
+
+    background : "clip", "picture" or "none". start_pose_noise_mm : how far the markers are moved (normal,
+    each coordinate) before the start pose is fitted.
+    """
 
     background: str = "clip"
     masks: bool = False
@@ -57,9 +64,12 @@ class Include(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Footage to be made. motion : "walk", "run", "box", "handstand", "stand"; or "arm", which shows `body` itself,
-    seen by one camera, as in Deutscher & Reid 6.1. options : numbers of the motion. tracker, weighting : what runs of
-    the session use by default."""
+    """Footage to be made.
+
+    motion : "walk", "run", "box", "handstand", "stand"; or "arm", which shows `body` itself, seen by one
+    camera, as in Deutscher & Reid 6.1. options : numbers of the motion. tracker, weighting : what runs of
+    the session use by default.
+    """
 
     title: str
     motion: str
@@ -112,7 +122,9 @@ def read_recipe(path: Path) -> Recipe:
 
 
 def recipe_cameras(recipe: Recipe, rng: np.random.Generator) -> tuple[Camera, ...]:
-    """The cameras that are made up or put down by hand (those of a calibration file are read by the caller)."""
+    """The cameras that are made up or put down by hand (those of a calibration file are read by the
+    caller).
+    """
     size = (recipe.picture.width, recipe.picture.height)
     if recipe.cameras.placed:
         return tuple(

@@ -12,6 +12,7 @@ from studio.body.inverse_kinematics import pose_from_markers
 from studio.body.subject import Subject, fit_subject, write_subject
 from studio.capture.calibration_files import read_calibration, write_calibration
 from studio.capture.trc import MarkerMotion, write_trc
+from studio.errors import SessionError
 from studio.geometry.camera import Camera
 from studio.sessions.importers.catalogue import import_source
 from studio.sessions.manifest import read_manifest, write_manifest
@@ -31,12 +32,15 @@ RECIPE_COPY = "recipe.toml"
 def synthesize(recipe: Path | str, into: Path, progress: Progress | None = None) -> Path:
     """Render a recipe's footage and make a session of it; returns the session's folder.
 
-    recipe : a TOML file or the name of a bundled recipe. into : the session folder to be made. progress : called with
-    frames done and frames in all. The same recipe gives the same pictures on any number of threads. Raises StudioError
-    for a recipe that cannot be followed and what `import_source` raises for `into`.
+    recipe : a TOML file or the name of a bundled recipe. into : the session folder to be made. progress :
+    called with frames done and frames in all. The same recipe gives the same pictures on any number of
+    threads. Raises StudioError for a recipe that cannot be followed and what `import_source` raises for
+    `into`.
     """
     path = find_recipe(recipe)
     wanted = read_recipe(path)
+    if into.exists():
+        raise SessionError(f"'{into}' exists already.", "Give the folder of a session that is to be made.")
     with tempfile.TemporaryDirectory(prefix="studio-synthesis-") as folder:
         source = Path(folder) / into.name
         source.mkdir()
@@ -54,7 +58,8 @@ def synthesize(recipe: Path | str, into: Path, progress: Progress | None = None)
 def render_source(
     recipe: Recipe, recipe_folder: Path, source: Path, progress: Progress | None = None
 ) -> None:
-    """Write the folder that `import` understands: videos, background, masks, calibration, truth, subject, start pose.
+    """Write the folder that `import` understands: videos, background, masks, calibration, truth, subject,
+    start pose.
 
     recipe_folder : where a relative `cameras.calibration` starts. source : an empty folder.
     """
@@ -81,7 +86,9 @@ def render_source(
 
 
 def person_subject(recipe: Recipe, motion: PersonMotion) -> Subject:
-    """What a tape measure says of the rendered person: height and the distances between neighbouring markers."""
+    """What a tape measure says of the rendered person: height and the distances between neighbouring
+    markers.
+    """
     lengths = {pair: round(length, 1) for pair, length in marker_lengths(motion).items()}
     return Subject(body=recipe.body, height_mm=recipe.height_mm, lengths_mm=lengths)
 
@@ -96,8 +103,10 @@ def _cameras(recipe: Recipe, recipe_folder: Path, rng: np.random.Generator) -> t
 def _write_start_pose(
     recipe: Recipe, subject: Subject, truth: MarkerMotion, rng: np.random.Generator, path: Path
 ) -> None:
-    """The subject's pose in frame 0 as a person would find it: inverse kinematics on the true markers, each coordinate
-    moved by normal noise of `start_pose_noise_mm` (so it is close to the truth, not the truth)."""
+    """The subject's pose in frame 0 as a person would find it: inverse kinematics on the true markers, each
+    coordinate moved by normal noise of `start_pose_noise_mm` (so it is close to the truth, not the
+    truth).
+    """
     body, _ = fit_subject(load_body(recipe.body), subject)
     known = {marker.name for marker in body.markers}
     kept = [index for index, name in enumerate(truth.names) if name in known]

@@ -1,8 +1,9 @@
 """Pictures of the person in the room, with their exact masks.
 
-The room is traced once a camera; in each frame the person's shadow on the floor is computed once for all cameras and
-the person is traced inside the window that can hold them. A picture is then the room, darkened by the shadow, under
-the person, softened as by a lens, with sensor noise that depends only on seed, camera and frame.
+The room is traced once a camera; in each frame the person's shadow on the floor is computed once for all
+cameras and the person is traced inside the window that can hold them. A picture is then the room, darkened
+by the shadow, under the person, softened as by a lens, with sensor noise that depends only on seed, camera
+and frame.
 """
 
 from dataclasses import dataclass
@@ -27,9 +28,9 @@ Bytes = NDArray[np.uint8]
 
 WARDROBE = np.array(
     [
-        (0.78, 0.57, 0.46),  # skin
+        (0.80, 0.52, 0.42),  # skin
         (0.22, 0.34, 0.46),  # shirt
-        (0.27, 0.25, 0.24),  # trousers
+        (0.15, 0.17, 0.23),  # trousers
         (0.12, 0.12, 0.13),  # shoes
         (0.15, 0.10, 0.07),  # hair
         (0.52, 0.56, 0.58),  # the shirt's stripes
@@ -70,12 +71,16 @@ class Renderer:
         self._views = tuple(_view(room, camera, samples) for camera in cameras)
 
     def empty(self, camera: int, frame: int) -> Bytes:
-        """(H, W, 3) BGR picture of the room alone; its noise is that of frame -1 - `frame`, which no other has."""
+        """(H, W, 3) BGR picture of the room alone; its noise is that of frame -1 - `frame`, which no other
+        has.
+        """
         view = self._views[camera]
         return self._developed(view.key + view.ambient, camera, -1 - frame)
 
     def shadow(self, frame: int) -> tuple[Floats, Floats]:
-        """The person's shadow of the lamp and of the surroundings on the floor's grid, (n, n) each, 1 = no shadow."""
+        """The person's shadow of the lamp and of the surroundings on the floor's grid, (n, n) each, 1 = no
+        shadow.
+        """
         count = int(2 * SHADOW_REACH / SHADOW_CELL) + 1
         key, ambient = np.ones((count, count), np.float32), np.ones((count, count), np.float32)
         left = -SHADOW_REACH
@@ -94,7 +99,8 @@ class Renderer:
         if window is not None:
             rows, columns = window
             person, coverage = self._person(view, frame, rows, columns)
-            light[rows, columns] = light[rows, columns] * (1.0 - coverage[..., None]) + person
+            light[rows, columns] *= 1.0 - coverage[..., None]
+            light[rows, columns] += person
             mask[rows, columns] = np.where(coverage >= 0.5, 255, 0)
         return self._developed(light, camera, frame), mask
 
@@ -118,7 +124,7 @@ class Renderer:
         )
         return light, coverage
 
-    def _developed(self, light: Floats, camera: int, frame: int) -> Bytes:
+    def _developed(self, light: NDArray[np.floating], camera: int, frame: int) -> Bytes:
         """What the sensor makes of linear light: lens blur, exposure, noise, BGR bytes."""
         soft = cv2.GaussianBlur(np.ascontiguousarray(light[..., ::-1], np.float32), (0, 0), LENS_BLUR)
         exposed = np.asarray(255.0 * (1.0 - np.exp(-EXPOSURE * soft)), np.float32)

@@ -16,7 +16,10 @@ PLAIN, PLANKS, GRAIN, BOOKS, CHECKS, POSTER, TILES = range(7)
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A box in the room. centre, half : mm. turn : about the vertical, radians. colour, second : RGB 0...1."""
+    """A box in the room.
+
+    centre, half : mm. turn : about the vertical, radians. colour, second : RGB 0...1.
+    """
 
     centre: tuple[float, float, float]
     half: tuple[float, float, float]
@@ -28,7 +31,10 @@ class Block:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Room:
-    """Walls at ±half (mm), height, blocks; lights (4, 3): lamp position, (lamp radius, 0, 0), lamp colour, ambient."""
+    """Walls at ±half (mm), height, blocks.
+
+    lights : (4, 3) lamp position, (lamp radius, 0, 0), lamp colour, ambient colour.
+    """
 
     half: tuple[float, float]
     height: float
@@ -36,7 +42,7 @@ class Room:
     lights: Array
 
 
-LIGHTS = np.array([[700.0, -500.0, 2840.0], [260.0, 0.0, 0.0], [0.62, 0.60, 0.56], [0.44, 0.45, 0.47]])
+LIGHTS = np.array([[700.0, -500.0, 2840.0], [260.0, 0.0, 0.0], [0.46, 0.445, 0.42], [0.56, 0.57, 0.59]])
 
 FURNITURE = (
     # table with two things on it and a stool
@@ -56,7 +62,7 @@ FURNITURE = (
     Block((2250, -1900, 260), (330, 330, 260), (0.36, 0.42, 0.50), CHECKS, (0.50, 0.56, 0.62), 0.25),
     Block((-2350, -1850, 420), (260, 480, 420), (0.55, 0.50, 0.44), GRAIN, (0.47, 0.42, 0.37)),
     # rug and pictures on the walls
-    Block((150, -150, 4), (1250, 900, 4), (0.56, 0.49, 0.42), TILES, (0.50, 0.42, 0.36), 0.15),
+    Block((150, -150, 4), (1250, 900, 4), (0.50, 0.51, 0.50), TILES, (0.43, 0.44, 0.45), 0.15),
     Block((-1500, -2590, 1500), (420, 14, 320), (0.62, 0.64, 0.58), POSTER, (0.30, 0.38, 0.46)),
     Block((1200, -2590, 1450), (300, 14, 420), (0.66, 0.58, 0.46), POSTER, (0.48, 0.26, 0.22)),
     Block((2890, -300, 1500), (14, 520, 360), (0.56, 0.62, 0.68), POSTER, (0.36, 0.42, 0.36)),
@@ -65,7 +71,7 @@ FURNITURE = (
 
 
 def furnished_room(obstacle_height: float = 0.0) -> Room:
-    """The cluttered room; with a box of the given height (mm) standing at the origin where one is stepped over."""
+    """The cluttered room; with a box of the given height (mm) at the origin where one is stepped over."""
     blocks = FURNITURE
     if obstacle_height > 0.0:
         half = (100.0, 340.0, 0.5 * obstacle_height)

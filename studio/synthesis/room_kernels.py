@@ -11,14 +11,16 @@ from studio.synthesis.room import BOOKS, CHECKS, GRAIN, PLANKS, POSTER, TILES
 FAR = 1e9
 LAMP_SAMPLES = 12
 FLOOR, CEILING, WALL, BLOCKS = -1, -2, -3, 0
-FLOOR_COLOUR, FLOOR_SECOND = (0.57, 0.45, 0.33), (0.48, 0.37, 0.26)
+FLOOR_COLOUR, FLOOR_SECOND = (0.55, 0.50, 0.44), (0.47, 0.43, 0.38)
 WALL_COLOUR, SKIRTING = (0.68, 0.67, 0.63), (0.46, 0.44, 0.42)
 SKIRTING_HEIGHT = 90.0
 
 
 @njit(cache=True)
 def block_entry(ox, oy, oz, dx, dy, dz, block):
-    """Distance along a ray to a turned box and the axis of the face it enters (0..2); (FAR, 0) when it misses."""
+    """Distance along a ray to a turned box and the axis of the face it enters (0..2); (FAR, 0) when it
+    misses.
+    """
     cosine, sine = block[12], block[13]
     x, y = ox - block[0], oy - block[1]
     start = (cosine * x + sine * y, -sine * x + cosine * y, oz - block[2])
@@ -61,7 +63,9 @@ def first_surface(ox, oy, oz, dx, dy, dz, half_x, half_y, height, blocks):
 
 @njit(cache=True)
 def pattern_share(pattern, u, v):
-    """How much of the second colour a pattern shows at (u, v) mm of a face, and a factor for its brightness."""
+    """How much of the second colour a pattern shows at (u, v) mm of a face, and a factor for its
+    brightness.
+    """
     grain = value_noise(u / 14.0, v / 14.0, 3.0) - 0.5
     if pattern == PLANKS:
         plank = math.floor(v / 140.0)
@@ -79,7 +83,7 @@ def pattern_share(pattern, u, v):
         book = math.floor((u + 37.0 * shelf) / 44.0)
         return hashed(int(book), int(shelf), 7), 0.55 + 0.7 * hashed(int(book), int(shelf), 8)
     if pattern == CHECKS:
-        return float((int(math.floor(u / 80.0)) + int(math.floor(v / 80.0))) & 1), 1.0 + 0.08 * grain
+        return float((math.floor(u / 80.0) + math.floor(v / 80.0)) & 1), 1.0 + 0.08 * grain
     if pattern == POSTER:
         return 1.0 if value_noise(u / 150.0, v / 150.0, 9.0) > 0.5 else 0.0, 1.0 + 0.1 * grain
     if pattern == TILES:
@@ -138,7 +142,10 @@ def lamp_share(px, py, pz, lights, blocks, salt):
 
 @njit(cache=True, parallel=True)
 def trace_room(origin, rays, samples, size, lights, blocks, patterns, key, ambient, depth):
-    """The empty room. size : (3,) half widths and height. Fills key and ambient light (h, w, 3) and depth (h, w)."""
+    """The empty room.
+
+    size : (3,) half widths and height. Fills key and ambient light (h, w, 3) and depth (h, w).
+    """
     height, width = depth.shape
     for row in prange(height):
         colour = np.zeros(3)

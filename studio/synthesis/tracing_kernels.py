@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit, prange
 
 from studio.synthesis.distance_kernels import (
+    FAR,
     body_distance,
     body_normal,
     gather,
@@ -19,6 +20,8 @@ from studio.synthesis.noise_kernels import value_noise
 
 SAFETY, TOUCH, STEPS = 0.85, 0.8, 72
 OCCLUSION_REACH = 70.0
+# Samples of one pixel this close in depth (mm) share one shading: it changes little inside a pixel.
+SAME_SURFACE = 12.0
 
 
 @njit(cache=True)
@@ -89,6 +92,7 @@ def first_touch(origin, dx, dy, dz, pieces, labels, active):
     count, t, last = gather(origin[0], origin[1], origin[2], dx, dy, dz, pieces, 12.0, active)
     if count == 0:
         return -1.0, count
+    distance = 0.0
     for _ in range(STEPS):
         if t > last:
             return -1.0, count
@@ -105,14 +109,15 @@ def first_touch(origin, dx, dy, dz, pieces, labels, active):
 def trace_person(origin, rays, samples, room_depth, pieces, labels, lights, wardrobe, light, coverage):
     """The person as seen through a window of the picture.
 
-    origin : (3,) camera centre. rays : (h * samples, w * samples, 3) unit directions. room_depth : (h, w) distance
-    to what stands in the room, mm. Fills light (h, w, 3), premultiplied by coverage (h, w), both 0...1.
+    origin : (3,) camera centre. rays : (h * samples, w * samples, 3) unit directions. room_depth : (h, w)
+    distance to what stands in the room, mm. Fills light (h, w, 3), premultiplied by coverage (h, w), both
+    0...1.
     """
     height, width = coverage.shape
     for row in prange(height):
         active, shadow_active, colour = no_pieces(pieces), no_pieces(pieces), np.zeros(3)
         for column in range(width):
-            hits = 0
+            hits, shaded_at = 0, -FAR
             for sample in range(samples * samples):
                 ray = rays[row * samples + sample // samples, column * samples + sample % samples]
                 dx, dy, dz = np.float64(ray[0]), np.float64(ray[1]), np.float64(ray[2])
@@ -120,23 +125,25 @@ def trace_person(origin, rays, samples, room_depth, pieces, labels, lights, ward
                 if t < 0.0 or t > room_depth[row, column]:
                     continue
                 hits += 1
-                px, py, pz = origin[0] + t * dx, origin[1] + t * dy, origin[2] + t * dz
-                shaded(
-                    px,
-                    py,
-                    pz,
-                    dx,
-                    dy,
-                    dz,
-                    pieces,
-                    labels,
-                    active,
-                    count,
-                    shadow_active,
-                    lights,
-                    wardrobe,
-                    colour,
-                )
+                if abs(t - shaded_at) > SAME_SURFACE:
+                    shaded_at = t
+                    px, py, pz = origin[0] + t * dx, origin[1] + t * dy, origin[2] + t * dz
+                    shaded(
+                        px,
+                        py,
+                        pz,
+                        dx,
+                        dy,
+                        dz,
+                        pieces,
+                        labels,
+                        active,
+                        count,
+                        shadow_active,
+                        lights,
+                        wardrobe,
+                        colour,
+                    )
                 for channel in range(3):
                     light[row, column, channel] += colour[channel] / (samples * samples)
             coverage[row, column] = hits / (samples * samples)
@@ -146,7 +153,8 @@ def trace_person(origin, rays, samples, room_depth, pieces, labels, lights, ward
 def floor_shadow(left, near, cell, pieces, labels, lights, key, ambient):
     """What the person leaves of the lamp and of the room's light on the floor.
 
-    Cell (j, i) of the (n, n) outputs lies at x = left + i * cell, y = near + j * cell, mm; 1 = nothing taken away.
+    Cell (j, i) of the (n, n) outputs lies at x = left + i * cell, y = near + j * cell, mm; 1 = nothing
+    taken away.
     """
     rows, columns = key.shape
     for row in prange(rows):
@@ -157,7 +165,7 @@ def floor_shadow(left, near, cell, pieces, labels, lights, key, ambient):
             count, _, _ = gather(x, y, -1.0, 0.0, 0.0, 1.0, pieces, 160.0, active)
             taken = 0.0
             if count > 0:
-                for height, weight in ((30.0, 0.45), (110.0, 0.30)):
+                for height, weight in ((30.0, 0.20), (110.0, 0.14)):
                     distance = body_distance(x, y, height, pieces, labels, active, count)
                     taken += weight * min(max(1.0 - distance / (1.4 * height), 0.0), 1.0)
             ambient[row, column] = 1.0 - taken
