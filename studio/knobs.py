@@ -88,7 +88,9 @@ def checked(declared: Knob, value: object) -> Value:
         number = float(value)  # pyright: ignore[reportArgumentType]
     except (TypeError, ValueError):
         raise wrong from None
-    inside = (declared.low is None or number >= declared.low) and (declared.high is None or number <= declared.high)
+    inside = (declared.low is None or number >= declared.low) and (
+        declared.high is None or number <= declared.high
+    )
     if isinstance(value, bool) or not math.isfinite(number) or not inside:
         raise wrong
     if declared.kind is int:
