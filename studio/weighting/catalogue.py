@@ -7,8 +7,10 @@ from typing import Any, Protocol
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
+from studio.weighting.bodytrack import BodytrackSettings, BodytrackWeigher
 from studio.weighting.edge_region import EdgeRegionSettings, EdgeRegionWeigher
 from studio.weighting.problem import FrameFunction
+from studio.weighting.template import TemplateSettings, TemplateWeigher
 
 
 class Weigher(Protocol):
@@ -37,5 +39,7 @@ WEIGHTINGS: dict[str, Weighting] = {
     entry.name: entry
     for entry in (
         Weighting("edge-region", "Edges and region", EdgeRegionSettings, "proximity", EdgeRegionWeigher),
+        Weighting("bodytrack", "Benchmark's score", BodytrackSettings, "bodytrack", BodytrackWeigher),
+        Weighting("template", "Template and silhouette", TemplateSettings, "none", TemplateWeigher),
     )
 }

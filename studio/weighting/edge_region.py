@@ -26,7 +26,6 @@ from numpy.typing import NDArray
 
 from studio.body.model import BodyModel
 from studio.body.tables import kinematic_tables
-from studio.errors import FootageError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 from studio.knobs import knob
@@ -41,7 +40,7 @@ from studio.weighting.edge_region_kernels import (
     all_sums,
     chunk_sums,
 )
-from studio.weighting.evidence_check import check_views
+from studio.weighting.evidence_check import check_sizes, check_views
 from studio.weighting.occlusion_kernels import all_hidden, chunk_hidden
 from studio.weighting.outlines import OutlineProjector
 from studio.weighting.problem import Limits
@@ -49,9 +48,6 @@ from studio.weighting.problem import Limits
 Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 IntArray = NDArray[np.int64]
-
-# Pixel numbers are worked out in single precision, exact up to 2^24.
-LARGEST_PICTURE = 2**24 - PADDING
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,18 +108,12 @@ class EdgeRegionWeigher:
     """Makes the problem of any frame; holds nothing that changes."""
 
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: EdgeRegionSettings) -> None:
+        check_sizes(cameras)
         self.settings, self.cameras = settings, cameras
         self.projector = OutlineProjector(kinematic_tables(body), cameras)
         self.limits = Limits(body)
         self.along_edge = places_along(settings.edge_chunks)
         self.along_region = places_along(settings.region_chunks)
-        for camera in cameras:
-            if camera.width * camera.height > LARGEST_PICTURE:
-                size = f"{camera.width} × {camera.height}"
-                raise FootageError(
-                    f"Pictures of camera '{camera.name}' are {size}, more than 16.7 million pixels.",
-                    "Import the footage at a smaller size.",
-                )
 
     @property
     def samples_per_evaluation(self) -> int:

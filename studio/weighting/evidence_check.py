@@ -1,8 +1,22 @@
-"""That a frame's evidence belongs to the cameras it is weighed with."""
+"""That pictures are not too large for the kernels, and that a frame's evidence belongs to its cameras."""
 
 from studio.errors import FootageError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
+
+# Kernels work out pixel numbers in single precision, exact up to 2^24, and keep a few for entries that are no pixel.
+LARGEST_PICTURE = 2**24 - 16
+
+
+def check_sizes(cameras: tuple[Camera, ...]) -> None:
+    """Raises FootageError for a camera whose pictures have more pixels than the kernels can number."""
+    for camera in cameras:
+        if camera.width * camera.height > LARGEST_PICTURE:
+            size = f"{camera.width} × {camera.height}"
+            raise FootageError(
+                f"Pictures of camera '{camera.name}' are {size}, more than 16.7 million pixels.",
+                "Import the footage at a smaller size.",
+            )
 
 
 def check_views(cameras: tuple[Camera, ...], evidence: FrameEvidence, edges: bool = True) -> None:
