@@ -72,9 +72,7 @@ class TrackingRun:
 
     def _load(self) -> None:
         """Take up the run where its store says it stands."""
-        stored = self._reader.settings_history()
-        entries = (SettingsEntry(entry.version, entry.frame, entry.layer, entry.values) for entry in stored)
-        self.history = SettingsHistory(tuple(entries))
+        self.history = SettingsHistory(tuple(self._reader.settings_history()))
         self.settings_source: SettingsSource = self.latest_settings
         self._settings: dict[int, RunSettings] = {}
         if not self.history.entries:

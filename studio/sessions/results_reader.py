@@ -11,20 +11,11 @@ from numpy.typing import NDArray
 
 from studio.errors import NotFoundError, SessionError
 from studio.sessions.results_codec import unpack, unpack_layer, unpack_result
+from studio.settings import SettingsEntry
 from studio.tracking.tracker import FrameResult, LayerRecord
 
 Array = NDArray[np.float64]
 FILE_NAME = "results.sqlite"
-
-
-@dataclass(frozen=True, slots=True)
-class SettingsEntry:
-    """The settings in use since (frame, layer). values : every knob by its flat name."""
-
-    version: int
-    frame: int
-    layer: int
-    values: dict[str, bool | int | float | str]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
