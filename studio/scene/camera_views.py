@@ -17,10 +17,10 @@ from studio.scene.camera_placement import PicturePlane, StraightPicture, picture
 
 Bytes = NDArray[np.uint8]
 
-DEPTH = 0.55
+DEPTH = 0.8
 BACKDROP_DEPTH = 14.0
 LONGEST_SIDE = 480
-_BAR = 0.006
+_BAR = 0.008
 _LOOK_DISTANCE = 3.0
 _JPEG_QUALITY = 72
 
@@ -123,6 +123,7 @@ class CameraViews:
 
     def __init__(self, server: viser.ViserServer, cameras: Sequence[Camera], tokens: ColourTokens) -> None:
         self._server = server
+        self.through: str | None = None
         self._free: dict[int, tuple[NDArray[np.float64], ...]] = {}
         self.views = {camera.name: CameraView(server, camera, tokens) for camera in cameras}
 
@@ -149,6 +150,7 @@ class CameraViews:
 
     def look_through(self, name: str | None) -> None:
         """Put every viewer into a camera's place, or back where each was before (None)."""
+        self.through = name
         for other, view in self.views.items():
             view.take_role("shown" if name is None else "backdrop" if other == name else "aside")
         for client in self._server.get_clients().values():

@@ -43,8 +43,8 @@ class KnobInput:
         self._awaited: dict[str, Value] = {}
         self.handle = _make(gui, knob, value)
         self.handle.on_update(self._updated)
-        default = f"reset to {words(knob, knob.default)}"
-        self.reset = gui.add_button(default, color="gray", visible=False, hint=f"Default of {knob.label}.")
+        # A group of one button: as slight as what it resets, and in line with it.
+        self.reset = gui.add_button_group(" ", (f"reset to {words(knob, knob.default)}",), visible=False)
         self.reset.on_click(self._reset)
         self._dress()
 

@@ -20,7 +20,7 @@ from studio.scene.wishes import Wishes
 
 Array = NDArray[np.float64]
 
-PANEL_WIDTH = 330
+PANEL_WIDTH = 310
 
 
 class Director(Transport, Protocol):
@@ -61,7 +61,11 @@ class Panel:
         gui.main_panel.dock_right()
         gui.main_panel.set_width(PANEL_WIDTH)
         self.run = RunPanel(
-            gui, gui.add_folder("Run"), director.wishes, transport=director, refused=director.refused
+            gui,
+            gui.add_folder("Track and play", expand_by_default=False),
+            director.wishes,
+            transport=director,
+            refused=director.refused,
         )
         tabs = gui.add_tab_group()
         search, show = tabs.add_tab("Search"), tabs.add_tab("Show")

@@ -131,8 +131,8 @@ class PoseEditor:
 
 
 def shown_value(parameter: Parameter, value: float) -> float:
-    """A pose's entry as it is shown: degrees or mm."""
-    return math.degrees(value) if parameter.kind == "angle" else value
+    """A pose's entry as it is shown: degrees or mm, to a tenth."""
+    return round(math.degrees(value) if parameter.kind == "angle" else value, 1)
 
 
 def stored_value(parameter: Parameter, shown: float) -> float:

@@ -7,13 +7,13 @@ from typing import Protocol
 import viser
 
 from studio.errors import StudioError
-from studio.scene.playback import SPEEDS
+from studio.scene.playback import SPEEDS, Playback
 from studio.scene.wishes import Wishes
 from studio.worker.events import StateChanged
 
 _TRACK = ("▶ track", "pause", "cancel")
 _STEP = ("layer", "frame", "re-anneal")
-_MOVE = ("⏮", "◀", "⏯", "▶", "⏭")
+_MOVE = ("|◀", "◀", "play", "▶", "▶|")
 _STATE_WORDS = {"reannealing": "annealing again", "lost": "worker lost", "compiling": "compiling, once"}
 
 
@@ -28,14 +28,15 @@ class Transport(Protocol):
         """Show the stored frame so many places on."""
         ...
 
-    def play(self, playing: bool | None) -> None:
-        """Play or stop; None: the other of the two."""
-        ...
-
     def set_playback(
-        self, *, speed: float | None = None, loop: bool | None = None, follow: bool | None = None
+        self,
+        *,
+        playing: bool | None = None,
+        speed: float | None = None,
+        loop: bool | None = None,
+        follow: bool | None = None,
     ) -> None:
-        """Change how stored frames are played."""
+        """Play or stop, change how; None leaves it."""
         ...
 
     def reanneal_shown(self) -> None:
@@ -59,9 +60,10 @@ class RunPanel:
         self._refused = refused
         self._span = (0, 1)
         self._frame = 0
+        self._playing = False
+        self.status = gui.add_html(status_html(None), order=0.0)
+        self.progress = gui.add_progress_bar(0.0, visible=False, order=0.1)
         with folder:
-            self.status = gui.add_html(status_html(None))
-            self.progress = gui.add_progress_bar(0.0, visible=False)
             self.track = gui.add_button_group(
                 "track", _TRACK, hint="Track on, pause after this layer, end the run."
             )
@@ -93,6 +95,14 @@ class RunPanel:
         self.progress.animated = bool(state and state.state in ("tracking", "compiling"))
         self.progress.value = min(100.0, 100.0 * state.done / total) if state else 0.0
 
+    def show_stored(self, session: str, run: str, done: int, total: int) -> None:
+        """Show how a run stands that the tracking process does not have open (run "" : the session alone)."""
+        first = f"{session} / {run}" if run else session
+        self.status.content = _two_lines(
+            first, f"stored · {done} of {total} frames" if run else f"{total} frames, no run shown"
+        )
+        self.progress.visible = False
+
     def show_frame(self, frame: int | None, span: tuple[int, int]) -> None:
         """Show which frame is shown, of which (half open)."""
         first, last = span[0], max(span[0] + 1, span[1] - 1)
@@ -104,12 +114,16 @@ class RunPanel:
             if self.timeline.value != frame:
                 self.timeline.value = frame
 
-    def show_playback(self, speed: float, loop: bool, follow: bool) -> None:
+    def show_playback(self, pace: Playback, follow: bool) -> None:
         """Show how stored frames are played, without asking for it again."""
-        if self.speed.value != f"{speed:g} ×":
-            self.speed.value = f"{speed:g} ×"
-        if self.loop.value != loop:
-            self.loop.value = loop
+        self._playing = pace.playing
+        options = (*_MOVE[:2], "stop" if pace.playing else "play", *_MOVE[3:])
+        if tuple(self.move.options) != options:
+            self.move.options = options
+        if self.speed.value != f"{pace.speed:g} ×":
+            self.speed.value = f"{pace.speed:g} ×"
+        if self.loop.value != pace.loop:
+            self.loop.value = pace.loop
         if self.follow.value != follow:
             self.follow.value = follow
 
@@ -125,9 +139,10 @@ class RunPanel:
         self._obey(actions.get(event.target.value, self._transport.reanneal_shown))
 
     async def _move_clicked(self, event: viser.GuiEvent) -> None:
-        chosen = _MOVE.index(event.target.value)
+        word = event.target.value
+        chosen = _MOVE.index(word) if word in _MOVE else 2
         if chosen == 2:
-            self._transport.play(None)
+            self._transport.set_playback(playing=not self._playing)
         elif chosen in (1, 3):
             self._transport.step(chosen - 2)
         else:

@@ -21,8 +21,8 @@ from studio.scene.view_options import ViewOptions
 
 Bytes = NDArray[np.uint8]
 
-_VIEW_ELEVATION = 0.32
-_LEAST_DISTANCE = 2.6
+_VIEW_ELEVATION = 0.34
+_LEAST_DISTANCE, _MOST_DISTANCE = 2.6, 9.0
 _FIELD_OF_VIEW = 0.75
 
 
@@ -62,6 +62,8 @@ class SceneDrawing:
                 moment.frame, options.trail_markers, int(options.trail_frames), tokens, visible=options.trails
             )
             self.cameras.show(options.cameras, options.pictures)
+            # Through a camera the floor is the one in the picture.
+            self.floor.show(self.cameras.through is None)
 
     def hang(self, pictures: Mapping[str, Bytes]) -> None:
         """Hang new pictures (BGR, as stored or evenly reduced) on the cameras."""
@@ -93,7 +95,11 @@ class SceneDrawing:
         middle = (ends.min(axis=(0, 1)) + ends.max(axis=(0, 1))) / 2.0
         height = float(np.ptp(ends[..., 2]))
         toward = self._toward(middle)
-        distance = max(_LEAST_DISTANCE, 2.3 * height)
+        reach = [
+            float(np.linalg.norm(camera.centre * METRES_PER_MM - middle)) for camera in self._opened.cameras
+        ]
+        wanted = max(2.3 * height, float(np.mean(reach)) if reach else 0.0)
+        distance = float(np.clip(wanted, _LEAST_DISTANCE, _MOST_DISTANCE))
         position = middle + distance * (toward + np.array([0.0, 0.0, _VIEW_ELEVATION]))
         view = self._server.initial_camera
         view.position, view.look_at, view.fov = position, middle, _FIELD_OF_VIEW

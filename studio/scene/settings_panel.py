@@ -150,7 +150,7 @@ class SettingsPanel:
 
     def _add_reset(self, declared: Sequence[Knob]) -> None:
         names = tuple(knob.name for knob in declared if knob.takes_effect != "new run")
-        button = self._gui.add_button("Reset all to defaults", color="gray", disabled=True)
+        button = self._gui.add_button("Reset to defaults", color="gray", visible=False)
 
         async def reset(_: viser.GuiEvent) -> None:
             self.ask_all({name: self.inputs[name].knob.default for name in names})
@@ -166,8 +166,8 @@ class SettingsPanel:
                 for name in names
                 if pending.get(name, self.inputs[name].accepted) != self.inputs[name].knob.default
             ]
-            button.disabled = not moved
-            button.label = f"Reset {len(moved)} to default" if moved else "All at their defaults"
+            button.visible = len(moved) > 1
+            button.label = f"Reset {len(moved)} to their defaults"
 
 
 def in_use(event: SettingsApplied) -> str:

@@ -53,7 +53,7 @@ class SceneStage:
     @property
     def shown(self) -> Shown:
         """What is shown now."""
-        return self._director.shown if self._director else Shown()
+        return self._director.state.shown if self._director else Shown()
 
     def watch(self, callback: Callable[[Shown], None]) -> None:
         """Hear of every move that the scene's own controls, its playback or the tracking make; `callback`
@@ -83,7 +83,7 @@ class SceneStage:
 
     def look_through(self, camera: str | None) -> None:
         """Put the viewers into a camera's place, or back where they were (None or "")."""
-        if self._director is not None and (camera or None) != self.shown.look_through:
+        if self._director is not None:
             self._director.look_through(camera or None)
 
     def set_dark(self, dark: bool) -> None:
@@ -99,13 +99,13 @@ class SceneStage:
             if name not in known:
                 raise SettingsError(f"The scene has no option '{name}'.", f"Known: {', '.join(known)}.")
         if self._director is not None:
-            wanted = replace(self._director.options, **changes)  # pyright: ignore[reportArgumentType]
+            wanted = replace(self._director.state.options, **changes)  # pyright: ignore[reportArgumentType]
             self._director.change_options(wanted)
 
     def play(self, playing: bool) -> None:
         """Play stored frames, or stop."""
         if self._director is not None:
-            self._director.play(playing)
+            self._director.set_playback(playing=playing)
 
     def reanneal_shown(self) -> None:
         """Anneal the shown frame again with the settings in use. Raises StudioError if none is shown."""
