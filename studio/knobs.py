@@ -39,7 +39,7 @@ class Knob:
     group: str = ""
 
 
-def knob(  # noqa: PLR0913 - one argument for each thing that a knob declares
+def knob(
     default: Value,
     low: float | None = None,
     high: float | None = None,
