@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.model import BodyModel
-from studio.body.tables import kinematic_tables
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 from studio.knobs import knob
@@ -71,7 +70,7 @@ class BodytrackWeigher:
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: BodytrackSettings) -> None:
         check_sizes(cameras)
         self.settings, self.cameras = settings, cameras
-        self.projector = OutlineProjector(kinematic_tables(body), cameras)
+        self.projector = OutlineProjector.of_body(body, cameras)
         self.limits = Limits(body)
 
     def problem(self, evidence: FrameEvidence) -> "BodytrackProblem":

@@ -145,10 +145,14 @@ def chunk_scores(first, last, outlines, views, maps, capacity, sums):
             nothing = np.uint32(views[view, 2] * views[view, 3])
             for lane in range(LANES):
                 count = fill_edges(outlines, block, view, lane, width, height, indices)
-                sums[block, lane, 0] += add_up(maps, np.uint64(views[view, 0]), nothing, indices, pairs, count)
+                sums[block, lane, 0] += add_up(
+                    maps, np.uint64(views[view, 0]), nothing, indices, pairs, count
+                )
                 sums[block, lane, 1] += count
                 count = fill_inside(outlines, block, view, lane, width, height, indices)
-                sums[block, lane, 2] += add_up(maps, np.uint64(views[view, 1]), nothing, indices, pairs, count)
+                sums[block, lane, 2] += add_up(
+                    maps, np.uint64(views[view, 1]), nothing, indices, pairs, count
+                )
                 sums[block, lane, 3] += count
 
 

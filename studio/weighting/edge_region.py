@@ -25,7 +25,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.model import BodyModel
-from studio.body.tables import kinematic_tables
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 from studio.knobs import knob
@@ -110,7 +109,7 @@ class EdgeRegionWeigher:
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: EdgeRegionSettings) -> None:
         check_sizes(cameras)
         self.settings, self.cameras = settings, cameras
-        self.projector = OutlineProjector(kinematic_tables(body), cameras)
+        self.projector = OutlineProjector.of_body(body, cameras)
         self.limits = Limits(body)
         self.along_edge = places_along(settings.edge_chunks)
         self.along_region = places_along(settings.region_chunks)

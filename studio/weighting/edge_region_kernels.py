@@ -241,12 +241,18 @@ def record_indices(outlines, hidden, along_edge, along_region, views, indices):
 
 
 @njit(**OPTIONS)
-def loads_only(maps, views, pairs, edge_rows, sums):
-    """Nothing but the loads of `chunk_sums`, on recorded indices seen as (B, V, 16, rows, 8) uint64: its limit."""
-    for block in range(pairs.shape[0]):
-        for view in range(pairs.shape[1]):
-            edge_base, region_base = np.uint64(views[view, 0]), np.uint64(views[view, 1])
-            for lane in range(LANES):
-                stream = pairs[block, view, lane]
-                sums[block, view, lane, 0] = add_up(maps, edge_base, stream, 0, edge_rows)
-                sums[block, view, lane, 1] = add_up(maps, region_base, stream, edge_rows, stream.shape[0])
+def loads_only(maps, views, pairs, edge_rows, passes, sums):
+    """Nothing but the loads of `chunk_sums`, `passes` times over: its limit.
+
+    pairs : indices recorded by `record_indices`, seen as (B, V, 16, rows, 8) uint64. sums : (B, V, 16, 2), added to.
+    """
+    for _ in range(passes):
+        for block in range(pairs.shape[0]):
+            for view in range(pairs.shape[1]):
+                edge_base, region_base = np.uint64(views[view, 0]), np.uint64(views[view, 1])
+                for lane in range(LANES):
+                    stream = pairs[block, view, lane]
+                    sums[block, view, lane, 0] += add_up(maps, edge_base, stream, 0, edge_rows)
+                    sums[block, view, lane, 1] += add_up(
+                        maps, region_base, stream, edge_rows, stream.shape[0]
+                    )

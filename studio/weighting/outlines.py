@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.body.model import KinematicTables
+from studio.body.model import BodyModel, KinematicTables
+from studio.body.tables import kinematic_tables
 from studio.errors import BodyError
 from studio.geometry.camera import Camera
 from studio.weighting.block_threads import run_blocks
@@ -25,6 +26,11 @@ class OutlineProjector:
         self.program = compile_program(tables)
         self.cameras = cameras
         self._camera_table = camera_table(cameras)
+
+    @classmethod
+    def of_body(cls, body: BodyModel, cameras: tuple[Camera, ...]) -> "OutlineProjector":
+        """The projector of a body's drawn limbs."""
+        return cls(kinematic_tables(body), cameras)
 
     @property
     def limb_count(self) -> int:

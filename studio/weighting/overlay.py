@@ -53,7 +53,7 @@ def overlay_points(
     settings : of the weighting in use; sample points are those of its kernels.
     """
     pose = np.asarray(pose, dtype=np.float64)
-    corners, seen = OutlineProjector(kinematic_tables(body), cameras).corners(pose[None])
+    corners, seen = OutlineProjector.of_body(body, cameras).corners(pose[None])
     names = tuple(limb.name for limb in body.drawn)
     found: list[ViewOverlay] = []
     for camera, outlines, state in zip(cameras, corners[0], seen[0], strict=True):

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.model import BodyModel
-from studio.body.tables import kinematic_tables
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 from studio.weighting.block_threads import run_blocks
@@ -46,7 +45,7 @@ class TemplateWeigher:
 
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: TemplateSettings) -> None:
         self.settings, self.cameras = settings, cameras
-        self.projector = OutlineProjector(kinematic_tables(body), cameras)
+        self.projector = OutlineProjector.of_body(body, cameras)
         self.limits = Limits(body)
 
     def problem(self, evidence: FrameEvidence) -> "TemplateProblem":
@@ -58,8 +57,15 @@ class TemplateWeigher:
 class TemplateProblem:
     """One frame as a function of poses."""
 
-    def __init__(self, weigher: TemplateWeigher, silhouettes: Words, views: IntArray, pixels: IntArray) -> None:
-        self.weigher, self.silhouettes, self.views, self.silhouette_pixels = weigher, silhouettes, views, pixels
+    def __init__(
+        self, weigher: TemplateWeigher, silhouettes: Words, views: IntArray, pixels: IntArray
+    ) -> None:
+        self.weigher, self.silhouettes, self.views, self.silhouette_pixels = (
+            weigher,
+            silhouettes,
+            views,
+            pixels,
+        )
 
     def weigh(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights. Raises BodyError for poses that are no finite (N, D)."""

@@ -84,7 +84,9 @@ def set_span(words, left, right):
 
 
 @njit(**OPTIONS)
-def template_pixels(outlines, block, view, lane, height, width, silhouette, base, stride, planes, rows, words):
+def template_pixels(
+    outlines, block, view, lane, height, width, silhouette, base, stride, planes, rows, words
+):
     """Pixels of one pose's template in one view, and how many of them lie in the silhouette."""
     limbs = 0
     for limb in range(outlines.shape[2]):

@@ -1,0 +1,210 @@
+"""How fast poses are weighed, against the fastest that memory allows.
+
+The scene is made here: four 640 × 480 cameras like those of the Lee walk around the default body, a silhouette and a
+noisy picture. The limit is the edge and region weighting's own loads and nothing else: the map reads of the index
+stream that it really produced for the same poses, sixteen poses replayed from the cache, in the same run. Everything is
+repeated in turns and the best of each counted, so that another process taking a core for a moment changes little.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.catalogue import load_body
+from studio.body.forward_kinematics import limb_ends
+from studio.body.model import BodyModel
+from studio.evidence.edges import bodytrack_edges, proximity_edges
+from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
+from studio.geometry.camera import Camera
+from studio.weighting.bodytrack import BodytrackSettings, BodytrackWeigher
+from studio.weighting.edge_region import EdgeRegionProblem, EdgeRegionSettings, EdgeRegionWeigher
+from studio.weighting.edge_region_kernels import EDGE_LINES, LANES, loads_only, record_indices
+from studio.weighting.outlines import OutlineProjector
+from studio.weighting.problem import FrameFunction
+from studio.weighting.template import TemplateSettings, TemplateWeigher
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+WIDTH, HEIGHT = 640, 480
+FOCAL, DISTANCE, ABOVE = 560.0, 3300.0, 1700.0
+"""Pixels and mm: a person about 200 pixels tall, seen from above as by the Lee walk's cameras."""
+DISTORTION = (-0.32, 0.14, 0.0, 0.0, 0.0)
+FRAMES_PER_SECOND = 60.0
+POSES = 1008
+LIMIT_BLOCKS, LIMIT_PASSES = 8, 8
+
+
+@dataclass(frozen=True, slots=True)
+class Contest:
+    """One thing that is timed. run : does it once. evaluations : in one go."""
+
+    name: str
+    run: Callable[[], object]
+    evaluations: int
+    threads: int = 1
+
+
+def run_benchmark(
+    body_name: str = "human31", repeats: int = 30, progress: Progress | None = None
+) -> dict[str, object]:
+    """Evaluations a second of every weighting, one thread unless it says otherwise, and the limit of edge-region's.
+
+    repeats : of every measurement. progress : told (step, done, total). Changes the number of Numba's threads while it
+    runs, and sets it back.
+    """
+    body = load_body(body_name)
+    cameras = ring_of_cameras(body)
+    rng = np.random.default_rng(0)
+    sigma = np.array([entry.max_step for entry in body.parameters]) / (2.0 * FRAMES_PER_SECOND)
+    poses = body.neutral + sigma * rng.normal(size=(POSES, len(sigma)))
+    evidence = made_evidence(body, cameras, rng)
+    weigher = EdgeRegionWeigher(body, cameras, EdgeRegionSettings())
+    problem = weigher.problem(evidence["proximity"])
+    limits, limit_evaluations = limit_contests(problem, poses)
+    contests = [*weighing_contests(body, cameras, evidence, problem, poses), *limits]
+    best = timed(contests, repeats, progress)
+    rates = {
+        contest.name: contest.evaluations / best[contest.name]
+        for contest in contests
+        if contest not in limits
+    }
+    limit = limit_evaluations / sum(best[contest.name] for contest in limits)
+    rate = rates["edge_region"]
+    return {
+        "edge_region": {
+            "evaluations_per_second": round(rate),
+            "samples": weigher.samples_per_evaluation,
+            "load_limit_per_second": round(limit),
+            "fraction_of_load_limit": round(rate / limit, 3),
+        },
+        "others_evaluations_per_second": {
+            name: round(found) for name, found in rates.items() if name != "edge_region"
+        },
+        "body": body.name,
+        "cameras": len(cameras),
+        "poses": POSES,
+        "repeats": repeats,
+    }
+
+
+def ring_of_cameras(body: BodyModel) -> tuple[Camera, ...]:
+    """Four cameras around a body in its neutral pose, looking at its middle."""
+    middle = limb_ends(body, body.neutral[None]).reshape(-1, 3).mean(axis=0)
+    matrix = np.array([[FOCAL, 0.0, WIDTH / 2], [0.0, FOCAL, HEIGHT / 2], [0.0, 0.0, 1.0]])
+    cameras: list[Camera] = []
+    for number in range(4):
+        bearing = np.deg2rad(45.0 + 90.0 * number)
+        centre = middle + [DISTANCE * np.cos(bearing), DISTANCE * np.sin(bearing), ABOVE]
+        forward = (middle - centre) / np.linalg.norm(middle - centre)
+        right = np.cross(forward, [0.0, 0.0, 1.0])
+        right /= np.linalg.norm(right)
+        rotation = np.stack([right, np.cross(forward, right), forward])
+        distortion = np.array(DISTORTION)
+        cameras.append(
+            Camera(f"made{number + 1}", WIDTH, HEIGHT, matrix, distortion, rotation, -rotation @ centre)
+        )
+    return tuple(cameras)
+
+
+def made_evidence(
+    body: BodyModel, cameras: tuple[Camera, ...], rng: np.random.Generator
+) -> dict[str, FrameEvidence]:
+    """A frame of the body in its neutral pose as its cones, brighter than a noisy ground, by kind of edge map."""
+    corners, _ = OutlineProjector.of_body(body, cameras).corners(body.neutral[None])
+    frames: dict[str, list[ViewEvidence]] = {"proximity": [], "bodytrack": []}
+    for camera, outlines in zip(cameras, corners[0], strict=True):
+        mask = filled(outlines, camera.width, camera.height)
+        grey = np.clip(60.0 + 90.0 * (mask > 0) + rng.normal(0.0, 4.0, mask.shape), 0, 255).astype(np.uint8)
+        picture = np.repeat(grey[:, :, None], 3, axis=2)
+        proximity = proximity_edges(picture, 12.0, 2.0)
+        frames["proximity"].append(ViewEvidence(camera.name, picture, mask, proximity))
+        frames["bodytrack"].append(ViewEvidence(camera.name, picture, mask, bodytrack_edges(picture)))
+    return {kind: FrameEvidence(0, tuple(views)) for kind, views in frames.items()}
+
+
+def filled(outlines: Array, width: int, height: int) -> NDArray[np.uint8]:
+    """(H, W) 255 where a pixel's centre lies in any of the convex outlines (L, 4, 2)."""
+    x, y = np.meshgrid(np.arange(width, dtype=np.float64), np.arange(height, dtype=np.float64))
+    mask = np.zeros((height, width), dtype=np.bool_)
+    for outline in outlines[np.isfinite(outlines).all(axis=(1, 2))]:
+        edges = zip(outline, np.roll(outline, -1, axis=0), strict=True)
+        sides = np.array([(q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]) for p, q in edges])
+        mask |= (sides >= 0.0).all(axis=0) | (sides <= 0.0).all(axis=0)
+    return np.where(mask, np.uint8(255), np.uint8(0))
+
+
+def weighing_contests(
+    body: BodyModel,
+    cameras: tuple[Camera, ...],
+    evidence: dict[str, FrameEvidence],
+    problem: EdgeRegionProblem,
+    poses: Array,
+) -> list[Contest]:
+    """Every weighting on one thread, edge-region on two as well."""
+    aware = EdgeRegionWeigher(body, cameras, EdgeRegionSettings(occlusion_aware=True))
+    problems: dict[str, FrameFunction] = {
+        "edge_region": problem,
+        "edge_region_occlusion_aware": aware.problem(evidence["proximity"]),
+        "bodytrack": BodytrackWeigher(body, cameras, BodytrackSettings()).problem(evidence["bodytrack"]),
+        "template": TemplateWeigher(body, cameras, TemplateSettings()).problem(evidence["proximity"]),
+    }
+    found = [Contest(name, _weighing(entry, poses), len(poses)) for name, entry in problems.items()]
+    if numba.config.NUMBA_NUM_THREADS > 1:  # pyright: ignore[reportAttributeAccessIssue] - set by Numba
+        found.append(Contest("edge_region_two_threads", _weighing(problem, poses), len(poses), threads=2))
+    return found
+
+
+def limit_contests(problem: EdgeRegionProblem, poses: Array) -> tuple[list[Contest], int]:
+    """The loads alone, for LIMIT_BLOCKS blocks of sixteen poses spread over all, and how many evaluations they are."""
+    weigher, maps = problem.weigher, problem.maps
+    outlines = weigher.projector.blocks(poses)
+    outlines = np.ascontiguousarray(outlines[:: max(1, len(outlines) // LIMIT_BLOCKS)][:LIMIT_BLOCKS])
+    blocks, views, limbs = outlines.shape[:3]
+    rows = weigher.samples_per_evaluation // views // LANES
+    indices = np.zeros((blocks, views, LANES, rows, LANES), dtype=np.uint32)
+    hidden = problem.hidden(outlines)
+    record_indices(outlines, hidden, weigher.along_edge, weigher.along_region, maps.views, indices)
+    edge_rows = limbs * EDGE_LINES * len(weigher.along_edge)
+    contests = [
+        Contest(
+            f"limit {block}", _loading(problem, indices[block : block + 1], edge_rows), LANES * LIMIT_PASSES
+        )
+        for block in range(blocks)
+    ]
+    return contests, sum(contest.evaluations for contest in contests)
+
+
+def timed(contests: list[Contest], repeats: int, progress: Progress | None) -> dict[str, float]:
+    """The best time of each, seconds, all run in turns."""
+    threads = numba.get_num_threads()
+    best: dict[str, float] = {}
+    try:
+        for repeat in range(repeats + 1):
+            for contest in contests:
+                numba.set_num_threads(contest.threads)
+                start = time.perf_counter()
+                contest.run()
+                elapsed = time.perf_counter() - start
+                # The first round compiles and warms up.
+                if repeat:
+                    best[contest.name] = min(best.get(contest.name, np.inf), elapsed)
+            if progress is not None:
+                progress("Weighing", repeat, repeats)
+    finally:
+        numba.set_num_threads(threads)
+    return best
+
+
+def _weighing(problem: FrameFunction, poses: Array) -> Callable[[], object]:
+    return lambda: problem.weigh(poses)
+
+
+def _loading(problem: EdgeRegionProblem, indices: NDArray[np.uint32], edge_rows: int) -> Callable[[], object]:
+    pairs = indices.view(np.uint64)
+    sums = np.zeros((*indices.shape[:3], 2), dtype=np.int64)
+    return lambda: loads_only(problem.maps.values, problem.maps.views, pairs, edge_rows, LIMIT_PASSES, sums)
