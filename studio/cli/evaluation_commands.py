@@ -1,6 +1,5 @@
 """`studio evaluate` and `bench`."""
 
-import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from studio.capture.trc import read_trc
 from studio.cli.output import command, progress
 from studio.errors import TruthError
 from studio.evaluation.errors import evaluate
+from studio.evaluation.report import as_document, in_words
 from studio.experiments.benchmark import run_benchmark
 from studio.sessions.workspace import Workspace
 
@@ -33,12 +33,7 @@ def evaluate_command(session: str, run: str, truth: Path | None) -> Mapping[str,
     finally:
         reader.close()
     found = evaluate(np.asarray(poses), frames, stored.body(), read_trc(path), stored.record.fps)
-    told = {key: value for key, value in dataclasses.asdict(found).items()}
-    text = (
-        f"mean {found.mean_mm:.1f} mm, worst frame {found.worst_mm:.1f} mm, frames with a lost limb "
-        f"{found.lost_frames} (marker off by more than 150 mm), no alignment, {len(frames)} frames"
-    )
-    return {**told, "text": text}
+    return {**as_document(found), "text": in_words(found)}
 
 
 @click.command()

@@ -1,0 +1,131 @@
+"""Every command as a stranger calls it: one JSON object, or a cause, a remedy and exit code 2."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from studio.cli.main import COMMANDS, main
+from studio.sessions.session import Session
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(main, list(arguments), catch_exceptions=False)
+
+
+def told(*arguments: str) -> dict:
+    result = run(*arguments, "--json")
+    assert result.exit_code == 0, result.stderr
+    return json.loads(result.stdout)
+
+
+def refused(*arguments: str) -> str:
+    """What a wrong call says; its cause and remedy are one line each, and no traceback is shown."""
+    result = run(*arguments)
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert "Traceback" not in result.stderr
+    return result.stderr
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_help(name: str) -> None:
+    result = run(name, "--help")
+    assert result.exit_code == 0
+    assert "--json" in result.output
+
+
+def test_bodies_lists_parameters_and_limbs() -> None:
+    bodies = {entry["name"]: entry for entry in told("bodies")["bodies"]}
+    assert bodies["human31"]["parameters"] == 31
+    assert bodies["human31"]["limbs"] == 10
+    assert {"Hip", "Neck", "Head", "RWrist"} <= set(bodies["human31"]["markers"])
+
+
+def test_track_writes_poses_in_the_bodys_order(session_on_disk: Session, tmp_path: Path) -> None:
+    poses = tmp_path / "poses.csv"
+    arguments = (
+        "track",
+        session_on_disk.name,
+        "--frames",
+        "0:2",
+        "--particles",
+        "40",
+        "--layers",
+        "3",
+        "--seed",
+        "7",
+    )
+    first = told(*arguments, "--poses", str(poses))
+    assert first["frames"] == 2
+    assert first["seed"] == 7
+    assert first["evaluations_per_frame"] == 120
+    rows = list(csv.reader(poses.open()))
+    body = session_on_disk.body()
+    assert rows[0] == ["frame", *(parameter.name for parameter in body.parameters)]
+    assert [row[0] for row in rows[1:]] == ["0", "1"]
+    told(*arguments, "--poses", str(tmp_path / "again.csv"))
+    assert (tmp_path / "again.csv").read_text() == poses.read_text()
+    listed = told("runs", session_on_disk.name)["runs"]
+    assert [entry["done"] for entry in listed] == [2, 2]
+
+
+def test_condensation_prints_its_likelihood_scale(session_on_disk: Session) -> None:
+    answer = told(
+        "track", session_on_disk.name, "--tracker", "condensation", "--frames", "0:2", "--particles", "60"
+    )
+    assert answer["likelihood_scale"] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("extra", "word"),
+    [
+        (["--set", "survivall=0.4"], "survival"),
+        (["--set", "survival=1.7"], "0.02"),
+        (["--set", "survival"], "knob=value"),
+        (["--particles", "many"], "particles"),
+        (["--frames", "0:9999"], "0:"),
+        (["--frames", "x"], "A:B"),
+        (["--body", "centaur"], "centaur"),
+        (["--start-pose", "nowhere.csv"], "nowhere.csv"),
+        (["--seed", "-1"], "seed"),
+    ],
+)
+def test_wrong_settings_leave_the_session_untouched(
+    session_on_disk: Session, extra: list[str], word: str
+) -> None:
+    before = sorted(session_on_disk.path.rglob("*"))
+    assert word in refused("track", session_on_disk.name, *extra)
+    assert sorted(session_on_disk.path.rglob("*")) == before
+
+
+def test_an_unknown_session_is_named_with_where_it_was_sought() -> None:
+    assert "no session 'nobody'" in refused("track", "nobody")
+
+
+def test_evaluate_needs_a_truth(session_on_disk: Session) -> None:
+    run_name = told("track", session_on_disk.name, "--frames", "0:1", "--particles", "20", "--layers", "2")[
+        "run"
+    ]
+    assert "--truth" in refused("evaluate", session_on_disk.name, run_name)
+
+
+def test_start_pose_file_is_taken(session_on_disk: Session, tmp_path: Path) -> None:
+    body = session_on_disk.body()
+    pose = np.linspace(0.1, 0.4, len(body.parameters))
+    path = tmp_path / "pose.csv"
+    path.write_text(
+        ",".join(parameter.name for parameter in body.parameters)
+        + "\n"
+        + ",".join(map(repr, pose.tolist()))
+        + "\n"
+    )
+    answer = told(
+        "track", session_on_disk.name, "--frames", "0:1", "--particles", "20", "--start-pose", str(path)
+    )
+    record = session_on_disk.run(answer["run"]).record
+    assert record.start_pose == pytest.approx(tuple(pose))
+    assert "pose.csv" in record.start_source
