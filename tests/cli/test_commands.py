@@ -63,7 +63,7 @@ def test_track_writes_poses_in_the_bodys_order(session_on_disk: Session, tmp_pat
     assert first["frames"] == 2
     assert first["seed"] == 7
     assert first["evaluations_per_frame"] == 120
-    rows = list(csv.reader(poses.open()))
+    rows = list(csv.reader(poses.read_text().splitlines()))
     body = session_on_disk.body()
     assert rows[0] == ["frame", *(parameter.name for parameter in body.parameters)]
     assert [row[0] for row in rows[1:]] == ["0", "1"]
