@@ -111,6 +111,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         yield
     finally:
         doors.scene_port = 0
+        await import_routes.end_imports(doors)
         await doors.events.stop()
         await asyncio.to_thread(forget_composers)
         await asyncio.to_thread(doors.stage.stop)

@@ -31,14 +31,25 @@ class BodyLimit:
         if not promised.isdigit() or int(promised) > self.limit:
             await error_response(too_large)(scope, receive, send)
             return
-        received = 0
-
-        async def counting() -> Message:
-            nonlocal received
+        # Read here, because a route's own reading would answer for an error of ours.
+        body = bytearray()
+        more = True
+        while more:
             message = await receive()
-            received += len(message.get("body", b""))
-            if received > self.limit:
-                raise too_large
-            return message
+            if message["type"] == "http.disconnect":
+                return
+            body += message.get("body", b"")
+            more = message.get("more_body", False)
+            if len(body) > self.limit:
+                await error_response(too_large)(scope, receive, send)
+                return
+        given = False
 
-        await self.app(scope, counting, send)
+        async def replay() -> Message:
+            nonlocal given
+            if given:
+                return await receive()
+            given = True
+            return {"type": "http.request", "body": bytes(body), "more_body": False}
+
+        await self.app(scope, replay, send)

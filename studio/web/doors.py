@@ -6,6 +6,7 @@ brings them together.
 """
 
 import asyncio
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -60,14 +61,25 @@ class Control(Protocol):
 
 
 class Shown(Protocol):
-    """What the scene shows, when its own controls moved it."""
+    """What the scene shows, when its own controls moved it (`scene.view_options.Shown`)."""
 
-    session: str
-    run: str
-    frame: int | None
-    layer: int | None
-    look_through: str | None
-    follow: bool
+    @property
+    def session(self) -> str: ...
+
+    @property
+    def run(self) -> str: ...
+
+    @property
+    def frame(self) -> int | None: ...
+
+    @property
+    def layer(self) -> int | None: ...
+
+    @property
+    def look_through(self) -> str | None: ...
+
+    @property
+    def follow(self) -> bool: ...
 
 
 class Stage(Protocol):
@@ -135,6 +147,7 @@ class Doors:
     scene_port: int = 0
     imports: dict[str, ImportState] = field(default_factory=dict)
     uploads: dict[str, dict[str, int]] = field(default_factory=dict)
+    stops: dict[str, threading.Event] = field(default_factory=dict)
     jobs: set[asyncio.Task[None]] = field(default_factory=set)
 
     @property

@@ -45,10 +45,12 @@ class TooLargeError(StudioError):
 def error_response(error: StudioError, page: bool = False) -> Response:
     """An error as JSON, or as a small page where a person typed an address."""
     content = {"code": error.code, "message": error.message, "hint": error.hint, "status": error.status}
+    # What is too large must not be sent to its end for nothing: the connection is closed under it.
+    headers = {"connection": "close"} if error.status == 413 else None
     if page:
         words = PAGE.format(message=html.escape(error.message), hint=html.escape(error.hint))
-        return HTMLResponse(words, error.status)
-    return JSONResponse(content, error.status)
+        return HTMLResponse(words, error.status, headers)
+    return JSONResponse(content, error.status, headers)
 
 
 def validation_words(errors: Sequence[dict]) -> str:

@@ -22,7 +22,7 @@ from studio.web.archives import unpack_zip
 from studio.web.doors import Doors, doors_of
 from studio.web.error_responses import UnforeseenError, log
 from studio.web.import_schemas import FolderView, ImportRequest, ImportState
-from studio.web.safe_paths import PathRefused, folder_to_import
+from studio.web.safe_paths import PathRefused, folder_to_import, relative_path
 from studio.web.samples import install_sample
 from studio.web.schemas import CameraMatching, NewName, SampleRequest
 from studio.web.upload_routes import forget, upload_folder
@@ -38,6 +38,8 @@ FOLDERS_SHOWN = 1000
 @router.post("/imports", status_code=202)
 async def begin_import(wish: ImportRequest, doors: Door) -> ImportState:
     """Begin an import; the name must be free. Ask for its state, or wait for `import` events."""
+    if wish.calibration:
+        relative_path(wish.calibration)
     if (wish.source is None) == (wish.upload is None):
         raise PathRefused("An import needs either 'source' or 'upload'.", "Give a folder, or upload one.")
     into = await asyncio.to_thread(doors.workspace.place_for, wish.name)
@@ -47,6 +49,7 @@ async def begin_import(wish: ImportRequest, doors: Door) -> ImportState:
         source = upload_folder(doors, wish.upload or "")
     state = ImportState(identifier=secrets.token_hex(8), name=wish.name, state="running", step="reading")
     doors.imports[state.identifier] = state
+    doors.stops[state.identifier] = threading.Event()
     while len(doors.imports) > KEPT:
         doors.imports.pop(next(iter(doors.imports)))
     job = asyncio.create_task(asyncio.to_thread(_import, doors, state.identifier, wish, source, into))
@@ -62,6 +65,22 @@ def import_state(identifier: str, doors: Door) -> ImportState:
     if state is None:
         raise NotFoundError(f"There is no import '{identifier[:40]}'.", "Begin a new one.")
     return state
+
+
+@router.delete("/imports/{identifier}", status_code=202)
+def cancel_import(identifier: str, doors: Door) -> ImportState:
+    """Stop an import; nothing of it is kept."""
+    state = import_state(identifier, doors)
+    if identifier in doors.stops:
+        doors.stops[identifier].set()
+    return state
+
+
+async def end_imports(doors: Doors) -> None:
+    """Stop all imports and wait for their threads."""
+    for stop in doors.stops.values():
+        stop.set()
+    await asyncio.gather(*doors.jobs, return_exceptions=True)
 
 
 @router.post("/samples", status_code=201)
@@ -92,15 +111,14 @@ def folders(
 
 def _import(doors: Doors, identifier: str, wish: ImportRequest, source: Path, into: Path) -> None:
     """Do the import in this thread, keeping its state up to date; never raises."""
-    lock = threading.Lock()
+    stop = doors.stops[identifier]
 
     def tell(**changes: object) -> None:
-        with lock:
-            state = doors.imports.get(identifier)
-            if state is not None:
-                doors.imports[identifier] = state = state.model_copy(update=changes)
-                message: dict[str, object] = {"type": "import", "session": wish.name, "run": ""}
-                doors.events.publish(message | state.model_dump())
+        state = doors.imports.get(identifier)
+        if state is not None:
+            doors.imports[identifier] = state = state.model_copy(update=changes)
+            message: dict[str, object] = {"type": "import", "session": wish.name, "run": ""}
+            doors.events.publish(message | state.model_dump())
 
     try:
         folder = _unpacked(source, tell) if wish.upload else source
@@ -111,6 +129,7 @@ def _import(doors: Doors, identifier: str, wish: ImportRequest, source: Path, in
             fps=wish.fps,
             copy=wish.copy_footage or wish.upload is not None,
             progress=lambda step, done, total: tell(step=step, done=done, total=total),
+            cancelled=stop.is_set,
         )
     except StudioError as error:
         tell(state="failed", code=error.code, message=error.message, hint=error.hint)
@@ -120,6 +139,8 @@ def _import(doors: Doors, identifier: str, wish: ImportRequest, source: Path, in
         wrong = UnforeseenError(f"The import failed: {type(error).__name__}.", f"See '{doors.log_path}'.")
         tell(state="failed", code=wrong.code, message=wrong.message, hint=wrong.hint)
         return
+    finally:
+        doors.stops.pop(identifier, None)
     if wish.upload:
         forget(doors, wish.upload)
     tell(
@@ -145,11 +166,13 @@ def _unpacked(folder: Path, tell: Callable[..., None]) -> Path:
             raise
         files[0].unlink()
         folder = unpacked
-    while (
-        len(inside := [path for path in folder.iterdir() if path.name != "__MACOSX"]) == 1
-        and inside[0].is_dir()
-    ):
-        if inside[0].name.lower() in ("videos", "calibration"):
+    while len(inside := [path for path in folder.iterdir() if not _is_litter(path.name)]) == 1:
+        if not inside[0].is_dir() or inside[0].name.lower() in ("videos", "pictures", "calibration"):
             break
         folder = inside[0]
     return folder
+
+
+def _is_litter(name: str) -> bool:
+    """Whether a name is something that systems leave in folders."""
+    return name.startswith(".") or name in ("__MACOSX", "Thumbs.db", "desktop.ini")

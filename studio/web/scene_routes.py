@@ -18,7 +18,7 @@ class SceneWish(Request):
 
     With `session` the whole moment is named: `run` left out shows the session alone, `layer` left out
     all layers. look_through: a camera's name, null or "" for the free view. options: what is drawn, by the
-    names of the scene's own view options (body, truth, particles, trails, cameras, pictures, overlays, colour_by, …).
+    names of the scene's own view options (body, truth, particles, trails, cameras, pictures, overlays …).
     """
 
     session: RunName | None = None

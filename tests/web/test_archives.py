@@ -1,0 +1,116 @@
+"""Zips are unpacked without being believed."""
+
+import io
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from studio.errors import StudioError
+from studio.web.archives import ArchiveError, ArchiveLimits, unpack_zip
+
+
+def packed(path: Path, *entries: tuple[str, bytes]) -> Path:
+    """A zip with these names and contents."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in entries:
+            archive.writestr(name, content)
+    return path
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Where to unpack."""
+    made = tmp_path / "unpacked"
+    made.mkdir()
+    return made
+
+
+def written(folder: Path) -> list[str]:
+    """All files under a folder."""
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
+
+
+def test_a_good_zip_comes_out_byte_for_byte(tmp_path: Path, folder: Path) -> None:
+    archive = packed(tmp_path / "a.zip", ("take/", b""), ("take/videos/a.mp4", b"12345"), ("take/b.txt", b""))
+    assert unpack_zip(archive, folder) == 5
+    assert (folder / "take/videos/a.mp4").read_bytes() == b"12345"
+    assert written(folder) == ["take/b.txt", "take/videos/a.mp4"]
+
+
+@pytest.mark.parametrize("name", ["../out", "/abs", "a/../../out", "a\\..\\out", "C:out", "con"])
+def test_names_that_lead_out_are_refused_before_anything_is_written(
+    tmp_path: Path, folder: Path, name: str
+) -> None:
+    archive = packed(tmp_path / "a.zip", ("fine.txt", b"1"), ("placeholder", b"2"))
+    # zipfile would clean the name while writing, so it is put into the file afterwards.
+    archive.write_bytes(archive.read_bytes().replace(b"placeholder", name.encode().ljust(11, b"_")[:11]))
+    if name == "con":
+        archive = packed(tmp_path / "b.zip", ("fine.txt", b"1"), (name, b"2"))
+    with pytest.raises(StudioError):
+        unpack_zip(archive, folder)
+    assert written(folder) == []
+
+
+def test_links_are_refused(tmp_path: Path, folder: Path) -> None:
+    path = tmp_path / "a.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        entry = zipfile.ZipInfo("link")
+        entry.external_attr = 0o120777 << 16
+        archive.writestr(entry, "/etc/passwd")
+    with pytest.raises(ArchiveError, match="link"):
+        unpack_zip(path, folder)
+
+
+def test_a_bomb_is_stopped_by_the_bytes_that_come_out(tmp_path: Path, folder: Path) -> None:
+    archive = packed(tmp_path / "a.zip", ("zeros", bytes(30_000_000)))
+    assert archive.stat().st_size < 60_000
+    limits = ArchiveLimits(ratio=50.0, free=1_000_000)
+    with pytest.raises(ArchiveError, match="more than is allowed"):
+        unpack_zip(archive, folder, limits)
+    assert sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) <= 50 * 60_000 + (1 << 20)
+
+
+def test_sizes_claimed_in_the_index_do_not_help_a_bomb(tmp_path: Path, folder: Path) -> None:
+    """The index says that the entry has 10 bytes; the data are far more."""
+    archive = packed(tmp_path / "a.zip", ("zeros", bytes(3_000_000)))
+    content = bytearray(archive.read_bytes())
+    for place in (content.find(b"PK\x01\x02") + 24, content.find(b"PK\x03\x04") + 22):
+        content[place : place + 4] = (10).to_bytes(4, "little")
+    archive.write_bytes(content)
+    with pytest.raises(ArchiveError):
+        unpack_zip(archive, folder, ArchiveLimits(total=1_000_000))
+
+
+@pytest.mark.parametrize("limits", [ArchiveLimits(entries=1), ArchiveLimits(total=3)])
+def test_limits_of_count_and_total(tmp_path: Path, folder: Path, limits: ArchiveLimits) -> None:
+    archive = packed(tmp_path / "a.zip", ("a", b"12"), ("b", b"34"))
+    with pytest.raises(ArchiveError):
+        unpack_zip(archive, folder, limits)
+
+
+def test_the_same_name_twice_is_refused(tmp_path: Path, folder: Path) -> None:
+    path = tmp_path / "a.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("a", "1")
+        archive.writestr("A", "2")
+    with pytest.raises(ArchiveError, match="twice"):
+        unpack_zip(path, folder)
+
+
+@pytest.mark.parametrize("content", [b"", b"no zip", b"PK\x03\x04" + bytes(40)])
+def test_what_is_no_zip_is_named_so(tmp_path: Path, folder: Path, content: bytes) -> None:
+    path = tmp_path / "a.zip"
+    path.write_bytes(content)
+    with pytest.raises(ArchiveError, match=r"a\.zip"):
+        unpack_zip(path, folder)
+
+
+def test_a_zip_cut_short_is_refused(tmp_path: Path, folder: Path) -> None:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        archive.writestr("a", bytes(range(256)) * 50)
+    path = tmp_path / "a.zip"
+    path.write_bytes(stream.getvalue()[:-200])
+    with pytest.raises(ArchiveError):
+        unpack_zip(path, folder)

@@ -1,0 +1,161 @@
+"""Stand-ins for the tracking process and the scene that keep their contracts, and a server in a thread."""
+
+import socket
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import httpx
+import uvicorn
+from fastapi import FastAPI
+
+from studio.errors import RunError
+from studio.sessions.workspace import Workspace
+from studio.worker.commands import Command
+from studio.worker.events import Event, StateChanged
+from studio.worker.watchers import Subscription, Watchers
+
+NAN = float("nan")
+TOKEN = "a-token-that-only-this-test-knows_0123456789"
+
+
+def state_of(session: str = "", run: str = "", state: str = "idle") -> StateChanged:
+    """A state with nothing measured."""
+    return StateChanged(session, run, state, 0, 0, 0, 4, 0, NAN, NAN)
+
+
+class RecordingControl:
+    """A tracking process that does nothing but note what it was told."""
+
+    def __init__(self) -> None:
+        self.watchers = Watchers()
+        self.state = state_of()
+        self.commands: list[Command] = []
+        self.changes: list[dict[str, object]] = []
+        self.calls: list[str] = []
+
+    def start(self) -> None:
+        self.calls.append("start")
+
+    def send(self, command: Command) -> None:
+        if self.state.state == "lost":
+            raise RunError("The tracking process has died.", "Resume.")
+        self.commands.append(command)
+
+    def change_settings(self, **changes: bool | int | float | str) -> None:
+        self.changes.append(dict(changes))
+
+    def subscribe(self) -> Subscription:
+        return self.watchers.subscribe()
+
+    def restart(self, resume: bool = True) -> None:
+        self.calls.append(f"restart resume={resume}")
+        self.state = state_of()
+
+    def close(self) -> None:
+        self.calls.append("close")
+
+    def say(self, event: Event) -> None:
+        """Let the process say something."""
+        if isinstance(event, StateChanged):
+            self.state = event
+        self.watchers.publish(event)
+
+
+@dataclass
+class RecordingStage:
+    """A scene that notes what it is told to show; `port` may be that of any WebSocket server."""
+
+    port: int = 0
+    headers: Mapping[str, str] = field(default_factory=dict)
+    calls: list[tuple[object, ...]] = field(default_factory=list)
+    moved: Callable[[object], None] | None = None
+
+    def start(self) -> int:
+        self.calls.append(("start",))
+        return self.port
+
+    def stop(self) -> None:
+        self.calls.append(("stop",))
+
+    def relay_headers(self) -> Mapping[str, str]:
+        return self.headers
+
+    def watch(self, callback: Callable[[object], None]) -> None:
+        self.moved = callback
+
+    def show_run(
+        self, session: str, run: str = "", frame: int | None = None, layer: int | None = None
+    ) -> None:
+        self.calls.append(("run", session, run, frame, layer))
+
+    def show_frame(self, frame: int) -> None:
+        self.calls.append(("frame", frame))
+
+    def show_layer(self, layer: int | None) -> None:
+        self.calls.append(("layer", layer))
+
+    def look_through(self, camera: str | None) -> None:
+        self.calls.append(("look_through", camera))
+
+    def set_options(self, **changes: object) -> None:
+        self.calls.append(("options", changes))
+
+    def play(self, playing: bool) -> None:
+        self.calls.append(("play", playing))
+
+
+@dataclass
+class Studio:
+    """A served application with everything that stands behind it."""
+
+    base: str
+    client: httpx.Client
+    control: RecordingControl
+    stage: RecordingStage
+    workspace: Workspace
+    app: FastAPI
+    log_path: Path
+
+
+@contextmanager
+def serving(app: FastAPI) -> Iterator[str]:
+    """The application behind a real server on a free loopback port; yields its address."""
+    listener = socket.socket()
+    listener.bind(("127.0.0.1", 0))
+    listener.listen(32)
+    started = threading.Event()
+
+    class Server(uvicorn.Server):
+        async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+            await super().startup(sockets)
+            started.set()
+
+    config = uvicorn.Config(app, log_config=None, access_log=False, ws="auto", timeout_graceful_shutdown=2)
+    server = Server(config)
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
+    thread.start()
+    try:
+        assert started.wait(30.0), "the server did not start"
+        yield f"http://127.0.0.1:{listener.getsockname()[1]}"
+    finally:
+        server.should_exit = True
+        thread.join(30.0)
+        listener.close()
+        assert not thread.is_alive(), "the server did not stop"
+
+
+@contextmanager
+def let_in(base: str, token: str) -> Iterator[httpx.Client]:
+    """A browser's client that opened the printed address: it has the cookie and names its origin."""
+    with httpx.Client(base_url=base, headers={"origin": base}, timeout=30.0) as client:
+        answer = client.get("/", params={"token": token})
+        assert answer.status_code == 303, answer.text
+        yield client
+
+
+def cookie_header(client: httpx.Client) -> str:
+    """The client's cookies, for a WebSocket."""
+    return "; ".join(f"{name}={value}" for name, value in client.cookies.items())
