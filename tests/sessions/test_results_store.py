@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from records import layer_of, result_of
+from store_records import layer_of, result_of
 
 from studio.errors import NotFoundError, RunError, SessionError
 from studio.sessions.results_codec import kept_rows, particles_from
@@ -174,7 +174,7 @@ def test_a_writer_killed_in_the_middle_of_a_frame_leaves_whole_frames_only(tmp_p
         """
         import os, signal, sys
         from pathlib import Path
-        from records import layer_of, result_of
+        from store_records import layer_of, result_of
         from studio.sessions.results_store import ResultsWriter
 
         def layers(frame, deadly):
@@ -195,7 +195,7 @@ def test_a_writer_killed_in_the_middle_of_a_frame_leaves_whole_frames_only(tmp_p
             writer.write_frame(result_of(frame), layers(frame, False))
         """
     )
-    paths = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    paths = os.pathsep.join([str(Path(__file__).parents[1]), *sys.path])
     done = subprocess.run(
         [sys.executable, "-c", script, str(tmp_path)], env={**os.environ, "PYTHONPATH": paths}, check=False
     )

@@ -5,7 +5,7 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-from records import layer_of, result_of
+from store_records import layer_of, result_of
 from test_catalogue import record_of
 from toy_session import make_session
 

@@ -1,0 +1,41 @@
+"""Latest wins, all or nothing."""
+
+import pytest
+
+from studio.errors import SettingsError
+from studio.settings import default_settings
+from studio.worker.settings_mailbox import SettingsMailbox
+
+
+def test_each_change_is_a_version_and_the_newest_is_read() -> None:
+    mailbox = SettingsMailbox(3, default_settings())
+    assert mailbox.change({"survival": 0.4}) == ("survival",)
+    assert set(mailbox.change({"survival": 0.3, "layers": 5})) == {"survival", "layers"}
+    version, settings = mailbox.latest()
+    assert version == 5
+    assert (settings.tracker.survival, settings.tracker.layers) == (0.3, 5)
+
+
+def test_a_change_to_the_same_value_is_none() -> None:
+    mailbox = SettingsMailbox(1, default_settings())
+    before = mailbox.latest()
+    assert mailbox.change({"survival": before[1].tracker.survival}) == ()
+    assert mailbox.latest() is before
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"survival": 0.4, "layers": 0},
+        {"survival": 0.4, "speed": 1},
+        {"survival": 0.4, "start_repeats": 7},
+        {"survival": float("nan")},
+    ],
+)
+def test_what_is_refused_changes_nothing(changes: dict[str, object]) -> None:
+    mailbox = SettingsMailbox(1, default_settings())
+    before = mailbox.latest()
+    with pytest.raises(SettingsError) as caught:
+        mailbox.change(changes)
+    assert caught.value.hint
+    assert mailbox.latest() is before

@@ -1,0 +1,390 @@
+"""What each command does, between two layers of a frame (no process here: the job is stepped by hand)."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from toy_session import make_session, true_poses
+
+from studio.runs.new_run import RunRequest, prepare_run
+from studio.sessions.run_log import read_log
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.sessions.workspace import Workspace
+from studio.worker import commands
+from studio.worker.events import (
+    Acknowledged,
+    Event,
+    FrameFinished,
+    LayerFinished,
+    LogLine,
+    SettingsApplied,
+    StateChanged,
+)
+from studio.worker.tracking_job import TrackingJob
+
+LAYERS = 3
+
+
+def new_run(session: Session, name: str) -> StoredRun:
+    changes = {"particles": 30, "layers": LAYERS, "start_repeats": 1}
+    request = RunRequest(name=name, seed=5, start_pose=true_poses()[0], last=4, changes=changes)
+    return prepare_run(session, request)
+
+
+class Desk:
+    """A job with everything that it says."""
+
+    def __init__(self) -> None:
+        self.events: list[Event] = []
+        self.job = TrackingJob(self.events.append)
+
+    def ask(self, command: commands.Command) -> Acknowledged:
+        self.job.serve(command)
+        answer = self.events[-1]
+        assert isinstance(answer, Acknowledged)
+        assert answer.identifier == command.identifier
+        assert answer.command == type(command).__name__
+        return answer
+
+    def open(self, run: StoredRun) -> None:
+        assert self.ask(commands.Open(session=str(run.folder.parents[1]), run=str(run.folder))).ok
+
+    def layers(self) -> list[tuple[int, int, bool]]:
+        found = [event for event in self.events if isinstance(event, LayerFinished)]
+        return [(event.record.frame, event.record.layer, event.reannealed) for event in found]
+
+    def advance(self, times: int) -> None:
+        for _ in range(times):
+            assert self.job.busy
+            self.job.advance()
+
+    def work(self) -> None:
+        while self.job.busy:
+            self.job.advance()
+
+    @property
+    def state(self) -> StateChanged:
+        return [event for event in self.events if isinstance(event, StateChanged)][-1]
+
+    @property
+    def settings(self) -> SettingsApplied:
+        return [event for event in self.events if isinstance(event, SettingsApplied)][-1]
+
+
+@pytest.fixture
+def desk():
+    made = Desk()
+    yield made
+    made.job.close()
+
+
+@pytest.fixture
+def run(session_on_disk: Session) -> StoredRun:
+    return new_run(session_on_disk, "a")
+
+
+def poses_of(run: StoredRun) -> np.ndarray:
+    with run.results() as results:
+        return results.poses()[1]
+
+
+@pytest.fixture
+def unbroken(session_on_disk: Session) -> np.ndarray:
+    whole, desk = new_run(session_on_disk, "unbroken"), Desk()
+    desk.open(whole)
+    desk.ask(commands.Start())
+    desk.work()
+    desk.job.close()
+    return poses_of(whole)
+
+
+def test_from_open_to_finished(desk: Desk, run: StoredRun) -> None:
+    desk.open(run)
+    assert (desk.state.state, desk.state.first, desk.state.last, desk.state.done) == ("paused", 0, 4, 0)
+    assert (desk.state.session, desk.state.run) == ("toy", "a")
+    assert desk.settings.values["particles"] == 30
+    assert not desk.job.busy
+    assert desk.ask(commands.Start()).ok
+    assert desk.state.state == "tracking"
+    desk.work()
+    assert desk.state.state == "finished"
+    assert desk.state.done == 4
+    assert desk.layers() == [(frame, layer, False) for frame in range(4) for layer in range(LAYERS)]
+    finished = [event for event in desk.events if isinstance(event, FrameFinished)]
+    assert np.array_equal([event.result.estimate.pose for event in finished], poses_of(run))
+    assert [entry.text for entry in read_log(run.folder)] == ["Tracking from frame 0.", "Finished: 4 frames."]
+    assert not desk.ask(commands.Start()).ok
+
+
+def test_compiling_is_said_once(desk: Desk, run: StoredRun) -> None:
+    desk.open(run)
+    desk.ask(commands.Start())
+    desk.work()
+    said = [event.state for event in desk.events if isinstance(event, StateChanged)]
+    assert said[:4] == ["paused", "tracking", "compiling", "tracking"]
+    assert said.count("compiling") == 1
+
+
+def test_every_command_works_inside_a_frame(desk: Desk, run: StoredRun, unbroken: np.ndarray) -> None:
+    desk.open(run)
+    desk.ask(commands.Start())
+    desk.advance(LAYERS + 1)
+    for command in (
+        commands.Start(),
+        commands.Seek(frame=0),
+        commands.ChangeSettings(changes={}),
+        commands.Pause(),
+        commands.StepLayer(),
+        commands.StepFrame(),
+        commands.Reanneal(frame=0),
+        commands.Start(),
+        commands.Cancel(),
+        commands.Start(),
+    ):
+        assert desk.ask(command).ok, command
+        desk.advance(1) if desk.job.busy else None
+    desk.work()
+    assert np.array_equal(poses_of(run), unbroken)
+    assert desk.ask(commands.Stop()).ok
+    assert desk.job.stopped
+
+
+def test_a_layers_step_stops_in_the_frame_and_the_next_goes_on_from_its_particles(
+    desk: Desk, run: StoredRun, unbroken: np.ndarray
+) -> None:
+    desk.open(run)
+    waiting = None
+    for done in range(1, LAYERS):
+        desk.ask(commands.StepLayer())
+        desk.work()
+        assert (desk.state.state, desk.state.frame, desk.state.layer) == ("paused", 0, done)
+        last = [event for event in desk.events if isinstance(event, LayerFinished)][-1]
+        if waiting is not None:
+            assert np.array_equal(last.record.poses, waiting)
+        with run.results() as results:
+            partial = results.partial()
+            assert [record.layer for record in results.layers(0)] == list(range(done))
+        assert partial is not None
+        assert partial.next_layer == done
+        waiting = partial.state["set_poses"]
+    desk.ask(commands.Start())
+    desk.work()
+    assert np.array_equal(poses_of(run), unbroken)
+
+
+def test_a_frames_step_stops_at_its_end(desk: Desk, run: StoredRun) -> None:
+    desk.open(run)
+    desk.ask(commands.StepLayer())
+    desk.work()
+    desk.ask(commands.StepFrame())
+    desk.work()
+    assert (desk.state.state, desk.state.frame, desk.state.layer, desk.state.done) == ("paused", 1, 0, 1)
+
+
+def test_settings_change_between_two_layers_and_say_so(desk: Desk, run: StoredRun) -> None:
+    desk.open(run)
+    desk.ask(commands.Start())
+    desk.advance(LAYERS + 1)
+    assert desk.ask(commands.ChangeSettings(changes={"survival": 0.2})).ok
+    desk.advance(1)
+    said = desk.settings
+    assert (said.version, said.frame, said.layer, said.changed) == (2, 1, 1, ("survival",))
+    assert said.values["survival"] == 0.2
+    last = [event for event in desk.events if isinstance(event, LayerFinished)][-1]
+    assert (last.record.settings_version, last.record.alpha_wanted) == (2, 0.2)
+    refused = desk.ask(commands.ChangeSettings(changes={"survival": 2.0}))
+    assert (refused.ok, refused.code) == (False, "settings")
+    assert "survival" in refused.message
+
+
+def test_a_change_while_paused_anneals_the_frame_again_and_stores_nothing(
+    desk: Desk, run: StoredRun, unbroken: np.ndarray
+) -> None:
+    desk.open(run)
+    desk.ask(commands.StepFrame())
+    desk.work()
+    asked = commands.ChangeSettings(changes={"survival": 0.2})
+    desk.events.clear()
+    desk.ask(asked)
+    assert desk.state.state == "reannealing"
+    desk.work()
+    assert desk.layers() == [(0, layer, True) for layer in range(LAYERS)]
+    assert all(event.asked_at == asked.asked_at for event in desk.events if isinstance(event, LayerFinished))
+    assert (desk.settings.version, desk.settings.changed) == (2, ("survival",))
+    assert desk.state.state == "paused"
+    assert np.array_equal(poses_of(run), unbroken[:1])
+    with run.results() as results:
+        assert [entry.version for entry in results.settings_history()] == [1]
+    desk.ask(commands.ChangeSettings(changes={"survival": 0.5}))
+    desk.work()
+    desk.ask(commands.Start())
+    desk.work()
+    assert np.array_equal(poses_of(run), unbroken)
+
+
+def test_a_dragged_slider_shows_an_answer_and_then_the_newest(desk: Desk, run: StoredRun) -> None:
+    desk.open(run)
+    desk.ask(commands.StepFrame())
+    desk.work()
+    desk.events.clear()
+    desk.ask(commands.ChangeSettings(changes={"survival": 0.2}))
+    desk.advance(1)
+    for survival in (0.25, 0.3, 0.35):
+        desk.ask(commands.ChangeSettings(changes={"survival": survival}))
+    desk.work()
+    wanted = [event.record.alpha_wanted for event in desk.events if isinstance(event, LayerFinished)]
+    assert wanted == [0.2] * LAYERS + [0.35] * LAYERS
+
+
+def test_the_selected_frame_is_the_one_that_is_annealed(desk: Desk, run: StoredRun) -> None:
+    desk.open(run)
+    desk.ask(commands.Start())
+    desk.work()
+    assert desk.ask(commands.Seek(frame=2)).ok
+    assert desk.state.selected == 2
+    desk.events.clear()
+    desk.ask(commands.Reanneal())
+    desk.work()
+    assert desk.layers() == [(2, layer, True) for layer in range(LAYERS)]
+    again = [event.record for event in desk.events if isinstance(event, LayerFinished)]
+    with run.results() as results:
+        for one, other in zip(again, results.layers(2), strict=True):
+            assert np.array_equal(one.poses, other.poses)
+            assert np.array_equal(one.log_weights, other.log_weights)
+    refused = desk.ask(commands.Seek(frame=9))
+    assert (refused.ok, refused.code) == (False, "not-found")
+    assert desk.state.state == "finished"
+
+
+def test_an_answer_that_is_kept_is_the_runs_own(desk: Desk, run: StoredRun) -> None:
+    desk.open(run)
+    desk.ask(commands.Start())
+    desk.work()
+    desk.ask(commands.Seek(frame=1))
+    desk.ask(commands.ChangeSettings(changes={"survival": 0.2}))
+    desk.work()
+    desk.ask(commands.Reanneal(frame=1, keep=True))
+    desk.work()
+    last = [event for event in desk.events if isinstance(event, FrameFinished)][-1]
+    assert not last.reannealed
+    assert np.array_equal(poses_of(run)[1], last.result.estimate.pose)
+    assert (desk.state.state, desk.state.done, desk.state.frame) == ("paused", 2, 2)
+    desk.ask(commands.Start())
+    desk.work()
+    assert desk.state.state == "finished"
+    with run.results() as results:
+        assert {record.settings_version for record in results.layers(3)} == {2}
+
+
+def test_cancelled_and_taken_up_after_all(desk: Desk, run: StoredRun, unbroken: np.ndarray) -> None:
+    desk.open(run)
+    desk.ask(commands.Start())
+    desk.advance(LAYERS + 2)
+    assert desk.ask(commands.Cancel()).ok
+    assert desk.state.state == "cancelled"
+    assert not desk.job.busy
+    desk.job.close()
+    assert run.summary().status == "cancelled"
+    other = Desk()
+    other.open(run)
+    assert other.state.state == "cancelled"
+    other.ask(commands.Start())
+    other.work()
+    other.job.close()
+    assert np.array_equal(poses_of(run), unbroken)
+    assert run.summary().status == "finished"
+
+
+def test_without_a_run_everything_is_refused_in_words(desk: Desk, tmp_path: Path) -> None:
+    for command in (commands.Start(), commands.Pause(), commands.Reanneal(frame=0), commands.Cancel()):
+        answer = desk.ask(command)
+        assert not answer.ok
+        assert answer.hint
+    missing = desk.ask(commands.Open(session=str(tmp_path), run=str(tmp_path / "runs" / "x")))
+    assert missing.code == "not-found"
+    assert desk.job.busy is False
+
+
+def test_runs_wait_for_each_other(desk: Desk, session_on_disk: Session) -> None:
+    runs = [new_run(session_on_disk, name) for name in ("a", "b", "c", "d")]
+    folder = str(session_on_disk.path)
+    for run in runs:
+        assert desk.ask(commands.Enqueue(session=folder, run=str(run.folder))).ok
+    assert desk.state.run == "a"
+    assert desk.state.waiting == (("toy", "b"), ("toy", "c"), ("toy", "d"))
+    assert not desk.ask(commands.Enqueue(session=folder, run=str(runs[0].folder))).ok
+    assert desk.ask(commands.Dequeue(session=folder, run=str(runs[2].folder))).ok
+    desk.advance(2)
+    desk.ask(commands.Cancel())
+    assert (desk.state.run, desk.state.state, desk.state.waiting) == ("b", "tracking", (("toy", "d"),))
+    desk.work()
+    assert [run.summary().status for run in runs] == ["cancelled", "finished", "new", "finished"]
+
+
+def test_another_run_opened_while_tracking_leaves_the_first_saved_whole(
+    desk: Desk, run: StoredRun, session_on_disk: Session, unbroken: np.ndarray
+) -> None:
+    other = new_run(session_on_disk, "b")
+    desk.open(run)
+    desk.ask(commands.Start())
+    desk.advance(LAYERS + 2)
+    desk.open(run)
+    assert desk.state.state == "tracking"
+    desk.open(other)
+    assert (desk.state.run, desk.state.state) == ("b", "paused")
+    with run.results() as results:
+        partial = results.partial()
+    assert partial is not None
+    assert (partial.frame, partial.next_layer) == (1, 2)
+    desk.open(run)
+    desk.ask(commands.Start())
+    desk.work()
+    assert np.array_equal(poses_of(run), unbroken)
+
+
+def test_a_frame_that_cannot_be_read_fails_the_run_and_can_be_tried_again(
+    desk: Desk, run: StoredRun, session_on_disk: Session, unbroken: np.ndarray
+) -> None:
+    path = session_on_disk.path / "pictures" / "front" / "0002.png"
+    picture = path.read_bytes()
+    path.write_bytes(picture[: len(picture) // 2])
+    desk.open(run)
+    desk.ask(commands.Start())
+    desk.work()
+    assert (desk.state.state, desk.state.done) == ("failed", 2)
+    assert "0002.png" in desk.state.message
+    assert desk.state.hint
+    errors = [event for event in desk.events if isinstance(event, LogLine) and event.level == "error"]
+    assert len(errors) == 1
+    path.write_bytes(picture)
+    assert desk.ask(commands.Start()).ok
+    desk.work()
+    assert desk.state.state == "finished"
+    assert np.array_equal(poses_of(run), unbroken)
+
+
+def test_a_fault_of_the_program_is_an_event_with_its_traceback(
+    desk: Desk, run: StoredRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    desk.open(run)
+    monkeypatch.setattr(cv2, "imdecode", lambda *_: 1 / 0)
+    desk.ask(commands.Start())
+    desk.work()
+    assert desk.state.state == "failed"
+    assert "ZeroDivisionError" in desk.state.message
+    assert any(isinstance(event, LogLine) and "Traceback" in event.text for event in desk.events)
+
+
+def test_closing_a_run_lets_go_of_its_pictures(desk: Desk, run: StoredRun, tmp_path: Path) -> None:
+    desk.open(run)
+    desk.ask(commands.Start())
+    desk.advance(2)
+    opened = desk.job._run
+    assert opened is not None
+    make_session(Workspace().root / "other")
+    desk.open(new_run(Workspace().session("other"), "x"))
+    assert not opened._problems._evidence
+    assert not opened._problems._problems
+    assert not run.being_tracked()
