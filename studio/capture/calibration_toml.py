@@ -52,7 +52,7 @@ class AssumedCrop:
         size = f"{self.calibrated[0]}x{self.calibrated[1]}"
         if self.scale != 1.0:
             return (
-                f"Camera {camera}: assumed crop: none (0 px), since the footage has black bars: the whole {size}"
+                f"Camera {camera}: assumed crop: none (0 px), as the footage has black bars: the whole {size}"
                 f" picture was scaled by {self.scale:.4f} and {'; '.join(what)}."
             )
         return (

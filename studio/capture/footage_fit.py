@@ -51,7 +51,8 @@ def fit_camera(
 def black_margins(pictures: Sequence[NDArray[np.uint8]]) -> Margins:
     """How many columns and rows are black in all pictures: left, top, right, bottom.
 
-    pictures : (H, W, 3) each. A dark scene is no bar: the row or column beside a bar must hold something bright.
+    pictures : (H, W, 3) each. A dark scene is no bar: the row or column beside a bar must hold something
+    bright.
     """
     brightest = np.max([picture.max(axis=2) for picture in pictures], axis=0)
     columns, rows = brightest.max(axis=0), brightest.max(axis=1)

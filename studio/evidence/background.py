@@ -30,6 +30,8 @@ GREY_SPREAD = 2.0
 colour."""
 BACKGROUND_SHARE = 0.7
 """Weight of the mixture's Gaussians that are background; what covers a pixel more rarely is foreground."""
+LEAST_VARIANCE = 16.0
+"""Of the mixture's Gaussians: a few still training frames would make a pixel's noise look smaller than it is."""
 FROZEN = {"mog2": 0.0, "knn": 1e-8}
 """Learning rates that change nothing (0 means "now" to OpenCV's KNN). Both models then see the training
 frames twice more, so that updates already due and the order of a mixture's Gaussians are settled."""
@@ -93,6 +95,8 @@ class SubtractorBackground:
         if kind == "mog2":
             self._model = cv2.createBackgroundSubtractorMOG2(count, 16.0, True)
             self._model.setBackgroundRatio(BACKGROUND_SHARE)
+            self._model.setVarMin(LEAST_VARIANCE)
+            self._model.setVarInit(LEAST_VARIANCE)
         else:
             self._model = cv2.createBackgroundSubtractorKNN(count, 400.0, True)
         cv2.setRNGSeed(0)

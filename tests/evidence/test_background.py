@@ -1,0 +1,139 @@
+"""Background models: noise, gain, shadows, ghosts, and masks that depend on nothing but the frame."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from studio.evidence.background import (
+    GaussianBackground,
+    SubtractorBackground,
+    gaussian_from_frames,
+    gaussian_from_median,
+)
+from studio.evidence.settings import EvidenceSettings
+
+HEIGHT, WIDTH, NOISE = 96, 128, 3.0
+SETTINGS = EvidenceSettings()
+ROOM = np.random.default_rng(7).uniform(60.0, 200.0, (HEIGHT, WIDTH, 3))
+PERSON = (slice(30, 70), slice(50, 75))
+SHADOW = (slice(70, 85), slice(50, 90))
+
+
+def seen(light: np.ndarray, seed: int) -> np.ndarray:
+    """A camera's picture of `light` with noise."""
+    noise = np.random.default_rng(seed).normal(0.0, NOISE, light.shape)
+    return np.clip(np.round(light + noise), 0, 255).astype(np.uint8)
+
+
+def scene(seed: int, gain: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> tuple[np.ndarray, np.ndarray]:
+    """A frame with a person in a colour of their own and a shadow of 70 %, and the person's mask."""
+    light = ROOM.copy()
+    light[SHADOW] *= 0.7
+    light[PERSON] = (30.0, 60.0, 230.0)
+    mask = np.zeros((HEIGHT, WIDTH), bool)
+    mask[PERSON] = True
+    return seen(light * np.array(gain), seed), mask
+
+
+def model() -> GaussianBackground:
+    return gaussian_from_frames([seen(ROOM, seed) for seed in range(100, 130)])
+
+
+def test_mean_and_deviation_of_an_empty_clip() -> None:
+    frames = [seen(ROOM, seed) for seed in range(40)]
+    found = gaussian_from_frames(frames)
+    np.testing.assert_allclose(found.mean, np.mean(frames, axis=0), rtol=1e-5)
+    np.testing.assert_allclose(np.sqrt(found.variance), np.std(frames, axis=0), atol=2e-2)
+
+
+def test_person_is_found_and_the_shadow_is_not() -> None:
+    frame, mask = scene(1)
+    found = model().foreground(frame, SETTINGS) > 0
+    assert found[mask].mean() > 0.99
+    assert found[SHADOW].mean() < 0.01
+    assert found[~mask].mean() < 0.002
+    without = dataclasses.replace(SETTINGS, mask_shadow_test=False)
+    assert (model().foreground(frame, without) > 0)[SHADOW].mean() > 0.95
+
+
+def test_shadows_darker_than_allowed_are_foreground() -> None:
+    frame, _ = scene(1)
+    strict = dataclasses.replace(SETTINGS, mask_shadow_darkest=0.8)
+    assert (model().foreground(frame, strict) > 0)[SHADOW].mean() > 0.9
+
+
+def test_the_threshold_counts_deviations() -> None:
+    frame = seen(ROOM, 50)
+    plain = dataclasses.replace(SETTINGS, mask_shadow_test=False, mask_gain_fit=False, mask_noise=NOISE)
+    background = GaussianBackground(ROOM.astype(np.float32), np.zeros_like(ROOM, np.float32))
+    for threshold in (2.0, 3.0):
+        chosen = dataclasses.replace(plain, mask_threshold=threshold)
+        outside = np.abs(frame - ROOM.astype(np.float32)).max(axis=2) > np.float32(threshold * NOISE)
+        np.testing.assert_array_equal(background.foreground(frame, chosen) > 0, outside)
+
+
+def test_another_exposure_is_fitted() -> None:
+    gain = (0.85, 1.1, 1.05)
+    frame, mask = scene(2, gain)
+    np.testing.assert_allclose(model().gain(frame), gain, atol=0.02)
+    found = model().foreground(frame, SETTINGS) > 0
+    assert found[~mask].mean() < 0.01
+    unfitted = dataclasses.replace(SETTINGS, mask_gain_fit=False, mask_shadow_test=False)
+    assert (model().foreground(frame, unfitted) > 0)[~mask].mean() > 0.2
+
+
+def test_grey_pictures_have_no_shadow_test() -> None:
+    grey = np.repeat(ROOM[:, :, :1], 3, axis=2)
+    background = gaussian_from_frames([np.round(grey).astype(np.uint8)])
+    assert background.is_grey
+    dark = np.round(grey * 0.7).astype(np.uint8)
+    fixed = dataclasses.replace(SETTINGS, mask_gain_fit=False)
+    assert (background.foreground(dark, fixed) > 0).mean() > 0.8
+    assert not model().is_grey
+
+
+def walking(frames: int) -> list[np.ndarray]:
+    """A person who crosses the room."""
+    found = []
+    for number in range(frames):
+        light = ROOM.copy()
+        light[30:70, 4 * number : 4 * number + 20] = (30.0, 60.0, 230.0)
+        found.append(seen(light, number))
+    return found
+
+
+def test_the_median_forgets_who_walks_through() -> None:
+    background = gaussian_from_median(walking(27))
+    assert np.abs(background.mean - ROOM).max() < 4 * NOISE
+    assert np.abs(np.median(np.sqrt(background.variance)) - NOISE) < 0.6
+
+
+def test_median_and_deviation_are_numpys() -> None:
+    frames = walking(9)
+    background = gaussian_from_median(frames)
+    median = np.median(frames, axis=0)
+    np.testing.assert_allclose(background.mean, median)
+    deviation = np.minimum(1.4826 * np.median(np.abs(np.array(frames) - median), axis=0), 20.0)
+    np.testing.assert_allclose(np.sqrt(background.variance), deviation, rtol=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["mog2", "knn"])
+def test_opencvs_models_find_the_person(kind: str) -> None:
+    background = SubtractorBackground(kind, [seen(ROOM, seed) for seed in range(100, 140)])
+    frame, mask = scene(1)
+    found = background.foreground(frame, SETTINGS) > 0
+    assert found[mask].mean() > 0.95
+    assert found[~mask].mean() < 0.05
+
+
+@pytest.mark.parametrize("kind", ["mog2", "knn"])
+def test_opencvs_masks_depend_on_the_frame_alone(kind: str) -> None:
+    training = walking(20)
+    frames = [scene(seed)[0] for seed in range(12)]
+    one, other = SubtractorBackground(kind, training), SubtractorBackground(kind, training)
+    first = [one.foreground(frame, SETTINGS) for frame in frames]
+    touched = dataclasses.replace(SETTINGS, mask_threshold=2.0, mask_shadow_test=False)
+    for number in (5, 11, 0, 3, 3, 7, 1, 10, 2, 4, 6, 8, 9):
+        other.foreground(frames[number], touched)
+        np.testing.assert_array_equal(other.foreground(frames[number], SETTINGS), first[number])

@@ -1,0 +1,68 @@
+"""Clean-up of masks, against SciPy's labelling."""
+
+import dataclasses
+
+import numpy as np
+from scipy import ndimage
+
+from studio.evidence.masks import cleaned
+from studio.evidence.settings import EvidenceSettings
+
+OFF = dataclasses.replace(
+    EvidenceSettings(), mask_opening=0, mask_closing=0, mask_fill_holes=0, mask_min_component=0
+)
+EIGHT = np.ones((3, 3))
+
+
+def blobs(seed: int) -> np.ndarray:
+    """Random pieces with holes and pieces inside holes."""
+    field = ndimage.gaussian_filter(np.random.default_rng(seed).normal(size=(120, 160)), 3.0)
+    return np.where(field > 0.02, np.uint8(255), np.uint8(0))
+
+
+def test_nothing_on_changes_nothing() -> None:
+    mask = blobs(0)
+    np.testing.assert_array_equal(cleaned(mask, OFF), mask)
+
+
+def test_small_pieces_are_dropped() -> None:
+    for seed in range(5):
+        mask = blobs(seed)
+        labels, count = ndimage.label(mask, EIGHT)
+        sizes = ndimage.sum_labels(mask > 0, labels, np.arange(1, count + 1))
+        least = int(np.median(sizes))
+        expected = np.isin(labels, 1 + np.flatnonzero(sizes >= least))
+        found = cleaned(mask, dataclasses.replace(OFF, mask_min_component=least))
+        np.testing.assert_array_equal(found > 0, expected)
+
+
+def test_the_largest_pieces_are_kept() -> None:
+    for seed in range(5):
+        mask = blobs(seed)
+        labels, count = ndimage.label(mask, EIGHT)
+        sizes = ndimage.sum_labels(mask > 0, labels, np.arange(1, count + 1))
+        expected = np.isin(labels, 1 + np.argsort(-sizes, kind="stable")[:2])
+        found = cleaned(mask, dataclasses.replace(OFF, mask_keep_components=2))
+        np.testing.assert_array_equal(found > 0, expected)
+
+
+def test_small_holes_are_filled() -> None:
+    mask = np.zeros((60, 60), np.uint8)
+    mask[5:55, 5:55] = 255
+    mask[10:14, 10:14] = 0
+    mask[30:45, 30:45] = 0
+    found = cleaned(mask, dataclasses.replace(OFF, mask_fill_holes=17))
+    assert found[10:14, 10:14].min() == 255
+    np.testing.assert_array_equal(found[20:], mask[20:])
+    kept = cleaned(mask, dataclasses.replace(OFF, mask_fill_holes=16))
+    np.testing.assert_array_equal(kept, mask)
+
+
+def test_opening_removes_specks_and_closing_closes_gaps() -> None:
+    mask = np.zeros((60, 60), np.uint8)
+    mask[20:40, 10:28] = 255
+    mask[20:40, 31:50] = 255
+    mask[5, 5] = mask[6, 50] = 255
+    found = cleaned(mask, dataclasses.replace(OFF, mask_opening=3, mask_closing=5))
+    assert found[:15].max() == 0
+    assert found[25:35, 28:31].min() == 255
