@@ -1,8 +1,9 @@
 """Which markers of a body a stick figure joins, read from the body's tree.
 
-The first marker on a joint hangs on the nearest marker (in the rest pose) of the nearest joint above that has
-any; further ones on a joint hang on its first. So any body has a stick figure, and markers of other names are
-left alone.
+The first marker on a joint hangs on the nearest marker (in the rest pose) of the nearest joint above that has any;
+or on an earlier one that hangs there as well, where that is less than half as far (a shoulder on the neck, though its
+joint hangs on the torso's). Further markers on a joint hang on its first. So any body has a stick figure, and markers
+of other names are left alone.
 """
 
 from collections.abc import Sequence
@@ -12,30 +13,42 @@ import numpy as np
 from studio.body.forward_kinematics import joint_frames, marker_points
 from studio.body.model import BodyModel, Marker
 
+_MUCH_NEARER = 0.5
+
 
 def marker_links(body: BodyModel, names: Sequence[str]) -> list[tuple[int, int]]:
     """Pairs of indices into `names` to be joined; names that the body does not carry are left alone."""
-    known = [marker for marker in body.markers if marker.name in names]
-    if not known:
+    carried: dict[int, list[Marker]] = {}
+    for marker in body.markers:
+        if marker.name in names:
+            carried.setdefault(marker.joint, []).append(marker)
+    if not carried:
         return []
-    place = {name: index for index, name in enumerate(names)}
     points = marker_points(body, body.neutral)[0]
     rest = {marker.name: point for marker, point in zip(body.markers, points, strict=True)}
     origins = joint_frames(body, body.neutral)[0, :, :, 3]
-    carried: dict[int, list[Marker]] = {}
-    for marker in known:
-        carried.setdefault(marker.joint, []).append(marker)
-    links: list[tuple[int, int]] = []
+    pairs: list[tuple[str, str]] = []
+    hanging: dict[int, list[str]] = {}
     for joint, markers in carried.items():
-        first = markers[0]
-        links += [(place[first.name], place[other.name]) for other in markers[1:]]
-        above = body.joints[joint].parent
-        while above >= 0 and above not in carried:
-            above = body.joints[above].parent
-        if above >= 0:
-            distances = [float(np.linalg.norm(rest[other.name] - origins[joint])) for other in carried[above]]
-            links.append((place[carried[above][int(np.argmin(distances))].name], place[first.name]))
-    return links
+        first = markers[0].name
+        pairs += [(first, other.name) for other in markers[1:]]
+        above = _carrying_joint_above(body, joint, carried)
+        if above is None:
+            continue
+        far = {name: float(np.linalg.norm(point - origins[joint])) for name, point in rest.items()}
+        nearest = min((marker.name for marker in carried[above]), key=far.__getitem__)
+        beside = min(hanging.get(above, []), key=far.__getitem__, default=nearest)
+        pairs.append((beside if far[beside] < _MUCH_NEARER * far[nearest] else nearest, first))
+        hanging.setdefault(above, []).append(first)
+    place = {name: index for index, name in enumerate(names)}
+    return [(place[one], place[other]) for one, other in pairs]
+
+
+def _carrying_joint_above(body: BodyModel, joint: int, carried: dict[int, list[Marker]]) -> int | None:
+    above = body.joints[joint].parent
+    while above >= 0 and above not in carried:
+        above = body.joints[above].parent
+    return above if above >= 0 else None
 
 
 def marker_sides(body: BodyModel) -> dict[str, str]:

@@ -30,12 +30,13 @@ class ViewMarks:
     """What is projected into one camera, in pixels of the stored picture; NaN where a point is behind the
     camera.
 
-    outlines : (L, 4, 2) corners A0 A1 B1 B0 of each limb. sides : (L,) "left", "right" or "middle".
+    contours : L closed polylines (K, 2), one a limb; empty for a limb that is not seen. sides : L times "left",
+    "right" or "middle".
     edge_samples, region_samples : (K, 2). clouds : one (points (K, 2), colour) a layer, drawn in order.
     truth : (S, 2, 2) ends of the lines of the reference's stick figure.
     """
 
-    outlines: Array
+    contours: tuple[Array, ...]
     sides: tuple[str, ...]
     edge_samples: Array
     region_samples: Array
@@ -43,7 +44,7 @@ class ViewMarks:
     truth: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
 
 
-NO_MARKS = ViewMarks(np.zeros((0, 4, 2)), (), np.zeros((0, 2)), np.zeros((0, 2)))
+NO_MARKS = ViewMarks((), (), np.zeros((0, 2)), np.zeros((0, 2)))
 
 
 def draw_view(
@@ -52,7 +53,7 @@ def draw_view(
     """(h, w, 3) BGR: the view's picture with the chosen layers of `OVERLAYS` over it, from the ground up."""
     picture = _resized(_three_channels(view.picture), scale)
     if "mask" in layers:
-        picture = _with_mask(picture, view.mask, marks.outlines, tokens, scale)
+        picture = _with_mask(picture, view.mask, marks.contours, tokens, scale)
     if "edges" in layers:
         strength = _resized(view.edges, scale)[:, :, None].astype(np.float32) / 255.0
         tint = np.array(_bgr(tokens["edge-map"]), dtype=np.float32)
@@ -70,11 +71,12 @@ def draw_view(
     return picture
 
 
-def projected_silhouette(outlines: Array, height: int, width: int, scale: float = 1.0) -> Bytes:
-    """(h, w) uint8, 255 inside any limb's outline."""
+def projected_silhouette(contours: tuple[Array, ...], height: int, width: int, scale: float = 1.0) -> Bytes:
+    """(h, w) uint8, 255 inside any limb's contour."""
     filled = np.zeros((height, width), dtype=np.uint8)
-    for corners in _drawable(outlines):
-        cv2.fillPoly(filled, [_fixed_point(corners, scale)], (255,), shift=_SHIFT)
+    for contour in contours:
+        if _is_drawable(contour):
+            cv2.fillPoly(filled, [_fixed_point(contour, scale)], (255,), shift=_SHIFT)
     return filled
 
 
@@ -101,10 +103,12 @@ def _resized(picture: Bytes, scale: float) -> Bytes:
     return np.asarray(cv2.resize(picture, size, interpolation=method), dtype=np.uint8)
 
 
-def _with_mask(picture: Bytes, mask: Bytes, outlines: Array, tokens: ColourTokens, scale: float) -> Bytes:
+def _with_mask(
+    picture: Bytes, mask: Bytes, contours: tuple[Array, ...], tokens: ColourTokens, scale: float
+) -> Bytes:
     observed = _resized(mask, scale) > 127
     height, width = picture.shape[:2]
-    projected = projected_silhouette(outlines, height, width, scale) > 0
+    projected = projected_silhouette(contours, height, width, scale) > 0
     tint = picture.astype(np.float32)
     for region, token in (
         (observed & ~projected, "silhouette-observed"),
@@ -118,19 +122,21 @@ def _with_mask(picture: Bytes, mask: Bytes, outlines: Array, tokens: ColourToken
 def _with_outlines(picture: Bytes, marks: ViewMarks, tokens: ColourTokens, scale: float) -> Bytes:
     thin = max(1, round(1.2 * scale))
     for colours, thickness in ((None, thin + 2), (tokens, thin)):
-        for corners, side in zip(marks.outlines, marks.sides, strict=True):
-            for drawable in _drawable(corners[None]):
-                colour = _HALO if colours is None else _bgr(colours[f"limb-{side}"])
-                cv2.polylines(
-                    picture, [_fixed_point(drawable, scale)], True, colour, thickness, cv2.LINE_AA, _SHIFT
-                )
+        for contour, side in zip(marks.contours, marks.sides, strict=True):
+            if not _is_drawable(contour):
+                continue
+            colour = _HALO if colours is None else _bgr(colours[f"limb-{side}"])
+            pixels = _fixed_point(contour, scale)
+            cv2.polylines(picture, [pixels], True, colour, thickness, cv2.LINE_AA, _SHIFT)
     return picture
 
 
 def _with_lines(picture: Bytes, lines: Array, colour: Colour, scale: float) -> Bytes:
     thin = max(1, round(1.2 * scale))
     for shade, thickness in ((_HALO, thin + 2), (_bgr(colour), thin)):
-        for ends in _drawable(lines):
+        for ends in lines:
+            if not _is_drawable(ends):
+                continue
             pixels = _fixed_point(ends, scale)
             cv2.polylines(picture, [pixels], False, shade, thickness, cv2.LINE_AA, _SHIFT)
     return picture
@@ -145,13 +151,9 @@ def _with_dots(picture: Bytes, points: Array, colour: Colour, scale: float, *, r
     return picture
 
 
-def _drawable(outlines: Array) -> Array:
-    """The outlines all of whose corners lie before the camera and near enough to be drawn."""
-    if not len(outlines):
-        return outlines
-    finite = np.isfinite(outlines).all(axis=(1, 2))
-    near = np.nan_to_num(np.abs(outlines), nan=np.inf).max(axis=(1, 2)) < _FARTHEST
-    return outlines[finite & near]
+def _is_drawable(points: Array) -> bool:
+    """Whether there are points, all before the camera and near enough to be drawn (NaN is not near)."""
+    return len(points) > 0 and bool((np.abs(points) < _FARTHEST).all())
 
 
 def _fixed_point(points: Array, scale: float) -> NDArray[np.int32]:

@@ -8,6 +8,7 @@ that a route can ask for one picture after another.
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -117,15 +118,13 @@ class ViewComposer:
         truth = self._truth_lines(lens, frame) if "truth" in layers else NO_MARKS.truth
         dots = self._dots(lens, clouds, limbs) if "particles" in layers else ()
         if pose is None or not {"outline", "mask", "samples"} & set(layers):
-            return ViewMarks(
-                NO_MARKS.outlines, (), NO_MARKS.edge_samples, NO_MARKS.region_samples, dots, truth
-            )
+            return replace(NO_MARKS, clouds=dots, truth=truth)
         seen = overlay_points(self.body, (lens,), pose, self._settings.weighting)[0]
         return ViewMarks(
-            np.asarray(seen.outlines, dtype=np.float64),
+            seen.contours,
             tuple(limb.side for limb in self.body.drawn),
-            np.asarray(seen.edge_samples, dtype=np.float64).reshape(-1, 2),
-            np.asarray(seen.region_samples, dtype=np.float64).reshape(-1, 2),
+            seen.edge_samples,
+            seen.region_samples,
             dots,
             truth,
         )
