@@ -19,7 +19,7 @@ from studio.errors import BodyError, RunError
 from studio.runs.search_space import default_sigma, parameter_names
 from studio.sessions.manifest import now
 from studio.sessions.run_record import RunRecord
-from studio.sessions.session import Session
+from studio.sessions.session import Session, free_run_name
 from studio.sessions.stored_run import StoredRun
 from studio.settings import changed_settings, default_settings, values
 
@@ -66,7 +66,7 @@ def prepare_run(session: Session, request: RunRequest | None = None) -> StoredRu
     start, source = start_pose(session, body, asked.start_pose, asked.start_source)
     sigma = session.sigma(session.manifest.fps, body)
     record = RunRecord(
-        name=asked.name or session.free_run_name(),
+        name=asked.name or free_run_name(session),
         session=session.name,
         created=now(),
         tracker=tracker,

@@ -102,14 +102,9 @@ class Session:
         """
         path = self.path / SIGMA_NAME
         model = body or self.body()
-        if not path.exists() or model.name != self.body_name:
+        if not path.exists() or model.name != self.manifest.body:
             return None
         return read_sigma(path, _parameter_names(model), fps or self.manifest.fps)
-
-    @property
-    def body_name(self) -> str:
-        """Name of the session's body."""
-        return self.manifest.body
 
     @property
     def truth_path(self) -> Path | None:
@@ -144,13 +139,6 @@ class Session:
             )
         return StoredRun(path)
 
-    def free_run_name(self) -> str:
-        """A name for the next run: run-1, run-2, …"""
-        folder = self.path / RUNS_NAME
-        taken = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
-        number = len(taken) + 1
-        return free_name(f"run-{number}", taken)
-
     def new_run(self, record: RunRecord, body_text: str = "") -> StoredRun:
         """Make the folder of a run: its record, the calibration's and the body file's snapshot, an empty
         store.
@@ -177,10 +165,18 @@ class Session:
             shutil.rmtree(folder, ignore_errors=True)
         return StoredRun(place)
 
-    def with_manifest(self, manifest: SessionManifest) -> "Session":
-        """Write a changed manifest and return the session as it is then."""
-        write_manifest(self.path, manifest)
-        return Session(self.path)
+
+def free_run_name(session: Session) -> str:
+    """A name for the session's next run: run-1, run-2, …"""
+    folder = session.path / RUNS_NAME
+    taken = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+    return free_name(f"run-{len(taken) + 1}", taken)
+
+
+def described_anew(session: Session, manifest: SessionManifest) -> Session:
+    """Write a changed manifest and return the session as it is then."""
+    write_manifest(session.path, manifest)
+    return Session(session.path)
 
 
 def _is_run(path: Path) -> bool:

@@ -17,7 +17,7 @@ from studio.sessions.catalogue import Catalogue, RunEntry, SessionEntry
 from studio.sessions.manifest import FILE_NAME, write_manifest
 from studio.sessions.names import checked_name, free_name, inside, is_name
 from studio.sessions.results_reader import FILE_NAME as RESULTS_NAME
-from studio.sessions.session import RUNS_NAME, THUMBNAIL_NAME, Session
+from studio.sessions.session import RUNS_NAME, THUMBNAIL_NAME, Session, described_anew
 from studio.sessions.stored_run import RunSummary, StoredRun
 
 VARIABLE = "STUDIO_WORKSPACE"
@@ -119,7 +119,7 @@ class Workspace:
         atomic_files.sync_folder(self.root)
         manifest = session.manifest
         title = new_name if manifest.title in ("", name) else manifest.title
-        return Session(place).with_manifest(msgspec.structs.replace(manifest, name=new_name, title=title))
+        return described_anew(Session(place), msgspec.structs.replace(manifest, name=new_name, title=title))
 
     def retitle(self, name: str, title: str) -> Session:
         """Change the text that people see. Raises SessionError if it is empty or longer than 200
@@ -129,7 +129,7 @@ class Workspace:
             raise SessionError(
                 f"A title of {len(words)} characters cannot be shown.", "Use 1 to 200 characters."
             )
-        return session.with_manifest(msgspec.structs.replace(session.manifest, title=words))
+        return described_anew(session, msgspec.structs.replace(session.manifest, title=words))
 
     def duplicate(self, name: str, new_name: str | None = None) -> Session:
         """A copy of a session with its runs, whole or not at all; results being written are copied as they

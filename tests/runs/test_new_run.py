@@ -9,14 +9,15 @@ from studio.errors import BodyError, RunError, SettingsError, StudioError
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.search_space import default_sigma, parameter_names
 from studio.sessions.named_rows import write_pose, write_sigma
-from studio.sessions.session import Session
+from studio.sessions.session import Session, described_anew
 
 
 def test_defaults_come_from_the_session(session_on_disk: Session) -> None:
     names = parameter_names(session_on_disk.body())
     write_pose(session_on_disk.path / "start_pose.csv", names, np.array([0.1, 0.2, 0.3, 0.4]))
-    session = session_on_disk.with_manifest(
-        msgspec.structs.replace(session_on_disk.manifest, tracker="condensation", weighting="template")
+    session = described_anew(
+        session_on_disk,
+        msgspec.structs.replace(session_on_disk.manifest, tracker="condensation", weighting="template"),
     )
     record = prepare_run(session).record
     assert (record.tracker, record.weighting, record.body) == ("condensation", "template", "planar_arm4")

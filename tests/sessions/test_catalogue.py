@@ -8,7 +8,7 @@ from studio.runs.search_space import default_sigma, parameter_names
 from studio.sessions.catalogue import FILE_NAME
 from studio.sessions.manifest import now
 from studio.sessions.run_record import RunRecord
-from studio.sessions.session import Session
+from studio.sessions.session import Session, described_anew
 from studio.sessions.workspace import Workspace
 
 
@@ -63,7 +63,7 @@ def test_damage_is_mended(workspace: Workspace, damage: bytes) -> None:
 def test_it_follows_what_happens_to_the_folders(workspace: Workspace) -> None:
     workspace.sessions()
     session = workspace.session("toy")
-    session.with_manifest(msgspec.structs.replace(session.manifest, title="Another title"))
+    described_anew(session, msgspec.structs.replace(session.manifest, title="Another title"))
     workspace.trash_run("toy", "first")
     workspace.trash("other")
     (found,) = workspace.sessions()

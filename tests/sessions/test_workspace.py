@@ -11,7 +11,7 @@ from toy_session import make_session
 
 from studio.errors import NotFoundError, SessionError
 from studio.sessions.results_store import ResultsWriter
-from studio.sessions.session import Session
+from studio.sessions.session import Session, free_run_name
 from studio.sessions.thumbnails import jpeg
 from studio.sessions.workspace import Workspace, workspace_root
 
@@ -136,9 +136,9 @@ def test_a_session_gives_what_lies_in_it(session_on_disk: Session) -> None:
     assert session.sigma(60.0) is None
     assert session.truth_path is None
     assert session.subject() is None
-    run = session.new_run(record_of(session, session.free_run_name()))
+    run = session.new_run(record_of(session, free_run_name(session)))
     assert run.name == "run-1"
-    assert session.free_run_name() == "run-2"
+    assert free_run_name(session) == "run-2"
     with pytest.raises(SessionError, match="has a run"):
         session.new_run(record_of(session, "run-1"))
     assert run.body().dimensions == session.body().dimensions
