@@ -29,7 +29,7 @@ from studio.synthesis.recipe_file import Recipe
 
 Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
-Progress = Callable[[int, int], None]
+Progress = Callable[[str, int, int], None]
 
 SWING_SHARE, SPEED_SHARE = 0.30, 0.5
 ARM_COLOUR, WALL_COLOUR = (196.0, 186.0, 178.0), (64.0, 62.0, 60.0)
@@ -100,7 +100,7 @@ def render_arm(recipe: Recipe, camera: Camera, source: Path, progress: Progress 
             footage.add(_picture(share, recipe.picture.noise, stream))
             masks.add(np.where(coverage(outlines[frame], *size, 1) > 0.0, 255, 0).astype(np.uint8))
             if progress is not None:
-                progress(frame + 1, recipe.frames)
+                progress("rendering", frame + 1, recipe.frames)
     names = tuple(entry.name for entry in body.parameters)
     write_text(source / "truth" / "poses.csv", poses_csv(names, np.arange(recipe.frames), poses))
     markers = tuple(marker.name for marker in body.markers)

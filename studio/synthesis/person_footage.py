@@ -13,7 +13,7 @@ from studio.synthesis.recipe_file import Picture, Recipe
 from studio.synthesis.renderer import Renderer
 from studio.synthesis.room import furnished_room
 
-Progress = Callable[[int, int], None]
+Progress = Callable[[str, int, int], None]
 
 STEPPED_OVER, STEPPED_OVER_HEIGHT = "box", 160.0
 
@@ -45,7 +45,7 @@ def render_person(
                 if masks:
                     masks[index].add(mask)
             if progress is not None:
-                progress(frame + 1, motion.frame_count)
+                progress("rendering", frame + 1, motion.frame_count)
     if recipe.include.background != "none":
         (source / "background").mkdir()
         for index, camera in enumerate(cameras):

@@ -23,7 +23,7 @@ from studio.synthesis.person import PersonMotion, marker_lengths, marker_motion,
 from studio.synthesis.person_footage import render_person
 from studio.synthesis.recipe_file import Recipe, find_recipe, read_recipe, recipe_cameras
 
-Progress = Callable[[int, int], None]
+Progress = Callable[[str, int, int], None]
 
 ARM = "arm"
 RECIPE_COPY = "recipe.toml"
@@ -33,7 +33,7 @@ def synthesize(recipe: Path | str, into: Path, progress: Progress | None = None)
     """Render a recipe's footage and make a session of it; returns the session's folder.
 
     recipe : a TOML file or the name of a bundled recipe. into : the session folder to be made. progress :
-    called with frames done and frames in all. The same recipe gives the same pictures on any number of
+    called with the step in words, what is done of it and how much it is. The same recipe gives the same pictures on any number of
     threads. Raises StudioError for a recipe that cannot be followed and what `import_source` raises for
     `into`.
     """
@@ -45,7 +45,7 @@ def synthesize(recipe: Path | str, into: Path, progress: Progress | None = None)
         source = Path(folder) / into.name
         source.mkdir()
         render_source(wanted, path.parent, source, progress)
-        import_source(source, into, fps=wanted.fps)
+        import_source(source, into, fps=wanted.fps, progress=progress)
     manifest = read_manifest(into)
     changed = msgspec.structs.replace(
         manifest, title=wanted.title, weighting=wanted.weighting, imported_from=f"recipe {path.name}"

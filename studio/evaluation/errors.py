@@ -1,0 +1,177 @@
+"""How far found poses are from the true markers.
+
+The measure is that of Balan, Sigal & Black 2005 and HumanEva: the mean Euclidean distance of the markers in
+a frame, without any alignment, in mm. Beside it stand the two usual aligned ones: moved to the root marker
+(MPJPE), and after the best similarity (PA-MPJPE). A limb is lost in a frame when one of its markers is off
+by more than LOST_MM (the threshold of MPI-INF-3DHP's PCK).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.forward_kinematics import marker_points
+from studio.body.model import BodyModel
+from studio.capture.trc import MarkerMotion
+from studio.errors import TruthError
+from studio.evaluation.alignment import FEWEST_POINTS, moved_to_root, similarity_aligned
+from studio.runs.marker_lines import marker_sides
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+LOST_MM = 150.0
+TRUNK = "head and trunk"
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """Errors of a run against a truth, mm; no alignment unless said.
+
+    frames : the frames that were measured (those that the truth has a row for). mean_mm : mean over frames
+    of the frames' means; std_mm : their standard deviation; worst_mm : the worst frame's mean. lost_frames
+    : how many frames have any limb lost, lost_frame_numbers : which; lost_limbs : limbs lost in any frame.
+    per_frame_mm : in the order of `frames`. root_aligned_mm : with the root marker laid on the true one.
+    procrustes_mm : after the best turn, scale and move of each frame, None where no frame has three
+    markers. unmatched_markers : names that only the body or only the truth knows.
+    """
+
+    frames: tuple[int, ...]
+    mean_mm: float
+    std_mm: float
+    worst_mm: float
+    lost_frames: int
+    lost_frame_numbers: tuple[int, ...]
+    lost_limbs: tuple[str, ...]
+    per_marker_mm: dict[str, float]
+    per_frame_mm: tuple[float, ...]
+    root_aligned_mm: float
+    procrustes_mm: float | None
+    unmatched_markers: tuple[str, ...]
+
+
+def evaluate(poses: Array, frames: IntArray, body: BodyModel, truth: MarkerMotion, fps: float) -> Evaluation:
+    """The errors of poses (K, D) of the given frames (K,) of a body against true markers.
+
+    The truth's first row is frame 0; its other rows belong to the frames nearest to (Time - first Time) ×
+    fps. Raises TruthError when no marker or no frame is common to both.
+    """
+    names, of_body, of_truth, unmatched = _common_markers(body, truth)
+    numbers, kept, wanted = _common_frames(np.asarray(frames), truth, of_truth, fps)
+    found = marker_points(body, np.asarray(poses, dtype=float)[kept])[:, of_body]
+    seen = np.asarray(np.isfinite(wanted).all(axis=2))
+    distances = np.where(seen, np.linalg.norm(found - wanted, axis=2), np.nan)
+    per_frame = np.nanmean(distances, axis=1)
+    lost = np.nan_to_num(distances) > LOST_MM
+    in_frame = np.asarray(lost.any(axis=1))
+    limbs = limb_of_markers(body)
+    return Evaluation(
+        frames=tuple(int(frame) for frame in numbers),
+        mean_mm=float(per_frame.mean()),
+        std_mm=float(per_frame.std()),
+        worst_mm=float(per_frame.max()),
+        lost_frames=int(in_frame.sum()),
+        lost_frame_numbers=tuple(int(frame) for frame in numbers[in_frame]),
+        lost_limbs=tuple(sorted({limbs[names[index]] for index in np.nonzero(lost)[1]})),
+        per_marker_mm={
+            name: float(np.nanmean(distances[:, index]))
+            for index, name in enumerate(names)
+            if np.isfinite(distances[:, index]).any()
+        },
+        per_frame_mm=tuple(float(value) for value in per_frame),
+        root_aligned_mm=_root_aligned(found, wanted, seen),
+        procrustes_mm=_procrustes(found, wanted, seen),
+        unmatched_markers=unmatched,
+    )
+
+
+def rows_of_frames(truth: MarkerMotion, fps: float) -> dict[int, int]:
+    """Frame to the truth's row that is nearest to it in time; frames without a row within half a frame are
+    absent.
+    """
+    at = (truth.times - truth.times[0]) * fps
+    rows: dict[int, int] = {}
+    for row, place in enumerate(at):
+        frame = round(float(place))
+        if frame not in rows or abs(place - frame) < abs(at[rows[frame]] - frame):
+            rows[frame] = row
+    return rows
+
+
+def limb_of_markers(body: BodyModel) -> dict[str, str]:
+    """Marker to the limb it is counted with: all that is neither left nor right is one limb, head and
+    trunk; the others are grouped as the body's parameters are (a person has five limbs).
+    """
+    owned: dict[int, str] = {}
+    for index, joint in enumerate(body.joints):
+        moved = [step.parameter for step in joint.steps if step.parameter >= 0]
+        owned[index] = body.parameters[moved[0]].limb if moved else owned.get(joint.parent, TRUNK)
+    sides = marker_sides(body)
+    return {
+        marker.name: TRUNK if sides[marker.name] == "middle" else owned[marker.joint]
+        for marker in body.markers
+    }
+
+
+def _common_markers(
+    body: BodyModel, truth: MarkerMotion
+) -> tuple[tuple[str, ...], list[int], list[int], tuple[str, ...]]:
+    """Names in the body's order, their places in the body and in the truth, and the names of only one of
+    both.
+    """
+    known = [marker.name for marker in body.markers]
+    names = tuple(name for name in known if name in truth.names)
+    if not names:
+        raise TruthError(
+            f"The truth's markers ({', '.join(truth.names[:6])} …) are none of body '{body.name}'.",
+            f"Name them as the body does: {', '.join(known) or 'it has no markers'}.",
+        )
+    unmatched = tuple(sorted(set(known) ^ set(truth.names)))
+    return (
+        names,
+        [known.index(name) for name in names],
+        [truth.names.index(name) for name in names],
+        unmatched,
+    )
+
+
+def _common_frames(
+    frames: IntArray, truth: MarkerMotion, of_truth: list[int], fps: float
+) -> tuple[IntArray, IntArray, Array]:
+    """Frames (K',) in which the truth has any of the markers, their places in `frames`, and the true
+    positions (K', M, 3) mm of the markers in the truth's columns `of_truth`, NaN where missing.
+    """
+    rows = rows_of_frames(truth, fps)
+    places = [place for place, frame in enumerate(frames) if int(frame) in rows]
+    wanted = truth.positions[[rows[int(frames[place])] for place in places]][:, of_truth]
+    seen = np.asarray(np.isfinite(wanted).all(axis=2))
+    some = np.flatnonzero(seen.any(axis=1))
+    if not some.size:
+        raise TruthError(
+            f"No frame of the run has a row in the truth, whose rows are frames {min(rows)} to {max(rows)}.",
+            "Check that the truth belongs to this session and starts with its first frame.",
+        )
+    kept = np.array(places, dtype=np.int64)[some]
+    return frames[kept], kept, wanted[some]
+
+
+def _root_aligned(found: Array, wanted: Array, seen: NDArray[np.bool_]) -> float:
+    """Mean over frames of the markers' mean distance, mm, the root (the first marker seen, in the body's
+    order) laid on the true one.
+    """
+    means = []
+    for points, goal, there in zip(found, wanted, seen, strict=True):
+        laid = moved_to_root(points[there], goal[there], 0)
+        means.append(float(np.linalg.norm(laid - goal[there], axis=1).mean()))
+    return float(np.mean(means))
+
+
+def _procrustes(found: Array, wanted: Array, seen: NDArray[np.bool_]) -> float | None:
+    """Mean over frames of the markers' mean distance, mm, after the best similarity of each frame."""
+    means = []
+    for points, goal, there in zip(found, wanted, seen, strict=True):
+        if there.sum() >= FEWEST_POINTS:
+            laid = similarity_aligned(points[there], goal[there])
+            means.append(float(np.linalg.norm(laid - goal[there], axis=1).mean()))
+    return float(np.mean(means)) if means else None

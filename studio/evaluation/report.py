@@ -1,0 +1,64 @@
+"""Evaluations in words and as one JSON object, several runs (seeds) together."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from studio.evaluation.errors import LOST_MM, Evaluation
+
+
+@dataclass(frozen=True, slots=True)
+class SeedsSummary:
+    """Several runs of one setting.
+
+    mean_mm, worst_mm : means over the runs of their means and of their worst frames; spread_mm : standard
+    deviation of the runs' means (0 for one run). lost_limbs : limbs lost, summed over the runs.
+    runs_without_loss : runs in which no limb was lost in any frame.
+    """
+
+    runs: int
+    mean_mm: float
+    spread_mm: float
+    highest_mean_mm: float
+    worst_mm: float
+    lost_limbs: int
+    runs_without_loss: int
+
+
+def summarize(evaluations: Sequence[Evaluation]) -> SeedsSummary:
+    """The summary of one or more evaluations (an empty sequence is an error of the caller)."""
+    means = np.array([one.mean_mm for one in evaluations])
+    return SeedsSummary(
+        runs=len(evaluations),
+        mean_mm=float(means.mean()),
+        spread_mm=float(means.std(ddof=1)) if len(means) > 1 else 0.0,
+        highest_mean_mm=float(means.max()),
+        worst_mm=float(np.mean([one.worst_mm for one in evaluations])),
+        lost_limbs=sum(len(one.lost_limbs) for one in evaluations),
+        runs_without_loss=sum(not one.lost_limbs for one in evaluations),
+    )
+
+
+def as_document(evaluation: Evaluation) -> dict[str, object]:
+    """The evaluation as plain JSON values, the threshold of a lost limb beside it."""
+    return {**asdict(evaluation), "lost_threshold_mm": LOST_MM, "alignment": "none"}
+
+
+def in_words(evaluation: Evaluation) -> str:
+    """Lines for a person: every number with its alignment and threshold."""
+    procrustes = evaluation.procrustes_mm
+    lines = [
+        f"frames measured      {len(evaluation.frames)}",
+        f"mean, no alignment   {evaluation.mean_mm:.1f} mm (± {evaluation.std_mm:.1f} over frames)",
+        f"worst frame          {evaluation.worst_mm:.1f} mm",
+        f"root aligned         {evaluation.root_aligned_mm:.1f} mm",
+        f"after Procrustes     {'-' if procrustes is None else f'{procrustes:.1f} mm'}",
+        f"frames with a limb lost (a marker off by more than {LOST_MM:.0f} mm)  {evaluation.lost_frames}",
+    ]
+    if evaluation.lost_limbs:
+        lines.append(f"limbs lost           {', '.join(evaluation.lost_limbs)}")
+    lines += [f"  {name:16} {value:7.1f} mm" for name, value in evaluation.per_marker_mm.items()]
+    if evaluation.unmatched_markers:
+        lines.append(f"not matched          {', '.join(evaluation.unmatched_markers)}")
+    return "\n".join(lines)
