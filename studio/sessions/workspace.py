@@ -17,6 +17,7 @@ from studio.sessions.catalogue import Catalogue, RunEntry, SessionEntry
 from studio.sessions.manifest import FILE_NAME, write_manifest
 from studio.sessions.names import checked_name, free_name, inside, is_name
 from studio.sessions.results_reader import FILE_NAME as RESULTS_NAME
+from studio.sessions.run_record import write_run_record
 from studio.sessions.session import RUNS_NAME, THUMBNAIL_NAME, Session, described_anew
 from studio.sessions.stored_run import RunSummary, StoredRun
 
@@ -159,6 +160,19 @@ class Workspace:
         run = self.session(session_name).run(run_name)
         _check_idle(run)
         return self._to_trash(run.folder, f"{session_name}--{run_name}")
+
+    def rename_run(self, session_name: str, run_name: str, new_name: str) -> StoredRun:
+        """Give a run another name. Raises SessionError if it is taken or the run is being tracked."""
+        session = self.session(session_name)
+        run = session.run(run_name)
+        _check_idle(run)
+        place = inside(session.path / RUNS_NAME, new_name, "run")
+        taken = {entry.name.lower() for entry in place.parent.iterdir() if entry.name != run_name}
+        if new_name.lower() in taken:
+            raise SessionError(f"There is a run '{new_name}' already.", "Choose another name.")
+        os.rename(run.folder, place)
+        write_run_record(place, msgspec.structs.replace(run.record, name=new_name))
+        return session.run(new_name)
 
     def trashed(self) -> tuple[str, ...]:
         """What lies in the trash, oldest first; sessions among it can be given to `restore`."""

@@ -88,6 +88,13 @@ class Cancel(Command):
 
 
 @dataclass(frozen=True, slots=True)
+class Close(Command):
+    """Let go of the open run, saved where it stands (before it is renamed or deleted); refused while it is
+    tracked.
+    """
+
+
+@dataclass(frozen=True, slots=True)
 class Stop(Command):
     """End the process."""
 

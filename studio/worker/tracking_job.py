@@ -1,7 +1,7 @@
 """What the process is doing: one open run, those that wait, and what each command does to them.
 
-`serve` takes a command, `advance` does one layer; the process's loop calls them in turn, so that every
-command works between two layers of a frame. Everything that is to be known comes out as events.
+`serve` takes a command, `advance` does one layer; the process's loop calls them in turn, so every command works
+between two layers of a frame. Everything that is to be known comes out as events.
 """
 
 import contextlib
@@ -15,7 +15,7 @@ from studio.errors import RunError, StudioError
 from studio.worker import commands
 from studio.worker.events import Acknowledged, Event, FrameFinished, LayerFinished
 from studio.worker.open_run import OpenRun
-from studio.worker.reporter import Reporter, names_of
+from studio.worker.reporter import IDLE, Reporter, names_of
 
 COMPILING, TRACKING, PAUSED, REANNEALING = "compiling", "tracking", "paused", "reannealing"
 FINISHED, CANCELLED, FAILED = "finished", "cancelled", "failed"
@@ -46,6 +46,7 @@ class TrackingJob:
             commands.Reanneal: self._reanneal,
             commands.Cancel: self._cancel,
             commands.ChangeSettings: self._change_settings,
+            commands.Close: self._let_go,
             commands.Stop: self._stop,
         }
 
@@ -68,9 +69,8 @@ class TrackingJob:
         except Exception as error:
             self._say.log(self._run, "error", traceback.format_exc())
             refusal = (_unforeseen(error), "See the log.", "fault")
-        name = type(command).__name__
-        ok = not refusal[2]
-        self._say.post(Acknowledged(*names_of(self._run), command.identifier, name, ok, *refusal))
+        told = (command.identifier, type(command).__name__, not refusal[2])
+        self._say.post(Acknowledged(*names_of(self._run), *told, *refusal))
 
     def advance(self) -> None:
         """Do one layer of what is being done. What goes wrong becomes an event."""
@@ -178,18 +178,14 @@ class TrackingJob:
     def _dequeue(self, asked: commands.Dequeue) -> None:
         place = (asked.session, asked.run)
         if place not in self._waiting:
-            raise RunError(
-                f"Run '{Path(asked.run).name}' does not wait.", "Cancel it if it is being tracked."
-            )
+            raise RunError(f"Run '{Path(asked.run).name}' does not wait.", "Cancel it if it is tracked.")
         self._waiting.remove(place)
         self._state(self._say.state_name)
 
     def _begin(self, goal: str, asked_at: float = math.nan) -> None:
         run = self._opened()
         if run.tracking.finished:
-            raise RunError(
-                f"Run '{run.run_name}' has no frame left.", "Re-anneal a frame, or start a new run."
-            )
+            raise RunError(f"Run '{run.run_name}' has no frame left.", "Re-anneal one, or start a new run.")
         self._drop_question(run)
         run.tracking.mark_going_on()
         self._goal, self._asked_at = goal, asked_at if goal == ONE_LAYER else math.nan
@@ -241,6 +237,12 @@ class TrackingJob:
             # The answer on its way is let out first: a slider that is dragged would else never show one.
             self._ask_again = True
 
+    def _let_go(self, _: commands.Close) -> None:
+        if self._tracking:
+            raise RunError(f"Run '{self._opened().run_name}' is being tracked.", "Cancel it first.")
+        self.close()
+        self._state(IDLE)
+
     def _stop(self, _: commands.Stop) -> None:
         self.close()
         self.stopped = True
@@ -277,8 +279,7 @@ class TrackingJob:
                 self._say.log(self._run, "error", f"Run '{Path(run).name}' could not start: {error}")
 
     def _fail(self, run: OpenRun, message: str, hint: str) -> None:
-        """Say that the layer could not be done; what is stored stays, and the search stands before that
-        layer."""
+        """Say that the layer could not be done; the search stands before it, and what is stored stays."""
         self._say.log(run, "error", f"{message} {hint}".strip())
         if run.question is not None:
             self._drop_question(run)
