@@ -1,9 +1,10 @@
 """How fast poses are weighed, against the fastest that memory allows.
 
-The scene is made here: four 640 × 480 cameras like those of the Lee walk around the default body, a silhouette and a
-noisy picture. The limit is the edge and region weighting's own loads and nothing else: the map reads of the index
-stream that it really produced for the same poses, sixteen poses replayed from the cache, in the same run. Everything is
-repeated in turns and the best of each counted, so that another process taking a core for a moment changes little.
+The scene is made here: four 640 × 480 cameras like those of the Lee walk around the default body, a
+silhouette and a noisy picture. The limit is the edge and region weighting's own loads and nothing else: the
+map reads of the index stream that it really produced for the same poses, sixteen poses replayed from the
+cache, in the same run. Everything is repeated in turns and the best of each counted, so that another process
+taking a core for a moment changes little.
 """
 
 import time
@@ -52,11 +53,11 @@ class Contest:
 def run_benchmark(
     body_name: str = "human31", repeats: int = 30, progress: Progress | None = None
 ) -> dict[str, object]:
-    """Evaluations a second of every weighting, one thread unless it says otherwise, and the limit of edge-region's.
+    """Evaluations a second of every weighting, one thread unless it says otherwise, and the limit of
+    edge-region's.
 
-    repeats : of every measurement. progress : told (step, done, total). Changes the number of Numba's threads while it
-    runs, and sets it back.
-    """
+    repeats : of every measurement. progress : told (step, done, total). Changes the number of Numba's threads
+    while it runs, and sets it back."""
     body = load_body(body_name)
     cameras = ring_of_cameras(body)
     rng = np.random.default_rng(0)
@@ -99,7 +100,7 @@ def ring_of_cameras(body: BodyModel) -> tuple[Camera, ...]:
     cameras: list[Camera] = []
     for number in range(4):
         bearing = np.deg2rad(45.0 + 90.0 * number)
-        centre = middle + [DISTANCE * np.cos(bearing), DISTANCE * np.sin(bearing), ABOVE]
+        centre = middle + np.array([DISTANCE * np.cos(bearing), DISTANCE * np.sin(bearing), ABOVE])
         forward = (middle - centre) / np.linalg.norm(middle - centre)
         right = np.cross(forward, [0.0, 0.0, 1.0])
         right /= np.linalg.norm(right)
@@ -114,7 +115,9 @@ def ring_of_cameras(body: BodyModel) -> tuple[Camera, ...]:
 def made_evidence(
     body: BodyModel, cameras: tuple[Camera, ...], rng: np.random.Generator
 ) -> dict[str, FrameEvidence]:
-    """A frame of the body in its neutral pose as its cones, brighter than a noisy ground, by kind of edge map."""
+    """A frame of the body in its neutral pose as its cones, brighter than a noisy ground, by kind of edge
+    map.
+    """
     corners, _ = OutlineProjector.of_body(body, cameras).corners(body.neutral[None])
     frames: dict[str, list[ViewEvidence]] = {"proximity": [], "bodytrack": []}
     for camera, outlines in zip(cameras, corners[0], strict=True):
@@ -154,13 +157,15 @@ def weighing_contests(
         "template": TemplateWeigher(body, cameras, TemplateSettings()).problem(evidence["proximity"]),
     }
     found = [Contest(name, _weighing(entry, poses), len(poses)) for name, entry in problems.items()]
-    if numba.config.NUMBA_NUM_THREADS > 1:  # pyright: ignore[reportAttributeAccessIssue] - set by Numba
+    if numba.get_num_threads() > 1:
         found.append(Contest("edge_region_two_threads", _weighing(problem, poses), len(poses), threads=2))
     return found
 
 
 def limit_contests(problem: EdgeRegionProblem, poses: Array) -> tuple[list[Contest], int]:
-    """The loads alone, for LIMIT_BLOCKS blocks of sixteen poses spread over all, and how many evaluations they are."""
+    """The loads alone, for LIMIT_BLOCKS blocks of sixteen poses spread over all, and how many evaluations
+    they are.
+    """
     weigher, maps = problem.weigher, problem.maps
     outlines = weigher.projector.blocks(poses)
     outlines = np.ascontiguousarray(outlines[:: max(1, len(outlines) // LIMIT_BLOCKS)][:LIMIT_BLOCKS])

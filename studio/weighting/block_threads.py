@@ -1,7 +1,7 @@
 """Blocks of sixteen poses shared among Numba's threads.
 
-Every kernel exists twice: `chunk`, which does the blocks first..last - 1 in the calling thread, and `all`, which hands
-equal chunks to threads. What comes out for a pose never depends on which.
+Every kernel exists twice: `chunk`, which does the blocks first..last - 1 in the calling thread, and `all`,
+which hands equal chunks to threads. What comes out for a pose never depends on which.
 """
 
 import threading

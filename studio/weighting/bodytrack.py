@@ -2,16 +2,17 @@
 
 E = E_edge + E_inside, lower is better; two plain averages over all samples pooled over limbs and cameras:
 
-* E_edge: n = max(4, round(length / 5 px)) intervals along each straight side of a limb's outline, n + 1 samples
+* E_edge: n = max(4, round(length / 5 px)) intervals along each straight side of a limb's outline, n + 1
+samples
   with both ends; error ((255 - e) / 255)² of the benchmark's edge map e (`evidence.edges`).
 * E_inside: rows of max(4, round(side / 10 px)) intervals with both ends, columns at j / n of the width,
   j = 0 ... n - 1, n = max(4, round(middle width / 10 px)); error 1 where the mask is 0.
 
-Samples outside a picture are skipped and not counted, as in the benchmark; so is a limb that reaches behind a camera.
-A pose of which no camera sees anything has the worst score, 1 + 1.
+Samples outside a picture are skipped and not counted, as in the benchmark; so is a limb that reaches behind a
+camera. A pose of which no camera sees anything has the worst score, 1 + 1.
 
-log w = -(a E_edge + b E_inside), a = b = 1 being the benchmark's: there is no other factor, since the annealed filter
-finds its own exponent β and Condensation its own likelihood scale.
+log w = -(a E_edge + b E_inside), a = b = 1 being the benchmark's: there is no other factor, since the
+annealed filter finds its own exponent β and Condensation its own likelihood scale.
 """
 
 from dataclasses import dataclass
@@ -34,8 +35,8 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 FULL = 255 * 255
-# The buffer holds one side, or one column of the grid, at the least, however long; more than this many samples of a
-# kind in one view are those of a limb that fills many pictures, and are left out.
+# The buffer holds one side, or one column of the grid, at the least, however long; more than this many
+# samples of a kind in one view are those of a limb that fills many pictures, and are left out.
 LEAST_CAPACITY = 1 << 14
 
 
@@ -55,7 +56,9 @@ class BodytrackSettings:
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """The benchmark's score of one pose: total = edge + inside. edge_samples, inside_samples : how many counted."""
+    """The benchmark's score of one pose: total = edge + inside. edge_samples, inside_samples : how many
+    counted.
+    """
 
     total: float
     edge: float
@@ -131,8 +134,9 @@ def score(body: BodyModel, cameras: tuple[Camera, ...], evidence: FrameEvidence,
 
 
 def score_maps(evidence: FrameEvidence) -> tuple[NDArray[np.uint16], IntArray]:
-    """Flat maps of (255 - e)² and of "no foreground" of all views, each followed by a 0, and (V, 4) where the edge
-    map and the mask's begin, width, height."""
+    """Flat maps of (255 - e)² and of "no foreground" of all views, each followed by a 0, and (V, 4) where the
+    edge map and the mask's begin, width, height.
+    """
     table = ((255 - np.arange(256)) ** 2).astype(np.uint16)
     sizes = [view.mask.size for view in evidence.views]
     values = np.zeros(2 * sum(size + 1 for size in sizes), dtype=np.uint16)

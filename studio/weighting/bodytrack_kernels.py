@@ -1,8 +1,9 @@
-"""The sums of the benchmark's score for many poses: as many samples as a limb is long and wide in the picture.
+"""The sums of the benchmark's score for many poses: as many samples as a limb is long and wide in the
+picture.
 
-Two passes, as in `edge_region_kernels`: indices into a buffer, filled up to a multiple of sixteen with the index of an
-entry that is 0, then bare loads. Maps are 16-bit and hold (255 - e)² and "no foreground" (0 or 1), so that sums are
-exact.
+Two passes, as in `edge_region_kernels`: indices into a buffer, filled up to a multiple of sixteen with the
+index of an entry that is 0, then bare loads. Maps are 16-bit and hold (255 - e)² and "no foreground" (0 or
+1), so that sums are exact.
 """
 
 import numpy as np
@@ -88,7 +89,9 @@ def fill_edges(outlines, block, view, lane, width, height, indices):
 
 @njit(**OPTIONS)
 def fill_inside(outlines, block, view, lane, width, height, indices):
-    """Indices of the grid within every limb, its last column left out as the benchmark does; returns how many."""
+    """Indices of the grid within every limb, its last column left out as the benchmark does; returns how
+    many.
+    """
     at = 0
     for limb in range(outlines.shape[2]):
         state = outlines[block, view, limb, 8 * LANES + lane]
@@ -107,7 +110,9 @@ def fill_inside(outlines, block, view, lane, width, height, indices):
 
 @njit(**OPTIONS)
 def add_up(maps, base, nothing, indices, pairs, count):
-    """The sum of a map's entries at the first `count` indices, two indices a load (see `edge_region_kernels`)."""
+    """The sum of a map's entries at the first `count` indices, two indices a load (see
+    `edge_region_kernels`).
+    """
     rounds = (count + ROUND - 1) // ROUND
     for i in range(count, rounds * ROUND):
         indices[i] = nothing
@@ -133,9 +138,8 @@ def add_up(maps, base, nothing, indices, pairs, count):
 def chunk_scores(first, last, outlines, views, maps, capacity, sums):
     """Sums of the blocks first..last - 1 over all limbs and views.
 
-    sums : (B, 16, 4) int64: edge map, edge samples, inside map, inside samples. capacity : a multiple of sixteen, the
-    most samples of one kind in one view.
-    """
+    sums : (B, 16, 4) int64: edge map, edge samples, inside map, inside samples. capacity : a multiple of
+    sixteen, the most samples of one kind in one view."""
     indices = np.zeros(capacity, np.uint32)
     pairs = indices.view(np.uint64).reshape((capacity // ROUND, 8))
     for block in range(first, last):

@@ -1,21 +1,23 @@
 """Edge and region weighting of Deutscher & Reid 2005, section 4.2.
 
-    Σe = 1/N Σ (1 - p)²   over samples along the sides of the projected cones, p from the edge map     (Eq. 14)
-    Σr = 1/N Σ (1 - p)²   over samples within them, p from the foreground map                          (Eq. 15)
-    log w = - Σ over cameras of (a Σe + b Σr)                                                     (Eq. 16, 17)
+    Σe = 1/N Σ (1 - p)²    over samples along the sides of the projected cones, p from the edge map  (Eq. 14)
+    Σr = 1/N Σ (1 - p)²    over samples within them, p from the foreground map                       (Eq. 15)
+    log w = - Σ over cameras of (a Σe + b Σr)                                                    (Eq. 16, 17)
 
-Eq. 17 is printed without the minus sign of Eq. 16; it belongs there, else the worst pose weighs most. The paper's
-weights are a = b = 1 ("an equal weighting to each component was determined empirically").
+Eq. 17 is printed without the minus sign of Eq. 16; it belongs there, else the worst pose weighs most. The
+paper's weights are a = b = 1 ("an equal weighting to each component was determined empirically").
 
-Every limb has the same number of samples in every view, spread evenly: `edge_samples` on its two sides together,
-`region_samples` on three lines within (Fig. 6).
+Every limb has the same number of samples in every view, spread evenly: `edge_samples` on its two sides
+together, `region_samples` on three lines within (Fig. 6).
 
-**Where nothing is seen.** N is the same for every pose: a sample outside the picture, or of a limb that reaches behind
-a camera or out of its lens, reads p = 0, the worst there is. So no pose gains by leaving a picture, a view that sees
-nothing of the body costs a + b, and log w lies between -(a + b) × cameras and 0 for any finite pose.
+**Where nothing is seen.** N is the same for every pose: a sample outside the picture, or of a limb that
+reaches behind a camera or out of its lens, reads p = 0, the worst there is. So no pose gains by leaving a
+picture, a view that sees nothing of the body costs a + b, and log w lies between -(a + b) × cameras and 0 for
+any finite pose.
 
-**Occlusion-aware edges.** A side that passes behind a nearer limb makes no edge in the picture. With the option on,
-such samples are left out of Eq. 14 and its N (of that view and pose) counts the others; if none is left, Σe = 1.
+**Occlusion-aware edges.** A side that passes behind a nearer limb makes no edge in the picture. With the
+option on, such samples are left out of Eq. 14 and its N (of that view and pose) counts the others; if none is
+left, Σe = 1.
 """
 
 from dataclasses import dataclass
@@ -36,8 +38,8 @@ from studio.weighting.edge_region_kernels import (
     PADDING,
     REGION_LINES,
     WORST,
-    all_sums,
-    chunk_sums,
+    all_weights,
+    chunk_weights,
 )
 from studio.weighting.evidence_check import check_sizes, check_views
 from studio.weighting.occlusion_kernels import all_hidden, chunk_hidden
@@ -51,7 +53,9 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class EdgeRegionSettings:
-    """Knobs of the edge and region weighting. A frame's problem is made once, so all take effect with the next."""
+    """Knobs of the edge and region weighting. A frame's problem is made once, so all take effect with the
+    next.
+    """
 
     title: ClassVar[str] = "Edge and region"
 
@@ -96,8 +100,9 @@ class EdgeRegionSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WeightingMaps:
-    """All cameras' maps, one after another. values : flat bytes 255 (1 - p)². views : (V, 4) where the edge map and
-    the region map begin, width, height."""
+    """All cameras' maps, one after another. values : flat bytes 255 (1 - p)². views : (V, 4) where the edge
+    map and the region map begin, width, height.
+    """
 
     values: Bytes
     views: IntArray
@@ -134,27 +139,30 @@ class EdgeRegionProblem:
 
     def weigh(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights, Eq. 17. Raises BodyError for poses that are no finite (N, D)."""
-        poses = np.asarray(poses, dtype=np.float64)
-        edge, region = self.terms(poses)
-        settings = self.weigher.settings
-        return -(settings.edge_weight * edge.sum(axis=1) + settings.region_weight * region.sum(axis=1))
+        return self._evaluated(poses)[1]
 
     def terms(self, poses: Array) -> tuple[Array, Array]:
         """Σe and Σr, each (N, V), of poses (N, D)."""
-        weigher = self.weigher
+        terms = self._evaluated(poses)[0]
+        return terms[..., 0], terms[..., 1]
+
+    def _evaluated(self, poses: Array) -> tuple[Array, Array]:
+        """Terms (N, V, 2) and log-weights (N,)."""
+        weigher, settings = self.weigher, self.weigher.settings
         outlines = weigher.projector.blocks(poses)
         hidden = self.hidden(outlines)
-        blocks, views, limbs = outlines.shape[:3]
-        sums = np.zeros((blocks, views, LANES, 3), dtype=np.int64)
+        blocks, views = outlines.shape[:2]
+        terms = np.empty((blocks, LANES, views, 2))
+        log_weights = np.empty((blocks, LANES))
         along = weigher.along_edge, weigher.along_region
+        weights = np.array([settings.edge_weight, settings.region_weight])
         run_blocks(
-            chunk_sums, all_sums, blocks, outlines, hidden, *along, self.maps.views, self.maps.values, sums
+            chunk_weights,
+            all_weights,
+            blocks,
+            *(outlines, hidden, *along, self.maps.views, self.maps.values, weights, terms, log_weights),
         )
-        sums = sums.transpose(0, 2, 1, 3).reshape(blocks * LANES, views, 3)[: len(poses)]
-        counted = sums[..., 2]
-        edge = np.where(counted > 0, sums[..., 0] / (WORST * np.maximum(counted, 1)), 1.0)
-        region = sums[..., 1] / (WORST * limbs * REGION_LINES * weigher.along_region.size)
-        return edge, region
+        return terms.reshape(-1, views, 2)[: len(poses)], log_weights.ravel()[: len(poses)]
 
     def hidden(self, outlines: NDArray[np.float32]) -> NDArray[np.uint64]:
         """(B, V, L, 2, 16) a bit for each hidden edge sample; of no blocks where the option is off."""

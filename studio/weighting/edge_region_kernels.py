@@ -1,10 +1,10 @@
 """Edge and region sums of Eq. 14 and 15 for many poses, in two passes: where to look, then bare loads.
 
-A limb in a view is five straight lines of n samples: its two sides (edges) and three lines within (region), n a
-multiple of sixteen. The first pass interpolates them between the outline's corners and writes which entries of the
-maps they fall on; the second adds those entries up, two indices in each 64-bit load. Maps are bytes that hold
-255 (1 - p)² already. Each is followed by two entries for samples that fall on no pixel: NOTHING_SEEN costs the most
-that a sample can, NOT_COUNTED costs nothing and is left out of N.
+A limb in a view is five straight lines of n samples: its two sides (edges) and three lines within (region), n
+a multiple of sixteen. The first pass interpolates them between the outline's corners and writes which entries
+of the maps they fall on; the second adds those entries up, two indices in each 64-bit load. Maps are bytes
+that hold 255 (1 - p)² already. Each is followed by two entries for samples that fall on no pixel:
+NOTHING_SEEN costs the most that a sample can, NOT_COUNTED costs nothing and is left out of N.
 """
 
 import numpy as np
@@ -129,8 +129,8 @@ def hide(bits, not_counted, indices, first, last):
 def fill_view(outlines, hidden, block, view, lane, along_edge, along_region, views, indices):
     """Indices of all samples of one pose in one view: first all edges, limb by limb, then all regions.
 
-    hidden : (B, V, L, 2, 16) bits of edge samples, no blocks where none are looked for. Returns how many are hidden.
-    """
+    hidden : (B, V, L, 2, 16) bits of edge samples, no blocks where none are looked for. Returns how many are
+    hidden."""
     limbs = outlines.shape[2]
     width = np.float32(views[view, 2])
     edge_rows, region_rows = EDGE_LINES * along_edge.shape[0], REGION_LINES * along_region.shape[0]
@@ -188,42 +188,51 @@ def add_up(maps, base, pairs, first, last):
 
 
 @njit(**OPTIONS)
-def chunk_sums(first, last, outlines, hidden, along_edge, along_region, views, maps, sums):
-    """Sums over the samples of the blocks first..last - 1.
+def chunk_weights(
+    first, last, outlines, hidden, along_edge, along_region, views, maps, weights, terms, log_weights
+):
+    """Eq. 14, 15 and 17 for the blocks first..last - 1.
 
-    sums : (B, V, 16, 3) int64: edge map, region map, counted edge samples.
-    """
+    weights : (2,) of the edge and region terms. terms : (B, 16, V, 2) float64, filled with Σe and Σr.
+    log_weights : (B, 16)."""
     limbs = outlines.shape[2]
     edge_rows = limbs * EDGE_LINES * along_edge.shape[0]
     rows = edge_rows + limbs * REGION_LINES * along_region.shape[0]
+    edge_worst, region_worst = float(WORST * edge_rows * CHUNK), float(WORST * (rows - edge_rows) * CHUNK)
     indices = np.zeros((rows, CHUNK), np.uint32)
     pairs = indices.view(np.uint64)
     for block in range(first, last):
+        log_weights[block] = 0.0
         for view in range(outlines.shape[1]):
             edge_base, region_base = np.uint64(views[view, 0]), np.uint64(views[view, 1])
             for lane in range(LANES):
                 lost = fill_view(
                     outlines, hidden, block, view, lane, along_edge, along_region, views, indices
                 )
-                sums[block, view, lane, 0] = add_up(maps, edge_base, pairs, 0, edge_rows)
-                sums[block, view, lane, 1] = add_up(maps, region_base, pairs, edge_rows, rows)
-                sums[block, view, lane, 2] = edge_rows * CHUNK - lost
+                edge, region = 1.0, add_up(maps, region_base, pairs, edge_rows, rows) / region_worst
+                if lost < edge_rows * CHUNK:
+                    edge = add_up(maps, edge_base, pairs, 0, edge_rows) / (edge_worst - WORST * lost)
+                terms[block, lane, view, 0] = edge
+                terms[block, lane, view, 1] = region
+                log_weights[block, lane] -= weights[0] * edge + weights[1] * region
 
 
 @njit(parallel=True, **OPTIONS)
-def all_sums(chunks, outlines, hidden, along_edge, along_region, views, maps, sums):
-    """`chunk_sums` of all blocks, shared among `chunks` threads."""
-    share = (sums.shape[0] + chunks - 1) // chunks
+def all_weights(chunks, outlines, hidden, along_edge, along_region, views, maps, weights, terms, log_weights):
+    """`chunk_weights` of all blocks, shared among `chunks` threads."""
+    share = (terms.shape[0] + chunks - 1) // chunks
     for chunk in prange(chunks):
-        chunk_sums(
-            chunk * share, min((chunk + 1) * share, sums.shape[0]), outlines, hidden, along_edge, along_region, views,
-            maps, sums,
+        chunk_weights(
+            chunk * share, min((chunk + 1) * share, terms.shape[0]), outlines, hidden, along_edge,
+            along_region, views, maps, weights, terms, log_weights,
         )  # fmt: skip
 
 
 @njit(**OPTIONS)
 def record_indices(outlines, hidden, along_edge, along_region, views, indices):
-    """The index stream that `chunk_sums` produces: indices (B, V, 16, rows, 16) uint32. For benchmark and overlay."""
+    """The index stream that `chunk_weights` produces: indices (B, V, 16, rows, 16) uint32. For benchmark and
+    overlay.
+    """
     for block in range(indices.shape[0]):
         for view in range(outlines.shape[1]):
             for lane in range(LANES):
@@ -242,10 +251,10 @@ def record_indices(outlines, hidden, along_edge, along_region, views, indices):
 
 @njit(**OPTIONS)
 def loads_only(maps, views, pairs, edge_rows, passes, sums):
-    """Nothing but the loads of `chunk_sums`, `passes` times over: its limit.
+    """Nothing but the loads of `chunk_weights`, `passes` times over: its limit.
 
-    pairs : indices recorded by `record_indices`, seen as (B, V, 16, rows, 8) uint64. sums : (B, V, 16, 2), added to.
-    """
+    pairs : indices recorded by `record_indices`, seen as (B, V, 16, rows, 8) uint64. sums : (B, V, 16, 2),
+    added to."""
     for _ in range(passes):
         for block in range(pairs.shape[0]):
             for view in range(pairs.shape[1]):

@@ -4,7 +4,8 @@ from studio.errors import FootageError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 
-# Kernels work out pixel numbers in single precision, exact up to 2^24, and keep a few for entries that are no pixel.
+# Kernels work out pixel numbers in single precision, exact up to 2^24, and keep a few for entries that are no
+# pixel.
 LARGEST_PICTURE = 2**24 - 16
 
 

@@ -1,8 +1,8 @@
 """A body's kinematic tables as a short program for the outline kernel.
 
-Steps by constants are folded into one fixed motion each and joints that carry no drawn limb are left out, so that a
-pose costs one pair of column turns for each of its angles and little else. Any tree that `KinematicTables` can hold
-can be compiled; nothing here knows a body by name.
+Steps by constants are folded into one fixed motion each and joints that carry no drawn limb are left out, so
+that a pose costs one pair of column turns for each of its angles and little else. Any tree that
+`KinematicTables` can hold can be compiled; nothing here knows a body by name.
 """
 
 from dataclasses import dataclass
@@ -28,9 +28,8 @@ class KinematicProgram:
 
     parent (F,): -1 for the world. first_operation (F + 1,). operation_kind, operation_parameter (K,);
     operation_value (K,): coefficient of the pose entry. fixed (K, 3, 4): the constant motion of FIXED kinds.
-    limb_frame (L,). limb_shape (L, 5): length, radius_start, radius_end, scale_x, scale_y, mm. Arrays are int64 and
-    float32, as the kernels read them. dimension : entries of a pose that are read, at least.
-    """
+    limb_frame (L,). limb_shape (L, 5): length, radius_start, radius_end, scale_x, scale_y, mm. Arrays are
+    int64 and float32, as the kernels read them. dimension : entries of a pose that are read, at least."""
 
     parent: IntArray
     first_operation: IntArray

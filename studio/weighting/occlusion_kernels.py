@@ -1,8 +1,8 @@
 """Which edge samples of a limb are hidden behind nearer limbs.
 
-A limb's outline in a view is convex, so the part of another limb's straight side that lies behind it is one interval,
-found by clipping the side against four half-planes. Limbs are ordered by the depth of their middles. Sixteen poses at
-a time, like the outlines.
+A limb's outline in a view is convex, so the part of another limb's straight side that lies behind it is one
+interval, found by clipping the side against four half-planes. Limbs are ordered by the depth of their
+middles. Sixteen poses at a time, like the outlines.
 """
 
 import numpy as np
@@ -58,7 +58,9 @@ def sample_bits(interval, samples):
 
 @njit(**INLINED)
 def limb_hidden(outline, near, samples, hidden):
-    """Add to `hidden` (32,) the bits of both sides of a limb (160,) that another limb hides, where it is nearer."""
+    """Add to `hidden` (32,) the bits of both sides of a limb (160,) that another limb hides, where it is
+    nearer.
+    """
     for lane in range(LANES):
         corners = (
             near[lane], near[LANES + lane], near[2 * LANES + lane], near[3 * LANES + lane],

@@ -1,26 +1,30 @@
-"""Poses to projected limb outlines, sixteen poses at a time (structure of arrays, so that all of it vectorises).
+"""Poses to projected limb outlines, sixteen poses at a time (structure of arrays, so that all of it
+vectorises).
 
-A limb's outline in a view is four points: side A from its start to its end, and side B (Lee-walk README, "Limb outline
-in an image"): with u the unit vector across the limb as the camera sees it, A = (-r0 u, 0) to (-r1 u, length) and
-B = (+r0 u, 0) to (+r1 u, length), each projected once, lens distortion included. Samples between them are interpolated
-in the image by the weightings. Frames are twelve rows of sixteen lanes in one flat array: distances between rows that
-the compiler knows are what lets it vectorise without checking for overlap.
+A limb's outline in a view is four points: side A from its start to its end, and side B (Lee-walk README,
+"Limb outline in an image"): with u the unit vector across the limb as the camera sees it, A = (-r0 u, 0) to
+(-r1 u, length) and B = (+r0 u, 0) to (+r1 u, length), each projected once, lens distortion included. Samples
+between them are interpolated in the image by the weightings. Frames are twelve rows of sixteen lanes in one
+flat array: distances between rows that the compiler knows are what lets it vectorise without checking for
+overlap.
 
-Not-a-number and infinity keep their meaning here (no `nnan`, `ninf`): a point that cannot be projected must compare as
-unseen.
+Not-a-number and infinity keep their meaning here (no `nnan`, `ninf`): a point that cannot be projected must
+compare as unseen.
 """
 
 import numpy as np
 from numba import njit, prange
 
 LANES = 16
-# Rows of an outline: x and y (pixels) of A start, A end, B end, B start; whether it is seen; depth of its middle, mm.
+# Rows of an outline: x and y (pixels) of A start, A end, B end, B start; whether it is seen; depth of its
+# middle, mm.
 ROWS = 10
 SEEN_ROW, DEPTH_ROW = 8, 9
 WHOLLY_INSIDE, PARTLY_OUTSIDE, UNSEEN = 1.0, 0.0, -1.0
 UNSEEN_PIXEL = np.float32(-1.0e6)
 NEAREST_DEPTH = np.float32(10.0)
-# A corner this close to the picture's border (pixels) counts as outside, so that rounding cannot carry a sample over.
+# A corner this close to the picture's border (pixels) counts as outside, so that rounding cannot carry a
+# sample over.
 MARGIN = np.float32(0.01)
 
 FLAGS = {"contract", "reassoc", "nsz", "arcp", "afn"}
@@ -37,62 +41,84 @@ FULL_TURN, TURNS = 2.0 * np.pi, 0.5 / np.pi
 
 
 @njit(**INLINED)
-def turn(frame, second, third, entries, parameter, value):
-    """Turn frames by a pose entry about the axis before `second` in the cycle x, y, z: two columns mix."""
-    for lane in range(LANES):
-        angle = value * entries[parameter, lane]
-        x = np.float32(angle - FULL_TURN * np.floor(angle * TURNS + 0.5))
-        q = x * x
-        s = x * (ONE + q * (S1 + q * (S2 + q * (S3 + q * (S4 + q * (S5 + q * S6))))))
-        c = ONE + q * (-HALF + q * (C2 + q * (C3 + q * (C4 + q * (C5 + q * (C6 + q * C7))))))
-        a0, b0 = frame[second * LANES + lane], frame[third * LANES + lane]
-        a1, b1 = frame[(4 + second) * LANES + lane], frame[(4 + third) * LANES + lane]
-        a2, b2 = frame[(8 + second) * LANES + lane], frame[(8 + third) * LANES + lane]
-        frame[second * LANES + lane], frame[third * LANES + lane] = c * a0 + s * b0, c * b0 - s * a0
-        frame[(4 + second) * LANES + lane], frame[(4 + third) * LANES + lane] = (
-            c * a1 + s * b1,
-            c * b1 - s * a1,
-        )
-        frame[(8 + second) * LANES + lane], frame[(8 + third) * LANES + lane] = (
-            c * a2 + s * b2,
-            c * b2 - s * a2,
-        )
+def pose_motions(entries, kinds, parameters, values, motions):
+    """Rows 2k and 2k + 1 of `motions`: cosine and sine of operation k's angle, or its distance."""
+    for k in range(kinds.shape[0]):
+        if kinds[k] >= 6:
+            continue
+        parameter, value = parameters[k], np.float64(values[k])
+        for lane in range(LANES):
+            amount = value * entries[parameter, lane]
+            x = np.float32(amount - FULL_TURN * np.floor(amount * TURNS + 0.5))
+            q = x * x
+            sine = x * (ONE + q * (S1 + q * (S2 + q * (S3 + q * (S4 + q * (S5 + q * S6))))))
+            cosine = ONE + q * (-HALF + q * (C2 + q * (C3 + q * (C4 + q * (C5 + q * (C6 + q * C7))))))
+            motions[k, lane] = cosine if kinds[k] < 3 else np.float32(amount)
+            motions[k, LANES + lane] = sine
 
 
 @njit(**INLINED)
-def move(frame, column, entries, parameter, value):
+def turn(frame, second, third, motions, k):
+    """Turn frames about the axis before `second` in the cycle x, y, z: two columns mix."""
+    for lane in range(LANES):
+        c, s = motions[k, lane], motions[k, LANES + lane]
+        a0, b0 = frame[second * LANES + lane], frame[third * LANES + lane]
+        a1, b1 = frame[(4 + second) * LANES + lane], frame[(4 + third) * LANES + lane]
+        a2, b2 = frame[(8 + second) * LANES + lane], frame[(8 + third) * LANES + lane]
+        frame[second * LANES + lane] = c * a0 + s * b0
+        frame[third * LANES + lane] = c * b0 - s * a0
+        frame[(4 + second) * LANES + lane] = c * a1 + s * b1
+        frame[(4 + third) * LANES + lane] = c * b1 - s * a1
+        frame[(8 + second) * LANES + lane] = c * a2 + s * b2
+        frame[(8 + third) * LANES + lane] = c * b2 - s * a2
+
+
+@njit(**INLINED)
+def move(frame, column, motions, k):
     """Move frames along one of their own axes by a pose entry."""
     for lane in range(LANES):
-        distance = np.float32(value * entries[parameter, lane])
+        distance = motions[k, lane]
         frame[3 * LANES + lane] += frame[column * LANES + lane] * distance
         frame[7 * LANES + lane] += frame[(4 + column) * LANES + lane] * distance
         frame[11 * LANES + lane] += frame[(8 + column) * LANES + lane] * distance
 
 
 @njit(**INLINED)
-def fixed_motion(frame, fixed, k, moves_only):
+def fixed_row(frame, row, lane, m):
+    """One row of frames times a constant motion, given as its twelve numbers."""
+    a, b = frame[row * LANES + lane], frame[(row + 1) * LANES + lane]
+    c, d = frame[(row + 2) * LANES + lane], frame[(row + 3) * LANES + lane]
+    frame[row * LANES + lane] = a * m[0] + b * m[4] + c * m[8]
+    frame[(row + 1) * LANES + lane] = a * m[1] + b * m[5] + c * m[9]
+    frame[(row + 2) * LANES + lane] = a * m[2] + b * m[6] + c * m[10]
+    frame[(row + 3) * LANES + lane] = a * m[3] + b * m[7] + c * m[11] + d
+
+
+@njit(**INLINED)
+def fixed_motion(frame, fixed, k):
     """Frames times one constant motion: fixed[k], (3, 4)."""
+    motion = (
+        fixed[k, 0, 0], fixed[k, 0, 1], fixed[k, 0, 2], fixed[k, 0, 3],
+        fixed[k, 1, 0], fixed[k, 1, 1], fixed[k, 1, 2], fixed[k, 1, 3],
+        fixed[k, 2, 0], fixed[k, 2, 1], fixed[k, 2, 2], fixed[k, 2, 3],
+    )  # fmt: skip
+    for lane in range(LANES):
+        fixed_row(frame, 0, lane, motion)
+        fixed_row(frame, 4, lane, motion)
+        fixed_row(frame, 8, lane, motion)
+
+
+@njit(**INLINED)
+def fixed_move(frame, fixed, k):
+    """Frames moved by one constant vector in their own axes: the last column of fixed[k]."""
     x, y, z = fixed[k, 0, 3], fixed[k, 1, 3], fixed[k, 2, 3]
     for lane in range(LANES):
-        for row in range(0, 12, 4):
-            frame[(row + 3) * LANES + lane] += (
-                frame[row * LANES + lane] * x
-                + frame[(row + 1) * LANES + lane] * y
-                + frame[(row + 2) * LANES + lane] * z
-            )
-    if moves_only:
-        return
-    m00, m01, m02 = fixed[k, 0, 0], fixed[k, 0, 1], fixed[k, 0, 2]
-    m10, m11, m12 = fixed[k, 1, 0], fixed[k, 1, 1], fixed[k, 1, 2]
-    m20, m21, m22 = fixed[k, 2, 0], fixed[k, 2, 1], fixed[k, 2, 2]
-    for lane in range(LANES):
-        for row in range(0, 12, 4):
-            a = frame[row * LANES + lane]
-            b = frame[(row + 1) * LANES + lane]
-            c = frame[(row + 2) * LANES + lane]
-            frame[row * LANES + lane] = a * m00 + b * m10 + c * m20
-            frame[(row + 1) * LANES + lane] = a * m01 + b * m11 + c * m21
-            frame[(row + 2) * LANES + lane] = a * m02 + b * m12 + c * m22
+        px = frame[lane] * x + frame[LANES + lane] * y + frame[2 * LANES + lane] * z
+        py = frame[4 * LANES + lane] * x + frame[5 * LANES + lane] * y + frame[6 * LANES + lane] * z
+        pz = frame[8 * LANES + lane] * x + frame[9 * LANES + lane] * y + frame[10 * LANES + lane] * z
+        frame[3 * LANES + lane] += px
+        frame[7 * LANES + lane] += py
+        frame[11 * LANES + lane] += pz
 
 
 @njit(**INLINED)
@@ -111,24 +137,29 @@ def load_parent(frame, frames, parent):
 
 
 @njit(**OPTIONS)
-def pose_frames(entries, parent, first_operation, kinds, parameters, values, fixed, frames, frame):
-    """World frames (F, 192) of sixteen poses, entries (D, 16): rows of (3, 4), sixteen lanes each."""
+def pose_frames(parent, first_operation, kinds, motions, fixed, frames):
+    """World frames (F, 192) of sixteen poses from their motions: rows of (3, 4), sixteen lanes each."""
     for joint in range(parent.shape[0]):
+        frame = frames[joint]
         load_parent(frame, frames, parent[joint])
         for k in range(first_operation[joint], first_operation[joint + 1]):
-            kind, parameter, value = kinds[k], parameters[k], np.float64(values[k])
+            kind = kinds[k]
             if kind == 0:
-                turn(frame, 1, 2, entries, parameter, value)
+                turn(frame, 1, 2, motions, k)
             elif kind == 1:
-                turn(frame, 2, 0, entries, parameter, value)
+                turn(frame, 2, 0, motions, k)
             elif kind == 2:
-                turn(frame, 0, 1, entries, parameter, value)
-            elif kind < 6:
-                move(frame, kind - 3, entries, parameter, value)
+                turn(frame, 0, 1, motions, k)
+            elif kind == 3:
+                move(frame, 0, motions, k)
+            elif kind == 4:
+                move(frame, 1, motions, k)
+            elif kind == 5:
+                move(frame, 2, motions, k)
+            elif kind == 6:
+                fixed_move(frame, fixed, k)
             else:
-                fixed_motion(frame, fixed, k, kind == 6)
-        for i in range(12 * LANES):
-            frames[joint, i] = frame[i]
+                fixed_motion(frame, fixed, k)
 
 
 @njit(**INLINED)
@@ -226,17 +257,20 @@ def chunk_outlines(
 ):
     """Outlines of the blocks first..last - 1 of sixteen poses each; lanes past the last pose repeat it."""
     frames = np.zeros((parent.shape[0], 12 * LANES), np.float32)
-    frame, outline = np.zeros(12 * LANES, np.float32), np.zeros(ROWS * LANES, np.float32)
-    entries = np.zeros((poses.shape[1], LANES), np.float64)
+    outline = np.zeros(ROWS * LANES, np.float32)
+    entries, motions = (
+        np.zeros((poses.shape[1], LANES), np.float64),
+        np.zeros((kinds.shape[0], 2 * LANES), np.float32),
+    )
     for block in range(first, last):
         for lane in range(LANES):
             pose = min(block * LANES + lane, poses.shape[0] - 1)
             for entry in range(poses.shape[1]):
                 entries[entry, lane] = poses[pose, entry]
-        pose_frames(entries, parent, first_operation, kinds, parameters, values, fixed, frames, frame)
+        pose_motions(entries, kinds, parameters, values, motions)
+        pose_frames(parent, first_operation, kinds, motions, fixed, frames)
         for limb in range(limb_frame.shape[0]):
-            for i in range(12 * LANES):
-                frame[i] = frames[limb_frame[limb], i]
+            frame = frames[limb_frame[limb]]
             for view in range(cameras.shape[0]):
                 limb_outline(frame, limb_shape[limb], cameras[view], outline)
                 for i in range(ROWS * LANES):

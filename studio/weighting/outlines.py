@@ -48,7 +48,7 @@ class OutlineProjector:
             raise BodyError(
                 f"Poses of shape {poses.shape} do not fit the body.", f"Give an array of shape {need}."
             )
-        if not np.isfinite(poses).all():
+        if not np.isfinite(poses.sum()) and not np.isfinite(poses).all():
             row, column = np.argwhere(~np.isfinite(poses))[0]
             raise BodyError(
                 f"Parameter {column} of pose {row} is {poses[row, column]}, which is no number.",
@@ -62,8 +62,9 @@ class OutlineProjector:
         return out
 
     def corners(self, poses: Array) -> tuple[Array, NDArray[np.int8]]:
-        """Corners A0, A1, B1, B0 (N, V, L, 4, 2) pixels, and how each limb is seen (N, V, L): 1 wholly inside the
-        picture, 0 not wholly, -1 not at all (behind the camera or out of its lens: corners are NaN)."""
+        """Corners A0, A1, B1, B0 (N, V, L, 4, 2) pixels, and how each limb is seen (N, V, L): 1 wholly inside
+        the picture, 0 not wholly, -1 not at all (behind the camera or out of its lens: corners are NaN).
+        """
         blocks = self.blocks(poses)
         count, views, limbs = blocks.shape[:3]
         rows = blocks.reshape(count, views, limbs, ROWS, LANES).transpose(0, 4, 1, 2, 3)
@@ -93,9 +94,8 @@ def camera_table(cameras: tuple[Camera, ...]) -> Floats:
 def monotone_limit(k1: float, k2: float, k3: float) -> float:
     """The squared tangent up to which radial distortion moves points outwards, at most WIDEST_VIEW.
 
-    Beyond it the polynomial folds back and would draw what lies outside the picture into it. The first positive root
-    of d/dr [r (1 + k1 r² + k2 r⁴ + k3 r⁶)] = 1 + 3 k1 s + 5 k2 s² + 7 k3 s³, s = r².
-    """
+    Beyond it the polynomial folds back and would draw what lies outside the picture into it. The first
+    positive root of d/dr [r (1 + k1 r² + k2 r⁴ + k3 r⁶)] = 1 + 3 k1 s + 5 k2 s² + 7 k3 s³, s = r²."""
     roots = np.roots([7.0 * k3, 5.0 * k2, 3.0 * k1, 1.0])
     real = roots.real[(np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real > 0.0)]
     return float(min(real.min(initial=WIDEST_VIEW), WIDEST_VIEW))

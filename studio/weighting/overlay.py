@@ -1,4 +1,6 @@
-"""What a weighting looks at, to be drawn over the pictures: outlines and sample points, the very ones kernels read."""
+"""What a weighting looks at, to be drawn over the pictures: outlines and sample points, the very ones kernels
+read.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -28,11 +30,10 @@ CAP_POINTS = 13
 class ViewOverlay:
     """One camera's view of one pose, pixels. L drawn limbs.
 
-    camera : its name. limbs : L names. outlines : (L, 4, 2) corners A0, A1, B1, B0, NaN for a limb that is not seen.
-    contours : L closed polylines (K, 2), sides and the half ellipses at both ends; (0, 2) for a limb that is not seen.
-    edge_samples, region_samples : (K, 2) points inside the picture that the weighting reads, before they are rounded
-    to the nearest pixel; none for the template, which reads all pixels.
-    """
+    camera : its name. limbs : L names. outlines : (L, 4, 2) corners A0, A1, B1, B0, NaN for a limb that is
+    not seen. contours : L closed polylines (K, 2), sides and the half ellipses at both ends; (0, 2) for a
+    limb that is not seen. edge_samples, region_samples : (K, 2) points inside the picture that the weighting
+    reads, before they are rounded to the nearest pixel; none for the template, which reads all pixels."""
 
     camera: str
     limbs: tuple[str, ...]
@@ -122,7 +123,9 @@ def _contours(body: BodyModel, camera: Camera, pose: Array, outlines: Array) -> 
 
 
 def _cap(camera: Camera, frame: Array, shape: Array, *, at_end: bool, start: Array, away: Array) -> Array:
-    """(CAP_POINTS, 2) the half of an end's ellipse that bulges away from the limb, from one side to the other."""
+    """(CAP_POINTS, 2) the half of an end's ellipse that bulges away from the limb, from one side to the
+    other.
+    """
     length, radius = (shape[0], shape[2]) if at_end else (0.0, shape[1])
     turns = np.linspace(0.0, 2.0 * np.pi, 2 * CAP_POINTS - 1)
     centre = frame[:, :2].T @ (camera.centre - frame[:, 3]) / shape[3:5]

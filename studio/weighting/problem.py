@@ -32,4 +32,4 @@ class Limits:
     def hold(self, poses: Array) -> NDArray[np.bool_]:
         """(N, D) poses to (N,) whether every parameter lies within its limits, both included."""
         poses = np.asarray(poses, dtype=np.float64)
-        return ((poses >= self.lower) & (poses <= self.upper)).all(axis=1)
+        return np.all((poses >= self.lower) & (poses <= self.upper), axis=1)

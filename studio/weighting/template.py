@@ -1,13 +1,16 @@
-"""A rendered template against a silhouette: the weighting of Deutscher & Reid 2005, section 6.1 (Figs. 11 to 18).
+"""A rendered template against a silhouette: the weighting of Deutscher & Reid 2005, section 6.1 (Figs. 11 to
+18).
 
-The limbs are drawn as filled quadrilaterals, their projected outlines; a pixel belongs to the template where its centre
-lies in any of them. The weight compares template and silhouette over **all** pixels, so that what is drawn but not seen
-counts as much as what is seen but not drawn ("both directions"; Eq. 15 alone looks only inside the model):
+The limbs are drawn as filled quadrilaterals, their projected outlines; a pixel belongs to the template where
+its centre lies in any of them. The weight compares template and silhouette over **all** pixels, so that what
+is drawn but not seen counts as much as what is seen but not drawn ("both directions"; Eq. 15 alone looks only
+inside the model):
 
     log w = - Σ over cameras of the mean squared difference of template and silhouette, both 0 or 1.
 
-One camera facing the plane of the arm is the paper's case. A limb that reaches behind the camera is not drawn: what the
-silhouette shows of it is then missed, so nothing is gained. log w lies between -cameras and 0.
+One camera facing the plane of the arm is the paper's case. A limb that reaches behind the camera is not
+drawn: what the silhouette shows of it is then missed, so nothing is gained. log w lies between -cameras and
+0.
 """
 
 from dataclasses import dataclass
@@ -88,8 +91,9 @@ class TemplateProblem:
 
 
 def packed_silhouettes(evidence: FrameEvidence) -> tuple[Words, IntArray, IntArray]:
-    """All masks as rows of 64-bit words (bit k of word w is pixel 64 w + k), one after another; (V, 4) where each
-    begins, words a row, width, height; (V,) its pixels."""
+    """All masks as rows of 64-bit words (bit k of word w is pixel 64 w + k), one after another; (V, 4) where
+    each begins, words a row, width, height; (V,) its pixels.
+    """
     parts: list[Words] = []
     views = np.zeros((len(evidence.views), 4), dtype=np.int64)
     start = 0

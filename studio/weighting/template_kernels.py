@@ -1,9 +1,9 @@
 """Rendered templates against silhouettes, a row of pixels in 64-bit words at a time.
 
-A projected limb is a convex quadrilateral, so a row of pixel centres meets it in one span, found from its four
-half-planes. A row's spans are set as bits, limb after limb (their union is the template), and counted: pixels of the
-template, and pixels of it that lie in the silhouette. Double precision, so that a pixel belongs to the template exactly
-where its centre does.
+A projected limb is a convex quadrilateral, so a row of pixel centres meets it in one span, found from its
+four half-planes. A row's spans are set as bits, limb after limb (their union is the template), and counted:
+pixels of the template, and pixels of it that lie in the silhouette. Double precision, so that a pixel belongs
+to the template exactly where its centre does.
 """
 
 import numpy as np
@@ -110,14 +110,16 @@ def template_pixels(
                 set_span(words, left, right)
                 low, high = min(low, left >> 6), max(high, right >> 6)
         for word in range(low, high + 1):
-            drawn += bit_count(words[word])
-            shared += bit_count(words[word] & silhouette[base + y * stride + word])
+            seen = words[word] & silhouette[base + y * stride + word]
+            drawn += bit_count(words[word])  # pyright: ignore[reportCallIssue] - Numba gives the context
+            shared += bit_count(seen)  # pyright: ignore[reportCallIssue]
     return drawn, shared
 
 
 @njit(**OPTIONS)
 def chunk_templates(first, last, outlines, views, silhouettes, counts):
-    """Counts of the blocks first..last - 1: (B, V, 16, 2) int64 pixels of the template, those in the silhouette.
+    """Counts of the blocks first..last - 1: (B, V, 16, 2) int64 pixels of the template, those in the
+    silhouette.
 
     views : (V, 4) where a view's silhouette begins (64-bit words), words a row, width, height.
     """
