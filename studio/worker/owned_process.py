@@ -1,6 +1,7 @@
 """One life of the tracking process, as seen from the server: started, spoken to, listened to, ended."""
 
 import contextlib
+import logging
 import multiprocessing
 import pickle
 import signal
@@ -18,6 +19,8 @@ SILENT_SECONDS = 20.0
 """A process sends a heartbeat every second; after this long without one it is said to be silent."""
 
 LOST_HINT = "Resume: the run goes on from its last finished frame with the same result."
+
+logger = logging.getLogger(__name__)
 
 
 class Listener(Protocol):
@@ -106,11 +109,15 @@ class OwnedProcess:
                 message = outbox.recv()
             except (EOFError, OSError, pickle.UnpicklingError):
                 break
-            if silent:
-                silent = False
-                self._listener.silent(self, False)
-            if not isinstance(message, Heartbeat):
-                self._listener.heard(self, message)
+            try:
+                if silent:
+                    silent = False
+                    self._listener.silent(self, False)
+                if not isinstance(message, Heartbeat):
+                    self._listener.heard(self, message)
+            except Exception:
+                # One event that cannot be passed on must not make its owner deaf.
+                logger.exception("An event of the tracking process could not be passed on.")
         outbox.close()
         self._process.join()
         self._listener.ended(self)
