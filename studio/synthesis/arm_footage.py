@@ -50,7 +50,7 @@ def arm_motion(body: BodyModel, frames: int, fps: float, rng: np.random.Generato
         low = entry.lower if np.isfinite(entry.lower) else -np.pi
         high = entry.upper if np.isfinite(entry.upper) else np.pi
         swing = SWING_SHARE * (high - low) * rng.uniform(0.5, 1.0)
-        middle = 0.5 * (low + high) + rng.uniform(-0.5, 0.5) * (0.5 * (high - low) - swing)
+        middle = 0.5 * (low + high) + rng.uniform(-0.9, 0.9) * (0.5 * (high - low) - swing)
         speed = min(SPEED_SHARE * entry.max_step, 2.0 * np.pi * swing)
         poses[:, index] = middle + swing * np.sin(speed / swing * times + rng.uniform(0.0, 2.0 * np.pi))
     return poses
