@@ -18,7 +18,8 @@ async function call(method, path, body, options = {}) {
     throw Object.assign(new Error(told.message ?? `The studio answered ${answer.status}.`), { hint: told.hint ?? "", status: answer.status });
   }
   const kind = answer.headers.get("content-type") ?? "";
-  return kind.includes("json") ? answer.json() : answer.text();
+  const text = await answer.text();
+  return kind.includes("json") && text ? JSON.parse(text) : text;
 }
 
 export const fetchJson = (path, options) => call("GET", path, undefined, options);

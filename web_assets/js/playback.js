@@ -7,6 +7,8 @@ const button = document.getElementById("play");
 const loop = document.getElementById("loop");
 const speed = document.getElementById("speed");
 const MOST_DRAWN_PER_SECOND = 30;
+const PLAY = button.innerHTML;
+const PAUSE = '<svg viewBox="0 0 16 16"><path d="M4 3h3v10H4zM9 3h3v10H9z"/></svg>';
 let timer = null;
 
 const frames = () => get("summary")?.frames ?? [];
@@ -28,7 +30,7 @@ function tick() {
 function stop() {
   clearTimeout(timer);
   timer = null;
-  button.textContent = "▶";
+  button.innerHTML = PLAY;
   button.setAttribute("aria-label", "Play");
 }
 
@@ -37,7 +39,7 @@ export function togglePlay() {
   if (timer) return stop();
   const all = frames();
   if (!all.length) return;
-  button.textContent = "⏸";
+  button.innerHTML = PAUSE;
   button.setAttribute("aria-label", "Pause");
   if (get("frame") >= all[all.length - 1].frame) goTo(all[0].frame);
   set({ follow: false });

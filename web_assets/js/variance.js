@@ -5,6 +5,11 @@ import { get, set, watch } from "./state.js";
 import { token } from "./theme.js";
 
 const LOWEST_SHARE = 1e-4;
+const MOST_LEVEL_LABELS = 8;
+
+const labelsOf = (names) => (names.length > MOST_LEVEL_LABELS
+  ? { rotate: 50, interval: 0, fontSize: 9.5, width: 76, overflow: "truncate" }
+  : { interval: 0 });
 
 /** Share of the first layer's variance that is left, before or after diffusion: rows = layers. */
 export function shares(layers, key) {
@@ -32,12 +37,12 @@ function heat(detail, layers) {
   return {
     title: title("Variance left before diffusion", "share of the first layer's, per parameter"),
     tooltip: tooltip({ formatter: ({ value }) => cell(detail, layers, value[1], value[0]) }),
-    grid: { left: 56, right: 76, top: 34, bottom: names.length > 8 ? 78 : 34 },
-    xAxis: axis({ type: "category", data: names, axisLabel: { rotate: names.length > 8 ? 55 : 0, interval: 0, fontSize: 10 }, splitLine: { show: false } }),
-    yAxis: axis({ type: "category", inverse: true, name: "layer", nameGap: 6, data: layers.map((_, at) => String(at + 1)), splitLine: { show: false } }),
+    grid: { left: 48, right: 84, top: 32, bottom: names.length > MOST_LEVEL_LABELS ? 62 : 26 },
+    xAxis: axis({ type: "category", data: names, axisLabel: labelsOf(names), splitLine: { show: false } }),
+    yAxis: axis({ type: "category", inverse: true, name: "layer", nameLocation: "middle", nameGap: 26, data: layers.map((_, at) => String(at + 1)), splitLine: { show: false } }),
     visualMap: {
-      min: -4, max: 0, calculable: false, orient: "vertical", right: 4, top: "middle", itemHeight: 90, itemWidth: 10, precision: 0,
-      inRange: { color: [token("surface-sunken"), token("layer-0"), token("layer-4"), token("layer-9")] },
+      min: -4, max: 0, calculable: false, orient: "vertical", right: 8, top: 30, itemHeight: 80, itemWidth: 10, precision: 0,
+      inRange: { color: ["surface-raised", "heat-low", "heat-middle", "heat-high"].map(token) },
       text: ["100 %", "0.01 %"], textStyle: { color: token("text-quiet"), fontSize: 10 },
     },
     series: [{ type: "heatmap", data: cells, itemStyle: { borderColor: token("surface"), borderWidth: 1 }, emphasis: { itemStyle: { borderColor: token("text") } } }],
@@ -50,12 +55,12 @@ function bars(detail, layers, layer) {
   const share = (key) => layers[at][key].map((value, index) => (first[index] > 0 ? (100 * value) / first[index] : null));
   const names = detail.parameters.map((parameter) => parameter.label);
   return {
-    title: title(`Layer ${at + 1} of ${layers.length}`, "% of the first layer's variance"),
+    title: title(`Layer ${at + 1} of ${layers.length}`, "of the first layer's variance"),
     legend: { ...legend(["before diffusion", "after diffusion"]), top: 26 },
     tooltip: tooltip({ trigger: "axis", axisPointer: { type: "shadow" }, formatter: (points) => cell(detail, layers, at, points[0].dataIndex) }),
-    grid: { left: 48, right: 12, top: 50, bottom: names.length > 8 ? 78 : 30 },
-    xAxis: axis({ type: "category", data: names, axisLabel: { rotate: names.length > 8 ? 55 : 0, fontSize: 10 }, splitLine: { show: false } }),
-    yAxis: axis({ type: "value", name: "%", min: 0 }),
+    grid: { left: 44, right: 12, top: 50, bottom: names.length > MOST_LEVEL_LABELS ? 62 : 26 },
+    xAxis: axis({ type: "category", data: names, axisLabel: labelsOf(names), splitLine: { show: false } }),
+    yAxis: axis({ type: "value", min: 0, axisLabel: { formatter: "{value} %" } }),
     series: [
       { name: "before diffusion", type: "bar", data: share("variance_resampled"), itemStyle: { color: token("layer-1") }, barGap: "0%" },
       { name: "after diffusion", type: "bar", data: share("variance_diffused"), itemStyle: { color: token("layer-8") } },
