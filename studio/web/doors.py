@@ -14,11 +14,12 @@ from typing import Protocol
 
 from fastapi import Request
 
+from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.workspace import Workspace
 from studio.web.event_stream import EventStream
 from studio.web.import_schemas import ImportState
 from studio.web.presets import Preset
-from studio.worker.commands import Command
+from studio.worker.commands import Close, Command
 from studio.worker.events import StateChanged
 from studio.worker.watchers import Subscription
 
@@ -41,6 +42,10 @@ class Control(Protocol):
 
     def send(self, command: Command) -> None:
         """Post a command; an `Acknowledged` event follows. Raises RunError if the process has died."""
+        ...
+
+    def request(self, command: Command) -> object:
+        """Post a command and wait until it is acknowledged. Raises what it was refused with."""
         ...
 
     def change_settings(self, **changes: Value) -> object:
@@ -95,6 +100,11 @@ class Stage(Protocol):
 
     def relay_headers(self) -> Mapping[str, str]:
         """The secret that the scene asks of whoever connects."""
+        ...
+
+    @property
+    def shown(self) -> Shown:
+        """What is shown now."""
         ...
 
     def watch(self, callback: Callable[[Shown], None]) -> None:
@@ -159,3 +169,17 @@ class Doors:
 def doors_of(request: Request) -> Doors:
     """The doors, as a dependency of routes."""
     return request.app.state.doors
+
+
+def let_go(doors: Doors, session: str, run: str = "") -> None:
+    """Free a session (or only a run of it) for renaming or deleting: footage, results and scene are closed.
+
+    Raises RunError while the run is being tracked.
+    """
+    state = doors.control.state
+    if state.state != "lost" and state.session == session and (not run or state.run == run) and state.run:
+        doors.control.request(Close())
+    shown = doors.stage.shown
+    if shown.session == session and (not run or shown.run == run):
+        doors.stage.show_run(session if run else "")
+    forget_composers()

@@ -177,7 +177,7 @@ def _with_errors(summary: FramesSummary, session: Session, run: StoredRun) -> Fr
     if measured is None:
         return summary
     errors = dict(zip(measured.frames, measured.per_frame_mm, strict=True))
-    lost = set(measured.lost_frames)
+    lost = set(measured.lost_frame_numbers)
     lines = [
         line.model_copy(update={"error_mm": errors.get(line.frame), "lost": line.frame in lost})
         for line in summary.frames

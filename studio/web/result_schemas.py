@@ -89,12 +89,18 @@ class ParticlesView(Answer):
 
 
 class EvaluationView(Answer):
-    """A run against the session's truth, in mm, without alignment unless said."""
+    """A run against the session's truth, in mm, without alignment unless said.
+
+    lost_frames: how many frames have a limb that is off by more than 150 mm; lost_frame_numbers: which.
+    """
 
     frames: list[int]
     mean_mm: Number
+    std_mm: Number
     worst_mm: Number
     lost_frames: int
+    lost_frame_numbers: list[int]
+    lost_limbs: list[str]
     per_marker_mm: dict[str, Number]
     per_frame_mm: Numbers
     root_aligned_mm: Number

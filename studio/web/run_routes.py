@@ -14,7 +14,7 @@ from studio.runs.new_run import RunRequest as NewRun
 from studio.runs.new_run import prepare_run
 from studio.sessions.run_log import read_log
 from studio.sessions.stored_run import StoredRun
-from studio.web.doors import Doors, doors_of
+from studio.web.doors import Doors, doors_of, let_go
 from studio.web.event_encoding import message_of, plain
 from studio.web.schemas import (
     Frame,
@@ -98,6 +98,7 @@ def rename_run(session: OpenSession, run: OpenRun, change: SessionChange, doors:
     """Give a run another name. Refused while it is being tracked."""
     name = run.name
     if change.name is not None and change.name != name:
+        let_go(doors, session.name, name)
         name = doors.workspace.rename_run(session.name, name, change.name).name
     doors.events.publish({"type": "sessions", "session": session.name, "run": name})
     return NewName(name=name)
@@ -106,6 +107,7 @@ def rename_run(session: OpenSession, run: OpenRun, change: SessionChange, doors:
 @router.delete(RUN)
 def delete_run(session: OpenSession, run: OpenRun, doors: Door) -> TrashEntry:
     """Move a run to the trash. Refused while it is being tracked."""
+    let_go(doors, session.name, run.name)
     place = doors.workspace.trash_run(session.name, run.name)
     doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
     return TrashEntry(id=place.name, name=run.name, restorable=False)

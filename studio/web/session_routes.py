@@ -5,10 +5,9 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Response
 
 from studio.errors import NotFoundError, StudioError
-from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.session import Session
 from studio.sessions.workspace import SessionSummary
-from studio.web.doors import Doors, doors_of
+from studio.web.doors import Doors, doors_of, let_go
 from studio.web.schemas import (
     NewName,
     SessionChange,
@@ -62,7 +61,7 @@ def change_session(session: OpenSession, change: SessionChange, doors: Door) -> 
     if change.title is not None:
         doors.workspace.retitle(name, change.title)
     if change.name is not None and change.name != name:
-        forget_composers()
+        let_go(doors, name)
         name = doors.workspace.rename(name, change.name).name
     return _changed(doors, name)
 
@@ -76,7 +75,7 @@ def duplicate(session: OpenSession, doors: Door, wish: NewName | None = None) ->
 @router.delete("/sessions/{session}")
 def delete(session: OpenSession, doors: Door) -> TrashEntry:
     """Move a session to the trash. Refused while a run of it is being tracked."""
-    forget_composers()
+    let_go(doors, session.name)
     place = doors.workspace.trash(session.name)
     _changed(doors, session.name)
     return TrashEntry(id=place.name, name=session.name, restorable=True)

@@ -149,13 +149,13 @@ def test_the_server_counts_what_arrives(studio: Studio, monkeypatch: pytest.Monk
         while True:
             yield bytes(100)
 
-    with pytest.raises(httpx.HTTPError) as broken:
-        answer = studio.client.put(
-            f"/api/uploads/{identifier}/files", params={"path": "b.bin"}, content=endless()
-        )
+    place = f"/api/uploads/{identifier}/files"
+    try:
+        answer = studio.client.put(place, params={"path": "b.bin"}, content=endless())
+    except httpx.HTTPError:
+        pass  # the server hung up on an endless body, which is as good
+    else:
         assert answer.status_code == 413
-        raise httpx.HTTPError("answered before all was sent, which is as good")
-    assert broken.value is not None
     file = studio.workspace.root / ".studio" / "uploads" / identifier / "b.bin"
     assert file.stat().st_size <= 400
 

@@ -12,6 +12,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from studio.errors import RunError
+from studio.scene.view_options import Shown
 from studio.sessions.workspace import Workspace
 from studio.worker.commands import Command
 from studio.worker.events import Event, StateChanged
@@ -43,6 +44,9 @@ class RecordingControl:
         if self.state.state == "lost":
             raise RunError("The tracking process has died.", "Resume.")
         self.commands.append(command)
+
+    def request(self, command: Command) -> None:
+        self.send(command)
 
     def change_settings(self, **changes: bool | int | float | str) -> None:
         self.changes.append(dict(changes))
@@ -82,6 +86,10 @@ class RecordingStage:
 
     def relay_headers(self) -> Mapping[str, str]:
         return self.headers
+
+    @property
+    def shown(self) -> Shown:
+        return Shown()
 
     def watch(self, callback: Callable[[object], None]) -> None:
         self.moved = callback

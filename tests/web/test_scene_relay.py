@@ -1,0 +1,155 @@
+"""viser comes through our door, and only through it."""
+
+import asyncio
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import viser
+import zstandard
+from web_doubles import TOKEN, RecordingControl, RecordingStage, Studio, cookie_header, let_in, serving
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+
+from studio.scene.guarded_server import GuardedServer
+from studio.sessions.workspace import Workspace
+from studio.web.app import build_app
+
+MARK = b"a label that only this scene has"
+VISER = f"viser-v{viser.__version__}"
+
+
+@pytest.fixture(scope="module")
+def inner() -> Iterator[GuardedServer]:
+    """A real viser server with one thing in it."""
+    server = GuardedServer()
+    server.scene.add_label("/mark-of-the-studio", MARK.decode())
+    yield server
+    server.stop()
+
+
+@pytest.fixture
+def relayed(tmp_path: Path, inner: GuardedServer) -> Iterator[Studio]:
+    """The application in front of the real viser server."""
+    workspace, control = Workspace(tmp_path), RecordingControl()
+    stage = RecordingStage(inner.get_port(), inner.relay_headers())
+    app = build_app(workspace, control, stage, TOKEN)
+    with serving(app) as base, let_in(base, TOKEN) as client:
+        yield Studio(base, client, control, stage, workspace, app, tmp_path / "log")
+
+
+def opened(studio: Studio, path: str = "/scene", protocol: str = VISER) -> ClientConnection:
+    """viser's client's socket."""
+    return connect(
+        studio.base.replace("http", "ws") + path,
+        origin=studio.base,  # pyright: ignore[reportArgumentType]
+        additional_headers={"cookie": cookie_header(studio.client)},
+        subprotocols=[protocol],  # pyright: ignore[reportArgumentType]
+        max_size=None,
+        proxy=None,
+    )
+
+
+def unpacked(message: str | bytes) -> bytes:
+    """What is inside one of viser's messages: 16 bytes of lengths, then msgpack under zstd."""
+    assert isinstance(message, bytes)
+    length = int.from_bytes(message[8:16], "little")
+    return zstandard.ZstdDecompressor().decompress(message[16 : 16 + length])
+
+
+def shows_the_mark(socket: ClientConnection) -> bool:
+    """Whether the label arrives before the connection ends or falls silent."""
+    try:
+        while True:
+            if MARK in unpacked(socket.recv(timeout=5)):
+                return True
+    except (ConnectionClosed, TimeoutError):
+        return False
+
+
+def test_the_client_comes_from_the_installed_wheel(relayed: Studio) -> None:
+    page = relayed.client.get("/scene/")
+    build = Path(viser.__file__).parent / "client" / "build" / "index.html"
+    assert page.content == build.read_bytes()
+    again = relayed.client.get("/scene/", headers={"if-none-match": page.headers["etag"]})
+    assert again.status_code == 304
+    assert relayed.client.get("/scene").headers["location"] == "/scene/"
+
+
+def test_the_scene_reaches_the_browser_under_viser_s_own_subprotocol(relayed: Studio) -> None:
+    with opened(relayed) as socket:
+        assert socket.subprotocol == VISER
+        assert shows_the_mark(socket)
+
+
+def test_what_the_browser_says_reaches_viser(relayed: Studio, inner: GuardedServer) -> None:
+    before = len(inner.get_clients())
+    with opened(relayed) as socket:
+        socket.recv(timeout=20)
+        # viser knows a client once its first camera message came; a broken one ends the connection.
+        socket.send(b"this is no message of viser's")
+        with pytest.raises(ConnectionClosed):
+            for _ in range(1000):
+                socket.recv(timeout=20)
+    assert len(inner.get_clients()) == before
+
+
+def test_another_version_s_client_is_turned_away(relayed: Studio) -> None:
+    with opened(relayed, protocol="viser-v0.0.1") as socket:
+        with pytest.raises(ConnectionClosed) as closed:
+            socket.recv(timeout=20)
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 1002
+
+
+def test_viser_cannot_be_reached_around_the_relay(relayed: Studio, inner: GuardedServer) -> None:
+    """A stranger on the loopback port, without the relay's secret, sees nothing of the scene."""
+    stranger = connect(
+        f"ws://127.0.0.1:{inner.get_port()}",
+        subprotocols=[VISER],  # pyright: ignore[reportArgumentType]
+        max_size=None,
+        proxy=None,
+    )
+    with stranger:
+        assert not shows_the_mark(stranger)
+        with pytest.raises(ConnectionClosed):
+            stranger.recv(timeout=20)
+    friend = connect(
+        f"ws://127.0.0.1:{inner.get_port()}",
+        subprotocols=[VISER],  # pyright: ignore[reportArgumentType]
+        additional_headers=inner.relay_headers(),
+        max_size=None,
+        proxy=None,
+    )
+    with friend:
+        assert shows_the_mark(friend)
+    for path in ("/scene/websocket", "/scene/ws", "/"):
+        with pytest.raises(InvalidStatus):
+            opened(relayed, path)
+
+
+def test_the_inner_server_listens_on_loopback_and_opens_no_tunnel(inner: GuardedServer) -> None:
+    assert inner.get_host() == "127.0.0.1"
+    assert inner.request_share_url() is None
+
+
+def test_without_a_scene_the_browser_is_asked_to_try_again(studio: Studio) -> None:
+    with pytest.raises(InvalidStatus) as refused:
+        opened(studio)
+    assert refused.value.response.status_code in (403, 503)
+
+
+def test_when_the_browser_leaves_viser_is_told(relayed: Studio, inner: GuardedServer) -> None:
+    sockets = [opened(relayed) for _ in range(3)]
+    for socket in sockets:
+        socket.recv(timeout=20)
+        socket.close()
+
+    async def gone() -> bool:
+        for _ in range(200):
+            if not inner._websock_server._live_connections:
+                return True
+            await asyncio.sleep(0.02)
+        return False
+
+    assert asyncio.run(gone())
