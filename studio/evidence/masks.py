@@ -25,7 +25,8 @@ def cleaned(mask: Bytes, settings: EvidenceSettings) -> Bytes:
 
 
 def _morphed(mask: Bytes, operation: int, size: int) -> Bytes:
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+    # Only odd kernels have a middle: an even one would shift the mask.
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size | 1, size | 1))
     return np.asarray(cv2.morphologyEx(mask, operation, kernel), dtype=np.uint8)
 
 

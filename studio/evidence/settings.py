@@ -34,7 +34,7 @@ class EvidenceSettings:
         help="Foreground is what differs from the background by more than this many standard deviations.",
     )
     mask_noise: float = knob(
-        5.0,
+        4.0,
         0.5,
         40.0,
         0.5,
@@ -65,7 +65,7 @@ class EvidenceSettings:
         help="A shadow leaves at least this share of the background's brightness.",
     )
     mask_shadow_colour: float = knob(
-        0.06,
+        0.04,
         0.005,
         0.5,
         0.005,
