@@ -12,6 +12,8 @@ from studio.scene.limb_meshes import limb_frames, limb_mesh
 
 Array = NDArray[np.float64]
 
+_CAGE_SECTIONS, _CAGE_SCALE = 10, (1.03, 1.03, 1.0)
+
 
 class BodyView:
     """A body at one pose.
@@ -75,13 +77,15 @@ def _add_limb(
     server: viser.ViserServer, name: str, index: int, body: BodyModel, tokens: ColourTokens, ghost: bool
 ) -> viser.MeshHandle:
     limb = body.drawn[index]
-    mesh = limb_mesh(limb)
+    mesh = limb_mesh(limb, _CAGE_SECTIONS) if ghost else limb_mesh(limb)
     return server.scene.add_mesh_simple(
         name,
         np.asarray(mesh.vertices),
         np.asarray(mesh.faces),
         color=_colour(tokens, limb.side, ghost),
         wireframe=ghost,
+        # Beside an answer that hardly differs the cage must lie around it, not in its surface.
+        scale=_CAGE_SCALE if ghost else 1.0,
         side="front",
         cast_shadow=not ghost,
         receive_shadow=not ghost,

@@ -5,9 +5,12 @@ any client open a public tunnel. Here it listens on the loopback address at a fr
 that do not carry a secret header (which only the web application's relay knows), and never opens a tunnel.
 """
 
+import contextlib
 import hmac
 import secrets
+from collections.abc import Iterator
 
+import rich
 import viser
 from viser.infra import WebsockClientConnection
 
@@ -22,7 +25,8 @@ class GuardedServer(viser.ViserServer):
 
     def __init__(self) -> None:
         self._relay_secret = secrets.token_urlsafe(32)
-        super().__init__(host="127.0.0.1", port=0, label="Capture studio", verbose=False)
+        with _quietly():
+            super().__init__(host="127.0.0.1", port=0, label="Capture studio", verbose=False)
         # Appended after viser's own callbacks, all of which run before the first message is sent or read.
         self._websock_server.on_client_connect(self._refuse_strangers)
         # A client that slipped in before the guard stood would be dropped here, and refused when it comes
@@ -37,6 +41,11 @@ class GuardedServer(viser.ViserServer):
         """None: the scene is never published, whoever asks."""
         return None
 
+    def stop(self) -> None:
+        """End the server and its threads."""
+        with _quietly():
+            super().stop()
+
     async def _refuse_strangers(self, client: WebsockClientConnection) -> None:
         connection = self._websock_server._live_connections.get(client.client_id)
         if connection is None or connection.request is None:
@@ -44,3 +53,14 @@ class GuardedServer(viser.ViserServer):
         shown = connection.request.headers.get(RELAY_HEADER, "")
         if not hmac.compare_digest(shown.encode(), self._relay_secret.encode()):
             await connection.close(_POLICY_VIOLATION, "This socket is for the studio's relay only.")
+
+
+@contextlib.contextmanager
+def _quietly() -> Iterator[None]:
+    """viser prints its own address and its end, told to be quiet or not: a second address would mislead people."""
+    console = rich.get_console()
+    before, console.quiet = console.quiet, True
+    try:
+        yield
+    finally:
+        console.quiet = before

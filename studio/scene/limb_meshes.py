@@ -18,20 +18,20 @@ SECTIONS = 28
 Array = NDArray[np.float64]
 
 
-def limb_mesh(limb: Limb) -> trimesh.Trimesh:
+def limb_mesh(limb: Limb, sections: int = SECTIONS) -> trimesh.Trimesh:
     """The limb's surface in its joint's frame, metres: a side and two flat caps with crisp rims, normals
     outwards.
     """
-    turn = np.linspace(0.0, 2.0 * np.pi, SECTIONS, endpoint=False)
+    turn = np.linspace(0.0, 2.0 * np.pi, sections, endpoint=False)
     circle = np.stack([limb.scale_x * np.cos(turn), limb.scale_y * np.sin(turn)], axis=-1)
-    start = np.column_stack([limb.radius_start * circle, np.zeros(SECTIONS)])
-    end = np.column_stack([limb.radius_end * circle, np.full(SECTIONS, limb.length)])
-    here = np.arange(SECTIONS)
+    start = np.column_stack([limb.radius_start * circle, np.zeros(sections)])
+    end = np.column_stack([limb.radius_end * circle, np.full(sections, limb.length)])
+    here = np.arange(sections)
     after = np.roll(here, -1)
     side = np.concatenate(
         [
-            np.column_stack([here, after, after + SECTIONS]),
-            np.column_stack([here, after + SECTIONS, here + SECTIONS]),
+            np.column_stack([here, after, after + sections]),
+            np.column_stack([here, after + sections, here + sections]),
         ]
     )
     parts = [

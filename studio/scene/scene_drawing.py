@@ -23,7 +23,8 @@ Bytes = NDArray[np.uint8]
 
 _VIEW_ELEVATION = 0.34
 _LEAST_DISTANCE, _MOST_DISTANCE = 2.6, 9.0
-_FIELD_OF_VIEW = 0.75
+_FIELD_OF_VIEW = 0.85
+_LOOK_HIGHER = np.array([0.0, 0.0, 0.2])
 
 
 class SceneDrawing:
@@ -92,13 +93,13 @@ class SceneDrawing:
         height.
         """
         ends = limb_ends(self._opened.body, self._opened.start_pose()[None])[0] * METRES_PER_MM
-        middle = (ends.min(axis=(0, 1)) + ends.max(axis=(0, 1))) / 2.0
+        middle = (ends.min(axis=(0, 1)) + ends.max(axis=(0, 1))) / 2.0 + _LOOK_HIGHER
         height = float(np.ptp(ends[..., 2]))
         toward = self._toward(middle)
         reach = [
             float(np.linalg.norm(camera.centre * METRES_PER_MM - middle)) for camera in self._opened.cameras
         ]
-        wanted = max(2.3 * height, float(np.mean(reach)) if reach else 0.0)
+        wanted = max(2.3 * height, 1.1 * float(np.mean(reach)) if reach else 0.0)
         distance = float(np.clip(wanted, _LEAST_DISTANCE, _MOST_DISTANCE))
         position = middle + distance * (toward + np.array([0.0, 0.0, _VIEW_ELEVATION]))
         view = self._server.initial_camera

@@ -1,0 +1,272 @@
+"""The scene as a whole, on a session from disk, with a tracking process that a test plays."""
+
+import asyncio
+import dataclasses
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+import viser
+from conftest import FRAMES, LAYERS, cloud_record, frame_result, swaying_pose
+from scene_fakes import FakeControl
+from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed
+from websockets.typing import Subprotocol
+
+from studio.body.forward_kinematics import limb_ends, limb_frames
+from studio.body.model import BodyModel
+from studio.errors import SettingsError
+from studio.scene.particle_view import extremities
+from studio.scene.stage import SceneStage
+from studio.scene.view_options import Shown
+from studio.sessions.workspace import Workspace
+from studio.worker import commands
+from studio.worker.events import FrameFinished, LayerFinished, SettingsApplied, StateChanged
+
+PATIENCE = 20.0
+
+
+def until(condition: Callable[[], object]) -> None:
+    """Wait for a state, not for a time."""
+    waiting = threading.Event()
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline, "it never came about"
+        waiting.wait(0.01)
+
+
+@pytest.fixture
+def control() -> FakeControl:
+    return FakeControl("swaying", "run-1", "paused")
+
+
+@pytest.fixture
+def stage(workspace: Workspace, control: FakeControl) -> Iterator[SceneStage]:
+    made = SceneStage(workspace, control)
+    made.start()
+    yield made
+    made.stop()
+
+
+def drawing(stage: SceneStage):
+    return stage._director.state.run.drawing  # pyright: ignore[reportOptionalMemberAccess]
+
+
+def open_run(stage: SceneStage) -> None:
+    stage.show_run("swaying", "run-1")
+    until(lambda: stage.shown.run == "run-1" and drawing(stage).body.handles[0].visible)
+
+
+def body_stands_at(stage: SceneStage, body: BodyModel, pose: np.ndarray) -> bool:
+    places = limb_frames(body, pose)[0, :, :, 3] / 1000.0
+    return np.allclose([handle.position for handle in drawing(stage).body.handles], places, atol=1e-9)
+
+
+def test_the_stored_run_is_drawn_clouds_and_all(
+    stage: SceneStage, human: BodyModel, workspace: Workspace
+) -> None:
+    open_run(stage)
+    assert stage.shown.frame == FRAMES - 2, "the newest stored frame"
+    stage.show_frame(1)
+    until(lambda: body_stands_at(stage, human, swaying_pose(human, 1)))
+    with workspace.session("swaying").run("run-1").results() as results:
+        records = results.layers(1)
+    until(lambda: len(drawing(stage).particles.handles) == LAYERS)
+    for record, handle in zip(records, drawing(stage).particles.handles, strict=True):
+        ends = limb_ends(human, record.poses)[:, list(extremities(human)), 1].reshape(-1, 3) / 1000.0
+        until(lambda handle=handle, ends=ends: np.allclose(handle.points, ends, atol=1e-6))
+        assert handle.visible
+    assert drawing(stage).truth.handle.visible
+    assert not drawing(stage).beside.handles[0].visible
+
+
+def test_the_pictures_are_hung_with_outlines(stage: SceneStage) -> None:
+    open_run(stage)
+    views = drawing(stage).cameras.views
+    until(lambda: all(view.picture.visible for view in views.values()))
+    plain = views["cam1"].picture.image
+    colourful = np.abs(plain.astype(int) - plain.mean(axis=2, keepdims=True)).max(axis=2) > 60
+    assert colourful.sum() > 100, "the limbs' outlines are the only saturated colours"
+    stage.set_options(overlays=())
+    until(lambda: np.abs(np.diff(views["cam1"].picture.image.astype(int), axis=2)).max() < 60)
+
+
+def test_layers_in_the_making_are_drawn_at_once(
+    stage: SceneStage, control: FakeControl, human: BodyModel
+) -> None:
+    open_run(stage)
+    control.say(dataclasses.replace(control.state, state="tracking"))
+    new = FRAMES - 1
+    for layer in range(2):
+        control.say(LayerFinished("swaying", "run-1", cloud_record(human, new, layer)))
+    until(lambda: stage.shown.frame == new)
+    until(
+        lambda: (
+            [handle.visible for handle in drawing(stage).particles.handles][:LAYERS]
+            == [True, True, False, False]
+        )
+    )
+    until(lambda: body_stands_at(stage, human, swaying_pose(human, new)))
+
+
+def test_a_reannealed_frame_stands_beside_the_stored_answer(
+    stage: SceneStage, control: FakeControl, human: BodyModel
+) -> None:
+    open_run(stage)
+    stage.show_frame(2)
+    until(lambda: stage.shown.frame == 2)
+    control.say(LayerFinished("swaying", "run-1", cloud_record(human, 2, 0), True))
+    control.say(FrameFinished("swaying", "run-1", frame_result(human, 2, shift=120.0), True))
+    moved = swaying_pose(human, 2)
+    moved[4] += 120.0
+    until(lambda: body_stands_at(stage, human, moved))
+    stored = limb_frames(human, swaying_pose(human, 2))[0, :, :, 3] / 1000.0
+    ghosts = drawing(stage).beside.handles
+    until(lambda: all(ghost.visible for ghost in ghosts))
+    np.testing.assert_allclose([ghost.position for ghost in ghosts], stored, atol=1e-9)
+    stage.show_frame(3)
+    until(lambda: body_stands_at(stage, human, swaying_pose(human, 3)))
+    until(lambda: not ghosts[0].visible)
+
+
+def test_a_setting_selects_the_shown_frame_and_is_asked_for(stage: SceneStage, control: FakeControl) -> None:
+    open_run(stage)
+    stage.show_frame(2)
+    until(lambda: stage.shown.frame == 2)
+    panel = stage._director.state._panel  # pyright: ignore[reportOptionalMemberAccess]
+    panel.settings.inputs["survival"].handle.value = 0.7
+    until(lambda: len(control.commands) == 2)
+    seek, change = control.commands
+    assert isinstance(seek, commands.Seek)
+    assert seek.frame == 2
+    assert isinstance(change, commands.ChangeSettings)
+    assert change.changes == {"survival": 0.7}
+    control.answer(change, "Setting 'survival' cannot be 0.7.", "Try 0.6.")
+    until(lambda: panel.settings.inputs["survival"].handle.value == 0.5)
+    control.say(SettingsApplied("swaying", "run-1", 2, 2, 0, {"survival": 0.6}, ("survival",)))
+    until(lambda: panel.settings.inputs["survival"].handle.value == 0.6)
+    assert len(control.commands) == 2, "showing what is in use asks for nothing"
+
+
+def test_a_run_that_is_not_open_is_opened_first(stage: SceneStage, control: FakeControl) -> None:
+    control.state = dataclasses.replace(control.state, session="other", run="run-9")
+    open_run(stage)
+    stage.reanneal_shown()
+    assert [type(command) for command in control.commands] == [commands.Open, commands.Reanneal]
+    control.say(dataclasses.replace(control.state, state="tracking"))
+    with pytest.raises(Exception, match=r"run-9.*is being tracked"):
+        stage.reanneal_shown()
+
+
+def test_playback_shows_one_frame_after_another_and_tells_the_page(stage: SceneStage) -> None:
+    open_run(stage)
+    told: list[Shown] = []
+    stage.watch(told.append)
+    stage.show_frame(0)
+    until(lambda: stage.shown.frame == 0)
+    assert told == [], "who asked is not told"
+    stage.play(True)
+    until(lambda: {shown.frame for shown in told} >= set(range(1, FRAMES - 1)) and len(told) > 6)
+    stage.play(False)
+
+
+def test_looking_through_a_camera_by_its_name(stage: SceneStage) -> None:
+    open_run(stage)
+    stage.look_through("cam2")
+    until(lambda: stage.shown.look_through == "cam2")
+    stage.look_through("no such camera")
+    stage.look_through("")
+    until(lambda: stage.shown.look_through is None)
+
+
+def test_the_theme_changes_every_colour(stage: SceneStage) -> None:
+    open_run(stage)
+    before = drawing(stage).body.handles[0].color
+    stage.set_dark(False)
+    until(lambda: drawing(stage).body.handles[0].color != before)
+    with pytest.raises(SettingsError, match="no option 'colour'"):
+        stage.set_options(colour="red")
+
+
+def test_the_start_pose_under_the_sliders_is_shown_and_saved(
+    stage: SceneStage, human: BodyModel, workspace: Workspace
+) -> None:
+    open_run(stage)
+    editor = stage._director.state._panel.pose  # pyright: ignore[reportOptionalMemberAccess]
+    editor.sliders[9].value = -40.0
+    wanted = swaying_pose(human, 0)
+    wanted[9] = np.deg2rad(-40.0)
+    until(lambda: body_stands_at(stage, human, wanted))
+    stage._director.save_pose(editor.pose)  # pyright: ignore[reportOptionalMemberAccess]
+    until(lambda: editor.save.disabled)
+    stored = workspace.session("swaying").start_pose(human)
+    assert stored is not None
+    np.testing.assert_allclose(stored, wanted, atol=1e-12)
+    editor.editing.value = False
+    until(lambda: body_stands_at(stage, human, swaying_pose(human, FRAMES - 2)))
+
+
+def test_a_session_without_a_run_and_none_at_all(stage: SceneStage, human: BodyModel) -> None:
+    stage.show_run("swaying")
+    until(lambda: stage.shown.session == "swaying" and drawing(stage).body.handles[0].visible)
+    assert body_stands_at(stage, human, human.neutral)
+    stage.show_run("")
+    until(lambda: stage.shown.session == "" and stage._director.state.run is None)  # pyright: ignore[reportOptionalMemberAccess]
+
+
+def test_what_cannot_be_opened_leaves_the_scene_alive(stage: SceneStage) -> None:
+    stage.show_run("no-such-session", "run-1")
+    open_run(stage)
+
+
+def test_strangers_are_refused_and_nothing_is_ever_shared(stage: SceneStage) -> None:
+    open_run(stage)
+
+    async def knock(headers: dict[str, str]) -> tuple[int | None, int]:
+        heard = 0
+        address = f"ws://127.0.0.1:{stage.port}"
+        async with connect(
+            address,
+            subprotocols=[Subprotocol(f"viser-v{viser.__version__}")],
+            additional_headers=headers,
+            proxy=None,
+        ) as socket:
+            try:
+                await asyncio.wait_for(socket.recv(), 5.0)
+                heard = 1
+            except ConnectionClosed:
+                pass
+            return socket.close_code, heard
+
+    assert asyncio.run(knock({})) == (1008, 0)
+    assert asyncio.run(knock({"X-Studio-Relay": "guess"})) == (1008, 0)
+    assert asyncio.run(knock(stage.relay_headers())) == (None, 1)
+    server = stage._server
+    assert server is not None
+    assert server.get_host() == "127.0.0.1"
+    assert server.request_share_url() is None
+
+
+def test_a_stopped_stage_can_be_started_again(workspace: Workspace) -> None:
+    made = SceneStage(workspace, FakeControl())
+    assert made.port == 0
+    first = made.start()
+    assert made.start() == first
+    made.stop()
+    assert made.port == 0
+    made.start()
+    made.show_run("swaying", "run-1")
+    until(lambda: made.shown.run == "run-1")
+    made.stop()
+    made.stop()
+
+
+def test_the_state_of_the_process_opens_its_run(workspace: Workspace) -> None:
+    control = FakeControl()
+    made = SceneStage(workspace, control)
+    made.start()
+    control.say(StateChanged("swaying", "run-1", "tracking", 0, 0, 0, 6, 5, 30.0, 0.1))
+    until(lambda: made.shown.run == "run-1")
+    made.stop()
