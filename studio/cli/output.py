@@ -1,13 +1,13 @@
 """What every command shares: `--json`, progress on standard error, errors in words with exit code 2."""
 
 import functools
-import json
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import ParamSpec
 
 import click
+import msgspec
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -47,7 +47,7 @@ def command(function: Callable[P, Mapping[str, object]]) -> Callable[P, None]:
             sys.exit(CANCELLED)
         text = result.pop("text", None)
         if as_json:
-            click.echo(json.dumps(result, allow_nan=False, default=_plain_value))
+            click.echo(msgspec.json.encode(result, enc_hook=_plain_value).decode())
         else:
             click.echo(
                 text if text is not None else "\n".join(f"{key:24} {value}" for key, value in result.items())
@@ -61,7 +61,7 @@ def _plain(text: str) -> str:
 
 
 def _plain_value(value: object) -> object:
-    """Arrays and paths as JSON values."""
+    """Arrays and paths as JSON values (NaN becomes null)."""
     as_list = getattr(value, "tolist", None)
     return as_list() if callable(as_list) else str(value)
 
