@@ -36,7 +36,8 @@ def keep(name: str, rows: tuple[Row, ...]) -> None:
         found = row.summary
         print(
             f"\n{row.contender:18} {row.evaluations_per_frame} evaluations: mean {found.mean_mm:.1f} mm, worst frame "
-            f"{found.worst_mm:.1f} mm, limbs lost {found.lost_limbs}, clean runs {found.runs_without_loss}/{found.runs}, "
+            f"{found.worst_mm:.1f} mm, limbs lost {found.lost_limbs}, clean runs "
+            f"{found.runs_without_loss}/{found.runs}, "
             f"seeds {row.per_seed_mm}, last β {row.likelihood_scales[0]:.1f}"
         )
 
