@@ -170,8 +170,9 @@ class Workspace:
         taken = {entry.name.lower() for entry in place.parent.iterdir() if entry.name != run_name}
         if new_name.lower() in taken:
             raise SessionError(f"There is a run '{new_name}' already.", "Choose another name.")
+        record = msgspec.structs.replace(run.record, name=new_name)
         os.rename(run.folder, place)
-        write_run_record(place, msgspec.structs.replace(run.record, name=new_name))
+        write_run_record(place, record)
         return session.run(new_name)
 
     def trashed(self) -> tuple[str, ...]:

@@ -41,7 +41,8 @@ def make_source(folder: Path) -> Path:
     for name in ("cam1", "cam2"):
         (folder / "pictures" / name).mkdir(parents=True)
         for frame in range(FRAMES):
-            picture = rng.integers(0, 255, (HEIGHT, WIDTH, 3), dtype=np.uint8)
+            blocks = rng.integers(0, 255, (HEIGHT // 16, WIDTH // 16, 3), dtype=np.uint8)
+            picture = blocks.repeat(16, axis=0).repeat(16, axis=1)
             cv2.imwrite(str(folder / "pictures" / name / f"{frame:04d}.png"), picture)
     (folder / "calibration").mkdir()
     write_calibration((camera("cam1", 0.0), camera("cam2", 1.5)), folder / "calibration" / "cameras.toml")

@@ -1,9 +1,11 @@
 """viser comes through our door, and only through it."""
 
 import asyncio
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
 import viser
 import zstandard
@@ -82,16 +84,21 @@ def test_the_scene_reaches_the_browser_under_viser_s_own_subprotocol(relayed: St
         assert shows_the_mark(socket)
 
 
-def test_what_the_browser_says_reaches_viser(relayed: Studio, inner: GuardedServer) -> None:
-    before = len(inner.get_clients())
+def test_a_slider_moved_in_the_browser_reaches_viser(relayed: Studio, inner: GuardedServer) -> None:
+    slider = inner.gui.add_slider("survival", 0.1, 0.9, 0.1, 0.5)
+    moved = threading.Event()
+
+    @slider.on_update
+    async def _(_: viser.GuiEvent) -> None:
+        moved.set()
+
+    update = {"type": "GuiUpdateMessage", "uuid": slider._impl.uuid, "updates": {"value": 0.7}}
     with opened(relayed) as socket:
         socket.recv(timeout=20)
-        # viser knows a client once its first camera message came; a broken one ends the connection.
-        socket.send(b"this is no message of viser's")
-        with pytest.raises(ConnectionClosed):
-            for _ in range(1000):
-                socket.recv(timeout=20)
-    assert len(inner.get_clients()) == before
+        socket.send(msgspec.msgpack.encode(update))
+        assert moved.wait(20.0)
+    assert slider.value == 0.7
+    slider.remove()
 
 
 def test_another_version_s_client_is_turned_away(relayed: Studio) -> None:

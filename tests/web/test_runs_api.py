@@ -1,0 +1,221 @@
+"""Runs and settings through the API: what reaches the tracking process, and what is refused before."""
+
+import pytest
+from web_doubles import Studio, state_of
+
+from studio.sessions.run_log import append_to_log
+from studio.sessions.stored_run import StoredRun
+from studio.worker import commands
+
+RUN = "/api/sessions/take1/runs/first"
+
+
+def posted(studio: Studio) -> list[type]:
+    """The kinds of the commands that were sent."""
+    return [type(command) for command in studio.control.commands]
+
+
+def test_a_run_is_made_with_what_was_asked(studio: Studio) -> None:
+    wish = {
+        "tracker": "condensation", "first": 1, "last": 3, "seed": 9, "settings": {"particles": 500}, "name": "c",
+        "body": "human31",
+    }  # fmt: skip
+    line = studio.client.post("/api/sessions/take1/runs", json=wish).json()
+    assert (line["name"], line["tracker"], line["first"], line["last"], line["seed"]) == (
+        "c",
+        "condensation",
+        1,
+        3,
+        9,
+    )
+    assert line["status"] == "new"
+    detail = studio.client.get("/api/sessions/take1/runs/c").json()
+    assert detail["settings"]["particles"] == 500
+    assert len(detail["parameters"]) == len(detail["sigma"]) == len(detail["start_pose"]) == 31
+    assert studio.client.post("/api/sessions/take1/runs", json={}).json()["name"] == "run-2"
+
+
+@pytest.mark.parametrize(
+    ("wish", "status"),
+    [
+        ({"tracker": "none"}, 422),
+        ({"tracker": "../x"}, 422),
+        ({"body": "none"}, 422),
+        ({"body": "/etc/passwd"}, 422),
+        ({"first": 3, "last": 3}, 409),
+        ({"last": 5}, 409),
+        ({"first": -1}, 422),
+        ({"seed": -1}, 422),
+        ({"settings": {"particles": 0}}, 422),
+        ({"settings": {"nothing": 1}}, 422),
+        ({"settings": {"survival": 99.0}}, 422),
+        ({"start_pose": [1.0]}, 422),
+        ({"name": "con"}, 422),
+        ({"unknown": 1}, 422),
+    ],
+)
+def test_what_cannot_be_is_refused_in_words_and_nothing_is_made(
+    studio: Studio, wish: dict[str, object], status: int
+) -> None:
+    answer = studio.client.post("/api/sessions/take1/runs", json=wish)
+    assert answer.status_code == status, answer.text
+    assert set(answer.json()) == {"code", "message", "hint", "status"}
+    assert answer.json()["message"]
+    assert studio.client.get("/api/sessions/take1/runs").json()["runs"] == []
+
+
+@pytest.mark.parametrize(
+    ("path", "kind"),
+    [
+        ("start", commands.Start),
+        ("pause", commands.Pause),
+        ("step-layer", commands.StepLayer),
+        ("step-frame", commands.StepFrame),
+        ("cancel", commands.Cancel),
+    ],
+)
+def test_commands_open_the_run_first_and_only_once(
+    studio: Studio, tracked: StoredRun, path: str, kind: type
+) -> None:
+    answer = studio.client.post(f"{RUN}/{path}")
+    assert answer.status_code == 202
+    assert posted(studio) == [commands.Open, kind]
+    opened, sent = studio.control.commands
+    assert isinstance(opened, commands.Open)
+    assert opened.run == str(tracked.folder)
+    assert answer.json() == {"identifier": sent.identifier, "command": kind.__name__}
+    studio.control.state = state_of("take1", "first", "paused")
+    studio.client.post(f"{RUN}/{path}")
+    assert posted(studio) == [commands.Open, kind, kind]
+
+
+def test_frames_to_seek_and_to_anneal_again(studio: Studio, tracked: StoredRun) -> None:
+    studio.control.state = state_of("take1", "first", "paused")
+    studio.client.post(f"{RUN}/seek", json={"frame": 1})
+    studio.client.post(f"{RUN}/reanneal", json={"frame": 1, "keep": True})
+    studio.client.post(f"{RUN}/reanneal", json={})
+    seek, kept, selected = studio.control.commands
+    assert isinstance(seek, commands.Seek)
+    assert isinstance(kept, commands.Reanneal)
+    assert isinstance(selected, commands.Reanneal)
+    assert (seek.frame, kept.frame, kept.keep, selected.frame, selected.keep) == (1, 1, True, -1, False)
+    assert studio.client.post(f"{RUN}/seek", json={"frame": -2}).status_code == 422
+    assert studio.client.post(f"{RUN}/seek", json={}).status_code == 422
+
+
+def test_while_another_run_is_tracked_a_start_waits_and_the_rest_is_refused(
+    studio: Studio, tracked: StoredRun
+) -> None:
+    studio.control.state = state_of("take1", "other", "tracking")
+    assert studio.client.post(f"{RUN}/start").json()["command"] == "Enqueue"
+    refused = studio.client.post(f"{RUN}/step-layer")
+    assert refused.status_code == 409
+    assert "'other'" in refused.json()["message"]
+    assert studio.client.patch(f"{RUN}/settings", json={"survival": 0.4}).status_code == 409
+    assert studio.client.post(f"{RUN}/dequeue").json()["command"] == "Dequeue"
+    assert posted(studio) == [commands.Enqueue, commands.Dequeue]
+
+
+def test_after_the_process_died_start_revives_it_and_goes_on(studio: Studio, tracked: StoredRun) -> None:
+    studio.control.state = state_of("take1", "first", "lost")
+    assert studio.client.get("/api/worker").json()["state"] == "lost"
+    assert studio.client.post(f"{RUN}/start").status_code == 202
+    assert "restart resume=False" in studio.control.calls
+    assert posted(studio) == [commands.Open, commands.Start]
+    studio.control.state = state_of("take1", "first", "lost")
+    assert studio.client.post("/api/worker/restart").status_code == 202
+    assert "restart resume=True" in studio.control.calls
+
+
+def test_the_log_is_the_runs_own_file(studio: Studio, tracked: StoredRun) -> None:
+    append_to_log(tracked.folder, "info", "Tracking from frame 0.")
+    append_to_log(tracked.folder, "warning", "Slow.")
+    lines = studio.client.get(f"{RUN}/log").json()["lines"]
+    assert [(line["level"], line["text"]) for line in lines] == [
+        ("info", "Tracking from frame 0."),
+        ("warning", "Slow."),
+    ]
+
+
+# ---------------------------------------------------------------- settings
+
+
+def test_knobs_are_the_declarations(studio: Studio) -> None:
+    told = studio.client.get("/api/knobs", params={"tracker": "annealed", "weighting": "edge-region"}).json()
+    survival = next(entry for entry in told["knobs"] if entry["name"] == "survival")
+    assert (survival["kind"], survival["low"], survival["high"], survival["default"]) == (
+        "float",
+        0.02,
+        0.98,
+        0.5,
+    )
+    assert survival["takes_effect"] == "next layer"
+    assert told["values"]["layers"] == 10
+    assert told["json_schema"]["properties"]["layers"]["maximum"] == 60
+    assert studio.client.get("/api/knobs", params={"tracker": "none"}).status_code == 422
+
+
+def test_choices_for_a_new_run(studio: Studio) -> None:
+    told = studio.client.get("/api/choices").json()
+    assert {"annealed", "condensation"} <= {entry["name"] for entry in told["trackers"]}
+    assert {"edge-region", "bodytrack", "template"} <= {entry["name"] for entry in told["weightings"]}
+    sizes = {entry["name"]: entry["parameters"] for entry in told["bodies"]}
+    assert sizes["human31"] == 31
+    own = studio.workspace.root / "bodies"
+    own.mkdir()
+    (own / "broken.toml").write_text("nonsense = [")
+    assert "broken" not in {entry["name"] for entry in studio.client.get("/api/choices").json()["bodies"]}
+
+
+def test_settings_in_use_and_every_change_before(studio: Studio, tracked: StoredRun) -> None:
+    told = studio.client.get(f"{RUN}/settings").json()
+    assert (told["version"], told["frame"], told["layer"]) == (2, 1, 1)
+    assert told["values"]["survival"] == 0.3
+    [change] = told["changes"]
+    assert change == {"version": 2, "frame": 1, "layer": 1, "changed": ["survival"]}
+
+
+def test_a_change_is_checked_here_and_handed_on(studio: Studio, tracked: StoredRun) -> None:
+    assert studio.client.patch(f"{RUN}/settings", json={"survival": 0.6, "layers": 5}).status_code == 200
+    assert studio.control.changes == [{"survival": 0.6, "layers": 5}]
+    for wrong in ({"survival": 99.0}, {"survival": "x"}, {"none": 1}, {"layers": 2.5}, {"survival": None}):
+        answer = studio.client.patch(f"{RUN}/settings", json=wrong)
+        assert answer.status_code == 422, wrong
+    assert len(studio.control.changes) == 1
+
+
+def test_the_shown_frame_is_the_one_that_is_annealed_again(studio: Studio, tracked: StoredRun) -> None:
+    studio.control.state = state_of("take1", "first", "paused")
+    studio.client.patch(f"{RUN}/settings", params={"frame": 1}, json={"survival": 0.6})
+    [seek] = studio.control.commands
+    assert isinstance(seek, commands.Seek)
+    assert seek.frame == 1
+    studio.control.state = state_of("take1", "first", "tracking")
+    studio.client.patch(f"{RUN}/settings", params={"frame": 1}, json={"survival": 0.7})
+    assert len(studio.control.commands) == 1
+
+
+def test_reset_and_presets(studio: Studio, tracked: StoredRun) -> None:
+    client = studio.client
+    client.post(f"{RUN}/settings/reset", json={"names": ["survival"]})
+    assert studio.control.changes == [{"survival": 0.5}]
+    client.post(f"{RUN}/settings/reset", json={})
+    assert "start_repeats" not in studio.control.changes[1]
+    assert studio.control.changes[1]["layers"] == 10
+    assert client.post(f"{RUN}/settings/reset", json={"names": ["x"]}).status_code == 422
+
+    kept = client.put("/api/presets/mine", json={"values": {"survival": 0.33}, "help": "for walks"}).json()
+    assert {
+        "name": "mine",
+        "label": "mine",
+        "help": "for walks",
+        "values": {"survival": 0.33},
+        "own": True,
+    } in kept["presets"]
+    assert client.post(f"{RUN}/settings/preset", json={"name": "mine"}).status_code == 200
+    assert studio.control.changes[2] == {"survival": 0.33}
+    assert client.post(f"{RUN}/settings/preset", json={"name": "none"}).status_code == 404
+    assert client.put("/api/presets/odd", json={"values": {"none": 1}}).status_code == 422
+    assert client.put("/api/presets/odd", json={"values": {}}).status_code == 422
+    assert client.delete("/api/presets/mine").status_code == 200
+    assert client.delete("/api/presets/mine").status_code == 404
