@@ -72,10 +72,11 @@ class OpenedRun:
             _keep(self._layers, frame, found)
         return found
 
-    def forget(self, frame: int) -> None:
-        """Read a frame anew when it is asked for again."""
-        self._results.pop(frame, None)
-        self._layers.pop(frame, None)
+    def forget_from(self, frame: int) -> None:
+        """Read a frame and all later ones anew when they are asked for again."""
+        for kept in (self._results, self._layers):
+            for known in [number for number in kept if number >= frame]:
+                del kept[known]
 
     def poses(self) -> tuple[NDArray[np.int64], Array]:
         """The finished frames (K,) and their poses (K, D)."""

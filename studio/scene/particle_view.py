@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 
 FAR_END = 1
+MOST_DRAWN = 4000
+"""Particles drawn of a layer; of larger sets every second, third, … (the store keeps 2000 unless told otherwise)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,9 +115,10 @@ class ParticleView:
         tokens: ColourTokens,
         weights: tuple[float, float],
     ) -> None:
-        points = cloud_points(self._body, record.poses, style.limbs)
+        stride = -(-len(record.poses) // MOST_DRAWN)
+        points = cloud_points(self._body, record.poses[::stride], style.limbs)
         if style.colour_by == "weight":
-            shares = weight_shares(record.log_weights, *weights)
+            shares = weight_shares(record.log_weights[::stride], *weights)
             colours = np.repeat(tokens.ramp(shares), len(style.limbs), axis=0)
         else:
             colours = np.array(tokens.layer(record.layer, style.layer_count), dtype=np.uint8)

@@ -78,6 +78,10 @@ class SceneDrawing:
             if part is not None:
                 part.recolour(tokens)
 
+    def forget_poses(self) -> None:
+        """Take the run's poses anew: some of them changed."""
+        self.trails.clear()
+
     def read_poses(self) -> None:
         """Take the run's poses for the trails; only new ones are computed."""
         self.trails.set_poses(*self._opened.poses())

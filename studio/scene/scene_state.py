@@ -167,7 +167,7 @@ class SceneState:
                 self._refused(answer[1])
         if isinstance(event, StateChanged):
             self._show_state()
-            if event.run and not self.shown.run and self.shown.follow:
+            if event.run and not self.shown.session and self.shown.follow:
                 self._open(event.session, event.run)
         if self.run is None or (event.session, event.run) != (self.shown.session, self.shown.run):
             return

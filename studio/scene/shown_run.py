@@ -1,6 +1,5 @@
 """One opened run as it stands in the scene: its data, its handles, its pictures, its settings."""
 
-import bisect
 import time
 from collections.abc import Mapping
 
@@ -63,10 +62,13 @@ class ShownRun:
 
     def frame_finished(self, frame: int) -> None:
         """Take note of a new stored result."""
-        self.opened.forget(frame)
-        place = bisect.bisect_left(self.frames, frame)
-        if place == len(self.frames) or self.frames[place] != frame:
-            self.frames = (*self.frames[:place], frame, *self.frames[place:])
+        self.opened.forget_from(frame)
+        if not self.frames or frame > self.frames[-1]:
+            self.frames = (*self.frames, frame)
+        else:
+            # A frame was put in the place of an older answer, and what had followed from that was dropped.
+            self.frames = tuple(self.opened.frames())
+            self.drawing.forget_poses()
         self._trails_stale = True
 
     def save_start_pose(self, pose: Array) -> None:

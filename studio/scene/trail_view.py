@@ -40,6 +40,11 @@ class TrailView:
         last = {marker.joint: marker.name for marker in self._body.markers if marker.joint in joints}
         return tuple(last.values())
 
+    def clear(self) -> None:
+        """Forget all poses."""
+        self._frames = np.zeros(0, dtype=np.int64)
+        self._points = np.zeros((0, len(self._names), 3))
+
     def set_poses(self, frames: NDArray[np.int64], poses: Array) -> None:
         """Take a run's poses: frames (K,) ascending, poses (K, D). Only poses that are new are computed."""
         known = len(self._frames)

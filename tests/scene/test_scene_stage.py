@@ -21,6 +21,7 @@ from studio.errors import SettingsError
 from studio.scene.particle_view import extremities
 from studio.scene.stage import SceneStage
 from studio.scene.view_options import Shown
+from studio.sessions.results_store import ResultsWriter
 from studio.sessions.workspace import Workspace
 from studio.worker import commands
 from studio.worker.events import FrameFinished, LayerFinished, SettingsApplied, StateChanged
@@ -270,3 +271,18 @@ def test_the_state_of_the_process_opens_its_run(workspace: Workspace) -> None:
     control.say(StateChanged("swaying", "run-1", "tracking", 0, 0, 0, 6, 5, 30.0, 0.1))
     until(lambda: made.shown.run == "run-1")
     made.stop()
+
+
+def test_a_kept_answer_takes_the_place_of_the_stored_one_and_of_what_followed(
+    stage: SceneStage, control: FakeControl, human: BodyModel, workspace: Workspace
+) -> None:
+    open_run(stage)
+    stage.show_frame(2)
+    until(lambda: body_stands_at(stage, human, swaying_pose(human, 2)))
+    kept = frame_result(human, 2, shift=90.0)
+    with ResultsWriter(workspace.session("swaying").run("run-1").folder) as writer:
+        writer.forget_from(2)
+        writer.write_frame(kept, [cloud_record(human, 2, 0)])
+    control.say(FrameFinished("swaying", "run-1", kept))
+    until(lambda: stage._director.state.run.frames == (0, 1, 2))  # pyright: ignore[reportOptionalMemberAccess]
+    until(lambda: body_stands_at(stage, human, kept.estimate.pose))

@@ -14,7 +14,7 @@ from studio.scene.body_view import BodyView
 from studio.scene.camera_views import BACKDROP_DEPTH, DEPTH, CameraViews
 from studio.scene.floor_view import floor_extent
 from studio.scene.guarded_server import GuardedServer
-from studio.scene.particle_view import CloudStyle, ParticleView, extremities, weight_shares
+from studio.scene.particle_view import MOST_DRAWN, CloudStyle, ParticleView, extremities, weight_shares
 from studio.scene.stick_figure import TruthView, trail_segments
 from studio.scene.trail_view import TrailView
 
@@ -195,3 +195,19 @@ def test_the_floor_lies_under_all_cameras(cameras: tuple[Camera, ...]) -> None:
         assert abs(camera.centre[1] / 1000.0 - y) <= half
     assert (2 * x) % 1 == pytest.approx(0.0)
     assert floor_extent(()) == ((0.0, 0.0), 2.0)
+
+
+def test_of_an_enormous_set_evenly_spaced_particles_are_drawn(
+    server: GuardedServer, human: BodyModel
+) -> None:
+    record = cloud_record(human, 0, 0)
+    many = MOST_DRAWN * 2 + 10
+    fields = {key: getattr(record, key) for key in record.__slots__}
+    fields |= {
+        "poses": np.resize(record.poses, (many, 31)),
+        "log_weights": np.resize(record.log_weights, many),
+    }
+    view = ParticleView(server, human)
+    view.show([type(record)(**fields)], style((0,), "weight"), DARK)
+    assert view.handles[0].points.shape == (-(-many // 3), 3)
+    view.remove()
