@@ -212,4 +212,9 @@ def _weighing(problem: FrameFunction, poses: Array) -> Callable[[], object]:
 def _loading(problem: EdgeRegionProblem, indices: NDArray[np.uint32], edge_rows: int) -> Callable[[], object]:
     pairs = indices.view(np.uint64)
     sums = np.zeros((*indices.shape[:3], 2), dtype=np.int64)
-    return lambda: loads_only(problem.maps.values, problem.maps.views, pairs, edge_rows, LIMIT_PASSES, sums)
+
+    def load() -> NDArray[np.int64]:
+        loads_only(problem.maps.values, problem.maps.views, pairs, edge_rows, LIMIT_PASSES, sums)
+        return sums
+
+    return load

@@ -3,8 +3,7 @@
 E = E_edge + E_inside, lower is better; two plain averages over all samples pooled over limbs and cameras:
 
 * E_edge: n = max(4, round(length / 5 px)) intervals along each straight side of a limb's outline, n + 1
-samples
-  with both ends; error ((255 - e) / 255)² of the benchmark's edge map e (`evidence.edges`).
+  samples with both ends; error ((255 - e) / 255)² of the benchmark's edge map e (`evidence.edges`).
 * E_inside: rows of max(4, round(side / 10 px)) intervals with both ends, columns at j / n of the width,
   j = 0 ... n - 1, n = max(4, round(middle width / 10 px)); error 1 where the mask is 0.
 

@@ -16,15 +16,13 @@ import numpy as np
 from numba import njit, prange
 
 LANES = 16
-# Rows of an outline: x and y (pixels) of A start, A end, B end, B start; whether it is seen; depth of its
-# middle, mm.
+# Rows of an outline: x and y (pixels) of A start, A end, B end, B start; how it is seen (1 wholly inside the
+# picture, 0 not wholly, -1 not at all); depth of its middle, mm.
 ROWS = 10
 SEEN_ROW, DEPTH_ROW = 8, 9
-WHOLLY_INSIDE, PARTLY_OUTSIDE, UNSEEN = 1.0, 0.0, -1.0
 UNSEEN_PIXEL = np.float32(-1.0e6)
 NEAREST_DEPTH = np.float32(10.0)
-# A corner this close to the picture's border (pixels) counts as outside, so that rounding cannot carry a
-# sample over.
+# A corner this close to the border (pixels) counts as outside, so that rounding carries no sample over.
 MARGIN = np.float32(0.01)
 
 FLAGS = {"contract", "reassoc", "nsz", "arcp", "afn"}

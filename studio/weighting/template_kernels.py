@@ -65,7 +65,7 @@ def row_span(planes, first, y, width):
             right = min(right, -rest / a)
         elif rest < 0.0:
             right = -1.0
-    return int(np.ceil(left)), int(np.floor(right))
+    return int(np.ceil(min(left, float(width)))), int(np.floor(max(right, -1.0)))
 
 
 @njit(**INLINED)
@@ -93,7 +93,7 @@ def template_pixels(
         if outlines[block, view, limb, 8 * LANES + lane] < -0.5:
             continue
         top, bottom = half_planes(outlines, block, view, limb, lane, planes, EDGES * limbs)
-        rows[limbs, 0], rows[limbs, 1] = max(top, 0.0), min(bottom, height - 1.0)
+        rows[limbs, 0], rows[limbs, 1] = min(max(top, 0.0), height), max(min(bottom, height - 1.0), -1.0)
         limbs += 1
     begin, end = height, -1
     for limb in range(limbs):

@@ -1,0 +1,105 @@
+"""What is drawn is what the kernels read."""
+
+import numpy as np
+import pytest
+from weighting_scene import CENTRE, looking_at, plain_evidence, scattered
+
+from studio.body.forward_kinematics import limb_frames
+from studio.body.tables import kinematic_tables
+from studio.geometry.projection import project
+from studio.weighting.bodytrack import BodytrackSettings, BodytrackWeigher
+from studio.weighting.edge_region import EdgeRegionSettings, EdgeRegionWeigher
+from studio.weighting.edge_region_kernels import record_indices
+from studio.weighting.overlay import overlay_points
+from studio.weighting.template import TemplateSettings
+
+
+@pytest.mark.parametrize("move", [0.0, 1200.0])
+@pytest.mark.parametrize(("edge_samples", "region_samples"), [(32, 48), (64, 144)])
+def test_sample_points_are_the_pixels_that_the_kernel_reads(human, ring, move, edge_samples, region_samples):
+    """The recorded index stream, read back as pixels; 1.2 m aside some limbs are partly outside."""
+    settings = EdgeRegionSettings(edge_samples=edge_samples, region_samples=region_samples)
+    weigher = EdgeRegionWeigher(human, ring, settings)
+    problem = weigher.problem(plain_evidence(ring, 0, 0))
+    pose = scattered(human, 1)[0]
+    pose[3:5] += move
+    outlines = weigher.projector.blocks(pose[None])
+    rows = weigher.samples_per_evaluation // 4 // 16
+    indices = np.zeros((1, 4, 16, rows, 16), np.uint32)
+    along = weigher.along_edge, weigher.along_region
+    record_indices(outlines, problem.hidden(outlines), *along, problem.maps.views, indices)
+    edge_rows = 10 * edge_samples // 16
+    for v, (camera, seen) in enumerate(zip(ring, overlay_points(human, ring, pose, settings), strict=True)):
+        for points, stream in (
+            (seen.edge_samples, indices[0, v, 0, :edge_rows]),
+            (seen.region_samples, indices[0, v, 0, edge_rows:]),
+        ):
+            drawn = np.floor(points + 0.5).astype(int) @ [1, camera.width]
+            kernel = stream.ravel()[stream.ravel() < camera.width * camera.height]
+            np.testing.assert_array_equal(np.sort(drawn), np.sort(kernel))
+    if move:
+        total = sum(len(seen.edge_samples) for seen in overlay_points(human, ring, pose, settings))
+        assert 0 < total < 40 * edge_samples
+
+
+def test_the_benchmarks_sample_points_are_as_many_as_its_kernel_counts(human, ring):
+    problem = BodytrackWeigher(human, ring, BodytrackSettings()).problem(plain_evidence(ring, 0, 0))
+    for pose in scattered(human, 10, spread=20.0):
+        views = overlay_points(human, ring, pose, BodytrackSettings())
+        counts = problem.terms(pose[None])[2][0]
+        assert sum(len(view.edge_samples) for view in views) == counts[0]
+        assert sum(len(view.region_samples) for view in views) == counts[1]
+
+
+def test_outlines_and_contours_lie_on_the_cones(human, ring):
+    """Every point of a contour is the projection of a point of the cone's sides or rims."""
+    pose = scattered(human, 1)[0]
+    frames = limb_frames(human, pose[None])[0]
+    shapes = kinematic_tables(human).limb_shape
+    turns = np.linspace(0, 2 * np.pi, 721)
+    for camera, view in zip(ring, overlay_points(human, ring, pose, EdgeRegionSettings()), strict=True):
+        assert view.camera == camera.name
+        assert view.limbs == tuple(limb.name for limb in human.drawn)
+        for limb, contour in enumerate(view.contours):
+            np.testing.assert_array_equal(contour[0], contour[-1])
+            rims = []
+            for z, radius in ((0.0, shapes[limb, 1]), (shapes[limb, 0], shapes[limb, 2])):
+                ring_points = np.column_stack(
+                    [
+                        radius * shapes[limb, 3] * np.cos(turns),
+                        radius * shapes[limb, 4] * np.sin(turns),
+                        np.full(721, z),
+                    ]
+                )
+                rims.append(project(camera, ring_points @ frames[limb, :, :3].T + frames[limb, :, 3])[0])
+            rim = np.concatenate(rims)
+            away = np.linalg.norm(contour[:, None] - rim[None], axis=2).min(axis=1)
+            assert away.max() < 0.15, "half a step along the rim"
+            corners = view.outlines[limb]
+            middle = corners.mean(axis=0)
+            reach = np.abs(
+                (contour - middle) @ _unit(corners[1] + corners[2] - corners[0] - corners[3])
+            ).max()
+            straight = np.abs(
+                (corners - middle) @ _unit(corners[1] + corners[2] - corners[0] - corners[3])
+            ).max()
+            assert reach >= straight - 1e-6, "caps bulge outwards"
+
+
+def _unit(vector):
+    return vector / np.linalg.norm(vector)
+
+
+def test_limbs_that_are_not_seen_are_nan_and_empty(human, ring):
+    away = looking_at("away", ring[0].centre, 2 * ring[0].centre - CENTRE)
+    (view,) = overlay_points(human, (away,), human.neutral, EdgeRegionSettings())
+    assert np.isnan(view.outlines).all()
+    assert view.outlines.shape == (10, 4, 2)
+    assert all(contour.shape == (0, 2) for contour in view.contours)
+    assert view.edge_samples.shape == view.region_samples.shape == (0, 2)
+
+
+def test_the_template_has_no_sample_points(human, ring):
+    view = overlay_points(human, ring, human.neutral, TemplateSettings())[0]
+    assert view.edge_samples.shape == view.region_samples.shape == (0, 2)
+    assert np.isfinite(view.outlines).all()

@@ -1,0 +1,47 @@
+"""The catalogue: what every weighting must keep."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from weighting_scene import scattered
+
+from studio.evidence.pipeline import EDGE_KINDS
+from studio.evidence.settings import EvidenceSettings
+from studio.knobs import knobs_of
+from studio.weighting.catalogue import WEIGHTINGS
+
+
+def test_the_names():
+    assert list(WEIGHTINGS) == ["edge-region", "bodytrack", "template"]
+    assert all(name == entry.name for name, entry in WEIGHTINGS.items())
+
+
+@pytest.mark.parametrize("name", WEIGHTINGS)
+def test_every_weighting_keeps_the_contract(name, human, ring, smooth):
+    weighting = WEIGHTINGS[name]
+    assert weighting.edge_kind in EDGE_KINDS
+    problem = weighting.prepare(human, ring, weighting.settings_type()).problem(smooth)
+    poses = scattered(human, 33)
+    before = poses.copy()
+    weights = problem.weigh(poses)
+    assert weights.shape == (33,)
+    assert weights.dtype == np.float64
+    assert np.isfinite(weights).all()
+    assert len(np.unique(weights)) > 25
+    np.testing.assert_array_equal(problem.weigh(poses, stage=1), weights)
+    np.testing.assert_array_equal(poses, before)
+    assert problem.feasible(poses).shape == (33,)
+    assert problem.weigh(np.zeros((0, 31))).shape == (0,)
+
+
+def test_settings_are_frozen_hashable_and_have_flat_names_of_their_own():
+    names = [entry.name for entry in knobs_of(EvidenceSettings)]
+    for weighting in WEIGHTINGS.values():
+        settings = weighting.settings_type()
+        assert hash(settings) == hash(weighting.settings_type())
+        assert dataclasses.is_dataclass(settings)
+        with pytest.raises((dataclasses.FrozenInstanceError, TypeError)):
+            settings.anything = 1
+        names += [entry.name for entry in knobs_of(weighting.settings_type)]
+    assert len(names) == len(set(names))
