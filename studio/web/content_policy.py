@@ -44,7 +44,9 @@ class PolicyHeaders:
                 headers["referrer-policy"] = "no-referrer"
                 headers["cross-origin-resource-policy"] = "same-origin"
                 headers["cross-origin-opener-policy"] = "same-origin"
-                headers.setdefault("cache-control", "no-store")
+                # Assets are kept by the browser, which asks each time whether they changed.
+                fresh = "no-cache" if scope["path"].startswith("/assets/") else "no-store"
+                headers.setdefault("cache-control", fresh)
             await send(message)
 
         await self.app(scope, receive, send_with_policy)

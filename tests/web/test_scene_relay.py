@@ -92,9 +92,15 @@ def test_a_slider_moved_in_the_browser_reaches_viser(relayed: Studio, inner: Gua
     async def _(_: viser.GuiEvent) -> None:
         moved.set()
 
+    # viser takes a client for real when it tells where it looks from.
+    camera = {
+        "type": "ViewerCameraMessage", "wxyz": [1, 0, 0, 0], "position": [1, 1, 1], "fov": 1.0, "near": 0.1,
+        "far": 100.0, "image_height": 480, "image_width": 640, "look_at": [0, 0, 0], "up_direction": [0, 0, 1],
+    }  # fmt: skip
     update = {"type": "GuiUpdateMessage", "uuid": slider._impl.uuid, "updates": {"value": 0.7}}
     with opened(relayed) as socket:
         socket.recv(timeout=20)
+        socket.send(msgspec.msgpack.encode(camera))
         socket.send(msgspec.msgpack.encode(update))
         assert moved.wait(20.0)
     assert slider.value == 0.7

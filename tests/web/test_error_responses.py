@@ -1,0 +1,85 @@
+"""Every failure is words: code, cause, remedy; never a traceback, never a bare 500."""
+
+import logging
+from collections.abc import Iterator
+
+import pytest
+from web_doubles import Studio
+
+from studio.errors import StudioError
+from studio.web import session_routes
+from studio.web.error_responses import UnforeseenError, error_response, validation_words
+
+ENTRIES = {"code", "message", "hint", "status"}
+
+
+@pytest.fixture
+def records(caplog: pytest.LogCaptureFixture) -> Iterator[pytest.LogCaptureFixture]:
+    """What is logged at any level."""
+    with caplog.at_level(logging.DEBUG):
+        yield caplog
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "status"),
+    [
+        ("GET", "/api/nothing", 404),
+        ("GET", "/api/sessions/none", 404),
+        ("PUT", "/api/sessions", 405),
+        ("POST", "/api/imports", 422),
+        ("GET", "/api/sessions/take1/runs/none/frames", 404),
+        ("GET", "/api/sessions/a.b", 422),
+        ("DELETE", "/api/presets/none", 404),
+    ],
+)
+def test_refusals_of_the_api(studio: Studio, method: str, path: str, status: int) -> None:
+    answer = studio.client.request(method, path)
+    assert answer.status_code == status
+    told = answer.json()
+    assert set(told) == ENTRIES
+    assert told["status"] == status
+    assert told["message"].endswith(".")
+
+
+def test_a_body_that_is_no_json_is_named(studio: Studio) -> None:
+    answer = studio.client.post("/api/imports", content=b"{", headers={"content-type": "application/json"})
+    assert answer.status_code == 422
+    assert set(answer.json()) == ENTRIES
+
+
+def test_a_wrong_entry_is_named_with_its_place(studio: Studio) -> None:
+    told = studio.client.post("/api/imports", json={"name": "a", "source": "/x", "fps": "fast"}).json()
+    assert "'fps'" in told["message"]
+    assert validation_words([{"loc": ("body", "a", 0), "msg": "no"}]) == "The request is not valid: 'a.0': no."
+
+
+def test_a_page_that_is_not_there_is_a_page(studio: Studio) -> None:
+    answer = studio.client.get("/nothing<script>")
+    assert answer.status_code == 404
+    assert answer.headers["content-type"].startswith("text/html")
+    assert "<script>" not in answer.text
+
+
+def test_an_unforeseen_fault_is_told_in_words_and_logged_whole(
+    studio: Studio, monkeypatch: pytest.MonkeyPatch, records: pytest.LogCaptureFixture
+) -> None:
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("a secret of the code, line 7")
+
+    monkeypatch.setattr(session_routes, "session_line", broken)
+    answer = studio.client.get("/api/sessions")
+    assert answer.status_code == 500
+    told = answer.json()
+    assert set(told) == ENTRIES
+    assert "ZeroDivisionError" in told["message"]
+    assert str(studio.log_path) in told["hint"]
+    assert "Traceback" not in answer.text
+    assert "Traceback" in records.text
+    assert studio.client.get("/api/worker").status_code == 200
+
+
+def test_errors_of_the_studio_keep_their_words() -> None:
+    answer = error_response(StudioError("This is wrong.", "Do that."))
+    assert answer.status_code == 400
+    assert answer.body == b'{"code":"error","message":"This is wrong.","hint":"Do that.","status":400}'
+    assert UnforeseenError("x").status == 500

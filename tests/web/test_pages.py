@@ -1,0 +1,112 @@
+"""The page, its assets, the guide, preferences, and what the scene is told to show."""
+
+import re
+
+import pytest
+from web_doubles import TOKEN, Studio
+
+from studio.evidence.settings import EvidenceSettings
+from studio.knobs import knobs_of
+from studio.scene.view_options import Shown
+from studio.sessions.stored_run import StoredRun
+from studio.settings import RecordingSettings
+from studio.tracking.catalogue import TRACKERS
+from studio.web.guide_routes import anchor_of
+from studio.web.page_routes import assets_folder
+from studio.weighting.catalogue import WEIGHTINGS
+
+
+def test_the_page_and_all_that_it_names_are_there(studio: Studio) -> None:
+    page = studio.client.get("/")
+    assert page.headers["content-type"].startswith("text/html")
+    assert TOKEN not in page.text
+    named = re.findall(r'(?:href|src)="(/assets/[^"]+)"', page.text)
+    assert named
+    for address in named:
+        assert studio.client.get(address).status_code == 200, address
+
+
+def test_modules_have_the_type_that_browsers_want_and_are_asked_for_anew(studio: Studio) -> None:
+    module = studio.client.get("/assets/js/main.js")
+    assert module.headers["content-type"].startswith("text/javascript")
+    assert module.headers["cache-control"] == "no-cache"
+    again = studio.client.get("/assets/js/main.js", headers={"if-none-match": module.headers["etag"]})
+    assert again.status_code == 304
+
+
+def test_every_module_that_a_module_imports_is_there() -> None:
+    for path in (assets_folder() / "js").glob("*.js"):
+        for name in re.findall(r'from "(\.[^"]+)"', path.read_text(encoding="utf-8")):
+            assert (path.parent / name).is_file(), (path.name, name)
+
+
+def test_the_guide_has_every_knob_with_its_range(studio: Studio) -> None:
+    text = studio.client.get("/guide").text
+    assert "{{knobs}}" not in text
+    types = [entry.settings_type for entry in (*TRACKERS.values(), *WEIGHTINGS.values())]
+    for settings_type in (*types, EvidenceSettings, RecordingSettings):
+        for knob in knobs_of(settings_type):
+            assert f"<code>{knob.name}</code>" in text, knob.name
+            assert knob.takes_effect in text
+    assert "a number from 0.02 to 0.98" in text
+    for anchor in re.findall(r'<a href="#([^"]+)"', text):
+        assert f'id="{anchor}"' in text
+
+
+def test_anchors_are_plain_words() -> None:
+    assert anchor_of("Survival & β: α wanted") == "survival-β-α-wanted"
+
+
+def test_preferences_are_remembered(studio: Studio) -> None:
+    client = studio.client
+    assert client.get("/api/preferences").json() == {}
+    assert client.patch("/api/preferences", json={"theme": "dark", "speed": 2}).json() == {"theme": "dark", "speed": 2}
+    assert client.patch("/api/preferences", json={"speed": None, "folded": ["log"]}).status_code == 200
+    assert client.get("/api/preferences").json() == {"theme": "dark", "folded": ["log"]}
+    big = client.patch("/api/preferences", json={"x": "y" * 20_000})
+    assert big.status_code == 422
+    assert client.get("/api/preferences").json() == {"theme": "dark", "folded": ["log"]}
+    (studio.workspace.root / ".studio" / "preferences.json").write_text("[broken")
+    assert client.get("/api/preferences").json() == {}
+
+
+@pytest.mark.parametrize(
+    ("wish", "calls"),
+    [
+        ({"session": "take1", "run": "first", "frame": 1, "layer": 2}, [("run", "take1", "first", 1, 2)]),
+        ({"session": "take1"}, [("run", "take1", "", None, None)]),
+        ({"session": "take1", "run": None, "frame": None, "layer": None}, [("run", "take1", "", None, None)]),
+        ({"frame": 3}, [("frame", 3)]),
+        ({"layer": None}, [("layer", None)]),
+        ({"look_through": ""}, [("look_through", None)]),
+        ({"look_through": "cam1"}, [("look_through", "cam1")]),
+        ({"dark": False}, [("options", {"dark": False})]),
+        ({"options": {"overlays": ["mask"]}}, [("options", {"overlays": ("mask",)})]),
+        ({"playing": True}, [("play", True)]),
+        ({}, []),
+    ],
+)
+@pytest.mark.parametrize("path", ["show", "view"])
+def test_the_scene_is_told_what_to_show(
+    studio: Studio, tracked: StoredRun, path: str, wish: dict[str, object], calls: list[tuple]
+) -> None:
+    assert studio.client.post(f"/api/scene/{path}", json=wish).status_code == 204
+    assert studio.stage.calls[1:] == calls
+
+
+def test_the_scene_is_not_told_of_what_does_not_exist(studio: Studio, tracked: StoredRun) -> None:
+    for wish in ({"session": "none"}, {"session": "take1", "run": "none"}):
+        assert studio.client.post("/api/scene/show", json=wish).status_code == 404
+    for wish in ({"session": "../x"}, {"frame": -1}, {"layer": "x"}, {"unknown": 1}):
+        assert studio.client.post("/api/scene/show", json=wish).status_code == 422
+    assert studio.stage.calls == [("start",)]
+    assert Shown().session == ""
+
+
+def test_the_api_describes_itself(studio: Studio) -> None:
+    spec = studio.client.get("/api/openapi.json").json()
+    assert spec["info"]["title"] == "Capture studio"
+    for path, methods in spec["paths"].items():
+        for method, operation in methods.items():
+            assert operation.get("description"), (method, path)
+            assert "ErrorAnswer" in str(operation["responses"]["422"]), (method, path)
