@@ -268,8 +268,8 @@ class TrackingRun:
 
 
 def start_of(pose: tuple[float, ...] | None) -> Carried:
-    """What a run starts from: one particle at the start pose, or (None) nothing, for a uniform start."""
-    if pose is None:
-        return Carried(None)
-    point = np.array(pose)
-    return Carried(ParticleSet(point[None], np.zeros(1)), point)
+    """What a run starts from: one particle at the start pose, or (None) nothing, for a uniform start.
+
+    A start pose is no estimate: the way from it to the first frame's result is no velocity (Eq. 10).
+    """
+    return Carried(None if pose is None else ParticleSet(np.array(pose)[None], np.zeros(1)))
