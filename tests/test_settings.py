@@ -131,7 +131,7 @@ def test_schema_describes_every_knob() -> None:
 
 def test_history_tells_what_was_in_use() -> None:
     first = default_settings()
-    second = changed_settings(first, {"survival": 0.3})
+    second = changed_settings(first, {"survival": 0.4})
     history = SettingsHistory().with_applied(1, 10, 0, first).with_applied(2, 12, 4, second)
     assert history.with_applied(2, 13, 0, second) is history
     assert history.in_use(9, 9) is None

@@ -30,7 +30,7 @@ PRESETS = (
     Preset(
         "improved filter",
         "Adaptive diffusion with shrinkage and crossover by limbs, 10 × 200.",
-        _IMPROVED | {"survival": 0.5, "layers": 10, "particles": 200},
+        _IMPROVED | {"survival": 0.3, "layers": 10, "particles": 200},
     ),
     Preset(
         "paper, Eq. 13",
@@ -52,6 +52,7 @@ PRESETS = (
             "diffusion_form": "paper",
             "crossover": 0.5,
             "crossover_by": "parameters",
+            "survival": 0.5,
             "layers": 10,
             "particles": 200,
         },
