@@ -32,7 +32,7 @@ from studio.web.access import AccessGuard, HostRule, binding_rule
 from studio.web.body_limit import BodyLimit
 from studio.web.content_policy import PolicyHeaders
 from studio.web.doors import Control, Doors, Stage
-from studio.web.error_responses import ErrorsInWords, add_error_handlers
+from studio.web.error_responses import ErrorsInWords, add_error_handlers, log
 from studio.web.event_stream import EventStream
 from studio.web.presets import Preset
 from studio.web.schemas import ErrorAnswer
@@ -114,5 +114,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         await import_routes.end_imports(doors)
         await doors.events.stop()
         await asyncio.to_thread(forget_composers)
-        await asyncio.to_thread(doors.stage.stop)
-        await asyncio.to_thread(doors.control.close)
+        ends = (asyncio.to_thread(doors.stage.stop), asyncio.to_thread(doors.control.close))
+        for problem in await asyncio.gather(*ends, return_exceptions=True):
+            if isinstance(problem, BaseException):
+                log.error("closing failed", exc_info=problem)

@@ -1,0 +1,184 @@
+"""Opening and closing the whole: what is printed, what is refused, and that nothing is left running."""
+
+import logging
+import multiprocessing
+import os
+import queue
+import re
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import psutil
+import pytest
+
+from studio import launch
+from studio.errors import AccessError, StudioError
+from studio.launch import RedactedFormatter, address, prepare_demo, serve
+from studio.sessions.workspace import Workspace
+from studio.web.samples import sample_folder
+
+SERVE = """
+import sys
+from pathlib import Path
+from studio.launch import serve
+if __name__ == "__main__":
+    serve(Path(sys.argv[1]), port=0, announce=lambda text: print(text, flush=True))
+    print("closed", flush=True)
+"""
+
+
+@pytest.fixture
+def served(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """The studio in a process of its own, as a command would start it, and its printed address."""
+    script = tmp_path / "serving.py"
+    script.write_text(SERVE)
+    process = subprocess.Popen(
+        [sys.executable, str(script), str(tmp_path / "workspace")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(Path(launch.__file__).parents[1])},
+    )
+    assert process.stdout is not None
+    line = process.stdout.readline()
+    try:
+        yield process, line.removeprefix("Open ").strip()
+    finally:
+        process.kill()
+        process.wait(20)
+        process.stdout.close()
+
+
+def test_the_printed_address_opens_the_studio_and_ctrl_c_closes_everything(
+    served: tuple[subprocess.Popen[str], str],
+) -> None:
+    process, printed = served
+    assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\?token=[\w-]{43}", printed)
+    with httpx.Client(timeout=30.0, follow_redirects=True) as browser:
+        page = browser.get(printed)
+        assert page.status_code == 200
+        assert "token" not in str(page.url)
+        base = printed.partition("/?")[0]
+        assert browser.get(f"{base}/api/sessions").json() == {"sessions": []}
+        assert browser.get(f"{base}/scene/").status_code == 200
+    family = psutil.Process(process.pid).children(recursive=True)
+    assert family
+    process.send_signal(signal.SIGINT)
+    assert process.wait(20) == 0
+    assert process.stdout is not None
+    rest = process.stdout.read()
+    assert rest == "closed\n"
+    _, alive = psutil.wait_procs(family, timeout=20)
+    assert alive == []
+
+
+def test_the_token_is_printed_once_and_logged_nowhere(
+    served: tuple[subprocess.Popen[str], str], tmp_path: Path
+) -> None:
+    process, printed = served
+    token = re.search(r"token=([\w-]+)", printed)
+    assert token is not None
+    base = printed.partition("/?")[0]
+    with httpx.Client(timeout=30.0) as browser:
+        for path in (f"/?token={token[1]}", f"/api/none?token={token[1]}", f"/?token={token[1]}x", "/"):
+            browser.get(base + path)
+        browser.request("BREW", f"{base}/?token={token[1]}")
+    process.send_signal(signal.SIGTERM)
+    process.wait(20)
+    assert process.stdout is not None
+    assert token[1] not in process.stdout.read()
+    for path in tmp_path.rglob("*"):
+        if path.is_file():
+            assert token[1].encode() not in path.read_bytes(), path
+
+
+def test_lines_of_the_log_lose_their_token() -> None:
+    record = logging.LogRecord("x", logging.ERROR, "", 1, 'GET "/?token=%s&a=1" failed', ("se-cr_et1",), None)
+    assert RedactedFormatter("%(message)s").format(record) == 'GET "/?token=…&a=1" failed'
+
+
+def test_another_host_needs_permission_before_anything_starts(tmp_path: Path) -> None:
+    before = multiprocessing.active_children()
+    with pytest.raises(AccessError, match=r"0\.0\.0\.0"):
+        serve(tmp_path / "w", host="0.0.0.0", port=0)
+    assert not (tmp_path / "w").exists()
+    assert multiprocessing.active_children() == before
+
+
+def test_a_port_that_is_taken_is_named(tmp_path: Path) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen(1)
+        port = taken.getsockname()[1]
+        with pytest.raises(StudioError, match=str(port)) as refused:
+            serve(tmp_path / "w", port=port)
+    assert "--port" in refused.value.hint
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_workspace_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    closed = tmp_path / "closed"
+    closed.mkdir(mode=0o500)
+    with pytest.raises(StudioError, match="closed"):
+        serve(closed / "w", port=0)
+
+
+def test_a_workspace_that_is_a_file_is_named(tmp_path: Path) -> None:
+    (tmp_path / "w").write_text("a file")
+    with pytest.raises(StudioError, match="w") as refused:
+        serve(tmp_path / "w", port=0)
+    assert "--workspace" in refused.value.hint
+
+
+@pytest.mark.parametrize(
+    ("host", "shown"),
+    [
+        ("127.0.0.1", "127.0.0.1"),
+        ("::1", "[::1]"),
+        ("0.0.0.0", socket.gethostname()),
+        ("a.example", "a.example"),
+    ],
+)
+def test_addresses(host: str, shown: str) -> None:
+    assert address(host, 80, "t") == f"http://{shown}:80/?token=t"
+    assert address(host, 80, "t", "walk", "run-1").endswith("&session=walk&run=run-1")
+
+
+def test_the_demo_s_session_is_copied_once_and_never_overwritten(tmp_path: Path) -> None:
+    first = prepare_demo(tmp_path)
+    assert first.name == "walk"
+    assert first.manifest.frame_count >= 150
+    original = sample_folder("walk")
+    for path in original.rglob("*"):
+        if path.is_file():
+            assert (first.path / path.relative_to(original)).read_bytes() == path.read_bytes()
+    mark = first.path / "note.txt"
+    mark.write_text("mine")
+    Workspace(tmp_path).retitle("walk", "My walk")
+    assert prepare_demo(tmp_path).manifest.title == "My walk"
+    assert mark.read_text() == "mine"
+
+
+def test_something_in_the_sample_s_place_is_not_touched(tmp_path: Path) -> None:
+    (tmp_path / "walk").mkdir()
+    (tmp_path / "walk" / "precious.txt").write_text("mine")
+    with pytest.raises(StudioError, match="in the way"):
+        prepare_demo(tmp_path)
+    assert (tmp_path / "walk" / "precious.txt").read_text() == "mine"
+
+
+def test_the_demo_tracks_the_walk_as_it_opens(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A second demo goes on with the run that the first one left."""
+    asked: queue.SimpleQueue[dict[str, object]] = queue.SimpleQueue()
+    monkeypatch.setattr(launch, "serve", lambda root, **wish: asked.put(wish))
+    launch.demo(tmp_path)
+    launch.demo(tmp_path)
+    one, two = asked.get(), asked.get()
+    assert (one["open_session"], one["track"]) == ("walk", True)
+    assert one["open_run"] == two["open_run"]
+    assert [run.name for run in Workspace(tmp_path).session("walk").runs()] == [one["open_run"]]
