@@ -120,12 +120,12 @@ def _trunk(bones: Skeleton) -> list[Piece]:
     shoulder, low = bones.shoulder[1], up + bones.shoulder[2]
     return [
         Piece("pelvis", TRUNK, TROUSERS, (-8, -0.7 * wide, 5), (-8, 0.7 * wide, 5), (110, 110), fold=2.0),
-        Piece("pelvis", TRUNK, TROUSERS, (-4, 0, 20), (0, 0, 0.16 * up), (140, 138), scale=(0.82, 1.08)),
+        Piece("pelvis", TRUNK, TROUSERS, (-4, 0, 20), (0, 0, 0.16 * up), (136, 128), scale=(0.80, 1.06)),
         Piece(
             "thorax",
             TRUNK,
             SHIRT,
-            (-2, 0, 0.16 * up),
+            (-2, 0, 0.13 * up),
             (0, 0, 0.48 * up),
             (140, 138),
             5,
@@ -188,7 +188,7 @@ def _arm(bones: Skeleton, side: str, index: int) -> list[Piece]:
             SHIRT,
             (-4, -0.55 * inward * bones.shoulder[1], bones.shoulder[2] - 10),
             (0, -0.98 * inward * bones.shoulder[1], bones.shoulder[2] - 2),
-            (66, 62),
+            (63, 60),
         ),
         Piece(
             f"{side}_upper_arm",
@@ -196,7 +196,7 @@ def _arm(bones: Skeleton, side: str, index: int) -> list[Piece]:
             SHIRT,
             (0, 0, 4),
             (0, 0, -0.62 * upper),
-            (62, 58),
+            (60, 57),
             3,
             fold=4.0,
             fold_period=90.0,

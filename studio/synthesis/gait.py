@@ -132,15 +132,15 @@ def foot_track(
         swing == 0.0
     )
     pitch = gait.heel_rise * push - 0.28 * land
-    ball = np.array([0.60 * foot_length, 0.0, -ankle_height])
+    ball = np.array([0.66 * foot_length, 0.0, -ankle_height])
     heel = np.array([-0.20 * foot_length, 0.0, -ankle_height])
     level, tilted = axis_turn(2, heading), axis_turn(2, heading) @ axis_turn(1, pitch)
     pivot = np.where((pitch > 0.0)[:, None], ball, heel)
     ground = np.concatenate([flat, np.full((len(times), 1), ankle_height)], axis=1)
     ankle = ground + (level @ pivot[..., None])[..., 0] - (tilted @ pivot[..., None])[..., 0]
-    ankle[:, 2] += gait.lift * np.sin(np.pi * swung(swing)) ** 2
+    ankle[:, 2] += gait.lift * eased(swing / 0.5) * eased((1.0 - swing) / 0.5)
     if obstacle is not None:
-        ankle[:, 2] += np.sin(np.pi * np.clip(swing, 0.0, 1.0)) ** 0.8 * obstacle(flat)
+        ankle[:, 2] += eased(swing / 0.3) * eased((1.0 - swing) / 0.3) * obstacle(flat)
     return FootTrack(ankle, tilted, swing)
 
 

@@ -26,6 +26,8 @@ from studio.synthesis.person import SIDES, PersonMotion, Skeleton, yaw_pitch_rol
 
 Array = NDArray[np.float64]
 Options = dict[str, float]
+BOB, RUNNING_BOB, NEARLY_STRAIGHT = 0.6, 0.018, 0.994
+
 MotionMaker = Callable[[Skeleton, Array, Options], PersonMotion]
 
 
@@ -51,21 +53,22 @@ def walk(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
 def run(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
     """A run in a circle: options radius_mm, speed_mm_s, cadence, start_degrees."""
     path = circle_path(options.get("radius_mm", 1150.0), np.radians(options.get("start_degrees", -150.0)))
-    gait = Gait(options.get("speed_mm_s", 2200.0), options.get("cadence", 2.7), 0.36, 110.0, 210.0, 0.6)
+    gait = Gait(options.get("speed_mm_s", 2200.0), options.get("cadence", 2.7), 0.36, 110.0, 180.0, 0.6)
     return _along(skeleton, times, gait, path, swing=0.62, elbow=1.35, lean=0.13)
 
 
 def box(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
     """Walking straight and stepping over a box at the origin: options height_mm of the box, speed_mm_s."""
-    speed = options.get("speed_mm_s", 800.0)
+    speed = options.get("speed_mm_s", 900.0)
     gait = Gait(speed, 1.6, 0.60, 0.11 * skeleton.height, 50.0, 0.45)
-    # The footprints fall 1.25 s x speed apart; this start puts one 0.3 m before the box's middle, one 0.2 m
-    # behind.
-    start = -300.0 - speed * gait.cycle * (0.5 * gait.duty + 0.5)
-    clearance = options.get("height_mm", 160.0) + 70.0
+    # A left footprint's toes end as far before the box's middle as the next right one's heel is behind it.
+    toes, heel = 0.70 * skeleton.foot, 0.28 * skeleton.foot
+    before = 0.5 * (speed / gait.cadence + toes - heel)
+    start = -before - speed * gait.cycle * (0.5 * gait.duty + 1.0)
+    clearance = options.get("height_mm", 120.0) + 120.0
 
     def obstacle(places: Array) -> Array:
-        return clearance * np.exp(-((places[:, 0] / 420.0) ** 4))
+        return clearance * np.exp(-((places[:, 0] / 480.0) ** 4))
 
     return _along(
         skeleton,
@@ -132,14 +135,14 @@ def _along(
     stride = np.cos(phase + 0.1)
     place, heading = path(gait.speed * times)
     sideways = 0.016 * skeleton.height * np.sin(phase - 0.4)
-    root = np.concatenate([place, _bobbing(skeleton, gait, phase)[:, None]], axis=1)
+    root = np.concatenate([place, np.zeros((len(times), 1))], axis=1)
     root[:, 0] -= sideways * np.sin(heading)
     root[:, 1] += sideways * np.cos(heading)
     turns = _trunk(
         heading - 0.09 * stride, lean + 0.015 * np.cos(2.0 * phase), 0.16 * stride, 0.03 * np.sin(phase)
     )
     feet = [foot_track(gait, path, times, skeleton, left=side == "left", obstacle=obstacle) for side in SIDES]
-    root[:, 2] += _room_to_reach(skeleton, root, turns["pelvis"], feet)
+    root[:, 2] = _pelvis_height(skeleton, gait, phase, _allowed_height(skeleton, root, turns["pelvis"], feet))
     for side, track in zip(SIDES, feet, strict=True):
         sign, index = (1.0, 0) if side == "left" else (-1.0, 1)
         hip = root + sign * skeleton.hip_half_width * turns["pelvis"][:, :, 1]
@@ -152,23 +155,33 @@ def _along(
     return PersonMotion(skeleton, _rate(times), root, turns)
 
 
-def _bobbing(skeleton: Skeleton, gait: Gait, phase: Array) -> Array:
-    """Height of the pelvis about its mean: highest over the standing leg in a walk, lowest there in a run."""
-    amplitude = (0.009 if gait.duty > 0.5 else -0.018) * skeleton.height
-    return amplitude * np.cos(2.0 * phase - 2.0 * np.pi * gait.duty)
+def _pelvis_height(skeleton: Skeleton, gait: Gait, phase: Array, allowed: Array) -> Array:
+    """Height of the pelvis (F,), mm, as high as `allowed` (F,) lets it be throughout.
 
-
-def _room_to_reach(skeleton: Skeleton, root: Array, pelvis: Array, feet: list[FootTrack]) -> float:
-    """The mean pelvis height at which both ankles are reached in every frame without quite straightening a
-    knee.
+    A walker follows the first two harmonics of the step cycle in what the legs allow, softened to BOB of
+    their size (bent knees smooth the way); a runner is lowest over the standing leg. The whole is then
+    lowered until it is allowed everywhere.
     """
-    highest = []
+    waves = np.stack([np.cos(phase), np.sin(phase), np.cos(2.0 * phase), np.sin(2.0 * phase)], axis=1)
+    if gait.duty > 0.5:
+        basis = np.concatenate([np.ones((len(phase), 1)), waves], axis=1)
+        bob = BOB * waves @ np.linalg.lstsq(basis, allowed, rcond=None)[0][1:]
+    else:
+        bob = -RUNNING_BOB * skeleton.height * np.cos(2.0 * phase - 2.0 * np.pi * gait.duty)
+    return bob + float(np.min(allowed - bob))
+
+
+def _allowed_height(skeleton: Skeleton, root: Array, pelvis: Array, feet: list[FootTrack]) -> Array:
+    """(F,) the height above `root` at which the pelvis still lets both ankles be reached without quite
+    straightening a knee."""
+    allowed = np.full(len(root), np.inf)
     for sign, index, track in ((1.0, 0, feet[0]), (-1.0, 1, feet[1])):
-        leg = 0.994 * (skeleton.thigh[index] + skeleton.shin[index])
+        leg = NEARLY_STRAIGHT * (skeleton.thigh[index] + skeleton.shin[index])
         hip = root + sign * skeleton.hip_half_width * pelvis[:, :, 1]
         across = np.linalg.norm((track.ankle - hip)[:, :2], axis=1)
-        highest.append(track.ankle[:, 2] + np.sqrt(np.maximum(leg**2 - across**2, 0.0)) - hip[:, 2])
-    return float(np.min(highest))
+        above = np.sqrt(np.maximum(leg**2 - across**2, 0.0))
+        allowed = np.minimum(allowed, track.ankle[:, 2] + above - hip[:, 2])
+    return allowed
 
 
 def _trunk(

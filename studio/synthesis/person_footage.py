@@ -15,7 +15,7 @@ from studio.synthesis.room import furnished_room
 
 Progress = Callable[[str, int, int], None]
 
-STEPPED_OVER, STEPPED_OVER_HEIGHT = "box", 160.0
+STEPPED_OVER, STEPPED_OVER_HEIGHT = "box", 120.0
 
 
 def render_person(

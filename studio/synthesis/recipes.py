@@ -32,10 +32,9 @@ RECIPE_COPY = "recipe.toml"
 def synthesize(recipe: Path | str, into: Path, progress: Progress | None = None) -> Path:
     """Render a recipe's footage and make a session of it; returns the session's folder.
 
-    recipe : a TOML file or the name of a bundled recipe. into : the session folder to be made. progress :
-    called with the step in words, what is done of it and how much it is. The same recipe gives the same pictures on any number of
-    threads. Raises StudioError for a recipe that cannot be followed and what `import_source` raises for
-    `into`.
+    recipe : a TOML file or the name of a bundled recipe. into : the session folder to be made. progress : called
+    with the step in words, what is done of it and how much it is. The same recipe gives the same pictures on any
+    number of threads. Raises StudioError for a recipe that cannot be followed and what `import_source` raises.
     """
     path = find_recipe(recipe)
     wanted = read_recipe(path)

@@ -74,7 +74,7 @@ def furnished_room(obstacle_height: float = 0.0) -> Room:
     """The cluttered room; with a box of the given height (mm) at the origin where one is stepped over."""
     blocks = FURNITURE
     if obstacle_height > 0.0:
-        half = (100.0, 340.0, 0.5 * obstacle_height)
+        half = (50.0, 340.0, 0.5 * obstacle_height)
         blocks += (Block((0.0, 0.0, half[2]), half, (0.62, 0.50, 0.34), GRAIN, (0.54, 0.42, 0.28)),)
     return Room((2900.0, 2600.0), 2900.0, blocks, LIGHTS.copy())
 
