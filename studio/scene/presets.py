@@ -6,6 +6,8 @@ A preset is offered where the tracker and weighting in use have every knob that 
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from studio.tracking.settings import AnnealedSettings
+
 Value = bool | int | float | str
 
 
@@ -18,12 +20,17 @@ class Preset:
     values: dict[str, Value]
 
 
+# What makes the improved filter is the tracker's own default.
 _IMPROVED: dict[str, Value] = {
-    "adaptive_diffusion": True,
-    "diffusion_form": "shrink",
-    "diffusion_fraction": 0.4,
-    "crossover": 0.5,
-    "crossover_by": "limbs",
+    name: getattr(AnnealedSettings(), name)
+    for name in (
+        "survival",
+        "adaptive_diffusion",
+        "diffusion_form",
+        "diffusion_fraction",
+        "crossover",
+        "crossover_by",
+    )
 }
 
 PRESETS = (
@@ -60,8 +67,8 @@ PRESETS = (
     Preset("fast preview", "A quarter of the work: 5 × 100.", _IMPROVED | {"layers": 5, "particles": 100}),
     Preset(
         "careful",
-        "More layers, more particles and slower annealing: 15 × 400.",
-        _IMPROVED | {"survival": 0.5, "layers": 15, "particles": 400},
+        "Three times the work, in more layers: 15 × 400.",
+        _IMPROVED | {"layers": 15, "particles": 400},
     ),
 )
 

@@ -24,6 +24,9 @@ from studio.settings import all_knobs, changed_settings, default_settings, value
 from studio.tracking.settings import AnnealedSettings
 from studio.worker.events import SettingsApplied, StateChanged
 
+DEFAULTS = values(default_settings())
+SURVIVAL = DEFAULTS["survival"]
+
 
 class Asked:
     """Remembers what a settings panel asks for."""
@@ -81,23 +84,23 @@ def test_every_knob_has_a_control_that_says_what_it_is(panel: SettingsPanel) -> 
 
 
 def test_moving_a_slider_asks_once(panel: SettingsPanel, asked: Asked, server: GuardedServer) -> None:
-    move(panel, "survival", 0.3)
-    assert asked.wishes == [{"survival": 0.3}]
+    move(panel, "survival", 0.7)
+    assert asked.wishes == [{"survival": 0.7}]
     assert panel.inputs["survival"].handle.label.startswith("• ")
     assert panel.inputs["survival"].reset.visible
     panel.settle("wish-1", True)
-    panel.show_applied(SettingsApplied("s", "r", 2, 128, 2, {"survival": 0.3, "layers": 12}, ("survival",)))
+    panel.show_applied(SettingsApplied("s", "r", 2, 128, 2, {"survival": 0.7, "layers": 12}, ("survival",)))
     settle(server)
-    assert asked.wishes == [{"survival": 0.3}], "what is shown is no wish"
+    assert asked.wishes == [{"survival": 0.7}], "what is shown is no wish"
     assert panel.inputs["layers"].handle.value == 12
     assert "frame 128, layer 3" in panel._in_use.content  # pyright: ignore[reportOptionalMemberAccess]
 
 
 def test_an_older_answer_does_not_pull_the_slider_back(panel: SettingsPanel) -> None:
-    move(panel, "survival", 0.3)
+    move(panel, "survival", 0.7)
     move(panel, "survival", 0.4)
     panel.settle("wish-1", True)
-    panel.show_applied(SettingsApplied("s", "r", 2, 1, 0, {"survival": 0.3}))
+    panel.show_applied(SettingsApplied("s", "r", 2, 1, 0, {"survival": 0.7}))
     assert panel.inputs["survival"].handle.value == 0.4
     panel.settle("wish-2", True)
     panel.show_applied(SettingsApplied("s", "r", 3, 1, 0, {"survival": 0.4}))
@@ -105,18 +108,18 @@ def test_an_older_answer_does_not_pull_the_slider_back(panel: SettingsPanel) -> 
 
 
 def test_a_refused_value_is_put_back(panel: SettingsPanel, asked: Asked, server: GuardedServer) -> None:
-    move(panel, "survival", 0.3)
+    move(panel, "survival", 0.7)
     panel.settle("wish-1", False)
     settle(server)
-    assert panel.inputs["survival"].handle.value == 0.5
+    assert panel.inputs["survival"].handle.value == SURVIVAL
     assert not panel.inputs["survival"].handle.label.startswith("•")
     move(panel, "survival", 99.0)
     assert "99" in str(asked.refusals[-1])
-    assert panel.inputs["survival"].handle.value == 0.5
+    assert panel.inputs["survival"].handle.value == SURVIVAL
     asked.unable = RunError("No run is open.", "Open one.")
     move(panel, "crossover", 0.2)
     assert asked.refusals[-1] is asked.unable
-    assert panel.inputs["crossover"].handle.value == 0.5
+    assert panel.inputs["crossover"].handle.value == DEFAULTS["crossover"]
     assert len(asked.wishes) == 1
 
 
@@ -132,7 +135,7 @@ def test_presets_and_resets_are_one_wish(panel: SettingsPanel, asked: Asked, ser
     assert asked.wishes == [{"layers": 15, "particles": 400}], "only what differs is asked for"
     panel.settle("wish-1", True)
     panel.ask_all({name: entry.knob.default for name, entry in panel.inputs.items()})
-    assert asked.wishes[1] == {"layers": 10, "particles": 200}
+    assert asked.wishes[1] == {name: DEFAULTS[name] for name in ("layers", "particles")}
     settle(server)
     assert len(asked.wishes) == 2
 

@@ -137,6 +137,7 @@ def test_a_setting_selects_the_shown_frame_and_is_asked_for(stage: SceneStage, c
     stage.show_frame(2)
     until(lambda: stage.shown.frame == 2)
     panel = stage._director.state._panel  # pyright: ignore[reportOptionalMemberAccess]
+    default = panel.settings.inputs["survival"].knob.default
     panel.settings.inputs["survival"].handle.value = 0.7
     until(lambda: len(control.commands) == 2)
     seek, change = control.commands
@@ -145,7 +146,7 @@ def test_a_setting_selects_the_shown_frame_and_is_asked_for(stage: SceneStage, c
     assert isinstance(change, commands.ChangeSettings)
     assert change.changes == {"survival": 0.7}
     control.answer(change, "Setting 'survival' cannot be 0.7.", "Try 0.6.")
-    until(lambda: panel.settings.inputs["survival"].handle.value == 0.5)
+    until(lambda: panel.settings.inputs["survival"].handle.value == default)
     control.say(SettingsApplied("swaying", "run-1", 2, 2, 0, {"survival": 0.6}, ("survival",)))
     until(lambda: panel.settings.inputs["survival"].handle.value == 0.6)
     assert len(control.commands) == 2, "showing what is in use asks for nothing"
