@@ -45,5 +45,8 @@ def test_no_committed_file_names_an_address_to_download_from_or_a_machine() -> N
     assert "--hash=sha256:" in lock
     for name in listed.split():
         path = ROOT / name
-        if path.suffix in {".py", ".toml", ".md", ".html", ".css", ".js", ".lock"} and "vendor" not in path.parts:
+        if (
+            path.suffix in {".py", ".toml", ".md", ".html", ".css", ".js", ".lock"}
+            and "vendor" not in path.parts
+        ):
             assert "/root/" not in path.read_text().replace('"/root/"', ""), name
