@@ -53,7 +53,7 @@ def walk(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
 def run(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
     """A run in a circle: options radius_mm, speed_mm_s, cadence, start_degrees."""
     path = circle_path(options.get("radius_mm", 1150.0), np.radians(options.get("start_degrees", -150.0)))
-    gait = Gait(options.get("speed_mm_s", 2200.0), options.get("cadence", 2.7), 0.36, 110.0, 180.0, 0.6)
+    gait = Gait(options.get("speed_mm_s", 2200.0), options.get("cadence", 2.7), 0.32, 110.0, 170.0, 0.6)
     return _along(skeleton, times, gait, path, swing=0.62, elbow=1.35, lean=0.13)
 
 
