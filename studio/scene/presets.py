@@ -37,7 +37,7 @@ PRESETS = (
     Preset(
         "improved filter",
         "Adaptive diffusion with shrinkage and crossover by limbs, 10 × 200.",
-        _IMPROVED | {"survival": 0.3, "layers": 10, "particles": 200},
+        _IMPROVED | {"layers": 10, "particles": 200},
     ),
     Preset(
         "paper, Eq. 13",
