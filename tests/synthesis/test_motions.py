@@ -88,7 +88,7 @@ def test_a_runner_flies_and_a_walker_does_not() -> None:
             (points[f"{side}_foot"] + motion.turns[f"{side}_foot"] @ heel)[:, 2] for side in ("left", "right")
         ]
         lowest = np.min([points["left_toes"][:, 2], points["right_toes"][:, 2], *heels], axis=0)
-        assert (np.count_nonzero(lowest > 3.0) >= 12) is flies, name
+        assert bool(np.count_nonzero(lowest > 3.0) >= 12) is flies, name
 
 
 def test_the_box_is_stepped_over() -> None:
