@@ -2,7 +2,7 @@
 at once.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import viser
@@ -14,7 +14,7 @@ from studio.scene.panel import Panel, tell
 from studio.scene.playback import stepped
 from studio.scene.presenter import Presenter
 from studio.scene.scene_state import SceneState
-from studio.scene.view_options import Shown, ViewOptions
+from studio.scene.view_options import Shown
 from studio.scene.wishes import Control, Wishes
 from studio.sessions.workspace import Workspace
 
@@ -82,6 +82,10 @@ class Director:
         """Show one layer's cloud, or all (None)."""
         self._presenter.post(lambda: self.state.change_shown(told, layer=layer))
 
+    def follow(self, following: bool) -> None:
+        """Show each frame as it is tracked, or stay."""
+        self._presenter.post(lambda: self.state.change_shown(False, follow=following))
+
     def look_through(self, camera: str | None) -> None:
         """Put the viewers into a camera's place, or back where they were (None)."""
         self._presenter.post(lambda: self.state.look_through(camera, False))
@@ -99,9 +103,9 @@ class Director:
         """
         self._presenter.post(lambda: self.state.set_playback(playing, speed, loop, follow))
 
-    def change_options(self, options: ViewOptions) -> None:
-        """Show other things."""
-        self._presenter.post(lambda: self.state.change_options(options))
+    def change_options(self, changes: Mapping[str, object]) -> None:
+        """Show other things. changes : new values by the names of `ViewOptions`; the others stay as they are then."""
+        self._presenter.post(lambda: self.state.change_options(changes))
 
     def change_settings(self, changes: dict[str, Value]) -> str:
         """Ask for knobs of the run that is shown; while nothing is tracked, the shown frame is annealed

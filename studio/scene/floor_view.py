@@ -5,10 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 import trimesh
 import viser
+from numpy.typing import NDArray
 
 from studio.geometry.camera import Camera
 from studio.runs.colour_tokens import ColourTokens
 from studio.scene.limb_meshes import METRES_PER_MM
+
+Array = NDArray[np.float64]
 
 _THICKNESS = 0.02
 _LEAST_HALF_WIDTH = 2.0
@@ -16,11 +19,14 @@ _MOST_HALF_WIDTH = 8.0
 
 
 class FloorView:
-    """The floor z = 0, as large as the cameras' ring."""
+    """The floor z = 0, as large as the cameras' ring and the person in it."""
 
-    def __init__(self, server: viser.ViserServer, cameras: Sequence[Camera], tokens: ColourTokens) -> None:
+    def __init__(
+        self, server: viser.ViserServer, cameras: Sequence[Camera], person: Array, tokens: ColourTokens
+    ) -> None:
+        """person : (3,) mm, where the body begins."""
         self._server = server
-        self._middle, self._half_width = floor_extent(cameras)
+        self._middle, self._half_width = floor_extent([*(camera.centre for camera in cameras), person])
         self._slab: viser.MeshHandle | None = None
         self._lines: viser.GridHandle | None = None
         self.recolour(tokens)
@@ -67,13 +73,9 @@ class FloorView:
         self._slab = self._lines = None
 
 
-def floor_extent(cameras: Sequence[Camera]) -> tuple[tuple[float, float], float]:
-    """Middle (x, y) and half width in metres of a square floor that lies under all cameras, on half-metre
-    lines.
-    """
-    if not cameras:
-        return (0.0, 0.0), _LEAST_HALF_WIDTH
-    centres = np.array([camera.centre for camera in cameras])[:, :2] * METRES_PER_MM
+def floor_extent(points: Sequence[Array]) -> tuple[tuple[float, float], float]:
+    """Middle (x, y) and half width in metres of a square floor under all points (mm), on half-metre lines."""
+    centres = np.array(points)[:, :2] * METRES_PER_MM
     low, high = centres.min(axis=0), centres.max(axis=0)
     middle = np.round(low + high) / 2.0
     reach = float(np.abs(centres - middle).max())

@@ -2,6 +2,7 @@
 pose.
 """
 
+from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
@@ -15,7 +16,6 @@ from studio.scene.pose_editor import PoseEditor
 from studio.scene.run_panel import RunPanel, Transport
 from studio.scene.settings_panel import SettingsPanel, SettingsTabs
 from studio.scene.show_panel import ShowPanel
-from studio.scene.view_options import ViewOptions
 from studio.scene.wishes import Wishes
 
 Array = NDArray[np.float64]
@@ -32,7 +32,7 @@ class Director(Transport, Protocol):
         """Ask for knobs; the identifier of the answer. Raises StudioError if it cannot be asked."""
         ...
 
-    def change_options(self, options: ViewOptions) -> None:
+    def change_options(self, changes: Mapping[str, object]) -> None:
         """Show other things."""
         ...
 

@@ -36,7 +36,8 @@ class SceneDrawing:
         self._opened = opened
         self._dark = dark
         body = opened.body
-        self.floor = FloorView(server, opened.cameras, tokens)
+        person = limb_ends(body, opened.start_pose()[None])[0].reshape(-1, 3).mean(axis=0)
+        self.floor = FloorView(server, opened.cameras, person, tokens)
         self.body = BodyView(server, body, tokens, name="/body")
         self.beside = BodyView(server, body, tokens, name="/stored", ghost=True)
         self.particles = ParticleView(server, body)

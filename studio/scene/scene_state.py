@@ -1,6 +1,6 @@
 """The scene's state and how it changes. Everything here happens in the presenter's thread."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -136,8 +136,9 @@ class SceneState:
         self.change_shown(True, follow=self.shown.follow if follow is None else follow)
         self._follow_shown()
 
-    def change_options(self, options: ViewOptions) -> None:
+    def change_options(self, changes: Mapping[str, object]) -> None:
         """Show other things, or in another theme."""
+        options = replace(self.options, **changes)  # pyright: ignore[reportArgumentType]
         themed = options.dark != self.options.dark
         self.options = options
         self._panel.show.show_options(options)

@@ -11,6 +11,7 @@ from studio.body.model import BodyModel
 from studio.runs.colour_tokens import ColourTokens
 from studio.runs.overlay_drawing import OVERLAYS
 from studio.scene.particle_view import extremities
+from studio.scene.trail_view import extremity_markers
 from studio.scene.view_options import ViewOptions
 
 ALL_LAYERS: str = "all together"
@@ -27,15 +28,16 @@ _SWITCHES = (
 
 
 class ShowPanel:
-    """options : what is shown. changed : called with new options. layer_chosen : with a layer or None for
-    all.
+    """options : what is shown. changed : called with what is to be shown otherwise, by name.
+
+    layer_chosen : called with a layer, or None for all.
     """
 
     def __init__(
         self,
         gui: viser.GuiApi,
         tab: viser.GuiTabHandle,
-        changed: Callable[[ViewOptions], None],
+        changed: Callable[[dict[str, object]], None],
         layer_chosen: Callable[[int | None], None],
     ) -> None:
         self._gui = gui
@@ -69,9 +71,7 @@ class ShowPanel:
         self._lists = []
         limbs = tuple(limb.name for limb in body.drawn)
         tips = tuple(limbs[index] for index in extremities(body))
-        joints = {body.drawn[index].joint for index in extremities(body)}
-        ends = {marker.joint: marker.name for marker in body.markers if marker.joint in joints}
-        self._defaults = {"limbs": tips, "trail_markers": tuple(ends.values())}
+        self._defaults = {"limbs": tips, "trail_markers": extremity_markers(body)}
         with self._tab:
             self._checklist("Limb ends with particles", "limbs", limbs)
             self._checklist(
@@ -166,7 +166,7 @@ class ShowPanel:
         wanted = replace(self.options, **changes)  # pyright: ignore[reportArgumentType]
         if wanted != self.options:
             self.options = wanted
-            self._changed(wanted)
+            self._changed(changes)
 
     async def _layer_updated(self, event: viser.GuiEvent) -> None:
         chosen = event.target.value

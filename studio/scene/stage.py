@@ -5,7 +5,7 @@ may be called from any thread; they post what is wished to the scene's own threa
 """
 
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import fields
 
 from studio.errors import SettingsError
 from studio.scene.director import Director
@@ -81,6 +81,11 @@ class SceneStage:
         if self._director is not None:
             self._director.choose_layer(layer, told=False)
 
+    def follow(self, following: bool) -> None:
+        """Show each frame as it is tracked, or stay where the viewer is."""
+        if self._director is not None:
+            self._director.follow(following)
+
     def look_through(self, camera: str | None) -> None:
         """Put the viewers into a camera's place, or back where they were (None or "")."""
         if self._director is not None:
@@ -99,8 +104,7 @@ class SceneStage:
             if name not in known:
                 raise SettingsError(f"The scene has no option '{name}'.", f"Known: {', '.join(known)}.")
         if self._director is not None:
-            wanted = replace(self._director.state.options, **changes)  # pyright: ignore[reportArgumentType]
-            self._director.change_options(wanted)
+            self._director.change_options(changes)
 
     def play(self, playing: bool) -> None:
         """Play stored frames, or stop."""

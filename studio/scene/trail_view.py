@@ -23,6 +23,7 @@ class TrailView:
         self._body = body
         self._names = [marker.name for marker in body.markers]
         self._sides = marker_sides(body)
+        self._extremities = extremity_markers(body)
         self._frames = np.zeros(0, dtype=np.int64)
         self._points = np.zeros((0, len(self._names), 3))
         self.handle = server.scene.add_line_segments(
@@ -33,12 +34,6 @@ class TrailView:
             thickness_units="screen",
             visible=False,
         )
-
-    def default_markers(self) -> tuple[str, ...]:
-        """The last marker on each extremity: wrists, ankles, head, tips."""
-        joints = {self._body.drawn[index].joint for index in extremities(self._body)}
-        last = {marker.joint: marker.name for marker in self._body.markers if marker.joint in joints}
-        return tuple(last.values())
 
     def clear(self) -> None:
         """Forget all poses."""
@@ -67,7 +62,7 @@ class TrailView:
         """Draw the paths of `markers` (None: the defaults) within `reach` frames of `frame` (0: all
         frames).
         """
-        chosen = self.default_markers() if markers is None else tuple(markers)
+        chosen = self._extremities if markers is None else tuple(markers)
         if not visible or frame is None or len(self._frames) < 2 or not self._names:
             self.handle.visible = False
             return
@@ -85,3 +80,16 @@ class TrailView:
     def remove(self) -> None:
         """Take the trails out of the scene."""
         self.handle.remove()
+
+
+def extremity_markers(body: BodyModel) -> tuple[str, ...]:
+    """The outermost marker towards each extremity: wrists, ankles, head, tips (hands and feet may carry none)."""
+    last = {marker.joint: marker.name for marker in body.markers}
+    found: dict[str, None] = {}
+    for index in extremities(body):
+        joint = body.drawn[index].joint
+        while joint >= 0 and joint not in last:
+            joint = body.joints[joint].parent
+        if joint >= 0:
+            found[last[joint]] = None
+    return tuple(found)

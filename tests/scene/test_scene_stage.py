@@ -187,7 +187,10 @@ def test_the_theme_changes_every_colour(stage: SceneStage) -> None:
     open_run(stage)
     before = drawing(stage).body.handles[0].color
     stage.set_dark(False)
+    stage.set_options(colour_by="weight")
     until(lambda: drawing(stage).body.handles[0].color != before)
+    until(lambda: stage._director.state.options.colour_by == "weight")  # pyright: ignore[reportOptionalMemberAccess]
+    assert not stage._director.state.options.dark, "one change does not take back another"  # pyright: ignore[reportOptionalMemberAccess]
     with pytest.raises(SettingsError, match="no option 'colour'"):
         stage.set_options(colour="red")
 

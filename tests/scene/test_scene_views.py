@@ -6,6 +6,7 @@ from conftest import LAYERS, PARTICLES, cloud_record, swaying_pose
 from scipy.spatial.transform import Rotation
 
 from studio.body.catalogue import load_body
+from studio.body.dimensions import with_dimensions
 from studio.body.forward_kinematics import limb_ends, limb_frames, marker_points
 from studio.body.model import BodyModel
 from studio.geometry.camera import Camera
@@ -16,7 +17,7 @@ from studio.scene.floor_view import floor_extent
 from studio.scene.guarded_server import GuardedServer
 from studio.scene.particle_view import MOST_DRAWN, CloudStyle, ParticleView, extremities, weight_shares
 from studio.scene.stick_figure import TruthView, trail_segments
-from studio.scene.trail_view import TrailView
+from studio.scene.trail_view import TrailView, extremity_markers
 
 DARK, LIGHT = colour_tokens(True), colour_tokens(False)
 
@@ -146,7 +147,7 @@ def test_trails_grow_and_follow_the_shown_frame(server: GuardedServer, human: Bo
     expected = marker_points(human, poses[2:7])[:, names.index("LWrist")] / 1000.0
     np.testing.assert_allclose(view.handle.points[:, 0], expected[:-1], atol=1e-6)
     np.testing.assert_allclose(view.handle.points[:, 1], expected[1:], atol=1e-6)
-    assert set(view.default_markers()) == {"LAnkle", "RAnkle", "LWrist", "RWrist", "Head"}
+    assert set(extremity_markers(human)) == {"LAnkle", "RAnkle", "LWrist", "RWrist", "Head"}
     view.show(4, None, 0, DARK)
     assert view.handle.points.shape == (5 * 8, 2, 3)
     view.show(4, None, 0, DARK, visible=False)
@@ -189,12 +190,12 @@ def test_a_picture_on_its_side_hangs_upright(server: GuardedServer, cameras: tup
 
 
 def test_the_floor_lies_under_all_cameras(cameras: tuple[Camera, ...]) -> None:
-    (x, y), half = floor_extent(cameras)
+    (x, y), half = floor_extent([camera.centre for camera in cameras])
     for camera in cameras:
         assert abs(camera.centre[0] / 1000.0 - x) <= half
         assert abs(camera.centre[1] / 1000.0 - y) <= half
     assert (2 * x) % 1 == pytest.approx(0.0)
-    assert floor_extent(()) == ((0.0, 0.0), 2.0)
+    assert floor_extent([np.zeros(3)]) == ((0.0, 0.0), 2.0)
 
 
 def test_of_an_enormous_set_evenly_spaced_particles_are_drawn(
@@ -211,3 +212,10 @@ def test_of_an_enormous_set_evenly_spaced_particles_are_drawn(
     view.show([type(record)(**fields)], style((0,), "weight"), DARK)
     assert view.handles[0].points.shape == (-(-many // 3), 3)
     view.remove()
+
+
+def test_hands_and_feet_without_markers_leave_their_trails_to_wrists_and_ankles(human: BodyModel) -> None:
+    ends = [f"{side}_{part}_length" for side in ("left", "right") for part in ("hand", "foot")]
+    whole = with_dimensions(human, human.dimensions | dict.fromkeys(ends, 150.0))
+    assert len(whole.drawn) == 14
+    assert set(extremity_markers(whole)) == {"LAnkle", "RAnkle", "LWrist", "RWrist", "Head"}
