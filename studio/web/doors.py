@@ -125,6 +125,10 @@ class Stage(Protocol):
         """Show one layer's cloud, or all."""
         ...
 
+    def follow(self, following: bool) -> None:
+        """Show each frame as it is tracked, or stay."""
+        ...
+
     def look_through(self, camera: str | None) -> None:
         """Put the viewers into a camera's place, or back."""
         ...

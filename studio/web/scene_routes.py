@@ -17,14 +17,16 @@ class SceneWish(Request):
     """What is to be shown; what is left out stays as it is.
 
     With `session` the whole moment is named: `run` left out shows the session alone, `layer` left out
-    all layers. look_through: a camera's name, null or "" for the free view. options: what is drawn, by the
-    names of the scene's own view options (body, truth, particles, trails, cameras, pictures, overlays …).
+    all layers. follow: whether each frame is shown as it is tracked. look_through: a camera's name, null
+    or "" for the free view. options: what is drawn, by the names of the scene's own view options (body,
+    truth, particles, trails, cameras, pictures, overlays …).
     """
 
     session: RunName | None = None
     run: RunName | None = None
     frame: int | None = Field(None, ge=0)
     layer: int | None = Field(None, ge=0)
+    follow: bool | None = None
     look_through: str | None = Field(None, max_length=128)
     dark: bool | None = None
     playing: bool | None = None
@@ -44,6 +46,8 @@ def show(wish: SceneWish, doors: Door) -> None:
             stage.show_frame(wish.frame)
         if "layer" in given:
             stage.show_layer(wish.layer)
+    if wish.follow is not None:
+        stage.follow(wish.follow)
     if "look_through" in given:
         stage.look_through(wish.look_through or None)
     options = {

@@ -105,6 +105,9 @@ class RecordingStage:
     def show_layer(self, layer: int | None) -> None:
         self.calls.append(("layer", layer))
 
+    def follow(self, following: bool) -> None:
+        self.calls.append(("follow", following))
+
     def look_through(self, camera: str | None) -> None:
         self.calls.append(("look_through", camera))
 
