@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -129,3 +130,28 @@ def test_start_pose_file_is_taken(session_on_disk: Session, tmp_path: Path) -> N
     record = session_on_disk.run(answer["run"]).record
     assert record.start_pose == pytest.approx(tuple(pose))
     assert "pose.csv" in record.start_source
+
+
+def test_import_refuses_a_folder_that_is_no_session_and_leaves_nothing(tmp_path: Path) -> None:
+    (tmp_path / "source" / "videos").mkdir(parents=True)
+    (tmp_path / "source" / "videos" / "cam1.mp4").write_bytes(b"no video")
+    said = refused("import", str(tmp_path / "source"), "--into", "made")
+    assert "calibration" in said
+    assert "remedy" in said
+    assert "no session 'made'" in refused("track", "made")
+
+
+def test_evaluate_prints_numbers_with_their_alignment(tmp_path: Path) -> None:
+    walk = Path(__file__).resolve().parents[2] / "sample_sessions" / "walk"
+    shutil.copytree(walk, tmp_path / "walk")
+    session = str(tmp_path / "walk")
+    tracked = told("track", session, "--frames", "0:3", "--particles", "100", "--layers", "5")
+    found = told("evaluate", session, tracked["run"])
+    assert found["mean_mm"] < 40.0
+    assert found["worst_mm"] >= found["mean_mm"]
+    assert found["lost_frames"] == 0
+    assert found["alignment"] == "none"
+    assert len(found["per_frame_mm"]) == 3
+    assert set(found["per_marker_mm"]) >= {"Head", "RWrist", "LAnkle"}
+    start = told("track", session, "--frames", "1:2", "--start-pose", str(walk / "truth" / "walk.trc"))
+    assert "markers of walk.trc" in start["start_pose"]
