@@ -62,7 +62,7 @@ class Footage:
             for camera in source.cameras
         }
         self._masks = {
-            camera.name: _Kept(_mask_reader(folder / camera.masks, camera), camera, thresholded_mask)
+            camera.name: _Kept(_mask_reader(folder / camera.masks), camera, thresholded_mask)
             for camera in source.cameras
             if camera.masks
         }
@@ -169,6 +169,6 @@ def _reader(kind: str, path: Path, camera: CameraSource) -> Reader:
     )
 
 
-def _mask_reader(path: Path, camera: CameraSource) -> Reader:
+def _mask_reader(path: Path) -> Reader:
     """Masks may have been trimmed with the footage, so only the frames in use need to be there."""
-    return PictureReader(path, 0) if path.is_dir() else VideoReader(path, camera.frame_count)
+    return PictureReader(path, 0) if path.is_dir() else VideoReader(path, 0)

@@ -123,6 +123,10 @@ class PictureReader:
 
     def read(self, index: int) -> Bytes:
         """(H, W, 3) uint8 BGR picture of frame `index`."""
+        if index >= len(self._paths):
+            raise FootageError(
+                f"'{self._folder.name}' has no picture for frame {index}.", "Put the pictures back."
+            )
         return read_picture(self._paths[index])
 
     def close(self) -> None:

@@ -87,6 +87,7 @@ class VideoReader:
     Thread-safe."""
 
     def __init__(self, path: Path, frame_count: int) -> None:
+        """frame_count : as measured, 0 where it is not known."""
         self._path, self._count = path, frame_count
         self._lock = threading.Lock()
         self._container: av.container.InputContainer | None = None
@@ -119,7 +120,7 @@ class VideoReader:
         """Place the decoder so that frame `index` is at most a keyframe's distance ahead."""
         if self._times is None and index > FORWARD:
             self._times, self._keys = _packet_times(self._path)
-        usable = self._times is not None and len(self._times) == self._count
+        usable = self._times is not None and self._count in (0, len(self._times))
         key = max((key for key in self._keys if key <= index), default=0) if usable else 0
         if self._container is not None and self._next <= index and key <= self._next:
             return
@@ -251,8 +252,9 @@ def _again(first: av.VideoFrame, rest: Iterator[av.VideoFrame]) -> Iterator[av.V
 
 
 def _cut(path: Path, frame: int, count: int) -> FootageError:
+    had = f", it had {count} frames when it was imported" if count else ""
     return FootageError(
-        f"'{path.name}' ends at frame {frame}, it had {count} frames when it was imported.",
+        f"'{path.name}' ends at frame {frame}{had}.",
         "Put the original file back, or import the session again.",
     )
 

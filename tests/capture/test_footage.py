@@ -47,7 +47,7 @@ def test_masks_are_thresholded_at_127(footage: Footage) -> None:
 def test_mask_videos_are_thresholded_too(tmp_path: Path) -> None:
     shape = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
     cv2.circle(shape, (60, 50), 25, (255, 255, 255), cv2.FILLED)
-    write_video(tmp_path / "m.mp4", [shape] * 5)
+    write_video(tmp_path / "m.mp4", [shape] * 9)
     write_video(tmp_path / "a.mp4", [numbered_frame(k) for k in range(5)])
     source = CameraSource("a", "video", "a.mp4", WIDTH, HEIGHT, 5, masks="m.mp4")
     mask = open_footage(FootageSource(30.0, 5, (source,)), tmp_path).mask("a", 3)

@@ -76,3 +76,5 @@ def test_an_empty_folder_and_one_that_lost_pictures(tmp_path: Path) -> None:
     assert list_pictures(tmp_path) == ()
     with pytest.raises(FootageError, match="had 3 at import"):
         PictureReader(tmp_path, 3)
+    with pytest.raises(FootageError, match="no picture for frame 2"):
+        PictureReader(tmp_path, 0).read(2)
