@@ -14,16 +14,20 @@ export function figure(value) {
   return String(Number(value.toPrecision(3)));
 }
 
-/** A chart in an element: `draw(option)` at most ten times a second, resized and redrawn with theme and page. */
+/** A chart in an element: drawn at most ten times a second and only while it is seen, redrawn with theme and size. */
 export class Chart {
-  constructor(id, { empty }) {
+  /** empty: what is said when there is nothing to draw. wire: called with the ECharts instance once it is made. */
+  constructor(id, { empty, wire = () => {} }) {
     this.element = document.getElementById(id);
     this.emptyText = empty;
+    this.wire = wire;
     this.make = null;
     this.timer = null;
-    this.chart = echarts.init(this.element, null, { renderer: "canvas" });
-    new ResizeObserver(() => this.element.clientWidth && this.chart.resize()).observe(this.element);
+    this.stale = false;
+    this.chart = null;
+    new ResizeObserver(() => this.resized()).observe(this.element);
     onTheme(() => this.redraw());
+    document.fonts.ready.then(() => this.redraw());
   }
 
   /** Draw what `make()` returns; null draws the empty state. */
@@ -33,12 +37,20 @@ export class Chart {
   }
 
   redraw() {
-    if (!this.make || !this.element.clientWidth) return;
-    const option = this.make();
-    this.chart.setOption({ ...look(), ...(option ?? nothing(this.emptyText)) }, { notMerge: true });
+    this.stale = !this.element.clientWidth;
+    if (!this.make || this.stale) return;
+    if (!this.chart) {
+      this.chart = echarts.init(this.element, null, { renderer: "canvas" });
+      this.wire(this.chart);
+    }
+    this.chart.setOption({ ...look(), ...(this.make() ?? nothing(this.emptyText)) }, { notMerge: true });
   }
 
-  on(name, listener) { this.chart.on(name, listener); }
+  resized() {
+    if (!this.element.clientWidth) return;
+    this.chart?.resize();
+    if (this.stale || !this.chart) this.redraw();
+  }
 }
 
 function nothing(text) {
@@ -64,7 +76,13 @@ export const tooltip = (more = {}) => ({
 /** A title at the chart's top left, with its unit in a quieter tone. */
 export const title = (text, unit = "") => ({
   left: 12, top: 8, text: unit ? `{a|${text}} {b|${unit}}` : `{a|${text}}`,
-  textStyle: { rich: { a: { color: token("text"), fontWeight: 600, fontSize: 12, fontFamily: "Inter" }, b: { color: token("text-quiet"), fontSize: 11, fontFamily: "Inter" } } },
+  textStyle: {
+    fontWeight: "normal",
+    rich: {
+      a: { color: token("text"), fontWeight: 600, fontSize: 12, fontFamily: "Inter" },
+      b: { color: token("text-quiet"), fontWeight: 450, fontSize: 11, fontFamily: "Inter", padding: [0, 0, 0, 4] },
+    },
+  },
 });
 
 /** An axis in the page's tones. */

@@ -27,6 +27,13 @@ function card(heading, text, actions = [], { bar = false } = {}) {
   curtain.hidden = false;
 }
 
+/** A line above the scene that leaves the scene in view. */
+function banner(text) {
+  curtain.replaceChildren(Object.assign(document.createElement("p"), { textContent: text }));
+  curtain.classList.add("banner");
+  curtain.hidden = false;
+}
+
 async function addSample() {
   try {
     const told = await post("/api/samples", { name: "walk" });
@@ -39,6 +46,10 @@ function draw() {
   const sessions = get("sessions");
   const work = get("work");
   const entry = sessions?.find((one) => one.name === get("session"));
+  curtain.classList.remove("banner");
+  document.body.classList.toggle("disconnected", get("connected") === false);
+  if (get("stranger")) return card("The studio was started again", "This page belongs to the one before. Open the address that the new one printed in its terminal.");
+  if (get("connected") === false) return banner("Disconnected. What is shown is the last state; trying to reach the studio again …");
   if (sessions?.length === 0) return card("Nothing here yet", "Import the footage of your cameras, or start with the bundled walk.", [["Open the sample", addSample, true], ["Import footage", importForm]]);
   if (work?.state === "lost" && work.session === get("session")) {
     const resume = () => post(`${runPath(work.session, work.run)}/start`).catch(complain);
@@ -51,5 +62,5 @@ function draw() {
 
 /** Wire the curtain. */
 export function startCurtain() {
-  watch(["sessions", "session", "run", "work"], draw);
+  watch(["sessions", "session", "run", "work", "connected", "stranger"], draw);
 }

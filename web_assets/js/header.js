@@ -31,12 +31,12 @@ export function stateLine(work) {
 function drawState() {
   const work = get("work");
   const here = isOpen(work);
-  const state = get("connected") ? (work?.state ?? "idle") : "disconnected";
+  const state = get("connected") === false ? "disconnected" : (work?.state ?? "idle");
   byId("state").dataset.state = state;
   byId("state-text").textContent = state === "disconnected" ? "disconnected, reconnecting" : (work && !here && work.run && work.state === "tracking" ? `${work.session}: ` : "") + stateLine(work);
   byId("state").title = work?.message ? `${work.message} ${work.hint}` : "";
   const bar = byId("run-progress");
-  bar.hidden = !work || !["tracking", "paused", "compiling"].includes(work.state);
+  bar.hidden = !here || !["tracking", "paused", "compiling"].includes(work.state);
   bar.classList.toggle("unknown", work?.state === "compiling");
   if (work && work.last > work.first) bar.firstElementChild.style.width = `${(100 * work.done) / (work.last - work.first)}%`;
   drawButtons(work, here);
@@ -48,9 +48,10 @@ function drawButtons(work, here) {
   const complete = get("summary") && get("summary").frames.length >= get("summary").last - get("summary").first;
   const toggle = byId("track-toggle");
   toggle.textContent = here && work.state === "tracking" ? "Pause" : here && work.state === "lost" ? "Resume" : get("summary")?.frames.length ? (complete ? "Tracked" : "Track on") : "Track";
+  toggle.classList.toggle("primary", !(complete && !busy));
   toggle.disabled = !run || !get("connected") || (complete && !busy);
   for (const id of ["step-layer", "step-frame"]) byId(id).disabled = !run || !get("connected") || busy || complete;
-  byId("reanneal").disabled = !run || !get("connected") || !get("summary")?.frames.length || (here && work.state === "tracking");
+  byId("reanneal").disabled = !run || !get("connected") || !get("summary")?.frames.length || get("frame") === null || (here && work.state === "tracking");
   byId("cancel").disabled = !here || !["tracking", "paused", "compiling"].includes(work.state);
 }
 
@@ -74,7 +75,7 @@ export function startHeader() {
   byId("cancel").onclick = () => tell("cancel");
   byId("reanneal").onclick = reanneal;
   byId("rail-toggle").onclick = () => byId("rail-toggle").setAttribute("aria-expanded", String(document.body.classList.toggle("rail-open")));
-  watch(["work", "run", "session", "connected", "summary"], drawState);
+  watch(["work", "run", "session", "connected", "summary", "frame"], drawState);
   watch(["session", "run", "summary"], () => {
     const crumbs = byId("crumbs");
     crumbs.replaceChildren();

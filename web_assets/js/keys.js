@@ -26,15 +26,18 @@ function showKeys() {
   openList("Keys", KEYS.map(([key, what]) => [key, what]));
 }
 
-/** Listen on the page (typing in a field and holding control are left alone). */
+/** Do what a key says; typing in a field and holding control are left alone. */
+export function takeKey(event) {
+  const typing = event.target.closest?.("input, select, textarea, dialog, [role=slider]:not(#track), [role=menu]");
+  if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
+  if ((event.key === " " || event.key === "Enter") && event.target.closest?.("button, a")) return;
+  const found = KEYS.find(([, , fits]) => fits(event));
+  if (!found) return;
+  event.preventDefault();
+  found[3](event);
+}
+
+/** Listen on the page. */
 export function startKeys() {
-  document.addEventListener("keydown", (event) => {
-    const typing = event.target.closest?.("input, select, textarea, dialog");
-    if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
-    if (event.key === " " && event.target.closest?.("button, a")) return;
-    const found = KEYS.find(([, , fits]) => fits(event));
-    if (!found) return;
-    event.preventDefault();
-    found[3](event);
-  });
+  document.addEventListener("keydown", takeKey);
 }

@@ -5,6 +5,7 @@ import { say } from "./messages.js";
 import { get, set } from "./state.js";
 
 const RETRY_MILLISECONDS = 1500;
+const STRANGER_MILLISECONDS = 15000;
 const handlers = {
   state: (event) => { set({ work: event }); if (event.state === "failed") say(event.message || "The run failed.", { remedy: event.hint, kind: "error" }); },
   acknowledged: (event) => { if (!event.ok) say(event.message, { remedy: event.hint, kind: "error" }); },
@@ -19,13 +20,23 @@ export const onEvent = (type, handler) => {
   handlers[type] = (event) => { before?.(event); handler(event, isHere(event)); };
 };
 
+/** Whether the studio that answers here still knows this browser; one that was started anew does not. */
+async function isKnown() {
+  const answer = await fetch("/api/worker").catch(() => null);
+  return answer === null || answer.status !== 403;
+}
+
 /** Open the socket and keep it open. */
 export function startLive() {
   const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/api/events`);
-  socket.onopen = () => set({ connected: true });
+  socket.onopen = () => set({ connected: true, stranger: false });
   socket.onmessage = ({ data }) => {
     const event = JSON.parse(data);
     handlers[event.type]?.(event);
   };
-  socket.onclose = () => { set({ connected: false }); setTimeout(startLive, RETRY_MILLISECONDS); };
+  socket.onclose = async () => {
+    set({ connected: false });
+    set({ stranger: !(await isKnown()) });
+    setTimeout(startLive, get("stranger") ? STRANGER_MILLISECONDS : RETRY_MILLISECONDS);
+  };
 }

@@ -23,11 +23,13 @@ export function addLine({ level, time, text }) {
 
 /** Show the log of the run that is open. */
 export function startLog() {
-  watch(["run"], async () => {
+  watch(["session", "run"], async () => {
     list.replaceChildren();
     if (!get("run")) return;
     const asked = get("run");
     const told = await fetchJson(`${runPath(get("session"), asked)}/log`).catch(() => ({ lines: [] }));
-    if (asked === get("run")) for (const line of told.lines ?? []) addLine(line);
+    if (asked !== get("run")) return;
+    list.replaceChildren();
+    for (const line of told.lines ?? []) addLine(line);
   });
 }

@@ -55,5 +55,5 @@ export function startPlayback() {
   loop.onclick = toggleLoop;
   document.getElementById("first").onclick = () => goTo(-Infinity);
   document.getElementById("last").onclick = () => goTo(Infinity);
-  watch(["run"], stop);
+  watch(["session", "run"], stop);
 }

@@ -9,9 +9,13 @@ const values = {
   layer: null,         // layer that is shown, null = all together
   follow: true,        // show every new frame as it is finished
   detail: null,        // the shown frame's layers
+  parameters: null,    // of the run's pose vector
+  layerCount: null,    // how many layers a frame takes with the settings in use
+  settings: null,      // the settings in use, and since when
   whatIf: null,        // layers of a re-annealed frame that is not stored
   work: null,          // the worker's last state
-  connected: false,    // whether the event socket is open
+  connected: null,     // whether the event socket is open, null before it was
+  stranger: false,     // whether the studio was started anew and does not know this browser
 };
 
 const watchers = new Map();

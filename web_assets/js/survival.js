@@ -1,52 +1,73 @@
-// What each layer did: survival wanted and reached, the exponent that brought it about, and its time.
+// What each layer did: survival wanted and reached, the exponent that brought it about, and its time. While a re-annealed
+// frame is shown, the stored answer's curves stay beside it.
 
 import { Chart, axis, figure, legend, title, tooltip } from "./charts.js";
 import { get, watch } from "./state.js";
 import { layerColour, token } from "./theme.js";
 
-const names = (layers) => layers.map((_, at) => String(at + 1));
+const FEWEST_ROWS = 2;
 
-function alpha(layers) {
-  const line = (name, key, colour, dash) => ({
-    name, type: "line", step: dash ? "middle" : false, data: layers.map((layer) => layer[key]),
-    lineStyle: { color: colour, type: dash ? "dashed" : "solid", width: 2 }, itemStyle: { color: colour }, symbolSize: 6,
-  });
+const names = (layers) => Array.from({ length: Math.max(layers.length, get("layerCount") ?? 0, FEWEST_ROWS) }, (_, at) => String(at + 1));
+
+const layerAxis = (layers) => axis({ type: "category", data: names(layers), name: "layer", nameLocation: "middle", nameGap: 20 });
+
+function line(name, layers, key, colour, { dashed = false, stepped = false } = {}) {
+  return {
+    name, type: "line", step: stepped ? "middle" : false, data: layers.map((layer) => layer[key]), symbol: "circle", symbolSize: dashed ? 4 : 6,
+    lineStyle: { color: colour, type: dashed ? "dashed" : "solid", width: dashed ? 1.5 : 2 }, itemStyle: { color: colour },
+  };
+}
+
+function alpha(layers, stored) {
+  const beside = stored ? [line("stored", stored, "alpha_reached", token("ghost"), { dashed: true })] : [];
   return {
     title: title("Survival rate α", "share of particles, Eq. 12"),
-    legend: legend(["wanted", "reached"]),
+    legend: legend(["wanted", "reached", ...(stored ? ["stored"] : [])]),
     tooltip: tooltip({ trigger: "axis", valueFormatter: figure }),
-    xAxis: axis({ type: "category", data: names(layers), name: "layer", nameLocation: "middle", nameGap: 20 }),
+    grid: { left: 44, right: 16, top: 52, bottom: 34 },
+    xAxis: layerAxis(layers),
     yAxis: axis({ type: "value", min: 0, max: 1 }),
-    series: [line("wanted", "alpha_wanted", token("text-quiet"), true), line("reached", "alpha_reached", token("accent"), false)],
+    series: [line("wanted", layers, "alpha_wanted", token("text-quiet"), { dashed: true, stepped: true }), line("reached", layers, "alpha_reached", token("accent")), ...beside],
   };
 }
 
-function beta(layers) {
+function beta(layers, stored) {
+  const beside = stored ? [line("stored", stored, "beta", token("ghost"), { dashed: true })] : [];
   return {
-    title: title("Exponent β", "w to the power of β, Eq. 3"),
+    title: title("Exponent β", "weights are raised to it, Eq. 3"),
+    legend: legend(stored ? ["β", "stored"] : []),
     tooltip: tooltip({ trigger: "axis", valueFormatter: figure }),
-    xAxis: axis({ type: "category", data: names(layers), name: "layer", nameLocation: "middle", nameGap: 20 }),
-    yAxis: axis({ type: "log" }),
-    series: [{ name: "β", type: "line", data: layers.map((layer) => layer.beta), symbolSize: 6, lineStyle: { color: token("layer-7"), width: 2 }, itemStyle: { color: token("layer-7") } }],
+    grid: { left: 56, right: 16, top: 52, bottom: 34 },
+    xAxis: layerAxis(layers),
+    yAxis: axis({ type: "log", axisLabel: { formatter: figure } }),
+    series: [line("β", layers, "beta", token("layer-7")), ...beside],
   };
 }
 
-function time(layers) {
+function time(layers, stored) {
   const sum = layers.reduce((total, layer) => total + layer.milliseconds, 0);
+  const beside = stored ? [line("stored", stored, "milliseconds", token("ghost"), { dashed: true })] : [];
   return {
     title: title("Time per layer", `ms, ${figure(sum)} in all`),
+    legend: legend(stored ? ["stored"] : []),
     tooltip: tooltip({ trigger: "axis", valueFormatter: (value) => `${figure(value)} ms` }),
-    xAxis: axis({ type: "category", data: names(layers), name: "layer", nameLocation: "middle", nameGap: 20 }),
-    yAxis: axis({ type: "value", name: "ms", min: 0 }),
-    series: [{ type: "bar", data: layers.map((layer, at) => ({ value: layer.milliseconds, itemStyle: { color: layerColour(at, layers.length) } })) }],
+    grid: { left: 44, right: 16, top: 52, bottom: 34 },
+    xAxis: layerAxis(layers),
+    yAxis: axis({ type: "value", min: 0 }),
+    series: [
+      { name: "this", type: "bar", barMaxWidth: 28, data: layers.map((layer, at) => ({ value: layer.milliseconds, itemStyle: { color: layerColour(at, layers.length) } })) },
+      ...beside,
+    ],
   };
 }
 
 /** Wire the three charts to the state. */
 export function startSurvival() {
   const charts = [["chart-alpha", alpha], ["chart-beta", beta], ["chart-time", time]].map(([id, make]) => [new Chart(id, { empty: "No layers yet." }), make]);
-  watch(["detail", "whatIf"], () => {
-    const layers = get("whatIf") ?? get("detail")?.layers;
-    for (const [chart, make] of charts) chart.draw(() => (layers?.length ? make(layers) : null));
+  watch(["detail", "whatIf", "layerCount"], () => {
+    const [detail, whatIf] = [get("detail")?.layers, get("whatIf")];
+    const layers = whatIf ?? detail;
+    const stored = whatIf && detail?.length ? detail : null;
+    for (const [chart, make] of charts) chart.draw(() => (layers?.length ? make(layers, stored) : null));
   });
 }

@@ -4,7 +4,8 @@ import { Chart, axis, figure, legend, title, tooltip } from "./charts.js";
 import { get, set, watch } from "./state.js";
 import { token } from "./theme.js";
 
-const LOWEST_SHARE = 1e-4;
+// The map's lowest colour: a parameter is as good as settled long before.
+const LOWEST_SHARE = 1e-2;
 const MOST_LEVEL_LABELS = 8;
 
 const labelsOf = (names) => (names.length > MOST_LEVEL_LABELS
@@ -32,18 +33,19 @@ function cell(detail, layers, layer, at) {
 
 function heat(detail, layers) {
   const left = shares(layers, "variance_resampled");
+  const rows = Array.from({ length: Math.max(layers.length, get("layerCount") ?? 0) }, (_, at) => String(at + 1));
   const names = detail.parameters.map((parameter) => parameter.label);
   const cells = left.flatMap((row, layer) => row.map((share, at) => [at, layer, Math.log10(Math.max(share, LOWEST_SHARE))]));
   return {
-    title: title("Variance left before diffusion", "share of the first layer's, per parameter"),
+    title: title("Variance left before diffusion", `share of the first layer's, frame ${layers[0].frame}${get("whatIf") ? " re-annealed" : ""}`),
     tooltip: tooltip({ formatter: ({ value }) => cell(detail, layers, value[1], value[0]) }),
     grid: { left: 48, right: 84, top: 32, bottom: names.length > MOST_LEVEL_LABELS ? 62 : 26 },
     xAxis: axis({ type: "category", data: names, axisLabel: labelsOf(names), splitLine: { show: false } }),
-    yAxis: axis({ type: "category", inverse: true, name: "layer", nameLocation: "middle", nameGap: 26, data: layers.map((_, at) => String(at + 1)), splitLine: { show: false } }),
+    yAxis: axis({ type: "category", inverse: true, name: "layer", nameLocation: "middle", nameGap: 26, data: rows, splitLine: { show: false } }),
     visualMap: {
-      min: -4, max: 0, calculable: false, orient: "vertical", right: 8, top: 30, itemHeight: 80, itemWidth: 10, precision: 0,
-      inRange: { color: ["surface-raised", "heat-low", "heat-middle", "heat-high"].map(token) },
-      text: ["100 %", "0.01 %"], textStyle: { color: token("text-quiet"), fontSize: 10 },
+      min: Math.log10(LOWEST_SHARE), max: 0, calculable: false, orient: "vertical", right: 8, top: 28, itemHeight: 84, itemWidth: 10, precision: 0,
+      inRange: { color: ["heat-lowest", "heat-low", "heat-middle", "heat-high"].map(token) },
+      text: ["100 %", "1 %"], textStyle: { color: token("text-quiet"), fontSize: 10 },
     },
     series: [{ type: "heatmap", data: cells, itemStyle: { borderColor: token("surface"), borderWidth: 1 }, emphasis: { itemStyle: { borderColor: token("text") } } }],
   };
@@ -78,18 +80,20 @@ export function varianceCsv(detail, layers) {
 
 /** Wire the two charts to the state. */
 export function startVariance() {
-  const map = new Chart("chart-heat", { empty: "No layers yet. Track a frame to see where its variance goes." });
-  const bar = new Chart("chart-bars", { empty: "" });
   let under = null;
+  const wire = (chart) => {
+    chart.on("mouseover", ({ value }) => { if (value && under !== value[1]) { under = value[1]; draw(); } });
+    chart.on("globalout", () => { under = null; draw(); });
+    chart.on("click", ({ value }) => value && set({ layer: value[1] }));
+  };
+  const map = new Chart("chart-heat", { empty: "No layers yet. Track a frame to see where its variance goes.", wire });
+  const bar = new Chart("chart-bars", { empty: "" });
   const draw = () => {
     const detail = get("detail");
     const layers = get("whatIf") ?? detail?.layers;
-    const shown = layers?.length ? layers : null;
+    const shown = detail && layers?.length ? layers : null;
     map.draw(() => shown && heat(detail, shown));
     bar.draw(() => shown && bars(detail, shown, Math.min(under ?? get("layer") ?? shown.length - 1, shown.length - 1)));
   };
-  map.on("mouseover", ({ value }) => { if (value && under !== value[1]) { under = value[1]; draw(); } });
-  map.on("globalout", () => { under = null; draw(); });
-  map.on("click", ({ value }) => value && set({ layer: value[1] }));
-  watch(["detail", "whatIf", "layer"], draw);
+  watch(["detail", "whatIf", "layer", "layerCount"], draw);
 }

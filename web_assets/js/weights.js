@@ -1,8 +1,9 @@
 // Over the frames: the best weight, and with truth the error.
 
 import { Chart, axis, figure, title, tooltip } from "./charts.js";
-import { get, set, watch } from "./state.js";
+import { get, watch } from "./state.js";
 import { token } from "./theme.js";
+import { goTo } from "./timeline.js";
 
 function overFrames(summary, { key, name, unit, colour, note }) {
   const frames = summary.frames.map((entry) => entry.frame);
@@ -20,17 +21,19 @@ function overFrames(summary, { key, name, unit, colour, note }) {
   };
 }
 
-/** Wire the two charts to the state; a click goes to the frame. */
+/** A click anywhere in a chart goes to the frame under it. */
+function goesToFrames(chart) {
+  chart.getZr().on("click", ({ offsetX, offsetY }) => {
+    const at = chart.convertFromPixel({ gridIndex: 0 }, [offsetX, offsetY])?.[0];
+    const entry = get("summary")?.frames[Math.round(at)];
+    if (entry) goTo(entry.frame);
+  });
+}
+
+/** Wire the two charts to the state. */
 export function startWeights() {
-  const weight = new Chart("chart-weight", { empty: "No frames yet." });
-  const error = new Chart("chart-error", { empty: "This session has no truth to measure against." });
-  for (const chart of [weight, error]) {
-    chart.chart.getZr().on("click", ({ offsetX, offsetY }) => {
-      const at = chart.chart.convertFromPixel({ gridIndex: 0 }, [offsetX, offsetY])?.[0];
-      const entry = get("summary")?.frames[Math.round(at)];
-      if (entry) set({ frame: entry.frame, follow: false });
-    });
-  }
+  const weight = new Chart("chart-weight", { empty: "No frames yet.", wire: goesToFrames });
+  const error = new Chart("chart-error", { empty: "This session has no truth to measure against.", wire: goesToFrames });
   watch(["summary", "frame"], () => {
     const summary = get("summary");
     const some = summary?.frames.length ? summary : null;

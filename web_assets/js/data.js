@@ -1,0 +1,155 @@
+// What the state is filled from: the stored run over the API, the search as it happens over the events.
+
+import { fetchJson, post, runPath } from "./api.js";
+import { onEvent } from "./live.js";
+import { complain } from "./messages.js";
+import { paced } from "./pace.js";
+import { refreshSessions } from "./rail.js";
+import { get, set, watch } from "./state.js";
+
+const SUMMARY_MILLISECONDS = 1500;
+const DETAIL_MILLISECONDS = 80;
+const SCENE_MILLISECONDS = 33;
+const SESSIONS_MILLISECONDS = 800;
+// A frame that takes longer than this is shown layer by layer while it is searched; quicker ones when they are done.
+const PATIENCE_MILLISECONDS = 700;
+
+const searching = () => ["tracking", "compiling"].includes(get("work")?.state);
+const isShown = (session, run) => session === get("session") && run === get("run");
+
+let arrived = [];      // lines of frames that finished since the summary was last asked for
+let layers = [];       // of the frame that is being searched
+let drawnAt = 0;       // when live layers were last shown
+let scene = {};        // what the scene was last told, or told itself
+
+/** The run's frames; those that finish while the answer is on its way are kept. */
+async function loadSummary() {
+  const [session, run] = [get("session"), get("run")];
+  if (!run) return;
+  arrived = [];
+  try {
+    const summary = await fetchJson(`${runPath(session, run)}/frames`);
+    if (!isShown(session, run)) return;
+    const last = summary.frames.at(-1)?.frame ?? -1;
+    summary.frames.push(...arrived.filter((line) => line.frame > last));
+    const newest = summary.frames.at(-1)?.frame ?? null;
+    const frame = get("frame") === null || (get("follow") && searching()) ? newest : get("frame");
+    set({ summary, frame });
+  } catch (error) { complain(error); }
+}
+
+/** What the run was asked to do, and its parameters' names. */
+async function loadRun() {
+  const [session, run] = [get("session"), get("run")];
+  layers = [];
+  if (!run) return;
+  try {
+    const told = await fetchJson(runPath(session, run));
+    if (isShown(session, run)) set({ parameters: told.parameters, layerCount: get("layerCount") ?? told.settings.layers ?? null });
+  } catch (error) { complain(error); }
+}
+
+/** The shown frame's layers, unless they came with the events. */
+async function loadDetail() {
+  const [session, run, frame] = [get("session"), get("run"), get("frame")];
+  if (!run || frame === null) return set({ detail: null });
+  if (get("detail")?.frame === frame) return;
+  try {
+    const detail = await fetchJson(`${runPath(session, run)}/frames/${frame}`);
+    if (isShown(session, run) && frame === get("frame")) set({ detail });
+  } catch (error) { if (error.status !== 404) complain(error); }
+}
+
+/** Move the scene to what the page shows. While a search is followed the scene follows it by itself. */
+async function showInScene() {
+  const [session, run, layer] = [get("session"), get("run"), get("layer")];
+  if (!session) return;
+  const follow = get("follow") && searching();
+  const frame = follow ? null : get("frame");
+  const wish = { session, run, layer, frame, follow: get("follow") };
+  if (Object.keys(wish).every((name) => wish[name] === scene[name])) return;
+  scene = wish;
+  await post("/api/scene/show", wish).catch(complain);
+}
+
+/** The scene's own controls moved, or it plays: follow them, and do not send it back what it said. */
+function takeScene(event) {
+  if (!isShown(event.session, event.run)) return;
+  if (event.follow && get("follow") && searching()) return;
+  const stored = get("summary")?.frames.some((line) => line.frame === event.frame);
+  const changes = { layer: event.layer, follow: event.follow, ...(stored ? { frame: event.frame } : {}) };
+  scene = { session: event.session, run: event.run, layer: event.layer, frame: stored ? event.frame : scene.frame, follow: event.follow };
+  if (stored && event.frame !== get("frame") && get("whatIf")) changes.whatIf = null;
+  set(changes);
+}
+
+/** A layer: those of a what-if stand beside the stored answer; those of a frame in progress are shown when it is slow. */
+function takeLayer(event) {
+  if (event.reannealed) {
+    const before = get("whatIf");
+    const goesOn = event.layer > 0 && before?.[0].frame === event.frame;
+    return set({ frame: event.frame, whatIf: [...(goesOn ? before.filter((layer) => layer.layer < event.layer) : []), event] });
+  }
+  layers = [...layers.filter((layer) => layer.frame === event.frame && layer.layer < event.layer), event];
+  if (!get("follow")) return;
+  const slow = performance.now() - drawnAt > PATIENCE_MILLISECONDS;
+  if (!searching() || slow) showLive(event.frame, false);
+}
+
+/** Show the layers that came with the events; whether they could be shown. */
+function showLive(frame, finished) {
+  if (!get("parameters") || layers[0]?.layer !== 0 || layers.some((layer, at) => layer.layer !== at)) return false;
+  drawnAt = performance.now();
+  set({ frame, whatIf: null, detail: { frame, finished, parameters: get("parameters"), layers } });
+  return true;
+}
+
+/** A finished frame goes on the timeline at once; its error comes with the next summary. */
+function takeFrame(event) {
+  const summary = get("summary");
+  if (!summary) return;
+  const line = { frame: event.frame, log_weight: event.log_weight, milliseconds: event.milliseconds, error_mm: null, lost: false };
+  arrived.push(line);
+  set({ summary: { ...summary, frames: [...summary.frames.filter((one) => one.frame < event.frame), line] } });
+  const whole = layers.length === event.layers && layers[0].frame === event.frame;
+  if (get("follow") && whole && showLive(event.frame, true)) return;
+  const changes = get("follow") ? { frame: event.frame } : {};
+  if (get("detail")?.frame === event.frame) Object.assign(changes, { detail: null, whatIf: null });
+  set(changes);
+}
+
+/** The search came to rest: what it stands in is shown, the rest of the page asks again. */
+function takeRest(work) {
+  const inside = work.state === "paused" && work.layer > 0 && layers.at(-1)?.frame === work.frame;
+  if (inside && get("follow") && !get("whatIf")) showLive(work.frame, false);
+}
+
+/** Wire events and state to the API. */
+export function startData() {
+  const summaryLater = paced(loadSummary, SUMMARY_MILLISECONDS);
+  const detailLater = paced(loadDetail, DETAIL_MILLISECONDS);
+  const sceneLater = paced(showInScene, SCENE_MILLISECONDS);
+  const sessionsLater = paced(refreshSessions, SESSIONS_MILLISECONDS);
+  watch(["session", "run"], () => { loadRun(); loadSummary(); });
+  watch(["session", "run", "frame"], detailLater);
+  watch(["session", "run", "frame", "layer", "follow"], sceneLater);
+  onEvent("frame", (event, here) => {
+    if (!here || event.reannealed) return;
+    takeFrame(event);
+    detailLater();
+    summaryLater();
+  });
+  onEvent("layer", (event, here) => { if (here) takeLayer(event); });
+  onEvent("settings", (event, here) => { if (here) set({ settings: event, layerCount: event.values.layers ?? null }); });
+  onEvent("state", (event, here) => {
+    if (here && !searching()) { takeRest(event); summaryLater(); sceneLater(); }
+    if (event.state !== "tracking") sessionsLater();
+  });
+  onEvent("sessions", sessionsLater);
+  onEvent("scene", takeScene);
+  let before = false;
+  watch(["connected"], () => {
+    if (get("connected") && before) { scene = {}; sessionsLater(); summaryLater(); }
+    before ||= get("connected");
+  });
+}
