@@ -3,12 +3,12 @@
 Upload routes stream to disk and count for themselves; everything else is small JSON.
 """
 
-from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from studio.web.error_responses import TooLargeError, error_response
 
 JSON_LIMIT = 1_000_000
+DRAINED = 16_000_000
 UPLOAD_PREFIX = "/api/uploads"
 
 
@@ -27,22 +27,20 @@ class BodyLimit:
         too_large = TooLargeError(
             f"The request carries more than {self.limit} bytes.", "Send less at a time."
         )
-        promised = Headers(scope=scope).get("content-length", "0")
-        if not promised.isdigit() or int(promised) > self.limit:
-            await error_response(too_large)(scope, receive, send)
-            return
-        # Read here, because a route's own reading would answer for an error of ours.
-        body = bytearray()
-        more = True
-        while more:
+        # Read here, because a route's own reading would answer for an error of ours. What is somewhat too large
+        # is read to its end: a browser that is cut off while it sends never hears why.
+        body, arrived, more = bytearray(), 0, True
+        while more and arrived <= self.limit + DRAINED:
             message = await receive()
             if message["type"] == "http.disconnect":
                 return
-            body += message.get("body", b"")
+            chunk = message.get("body", b"")
+            arrived += len(chunk)
+            body += chunk if arrived <= self.limit else b""
             more = message.get("more_body", False)
-            if len(body) > self.limit:
-                await error_response(too_large)(scope, receive, send)
-                return
+        if arrived > self.limit:
+            await error_response(too_large)(scope, receive, send)
+            return
         given = False
 
         async def replay() -> Message:

@@ -104,7 +104,7 @@ def tracked(session: Session) -> StoredRun:
                 frame, Estimate(pose, pose, layers[-1].best, -1.5), 3, 21, 1, 9.0, Carried(particles, pose)
             )
             writer.write_frame(result, layers, 2000)
-        writer.write_settings(2, 1, 1, run.record.settings | {"survival": 0.3})
+        writer.write_settings(2, 1, 1, run.record.settings | {"survival": 0.77})
     return run
 
 

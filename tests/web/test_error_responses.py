@@ -50,7 +50,9 @@ def test_a_body_that_is_no_json_is_named(studio: Studio) -> None:
 def test_a_wrong_entry_is_named_with_its_place(studio: Studio) -> None:
     told = studio.client.post("/api/imports", json={"name": "a", "source": "/x", "fps": "fast"}).json()
     assert "'fps'" in told["message"]
-    assert validation_words([{"loc": ("body", "a", 0), "msg": "no"}]) == "The request is not valid: 'a.0': no."
+    assert (
+        validation_words([{"loc": ("body", "a", 0), "msg": "no"}]) == "The request is not valid: 'a.0': no."
+    )
 
 
 def test_a_page_that_is_not_there_is_a_page(studio: Studio) -> None:

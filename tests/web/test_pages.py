@@ -60,7 +60,10 @@ def test_anchors_are_plain_words() -> None:
 def test_preferences_are_remembered(studio: Studio) -> None:
     client = studio.client
     assert client.get("/api/preferences").json() == {}
-    assert client.patch("/api/preferences", json={"theme": "dark", "speed": 2}).json() == {"theme": "dark", "speed": 2}
+    assert client.patch("/api/preferences", json={"theme": "dark", "speed": 2}).json() == {
+        "theme": "dark",
+        "speed": 2,
+    }
     assert client.patch("/api/preferences", json={"speed": None, "folded": ["log"]}).status_code == 200
     assert client.get("/api/preferences").json() == {"theme": "dark", "folded": ["log"]}
     big = client.patch("/api/preferences", json={"x": "y" * 20_000})

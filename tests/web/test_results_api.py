@@ -91,8 +91,8 @@ def test_any_stored_frame_with_all_its_layers(studio: Studio, tracked: StoredRun
             assert np.allclose(shown[name], getattr(stored, name))
         assert shown["particles"] == len(stored.poses)
         assert shown["beta"] == stored.beta
-    assert told["settings"]["survival"] == 0.3
-    assert studio.client.get(f"{RUN}/frames/0").json()["settings"]["survival"] == 0.5
+    assert told["settings"]["survival"] == 0.77
+    assert studio.client.get(f"{RUN}/frames/0").json()["settings"] == tracked.record.settings
     assert studio.client.get(f"{RUN}/frames/1/layers/2").json() == told["layers"][2]
 
 

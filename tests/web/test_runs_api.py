@@ -3,8 +3,10 @@
 import pytest
 from web_doubles import Studio, state_of
 
+from studio.knobs import knobs_of
 from studio.sessions.run_log import append_to_log
 from studio.sessions.stored_run import StoredRun
+from studio.tracking.settings import AnnealedSettings
 from studio.worker import commands
 
 RUN = "/api/sessions/take1/runs/first"
@@ -143,14 +145,12 @@ def test_the_log_is_the_runs_own_file(studio: Studio, tracked: StoredRun) -> Non
 def test_knobs_are_the_declarations(studio: Studio) -> None:
     told = studio.client.get("/api/knobs", params={"tracker": "annealed", "weighting": "edge-region"}).json()
     survival = next(entry for entry in told["knobs"] if entry["name"] == "survival")
-    assert (survival["kind"], survival["low"], survival["high"], survival["default"]) == (
-        "float",
-        0.02,
-        0.98,
-        0.5,
-    )
+    declared = next(entry for entry in knobs_of(AnnealedSettings) if entry.name == "survival")
+    for name in ("label", "low", "high", "step", "default", "help", "unit", "group"):
+        assert survival[name] == getattr(declared, name)
+    assert survival["kind"] == "float"
     assert survival["takes_effect"] == "next layer"
-    assert told["values"]["layers"] == 10
+    assert told["values"]["layers"] == AnnealedSettings().layers
     assert told["json_schema"]["properties"]["layers"]["maximum"] == 60
     assert studio.client.get("/api/knobs", params={"tracker": "none"}).status_code == 422
 
@@ -170,7 +170,7 @@ def test_choices_for_a_new_run(studio: Studio) -> None:
 def test_settings_in_use_and_every_change_before(studio: Studio, tracked: StoredRun) -> None:
     told = studio.client.get(f"{RUN}/settings").json()
     assert (told["version"], told["frame"], told["layer"]) == (2, 1, 1)
-    assert told["values"]["survival"] == 0.3
+    assert told["values"]["survival"] == 0.77
     [change] = told["changes"]
     assert change == {"version": 2, "frame": 1, "layer": 1, "changed": ["survival"]}
 
@@ -198,10 +198,10 @@ def test_the_shown_frame_is_the_one_that_is_annealed_again(studio: Studio, track
 def test_reset_and_presets(studio: Studio, tracked: StoredRun) -> None:
     client = studio.client
     client.post(f"{RUN}/settings/reset", json={"names": ["survival"]})
-    assert studio.control.changes == [{"survival": 0.5}]
+    assert studio.control.changes == [{"survival": AnnealedSettings().survival}]
     client.post(f"{RUN}/settings/reset", json={})
     assert "start_repeats" not in studio.control.changes[1]
-    assert studio.control.changes[1]["layers"] == 10
+    assert studio.control.changes[1]["layers"] == AnnealedSettings().layers
     assert client.post(f"{RUN}/settings/reset", json={"names": ["x"]}).status_code == 422
 
     kept = client.put("/api/presets/mine", json={"values": {"survival": 0.33}, "help": "for walks"}).json()
