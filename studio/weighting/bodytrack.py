@@ -37,6 +37,8 @@ FULL = 255 * 255
 # The buffer holds one side, or one column of the grid, at the least, however long; more than this many
 # samples of a kind in one view are those of a limb that fills many pictures, and are left out.
 LEAST_CAPACITY = 1 << 14
+# About half a millisecond of a four-camera frame.
+BLOCKS_A_THREAD = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +103,11 @@ class BodytrackProblem:
         outlines = self.weigher.projector.blocks(poses)
         sums = np.zeros((len(outlines), LANES, 4), dtype=np.int64)
         run_blocks(
-            chunk_scores, all_scores, len(outlines), outlines, self.views, self.maps, self._capacity, sums
+            chunk_scores,
+            all_scores,
+            len(outlines),
+            BLOCKS_A_THREAD,
+            *(outlines, self.views, self.maps, self._capacity, sums),
         )
         sums = sums.reshape(-1, 4)[: len(poses)]
         counts = np.maximum(sums[:, 1::2], 1)

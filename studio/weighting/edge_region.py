@@ -42,6 +42,7 @@ from studio.weighting.edge_region_kernels import (
     WORST,
     all_weights,
     chunk_weights,
+    record_indices,
 )
 from studio.weighting.evidence_check import check_sizes, check_views
 from studio.weighting.occlusion_kernels import all_hidden, chunk_hidden
@@ -51,6 +52,11 @@ from studio.weighting.problem import Limits
 Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 IntArray = NDArray[np.int64]
+Words = NDArray[np.uint32]
+
+
+# About half a millisecond of a four-camera frame.
+BLOCKS_A_THREAD = 24
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,14 +124,13 @@ class EdgeRegionWeigher:
         self.settings, self.cameras = settings, cameras
         self.projector = OutlineProjector.of_body(body, cameras)
         self.limits = Limits(body)
-        self.along_edge = places_along(settings.edge_chunks)
-        self.along_region = places_along(settings.region_chunks)
 
     @property
     def samples_per_evaluation(self) -> int:
         """Map reads that one pose costs."""
-        lines = EDGE_LINES * self.along_edge.size + REGION_LINES * self.along_region.size
-        return lines * self.projector.limb_count * len(self.cameras)
+        settings = self.settings
+        chunks = EDGE_LINES * settings.edge_chunks + REGION_LINES * settings.region_chunks
+        return chunks * CHUNK * self.projector.limb_count * len(self.cameras)
 
     def problem(self, evidence: FrameEvidence) -> "EdgeRegionProblem":
         """One frame as a function of poses. Raises FootageError where views do not fit the cameras."""
@@ -156,15 +161,28 @@ class EdgeRegionProblem:
         blocks, views = outlines.shape[:2]
         terms = np.empty((blocks, LANES, views, 2))
         log_weights = np.empty((blocks, LANES))
-        along = weigher.along_edge, weigher.along_region
+        chunks = settings.edge_chunks, settings.region_chunks
         weights = np.array([settings.edge_weight, settings.region_weight])
         run_blocks(
             chunk_weights,
             all_weights,
             blocks,
-            *(outlines, hidden, *along, self.maps.views, self.maps.values, weights, terms, log_weights),
+            BLOCKS_A_THREAD,
+            *(outlines, hidden, *chunks, self.maps.views, self.maps.values, weights, terms, log_weights),
         )
         return terms.reshape(-1, views, 2)[: len(poses)], log_weights.ravel()[: len(poses)]
+
+    def recorded_indices(self, outlines: NDArray[np.float32]) -> tuple[Words, Words]:
+        """The pixels that the kernel reads, for the benchmark and for tests: (B, V, 16, L, chunks, lines, 16) of
+        edges and of regions, numbered from 0 in each picture; see `edge_region_kernels` for numbers beyond it.
+        """
+        settings = self.weigher.settings
+        blocks, views, limbs = outlines.shape[:3]
+        shape = (blocks, views, LANES, limbs)
+        edges = np.zeros((*shape, settings.edge_chunks, EDGE_LINES, CHUNK), dtype=np.uint32)
+        region = np.zeros((*shape, settings.region_chunks, REGION_LINES, CHUNK), dtype=np.uint32)
+        record_indices(outlines, self.hidden(outlines), self.maps.views, edges, region)
+        return edges, region
 
     def hidden(self, outlines: NDArray[np.float32]) -> NDArray[np.uint64]:
         """(B, V, L, 2, 16) a bit for each hidden edge sample; of no blocks where the option is off."""
@@ -172,18 +190,13 @@ class EdgeRegionProblem:
         if not self.weigher.settings.occlusion_aware:
             return np.zeros((0, views, limbs, EDGE_LINES, LANES), dtype=np.uint64)
         hidden = np.empty((blocks, views, limbs, EDGE_LINES, LANES), dtype=np.uint64)
-        run_blocks(chunk_hidden, all_hidden, blocks, outlines, self.weigher.along_edge.size, hidden)
+        samples = self.weigher.settings.edge_chunks * CHUNK
+        run_blocks(chunk_hidden, all_hidden, blocks, BLOCKS_A_THREAD, outlines, samples, hidden)
         return hidden
 
     def feasible(self, poses: Array) -> NDArray[np.bool_]:
         """(N, D) poses to (N,) whether all parameters lie within the body's limits."""
         return self.weigher.limits.hold(poses)
-
-
-def places_along(chunks: int) -> NDArray[np.float32]:
-    """(chunks, 16) the middles of equal parts of a line from 0 to 1."""
-    count = chunks * CHUNK
-    return ((np.arange(count) + 0.5) / count).astype(np.float32).reshape(chunks, CHUNK)
 
 
 def weighting_maps(evidence: FrameEvidence) -> WeightingMaps:

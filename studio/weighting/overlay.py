@@ -15,8 +15,8 @@ from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.weighting.bodytrack import BodytrackSettings
 from studio.weighting.bodytrack_kernels import EDGE_STEP, INSIDE_STEP, LEAST
-from studio.weighting.edge_region import EdgeRegionSettings, places_along
-from studio.weighting.edge_region_kernels import FIRST_STRIP, SECOND_STRIP, THIRD_STRIP
+from studio.weighting.edge_region import EdgeRegionSettings
+from studio.weighting.edge_region_kernels import CHUNK, FIRST_STRIP, SECOND_STRIP, THIRD_STRIP
 from studio.weighting.outlines import OutlineProjector
 
 Array = NDArray[np.float64]
@@ -74,9 +74,9 @@ def sample_points(outlines: Array, settings: Any) -> tuple[Array, Array]:  # noq
     region: list[Array] = [np.zeros((0, 2))]
     for outline in outlines:
         if isinstance(settings, EdgeRegionSettings):
-            along = places_along(settings.edge_chunks).ravel().astype(np.float64)
+            along = _middles(settings.edge_chunks * CHUNK)
             edge += [_grid(outline, along, np.array([side])) for side in (0.0, 1.0)]
-            along = places_along(settings.region_chunks).ravel().astype(np.float64)
+            along = _middles(settings.region_chunks * CHUNK)
             region.append(_grid(outline, along, np.array(STRIPS)))
         elif isinstance(settings, BodytrackSettings):
             for side, (start, end) in ((0.0, (0, 1)), (1.0, (3, 2))):
@@ -94,6 +94,11 @@ def _grid(outline: Array, along: Array, across: Array) -> Array:
     side_a = outline[0] + along[:, None] * (outline[1] - outline[0])
     side_b = outline[3] + along[:, None] * (outline[2] - outline[3])
     return (side_a + across[:, None, None] * (side_b - side_a)).reshape(-1, 2)
+
+
+def _middles(count: int) -> Array:
+    """The middles of `count` equal parts of a line from 0 to 1."""
+    return (np.arange(count) + 0.5) / count
 
 
 def _intervals(line: Array, step: float) -> int:

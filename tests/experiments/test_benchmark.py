@@ -8,7 +8,13 @@ import pytest
 from scipy.ndimage import label
 
 from studio.body.catalogue import load_body
-from studio.experiments.benchmark import limit_contests, made_evidence, ring_of_cameras, run_benchmark
+from studio.experiments.benchmark import (
+    LIMIT_PASSES,
+    limit_contest,
+    made_evidence,
+    ring_of_cameras,
+    run_benchmark,
+)
 from studio.weighting.edge_region import EdgeRegionSettings, EdgeRegionWeigher
 
 
@@ -58,12 +64,10 @@ def test_the_limit_reads_what_the_weighting_reads():
     problem = weigher.problem(made_evidence(body, cameras, rng)["proximity"])
     step = np.array([entry.max_step for entry in body.parameters]) / 60.0
     poses = body.neutral + step * rng.normal(size=(32, 31))
-    contests, evaluations = limit_contests(problem, poses)
-    assert evaluations == 2 * 16 * 8
+    contest = limit_contest(problem, poses)
+    assert contest.evaluations == 32 * LIMIT_PASSES
     edge, region = problem.terms(poses)
-    for block, contest in enumerate(contests):
-        sums = contest.run()
-        assert sums.shape == (1, 4, 16, 2)
-        these = slice(16 * block, 16 * block + 16)
-        np.testing.assert_allclose(sums[0, :, :, 0].T / (8 * 255 * 320), edge[these])
-        np.testing.assert_allclose(sums[0, :, :, 1].T / (8 * 255 * 480), region[these])
+    sums = contest.run() / LIMIT_PASSES
+    assert sums.shape == (2, 4, 16, 2)
+    np.testing.assert_allclose(sums[..., 0].transpose(0, 2, 1).reshape(32, 4) / (255 * 320), edge)
+    np.testing.assert_allclose(sums[..., 1].transpose(0, 2, 1).reshape(32, 4) / (255 * 480), region)

@@ -1,6 +1,7 @@
 """The benchmark's score against the figures printed with its data, and against a plain twin."""
 
 import cv2
+import numba
 import numpy as np
 import pytest
 from weighting_scene import looking_at, on_grid, plain_evidence, read, scattered, true_corners
@@ -10,7 +11,7 @@ from studio.capture.calibration_files import read_calibration
 from studio.evidence.edges import bodytrack_edges
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
-from studio.weighting.bodytrack import BodytrackSettings, BodytrackWeigher, score
+from studio.weighting.bodytrack import BLOCKS_A_THREAD, BodytrackSettings, BodytrackWeigher, score
 
 
 @pytest.mark.real_data
@@ -88,6 +89,16 @@ def test_weights_of_the_terms(human, ring, smooth):
     settings = BodytrackSettings(score_edge_weight=2.0, score_inside_weight=0.5)
     weights = BodytrackWeigher(human, ring, settings).problem(smooth).weigh(poses)
     np.testing.assert_allclose(weights, -(2.0 * edge + 0.5 * inside), rtol=1e-12)
+
+
+def test_a_pose_weighs_the_same_on_any_number_of_threads(human, ring, smooth):
+    problem = BodytrackWeigher(human, ring, BodytrackSettings()).problem(smooth)
+    poses = scattered(human, 2 * 16 * BLOCKS_A_THREAD + 3)
+    numba.set_num_threads(1)
+    weights = problem.weigh(poses)
+    np.testing.assert_array_equal(problem.weigh(poses[100:101]), weights[100:101])
+    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
+    np.testing.assert_array_equal(problem.weigh(poses), weights)
 
 
 def test_seen_by_no_camera_is_the_worst(human, ring):

@@ -19,7 +19,7 @@ from studio.body.catalogue import load_body
 from studio.errors import BodyError, FootageError
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
-from studio.weighting.edge_region import EdgeRegionSettings, EdgeRegionWeigher
+from studio.weighting.edge_region import BLOCKS_A_THREAD, EdgeRegionSettings, EdgeRegionWeigher
 
 STRIPS = np.array([1, 3, 5]) / 6.0
 # The maps hold whole numbers of 255ths (1 - p)², each off by half at most; averages are off by less.
@@ -153,7 +153,7 @@ def test_any_finite_pose_weighs_a_number(human, ring, smooth):
 
 
 def test_a_pose_weighs_the_same_in_any_company_and_on_any_number_of_threads(human, ring, smooth):
-    poses = scattered(human, 70)
+    poses = scattered(human, 2 * 16 * BLOCKS_A_THREAD + 3)
     for occlusion_aware in (False, True):
         problem = problem_of(human, ring, smooth, occlusion_aware=occlusion_aware)
         numba.set_num_threads(1)

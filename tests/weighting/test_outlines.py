@@ -14,7 +14,7 @@ from studio.geometry.camera import Camera
 from studio.geometry.cones import limb_outlines
 from studio.geometry.projection import project
 from studio.weighting.kinematic_program import compile_program
-from studio.weighting.outlines import OutlineProjector, monotone_limit
+from studio.weighting.outlines import BLOCKS_A_THREAD, OutlineProjector, monotone_limit
 
 
 @pytest.mark.parametrize("name", list_bodies())
@@ -92,7 +92,7 @@ def chain(steps, joints, pose):
 
 def test_a_pose_has_the_same_outlines_in_any_company_and_on_any_number_of_threads(human, ring):
     projector = OutlineProjector.of_body(human, ring)
-    poses = scattered(human, 50)
+    poses = scattered(human, 2 * 16 * BLOCKS_A_THREAD + 3)
     numba.set_num_threads(1)
     together, _ = projector.corners(poses)
     alone = np.concatenate([projector.corners(pose[None])[0] for pose in poses[:5]])

@@ -9,7 +9,6 @@ from studio.body.tables import kinematic_tables
 from studio.geometry.projection import project
 from studio.weighting.bodytrack import BodytrackSettings, BodytrackWeigher
 from studio.weighting.edge_region import EdgeRegionSettings, EdgeRegionWeigher
-from studio.weighting.edge_region_kernels import record_indices
 from studio.weighting.overlay import overlay_points
 from studio.weighting.template import TemplateSettings
 
@@ -24,15 +23,11 @@ def test_sample_points_are_the_pixels_that_the_kernel_reads(human, ring, move, e
     pose = scattered(human, 1)[0]
     pose[3:5] += move
     outlines = weigher.projector.blocks(pose[None])
-    rows = weigher.samples_per_evaluation // 4 // 16
-    indices = np.zeros((1, 4, 16, rows, 16), np.uint32)
-    along = weigher.along_edge, weigher.along_region
-    record_indices(outlines, problem.hidden(outlines), *along, problem.maps.views, indices)
-    edge_rows = 10 * edge_samples // 16
+    edges, region = problem.recorded_indices(outlines)
     for v, (camera, seen) in enumerate(zip(ring, overlay_points(human, ring, pose, settings), strict=True)):
         for points, stream in (
-            (seen.edge_samples, indices[0, v, 0, :edge_rows]),
-            (seen.region_samples, indices[0, v, 0, edge_rows:]),
+            (seen.edge_samples, edges[0, v, 0]),
+            (seen.region_samples, region[0, v, 0]),
         ):
             drawn = np.floor(points + 0.5).astype(int) @ [1, camera.width]
             kernel = stream.ravel()[stream.ravel() < camera.width * camera.height]

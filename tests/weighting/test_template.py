@@ -8,7 +8,7 @@ from weighting_scene import inside_outline, looking_at, scattered
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
-from studio.weighting.template import TemplateSettings, TemplateWeigher
+from studio.weighting.template import BLOCKS_A_THREAD, TemplateSettings, TemplateWeigher
 
 
 def drawn(corners, width, height):
@@ -112,7 +112,7 @@ def test_any_finite_pose_weighs_a_number_on_any_number_of_threads():
     camera = looking_at("c", middle + np.array([1200.0, 0.0, 100.0]), middle, (160, 120), 150.0)
     mask = np.full((120, 160), 255, np.uint8)
     problem = TemplateWeigher(human, (camera,), TemplateSettings()).problem(with_masks((camera,), [mask]))
-    poses = scattered(human, 60, spread=100.0)
+    poses = scattered(human, 2 * 16 * BLOCKS_A_THREAD + 3, spread=100.0)
     poses[:12, :12] *= 10.0 ** np.arange(0, 300, 25)[:, None]
     poses[20:40, 3] += np.linspace(900.0, 1250.0, 20)
     numba.set_num_threads(1)
