@@ -82,10 +82,6 @@ class Director:
         """Show one layer's cloud, or all (None)."""
         self._presenter.post(lambda: self.state.change_shown(told, layer=layer))
 
-    def follow(self, following: bool) -> None:
-        """Show each frame as it is tracked, or stay."""
-        self._presenter.post(lambda: self.state.change_shown(False, follow=following))
-
     def look_through(self, camera: str | None) -> None:
         """Put the viewers into a camera's place, or back where they were (None)."""
         self._presenter.post(lambda: self.state.look_through(camera, False))
@@ -97,11 +93,12 @@ class Director:
         speed: float | None = None,
         loop: bool | None = None,
         follow: bool | None = None,
+        told: bool = True,
     ) -> None:
         """Play stored frames or stop, change how, and whether the scene follows the tracking; None leaves
         it.
         """
-        self._presenter.post(lambda: self.state.set_playback(playing, speed, loop, follow))
+        self._presenter.post(lambda: self.state.set_playback(playing, speed, loop, follow, told))
 
     def change_options(self, changes: Mapping[str, object]) -> None:
         """Show other things. changes : new values by the names of `ViewOptions`; the others stay as they are then."""

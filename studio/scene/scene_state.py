@@ -127,13 +127,13 @@ class SceneState:
         self.change_shown(told, look_through=camera)
 
     def set_playback(
-        self, playing: bool | None, speed: float | None, loop: bool | None, follow: bool | None
+        self, playing: bool | None, speed: float | None, loop: bool | None, follow: bool | None, told: bool
     ) -> None:
         """Change pace and following; None leaves it."""
         if playing is not None:
             self.player.play(playing)
         self.player.set_pace(speed, loop)
-        self.change_shown(True, follow=self.shown.follow if follow is None else follow)
+        self.change_shown(told, follow=self.shown.follow if follow is None else follow)
         self._follow_shown()
 
     def change_options(self, changes: Mapping[str, object]) -> None:

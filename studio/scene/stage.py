@@ -84,7 +84,7 @@ class SceneStage:
     def follow(self, following: bool) -> None:
         """Show each frame as it is tracked, or stay where the viewer is."""
         if self._director is not None:
-            self._director.follow(following)
+            self._director.set_playback(follow=following, told=False)
 
     def look_through(self, camera: str | None) -> None:
         """Put the viewers into a camera's place, or back where they were (None or "")."""
@@ -110,11 +110,6 @@ class SceneStage:
         """Play stored frames, or stop."""
         if self._director is not None:
             self._director.set_playback(playing=playing)
-
-    def reanneal_shown(self) -> None:
-        """Anneal the shown frame again with the settings in use. Raises StudioError if none is shown."""
-        if self._director is not None:
-            self._director.reanneal_shown()
 
     def _moved(self, shown: Shown) -> None:
         for callback in self._watchers:

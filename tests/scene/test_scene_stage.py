@@ -155,11 +155,11 @@ def test_a_setting_selects_the_shown_frame_and_is_asked_for(stage: SceneStage, c
 def test_a_run_that_is_not_open_is_opened_first(stage: SceneStage, control: FakeControl) -> None:
     control.state = dataclasses.replace(control.state, session="other", run="run-9")
     open_run(stage)
-    stage.reanneal_shown()
+    stage._director.reanneal_shown()  # pyright: ignore[reportOptionalMemberAccess]
     assert [type(command) for command in control.commands] == [commands.Open, commands.Reanneal]
     control.say(dataclasses.replace(control.state, state="tracking"))
     with pytest.raises(Exception, match=r"run-9.*is being tracked"):
-        stage.reanneal_shown()
+        stage._director.reanneal_shown()  # pyright: ignore[reportOptionalMemberAccess]
 
 
 def test_playback_shows_one_frame_after_another_and_tells_the_page(stage: SceneStage) -> None:
