@@ -16,7 +16,15 @@ from studio.geometry.projection import project
 from studio.weighting.bodytrack import BodytrackSettings
 from studio.weighting.bodytrack_kernels import EDGE_STEP, INSIDE_STEP, LEAST
 from studio.weighting.edge_region import EdgeRegionSettings
-from studio.weighting.edge_region_kernels import CHUNK, FIRST_STRIP, SECOND_STRIP, THIRD_STRIP
+from studio.weighting.edge_region_kernels import (
+    CHUNK,
+    EDGE_LINES,
+    FIRST_STRIP,
+    LANES,
+    SECOND_STRIP,
+    THIRD_STRIP,
+)
+from studio.weighting.occlusion_kernels import chunk_hidden
 from studio.weighting.outlines import OutlineProjector
 
 Array = NDArray[np.float64]
@@ -54,11 +62,15 @@ def overlay_points(
     settings : of the weighting in use; sample points are those of its kernels.
     """
     pose = np.asarray(pose, dtype=np.float64)
-    corners, seen = OutlineProjector.of_body(body, cameras).corners(pose[None])
+    projector = OutlineProjector.of_body(body, cameras)
+    corners, seen = projector.corners(pose[None])
+    read = _edges_read(projector, pose, settings)
     names = tuple(limb.name for limb in body.drawn)
     found: list[ViewOverlay] = []
-    for camera, outlines, state in zip(cameras, corners[0], seen[0], strict=True):
+    for view, (camera, outlines, state) in enumerate(zip(cameras, corners[0], seen[0], strict=True)):
         edge, region = sample_points(outlines[state >= 0], settings)
+        if read is not None:
+            edge = edge[read[view, state >= 0].ravel()]
         contours = _contours(body, camera, pose, outlines)
         found.append(
             ViewOverlay(
@@ -66,6 +78,18 @@ def overlay_points(
             )
         )
     return tuple(found)
+
+
+def _edges_read(projector: OutlineProjector, pose: Array, settings: Any) -> NDArray[np.bool_] | None:  # noqa: ANN401
+    """(V, L, 2, samples) whether an edge sample is in sight, where the weighting asks; None where it does not."""
+    if not isinstance(settings, EdgeRegionSettings) or not settings.occlusion_aware:
+        return None
+    samples = settings.edge_chunks * CHUNK
+    blocks = projector.blocks(pose[None])
+    hidden = np.empty((*blocks.shape[:3], EDGE_LINES, LANES), dtype=np.uint64)
+    chunk_hidden(0, 1, blocks, samples, hidden)
+    bits = hidden[0, ..., 0, None] >> np.arange(samples, dtype=np.uint64)
+    return (bits & np.uint64(1)) == 0
 
 
 def sample_points(outlines: Array, settings: Any) -> tuple[Array, Array]:  # noqa: ANN401

@@ -14,10 +14,16 @@ from studio.weighting.template import TemplateSettings
 
 
 @pytest.mark.parametrize("move", [0.0, 1200.0])
-@pytest.mark.parametrize(("edge_samples", "region_samples"), [(32, 48), (64, 144)])
-def test_sample_points_are_the_pixels_that_the_kernel_reads(human, ring, move, edge_samples, region_samples):
+@pytest.mark.parametrize(
+    ("edge_samples", "region_samples", "aware"), [(32, 48, False), (64, 144, False), (64, 48, True)]
+)
+def test_sample_points_are_the_pixels_that_the_kernel_reads(
+    human, ring, move, edge_samples, region_samples, aware
+):
     """The recorded index stream, read back as pixels; 1.2 m aside some limbs are partly outside."""
-    settings = EdgeRegionSettings(edge_samples=edge_samples, region_samples=region_samples)
+    settings = EdgeRegionSettings(
+        edge_samples=edge_samples, region_samples=region_samples, occlusion_aware=aware
+    )
     weigher = EdgeRegionWeigher(human, ring, settings)
     problem = weigher.problem(plain_evidence(ring, 0, 0))
     pose = scattered(human, 1)[0]
