@@ -147,6 +147,8 @@ def _common_frames(
     wanted = truth.positions[[rows[int(frames[place])] for place in places]][:, of_truth]
     seen = np.asarray(np.isfinite(wanted).all(axis=2))
     some = np.flatnonzero(seen.any(axis=1))
+    if not len(frames):
+        raise TruthError("The run has no finished frame to measure.", "Track the session first.")
     if not some.size:
         raise TruthError(
             f"No frame of the run has a row in the truth, whose rows are frames {min(rows)} to {max(rows)}.",

@@ -111,6 +111,8 @@ def test_nothing_in_common_is_an_error() -> None:
     other = changed(truth, names=tuple(f"Marker{index}" for index in range(15)))
     with pytest.raises(TruthError, match="Marker0"):
         evaluate(poses, np.arange(FRAMES), body, other, 60.0)
+    with pytest.raises(TruthError, match="no finished frame"):
+        evaluate(poses[:0], np.arange(0), body, truth, 60.0)
     with pytest.raises(TruthError, match="frames 0 to 5"):
         evaluate(poses, np.arange(100, 100 + FRAMES), body, truth, 60.0)
 

@@ -1,0 +1,58 @@
+"""Recipes: those that come along are sound, wrong ones are refused in words."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from studio.errors import StudioError
+from studio.synthesis.motions import MOTIONS
+from studio.synthesis.recipe_file import find_recipe, read_recipe, recipe_cameras, recipe_names
+
+
+@pytest.mark.parametrize("name", recipe_names())
+def test_bundled_recipes_are_sound(name: str) -> None:
+    recipe = read_recipe(find_recipe(name))
+    assert recipe.motion in {*MOTIONS, "arm"}
+    cameras = recipe_cameras(recipe, np.random.default_rng(recipe.seed))
+    assert len(cameras) == (1 if recipe.motion == "arm" else 4)
+    assert recipe.weighting == ("template" if recipe.motion == "arm" else "")
+
+
+def test_the_motions_of_the_issue_have_recipes() -> None:
+    assert {"walk", "run", "box", "handstand", "planar_arm", "branched_arms"} <= set(recipe_names())
+
+
+def test_an_unknown_recipe_names_those_there_are(tmp_path: Path) -> None:
+    for name in ("dance", "../walk", str(tmp_path / "none.toml")):
+        with pytest.raises(StudioError, match="no recipe") as told:
+            find_recipe(name)
+        assert "walk" in told.value.hint
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("frames = 150", "frames = 0"), "frames is 0"),
+        (("frames = 150", 'frames = "many"'), "frames"),
+        (("fps = 60", "fps = nan"), "fps is nan"),
+        (("height_mm = 1760", "height_mm = 12"), "height_mm is 12"),
+        (("width = 640", "width = 641"), "even"),
+        (("noise = 2.5", "noise = -1"), "noise is -1"),
+        (("samples = 2", "samples = 9"), "samples is 9"),
+        (('rig = "corners"', 'rig = "ring"'), "ring"),
+        (('rig = "corners"', ""), "rig, calibration, placed"),
+        (('background = "clip"', 'background = "fog"'), "fog"),
+        (("seed = 1", "seeds = 1"), "seeds"),
+        (("[options]", "[options"), "Recipe"),
+    ],
+)
+def test_a_wrong_entry_is_named(tmp_path: Path, change: tuple[str, str], words: str) -> None:
+    text = find_recipe("walk").read_text()
+    assert change[0] in text
+    path = tmp_path / "mine.toml"
+    path.write_text(text.replace(*change))
+    with pytest.raises(StudioError, match=words) as told:
+        read_recipe(path)
+    assert "mine.toml" in told.value.message
+    assert told.value.hint
