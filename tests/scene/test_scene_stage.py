@@ -57,7 +57,12 @@ def drawing(stage: SceneStage):
 
 def open_run(stage: SceneStage) -> None:
     stage.show_run("swaying", "run-1")
-    until(lambda: stage.shown.run == "run-1" and drawing(stage).body.handles[0].visible)
+
+    def is_drawn() -> bool:
+        run = stage._director.state.run  # pyright: ignore[reportOptionalMemberAccess]
+        return stage.shown.run == "run-1" and run is not None and run.drawing.body.handles[0].visible
+
+    until(is_drawn)
 
 
 def body_stands_at(stage: SceneStage, body: BodyModel, pose: np.ndarray) -> bool:
@@ -215,14 +220,16 @@ def test_the_start_pose_under_the_sliders_is_shown_and_saved(
 
 def test_a_session_without_a_run_and_none_at_all(stage: SceneStage, human: BodyModel) -> None:
     stage.show_run("swaying")
-    until(lambda: stage.shown.session == "swaying" and drawing(stage).body.handles[0].visible)
-    assert body_stands_at(stage, human, human.neutral)
+    until(lambda: stage.shown.session == "swaying" and stage.shown.run == "")
+    until(lambda: body_stands_at(stage, human, human.neutral))
     stage.show_run("")
     until(lambda: stage.shown.session == "" and stage._director.state.run is None)  # pyright: ignore[reportOptionalMemberAccess]
 
 
 def test_what_cannot_be_opened_leaves_the_scene_alive(stage: SceneStage) -> None:
+    open_run(stage)
     stage.show_run("no-such-session", "run-1")
+    until(lambda: stage.shown.session == "" and stage._director.state.run is None)  # pyright: ignore[reportOptionalMemberAccess]
     open_run(stage)
 
 
