@@ -15,6 +15,7 @@ from collections.abc import Callable
 
 from studio.errors import StudioError
 from studio.worker.events import Event
+from studio.worker.watchers import Subscription
 
 REDRAW_SECONDS = 1.0 / 30.0
 PICTURE_SECONDS = 1.0 / 10.0
@@ -29,7 +30,7 @@ class Presenter:
 
     def __init__(
         self,
-        events: "queue.Queue[Event]",
+        events: "Subscription | queue.Queue[Event]",
         *,
         heard: Callable[[Event], None],
         tick: Callable[[float], bool],

@@ -5,7 +5,6 @@ nothing is tracked, a change of settings anneals the selected frame again at onc
 newest wins), so the frame that is shown is selected first.
 """
 
-import queue
 import threading
 from collections import OrderedDict
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import Protocol
 from studio.errors import RunError, StudioError
 from studio.worker import commands
 from studio.worker.events import Acknowledged, Event, StateChanged
+from studio.worker.watchers import Subscription
 
 Value = bool | int | float | str
 
@@ -33,8 +33,8 @@ class Control(Protocol):
         """Post a command; an `Acknowledged` event follows. Raises RunError if the process has died."""
         ...
 
-    def subscribe(self) -> "queue.Queue[Event]":
-        """A queue that every event is put into."""
+    def subscribe(self) -> Subscription:
+        """Every event from now on."""
         ...
 
 

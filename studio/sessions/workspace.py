@@ -17,7 +17,7 @@ from studio.sessions.catalogue import Catalogue, RunEntry, SessionEntry
 from studio.sessions.manifest import FILE_NAME, write_manifest
 from studio.sessions.names import checked_name, free_name, inside, is_name
 from studio.sessions.results_reader import FILE_NAME as RESULTS_NAME
-from studio.sessions.run_record import write_run_record
+from studio.sessions.run_record import read_run_record, write_run_record
 from studio.sessions.session import RUNS_NAME, THUMBNAIL_NAME, Session, described_anew
 from studio.sessions.stored_run import RunSummary, StoredRun
 
@@ -191,6 +191,21 @@ class Workspace:
         name = free_name(Session(path).manifest.name, {entry.name for entry in self.root.iterdir()})
         os.rename(path, inside(self.root, name))
         return self.session(name)
+
+    def restore_run(self, trashed_name: str) -> StoredRun:
+        """Bring a run back into its session, under its own name or one like it. Raises NotFoundError."""
+        path = inside(self.root / TRASH_NAME, trashed_name)
+        record = read_run_record(path)
+        owners = [name for name in (trashed_name.partition("--")[0], record.session) if is_name(name)]
+        for owner in owners:
+            if (self.root / owner / FILE_NAME).is_file():
+                session = self.session(owner)
+                (session.path / RUNS_NAME).mkdir(exist_ok=True)
+                name = free_name(record.name, {entry.name for entry in (session.path / RUNS_NAME).iterdir()})
+                write_run_record(path, msgspec.structs.replace(record, name=name))
+                os.rename(path, inside(session.path / RUNS_NAME, name, "run"))
+                return session.run(name)
+        raise NotFoundError(f"Session '{owners[0]}' of this run is gone.", "Restore the session first.")
 
     def _to_trash(self, path: Path, label: str) -> Path:
         trash = self.root / TRASH_NAME

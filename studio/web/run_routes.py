@@ -30,7 +30,7 @@ from studio.web.schemas import (
     SessionChange,
     TrashEntry,
 )
-from studio.web.session_routes import OpenSession
+from studio.web.session_routes import OpenSession, trash_entry
 from studio.web.session_views import completed, parameter_views
 from studio.worker import commands
 
@@ -110,7 +110,7 @@ def delete_run(session: OpenSession, run: OpenRun, doors: Door) -> TrashEntry:
     let_go(doors, session.name, run.name)
     place = doors.workspace.trash_run(session.name, run.name)
     doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
-    return TrashEntry(id=place.name, name=run.name, restorable=False)
+    return trash_entry(place)
 
 
 @router.get(RUN + "/log")

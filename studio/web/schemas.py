@@ -198,17 +198,25 @@ class SampleRequest(Request):
 
 
 class TrashEntry(Answer):
-    """Something in the trash. name: what it was called; restorable: whether it is a whole session."""
+    """Something in the trash. name: what it was called; kind: session, run or other; others cannot be restored."""
 
     id: str
     name: str
-    restorable: bool
+    kind: Literal["session", "run", "other"]
+    restorable: bool = True
 
 
 class TrashList(Answer):
     """What lies in the trash, oldest first."""
 
     entries: list[TrashEntry]
+
+
+class Restored(Answer):
+    """Where something came back to. run: "" for a session."""
+
+    name: str
+    run: str = ""
 
 
 class TrashChoice(Request):

@@ -1,15 +1,21 @@
 """Sessions: list, look, rename, duplicate, throw away, bring back."""
 
+from pathlib import Path
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Response
 
 from studio.errors import NotFoundError, StudioError
+from studio.sessions.manifest import FILE_NAME, read_manifest
+from studio.sessions.names import inside
+from studio.sessions.run_record import FILE_NAME as RUN_FILE_NAME
+from studio.sessions.run_record import read_run_record
 from studio.sessions.session import Session
-from studio.sessions.workspace import SessionSummary
+from studio.sessions.workspace import TRASH_NAME, SessionSummary
 from studio.web.doors import Doors, doors_of, let_go
 from studio.web.schemas import (
     NewName,
+    Restored,
     SessionChange,
     SessionDetail,
     SessionList,
@@ -78,23 +84,40 @@ def delete(session: OpenSession, doors: Door) -> TrashEntry:
     let_go(doors, session.name)
     place = doors.workspace.trash(session.name)
     _changed(doors, session.name)
-    return TrashEntry(id=place.name, name=session.name, restorable=True)
+    return trash_entry(place)
 
 
 @router.get("/trash")
 def trash(doors: Door) -> TrashList:
     """What lies in the trash, oldest first."""
-    entries = [(name, name.rpartition("--")[0] or name) for name in doors.workspace.trashed()]
-    # A run keeps its session's name in front, which no session's name can look like.
-    return TrashList(
-        entries=[TrashEntry(id=full, name=name, restorable="--" not in name) for full, name in entries]
-    )
+    folder = doors.workspace.root / TRASH_NAME
+    return TrashList(entries=[trash_entry(folder / name) for name in doors.workspace.trashed()])
 
 
 @router.post("/trash/restore")
-def restore(choice: TrashChoice, doors: Door) -> NewName:
-    """Bring a session back under its own name, or one like it."""
-    return _changed(doors, doors.workspace.restore(choice.entry).name)
+def restore(choice: TrashChoice, doors: Door) -> Restored:
+    """Bring a session, or a run into its session, back under its own name or one like it."""
+    if (inside(doors.workspace.root / TRASH_NAME, choice.entry) / RUN_FILE_NAME).is_file():
+        run = doors.workspace.restore_run(choice.entry)
+        session = run.folder.parent.parent.name
+        _changed(doors, session)
+        return Restored(name=session, run=run.name)
+    session = doors.workspace.restore(choice.entry).name
+    _changed(doors, session)
+    return Restored(name=session)
+
+
+def trash_entry(place: Path) -> TrashEntry:
+    """What lies at a place in the trash, by its own record."""
+    try:
+        if (place / FILE_NAME).is_file():
+            return TrashEntry(id=place.name, name=read_manifest(place).name, kind="session")
+        if (place / RUN_FILE_NAME).is_file():
+            record = read_run_record(place)
+            return TrashEntry(id=place.name, name=f"{record.session} / {record.name}", kind="run")
+    except StudioError:
+        pass
+    return TrashEntry(id=place.name, name=place.name, kind="other", restorable=False)
 
 
 def _changed(doors: Doors, name: str) -> NewName:

@@ -86,6 +86,7 @@ def test_preferences_are_remembered(studio: Studio) -> None:
         ({"dark": False}, [("options", {"dark": False})]),
         ({"options": {"overlays": ["mask"]}}, [("options", {"overlays": ("mask",)})]),
         ({"playing": True}, [("play", True)]),
+        ({"frame": 1, "follow": False}, [("frame", 1), ("follow", False)]),
         ({}, []),
     ],
 )

@@ -84,8 +84,9 @@ def test_delete_goes_to_the_trash_and_comes_back(studio: Studio, tracked: Stored
     assert gone["name"] == "take1"
     assert sessions(studio) == {}
     [entry] = client.get("/api/trash").json()["entries"]
-    assert (entry["id"], entry["name"], entry["restorable"]) == (gone["id"], "take1", True)
-    assert client.post("/api/trash/restore", json={"entry": entry["id"]}).json() == {"name": "take1"}
+    assert (entry["id"], entry["name"], entry["kind"]) == (gone["id"], "take1", "session")
+    back = client.post("/api/trash/restore", json={"entry": entry["id"]})
+    assert back.json() == {"name": "take1", "run": ""}
     assert [run["name"] for run in sessions(studio)["take1"]["runs"]] == ["first"]
     assert client.post("/api/trash/restore", json={"entry": "none"}).status_code == 404
     assert client.post("/api/trash/restore", json={"entry": "../take1"}).status_code == 422
@@ -109,8 +110,19 @@ def test_a_run_is_renamed_and_deleted(studio: Studio, tracked: StoredRun) -> Non
     assert detail["run"]["name"] == "best"
     assert detail["run"]["done"] == 2
     gone = client.delete("/api/sessions/take1/runs/best").json()
-    assert gone["restorable"] is False
+    assert (gone["kind"], gone["name"]) == ("run", "take1 / best")
     assert [run["name"] for run in sessions(studio)["take1"]["runs"]] == ["second"]
-    [entry] = client.get("/api/trash").json()["entries"]
-    assert entry["restorable"] is False
     assert client.get("/api/sessions/take1/runs/best").status_code == 404
+    assert client.get("/api/trash").json()["entries"] == [gone]
+
+    # It comes back into its session under a free name, also if the session has another name by now.
+    client.post("/api/sessions/take1/runs", json={"name": "best"})
+    client.patch("/api/sessions/take1", json={"name": "moved"})
+    lost = client.post("/api/trash/restore", json={"entry": gone["id"]})
+    assert lost.status_code == 404
+    client.patch("/api/sessions/moved", json={"name": "take1"})
+    back = client.post("/api/trash/restore", json={"entry": gone["id"]}).json()
+    assert back == {"name": "take1", "run": "best-2"}
+    frames = client.get("/api/sessions/take1/runs/best-2/frames").json()["frames"]
+    assert [entry["frame"] for entry in frames] == [0, 1]
+    assert client.get("/api/trash").json()["entries"] == []
