@@ -5,11 +5,17 @@ with everything inlined (and WebAssembly), so `/scene` has a wider policy; `conn
 defeats the client's `?websocket=ws://elsewhere`.
 """
 
+import base64
+import hashlib
+
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from studio.web.error_responses import PAGE_STYLE
+
+_ERROR_PAGE_STYLE = base64.b64encode(hashlib.sha256(PAGE_STYLE.encode()).digest()).decode()
 PAGE_POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; font-src 'self'; "
+    f"default-src 'none'; script-src 'self'; style-src 'self' 'sha256-{_ERROR_PAGE_STYLE}'; img-src 'self' data: blob:; font-src 'self'; "
     "connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 SCENE_POLICY = (

@@ -19,9 +19,17 @@ from studio.errors import StudioError
 
 log = logging.getLogger("studio.web")
 
+# In the page itself, because who is not let in gets no asset either; the policy allows this very text.
+PAGE_STYLE = (
+    "body{margin:0;display:grid;place-items:center;min-height:100vh;font:16px/1.5 system-ui,sans-serif;"
+    "background:#14171c;color:#e8eaed}main{max-width:34rem;padding:2rem}h1{font-size:1.25rem;margin:0 0 .5rem}"
+    "p{margin:0;color:#a9b0ba}@media(prefers-color-scheme:light){body{background:#f6f7f9;color:#1c2026}"
+    "p{color:#5b6470}}"
+)
 PAGE = (
-    '<!doctype html><html lang="en"><meta charset="utf-8"><title>Capture studio</title>'
-    '<link rel="stylesheet" href="/assets/error.css"><main><h1>{message}</h1><p>{hint}</p></main></html>'
+    '<!doctype html><html lang="en"><meta charset="utf-8"><title>Capture studio</title><style>'
+    + PAGE_STYLE.replace("{", "{{").replace("}", "}}")
+    + "</style><main><h1>{message}</h1><p>{hint}</p></main></html>"
 )
 HINTS = {
     404: "Check the address; the API is listed at /api/openapi.json.",

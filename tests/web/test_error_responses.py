@@ -1,5 +1,7 @@
 """Every failure is words: code, cause, remedy; never a traceback, never a bare 500."""
 
+import base64
+import hashlib
 import logging
 from collections.abc import Iterator
 
@@ -8,6 +10,7 @@ from web_doubles import Studio
 
 from studio.errors import StudioError
 from studio.web import session_routes
+from studio.web.content_policy import PAGE_POLICY
 from studio.web.error_responses import UnforeseenError, error_response, validation_words
 
 ENTRIES = {"code", "message", "hint", "status"}
@@ -85,3 +88,12 @@ def test_errors_of_the_studio_keep_their_words() -> None:
     assert answer.status_code == 400
     assert answer.body == b'{"code":"error","message":"This is wrong.","hint":"Do that.","status":400}'
     assert UnforeseenError("x").status == 500
+
+
+def test_the_error_page_s_style_is_the_one_that_the_policy_allows() -> None:
+    """The page of a refusal brings its own style; the browser runs it because its hash is in the policy."""
+    page = error_response(StudioError("Cause & <cause>.", "Remedy."), page=True).body.decode()
+    style = page.partition("<style>")[2].partition("</style>")[0]
+    digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
+    assert f"'sha256-{digest}'" in PAGE_POLICY
+    assert "Cause &amp; &lt;cause&gt;." in page
