@@ -5,6 +5,7 @@ the JSON schema, the range check and the guide's table are all made from that on
 """
 
 import dataclasses
+import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -56,6 +57,7 @@ def knob(
     return field(default=default, metadata={"knob": declared})
 
 
+@functools.cache
 def knobs_of(settings_type: type) -> tuple[Knob, ...]:
     """The knobs of a settings class, in the order of their lines; `group` is the class's `title` attribute."""
     group = getattr(settings_type, "title", settings_type.__name__)

@@ -1,5 +1,7 @@
 """`studio evaluate` and `bench`."""
 
+import dataclasses
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -12,7 +14,11 @@ from studio.errors import TruthError
 from studio.evaluation.errors import evaluate
 from studio.evaluation.report import as_document, in_words
 from studio.experiments.benchmark import run_benchmark
+from studio.runs.new_run import RunRequest, prepare_run
 from studio.sessions.workspace import Workspace
+from studio.web.samples import install_sample
+from studio.worker.control import StudioControl
+from studio.worker.latency import measure_reannealing
 
 
 @click.command("evaluate")
@@ -39,6 +45,17 @@ def evaluate_command(session: str, run: str, truth: Path | None) -> Mapping[str,
 @click.command()
 @command
 def bench() -> dict[str, object]:
-    """Measure the weighting kernels against the speed of bare memory loads, in the same run."""
+    """Measure the kernels against bare memory loads in the same run, and the answer to a moved slider."""
     with progress("Measuring") as report:
-        return dict(run_benchmark(progress=report))
+        told = dict(run_benchmark(progress=report))
+        report("re-annealing", 0, 1)
+        with tempfile.TemporaryDirectory() as folder:
+            workspace = Workspace(Path(folder))
+            session = install_sample(workspace, "walk")
+            control = StudioControl(workspace)
+            try:
+                latency = measure_reannealing(control, session, prepare_run(session, RunRequest(last=2)))
+            finally:
+                control.close()
+        report("re-annealing", 1, 1)
+    return {**told, "reannealing": dataclasses.asdict(latency)}

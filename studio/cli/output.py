@@ -1,6 +1,7 @@
 """What every command shares: `--json`, progress on standard error, errors in words with exit code 2."""
 
 import functools
+import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -18,6 +19,8 @@ ProgressCallback = Callable[[str, int, int], None]
 
 CANCELLED = 130
 WRONG_INPUT = 2
+FAULT = 70
+TRACEBACK_VARIABLE = "STUDIO_TRACEBACK"
 
 messages = Console(stderr=True, highlight=False, soft_wrap=True)
 
@@ -45,6 +48,14 @@ def command(function: Callable[P, Mapping[str, object]]) -> Callable[P, None]:
         except KeyboardInterrupt:
             messages.print("Cancelled; what was finished is kept.")
             sys.exit(CANCELLED)
+        except Exception as error:
+            if os.environ.get(TRACEBACK_VARIABLE):
+                raise
+            messages.print(f"[bold red]error[/] {_plain(type(error).__name__)}: {_plain(str(error))}")
+            messages.print(
+                f"[bold]remedy[/] This is a fault of the studio: set {TRACEBACK_VARIABLE}=1 to see where."
+            )
+            sys.exit(FAULT)
         text = result.pop("text", None)
         if as_json:
             click.echo(msgspec.json.encode(result, enc_hook=_plain_value).decode())

@@ -1,0 +1,70 @@
+"""How long a person waits for the answer to a moved slider: from the wish to the last new layer at the server."""
+
+import statistics
+import time
+from dataclasses import dataclass
+
+from studio.errors import RunError
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.worker import commands
+from studio.worker.control import StudioControl
+from studio.worker.events import FrameFinished, StateChanged
+from studio.worker.watchers import Subscription
+
+PATIENCE_SECONDS = 120.0
+SURVIVALS = (0.4, 0.5)
+
+
+@dataclass(frozen=True, slots=True)
+class Latency:
+    """Milliseconds from the change of a setting to the arrival of a re-annealed frame's last layer.
+
+    layers, particles : of the frame.
+    """
+
+    median_ms: float
+    worst_ms: float
+    repeats: int
+    layers: int
+    particles: int
+
+
+def measure_reannealing(
+    control: StudioControl, session: Session, run: StoredRun, repeats: int = 12
+) -> Latency:
+    """Track the run's frames, then move the survival rate `repeats` times and wait for each answer.
+
+    The first answer, which may still compile, is not counted. Raises RunError when nothing comes.
+    """
+    watcher = control.subscribe()
+    try:
+        control.open_run(session.name, run.name)
+        control.request(commands.Start())
+        while True:
+            event = watcher.get(timeout=PATIENCE_SECONDS)
+            if isinstance(event, StateChanged) and event.state == "finished":
+                break
+            if isinstance(event, StateChanged) and event.state in ("failed", "lost"):
+                raise RunError(event.message, event.hint)
+        waits = [_answered(control, watcher, SURVIVALS[at % 2]) for at in range(repeats + 1)][1:]
+    finally:
+        watcher.close()
+    settings = run.record.settings
+    return Latency(
+        round(statistics.median(waits), 1),
+        round(max(waits), 1),
+        repeats,
+        int(settings["layers"]),
+        int(settings["particles"]),
+    )
+
+
+def _answered(control: StudioControl, watcher: Subscription, survival: float) -> float:
+    """Milliseconds until a re-annealed frame has come, all its layers before it."""
+    began = time.perf_counter()
+    control.change_settings(survival=survival)
+    while True:
+        event = watcher.get(timeout=PATIENCE_SECONDS)
+        if isinstance(event, FrameFinished) and event.reannealed:
+            return 1000.0 * (time.perf_counter() - began)
