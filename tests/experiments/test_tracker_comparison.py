@@ -7,6 +7,7 @@ import os
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 
+import numba
 import pytest
 
 from studio.errors import TruthError
@@ -59,9 +60,7 @@ def test_a_session_without_truth_is_refused(session_on_disk: Session) -> None:
 @pytest.mark.timeout(3600)
 def test_the_improved_filter_keeps_every_limb_on_the_bundled_walk() -> None:
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(
-        2, mp_context=context, initializer=os.environ.update, initargs=({"NUMBA_NUM_THREADS": "1"},)
-    ) as pool:
+    with ProcessPoolExecutor(2, mp_context=context, initializer=numba.set_num_threads, initargs=(1,)) as pool:
         rows = compare(WALK, contenders(), SEEDS, pool)
     keep("walk_accuracy", rows)
     found = {row.contender: row.summary for row in rows}
