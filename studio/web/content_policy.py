@@ -1,6 +1,7 @@
 """What our pages may load, run and contact, told to the browser with every answer.
 
-Our own pages have no inline script or style and contact nothing but this server. viser's client is one file
+Our own pages have no inline script or style sheet and contact nothing but this server (style attributes are
+allowed: the charts' tooltips are made of them). viser's client is one file
 with everything inlined (and WebAssembly), so `/scene` has a wider policy; `connect-src 'self'` there
 defeats the client's `?websocket=ws://elsewhere`.
 """
@@ -15,8 +16,10 @@ from studio.web.error_responses import PAGE_STYLE
 
 _ERROR_PAGE_STYLE = base64.b64encode(hashlib.sha256(PAGE_STYLE.encode()).digest()).decode()
 PAGE_POLICY = (
-    f"default-src 'none'; script-src 'self'; style-src 'self' 'sha256-{_ERROR_PAGE_STYLE}'; img-src 'self' data: blob:; font-src 'self'; "
-    "connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    f"default-src 'none'; script-src 'self'; style-src 'self' 'sha256-{_ERROR_PAGE_STYLE}'; "
+    "style-src-attr 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self'; connect-src 'self'; "
+    "frame-src 'self'; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'none'"
 )
 SCENE_POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' 'wasm-unsafe-eval' blob: data:; "

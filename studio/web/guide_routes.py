@@ -82,7 +82,7 @@ def knob_table(title: str, knobs: tuple[Knob, ...]) -> str:
 
 
 def _row(entry: Knob) -> str:
-    default = str(entry.default).lower() if entry.kind is bool else f"{entry.default}"
+    default = str(entry.default).lower() if entry.kind is bool else f"{entry.default}" or "empty"
     cells = (
         f"<strong>{html.escape(entry.label)}</strong><br><code>{html.escape(entry.name)}</code>",
         html.escape(entry.help),
