@@ -38,33 +38,49 @@ def command(function: Callable[P, Mapping[str, object]]) -> Callable[P, None]:
     @functools.wraps(function)
     def body(*arguments: P.args, **options: P.kwargs) -> None:
         as_json = bool(options.pop("as_json"))
-        try:
-            result = dict(function(*arguments, **options))
-        except StudioError as error:
-            messages.print(f"[bold red]error[/] {_plain(error.message)}")
-            if error.hint:
-                messages.print(f"[bold]remedy[/] {_plain(error.hint)}")
-            sys.exit(WRONG_INPUT)
-        except KeyboardInterrupt:
-            messages.print("Cancelled; what was finished is kept.")
-            sys.exit(CANCELLED)
-        except Exception as error:
-            if os.environ.get(TRACEBACK_VARIABLE):
-                raise
-            messages.print(f"[bold red]error[/] {_plain(type(error).__name__)}: {_plain(str(error))}")
-            messages.print(
-                f"[bold]remedy[/] This is a fault of the studio: set {TRACEBACK_VARIABLE}=1 to see where."
-            )
-            sys.exit(FAULT)
-        text = result.pop("text", None)
-        if as_json:
-            click.echo(msgspec.json.encode(result, enc_hook=_plain_value).decode())
-        else:
-            click.echo(
-                text if text is not None else "\n".join(f"{key:24} {value}" for key, value in result.items())
-            )
+        with errors_in_words():
+            tell(function(*arguments, **options), as_json)
 
     return body
+
+
+def tell(result: Mapping[str, object], as_json: bool) -> None:
+    """Print a result for a person, or as one JSON object."""
+    values = dict(result)
+    text = values.pop("text", None)
+    if as_json:
+        click.echo(msgspec.json.encode(values, enc_hook=_plain_value).decode())
+    else:
+        click.echo(
+            text if text is not None else "\n".join(f"{key:24} {value}" for key, value in values.items())
+        )
+
+
+@contextmanager
+def errors_in_words() -> Iterator[None]:
+    """Turn whatever goes wrong into a cause, a remedy and an exit code; never a traceback."""
+    try:
+        yield
+    except StudioError as error:
+        _say_wrong(error.message, error.hint)
+        sys.exit(WRONG_INPUT)
+    except KeyboardInterrupt:
+        messages.print("Cancelled; what was finished is kept.")
+        sys.exit(CANCELLED)
+    except Exception as error:
+        if os.environ.get(TRACEBACK_VARIABLE):
+            raise
+        _say_wrong(
+            f"{type(error).__name__}: {error}",
+            f"This is a fault of the studio: set {TRACEBACK_VARIABLE}=1 to see where.",
+        )
+        sys.exit(FAULT)
+
+
+def _say_wrong(cause: str, remedy: str) -> None:
+    messages.print(f"[bold red]error[/] {_plain(cause)}")
+    if remedy:
+        messages.print(f"[bold]remedy[/] {_plain(remedy)}")
 
 
 def _plain(text: str) -> str:
