@@ -129,7 +129,7 @@ class EvidenceSettings:
         help="Apply the clean-up also to masks that came with the footage.",
     )
     edge_threshold: float = knob(
-        5.0,
+        6.0,
         0.5,
         60.0,
         0.5,
@@ -139,7 +139,7 @@ class EvidenceSettings:
         help="Weaker gradients are no edges.",
     )
     edge_smoothing: float = knob(
-        3.0,
+        2.0,
         0.5,
         20.0,
         0.25,

@@ -51,7 +51,7 @@ def test_person_is_found_and_the_shadow_is_not() -> None:
     frame, mask = scene(1)
     found = model().foreground(frame, SETTINGS) > 0
     assert found[mask].mean() > 0.99
-    assert found[SHADOW].mean() < 0.01
+    assert found[SHADOW].mean() < 0.03
     assert found[~mask].mean() < 0.002
     without = dataclasses.replace(SETTINGS, mask_shadow_test=False)
     assert (model().foreground(frame, without) > 0)[SHADOW].mean() > 0.95
