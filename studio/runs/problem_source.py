@@ -32,7 +32,8 @@ class ProblemSource:
     """Every frame of a session for one body. May be used by several threads. Close it when done.
 
     cameras : the run's snapshot, by default the session's. executor : makes the next frame ready; None:
-    nobody does. last : the frame after the last one that is worth making ready.
+    nobody does. views : another executor, which shares out a frame's cameras. last : the frame after the last
+    one that is worth making ready.
     """
 
     def __init__(
@@ -43,6 +44,7 @@ class ProblemSource:
         *,
         last: int | None = None,
         executor: Executor | None = None,
+        views: Executor | None = None,
     ) -> None:
         self.body = body
         self.cameras = cameras or session.cameras()
@@ -50,6 +52,7 @@ class ProblemSource:
         self._last = self.footage.frame_count if last is None else last
         self._backgrounds = Backgrounds(self.footage)
         self._executor = executor
+        self._views = views
         self._making = threading.Lock()
         self._coming: tuple[Hashable, Future[FrameProblem]] | None = None
         self._evidence: OrderedDict[Hashable, FrameEvidence] = OrderedDict()
@@ -77,6 +80,7 @@ class ProblemSource:
                     self._backgrounds,
                     settings.evidence,
                     WEIGHTINGS[settings.weighting_name].edge_kind,
+                    self._views,
                 )
                 found = _keep(self._evidence, key, maker.evidence(frame), KEPT_FRAMES)
             return found

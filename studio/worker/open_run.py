@@ -14,6 +14,9 @@ from studio.sessions.run_log import append_to_log
 from studio.sessions.session import Session
 from studio.worker.settings_mailbox import SettingsMailbox
 
+VIEW_THREADS = 2
+"""Cameras of a frame that are decoded and masked at once."""
+
 
 class OpenRun:
     """One run, opened for tracking. Closing it saves it whole and frees its memory."""
@@ -23,14 +26,19 @@ class OpenRun:
         self.stored = self.session.run(Path(run_folder).name)
         record = self.stored.record
         self._ahead = ThreadPoolExecutor(1, thread_name_prefix="next-frame")
+        self._views = ThreadPoolExecutor(VIEW_THREADS, thread_name_prefix="view")
         self._problems = ProblemSource(
-            self.session, self.stored.body(), self.stored.cameras(), last=record.last, executor=self._ahead
+            self.session,
+            self.stored.body(),
+            self.stored.cameras(),
+            last=record.last,
+            executor=self._ahead,
+            views=self._views,
         )
         try:
             self.tracking = TrackingRun(self.stored, self._problems)
         except StudioError:
-            self._problems.close()
-            self._ahead.shutdown()
+            self._close_problems()
             raise
         self.mailbox = SettingsMailbox(*self.tracking.latest_settings())
         self.tracking.settings_source = self.mailbox.latest
@@ -102,5 +110,9 @@ class OpenRun:
         try:
             self.tracking.close()
         finally:
-            self._problems.close()
-            self._ahead.shutdown()
+            self._close_problems()
+
+    def _close_problems(self) -> None:
+        self._problems.close()
+        self._ahead.shutdown()
+        self._views.shutdown()
