@@ -63,12 +63,15 @@ class ShownRun:
     def frame_finished(self, frame: int) -> None:
         """Take note of a new stored result."""
         self.opened.forget_from(frame)
-        if not self.frames or frame > self.frames[-1]:
+        newest = self.frames[-1] if self.frames else self.opened.span[0] - 1
+        if frame == newest + 1:
             self.frames = (*self.frames, frame)
         else:
-            # A frame was put in the place of an older answer, and what had followed from that was dropped.
+            # The newest event wins, so some frames were not heard of; or this one took the place of an older
+            # answer, and what had followed from that was dropped.
             self.frames = tuple(self.opened.frames())
-            self.drawing.forget_poses()
+            if frame <= newest:
+                self.drawing.forget_poses()
         self._trails_stale = True
 
     def save_start_pose(self, pose: Array) -> None:
