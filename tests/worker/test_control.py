@@ -111,11 +111,11 @@ def test_commands_are_answered_while_a_frame_is_annealed(
     control.open_run("toy", "long")
     control.request(commands.Start())
     wait_for(watching, lambda event: isinstance(event, LayerFinished))
-    control.change_settings(survival=0.3)
+    control.change_settings(survival=0.4)
     changed = wait_for(
         watching, lambda event: isinstance(event, LayerFinished) and event.record.settings_version == 2
     )
-    assert changed.record.alpha_wanted == 0.3
+    assert changed.record.alpha_wanted == 0.4
     with pytest.raises(SettingsError, match="survival"):
         control.change_settings(survival=7.0)
     control.request(commands.Pause())
@@ -135,7 +135,7 @@ def test_the_time_from_a_slider_to_its_last_layer_is_in_the_events(
     track(control, new_run(session_on_disk, "a"))
     watching = control.subscribe()
     asked = time.monotonic()
-    control.change_settings(survival=0.3)
+    control.change_settings(survival=0.4)
     last = wait_for(watching, lambda event: isinstance(event, LayerFinished) and event.record.layer == 9)
     assert isinstance(last, LayerFinished)
     assert last.reannealed

@@ -217,7 +217,7 @@ def test_a_change_while_paused_anneals_the_frame_again_and_stores_nothing(
     assert np.array_equal(poses_of(run), unbroken[:1])
     with run.results() as results:
         assert [entry.version for entry in results.settings_history()] == [1]
-    desk.ask(commands.ChangeSettings(changes={"survival": 0.5}))
+    desk.ask(commands.ChangeSettings(changes={"survival": 0.3}))
     desk.work()
     desk.ask(commands.Start())
     desk.work()
@@ -231,7 +231,7 @@ def test_a_dragged_slider_shows_an_answer_and_then_the_newest(desk: Desk, run: S
     desk.events.clear()
     desk.ask(commands.ChangeSettings(changes={"survival": 0.2}))
     desk.advance(1)
-    for survival in (0.25, 0.3, 0.35):
+    for survival in (0.25, 0.31, 0.35):
         desk.ask(commands.ChangeSettings(changes={"survival": survival}))
     desk.work()
     wanted = [event.record.alpha_wanted for event in desk.events if isinstance(event, LayerFinished)]
