@@ -23,7 +23,7 @@ demo: env
 	$(BIN)/studio demo
 
 test: env browser
-	$(BIN)/pytest
+	$(BIN)/pytest -n 2 --dist loadfile
 
 test-slow: env browser
 	$(BIN)/pytest -m slow --timeout 3600

@@ -21,7 +21,7 @@ function line(name, layers, key, colour, { dashed = false, stepped = false } = {
 function alpha(layers, stored) {
   const beside = stored ? [line("stored", stored, "alpha_reached", token("ghost"), { dashed: true })] : [];
   return {
-    title: title("Survival rate α", "share of particles, Eq. 12"),
+    title: title("Survival rate α", "Eq. 12"),
     legend: legend(["wanted", "reached", ...(stored ? ["stored"] : [])]),
     tooltip: tooltip({ trigger: "axis", valueFormatter: figure }),
     grid: { left: 44, right: 16, top: 52, bottom: 34 },
