@@ -10,9 +10,10 @@ const LAYERS = [["outline", "outlines"], ["truth", "truth"], ["mask", "mask"], [
 const shown = new Set(JSON.parse(localStorage.getItem("overlays") ?? '["outline"]'));
 let cameras = [];
 
+/** A view's address: of the run's frame, or, before there is a run, the session's first picture. */
 function source(camera, height) {
-  const show = [...shown].join(",");
-  return `${runPath(get("session"), get("run"))}/frames/${get("frame")}/views/${encodeURIComponent(camera.name)}.jpg?show=${show}&height=${height}`;
+  const place = get("run") ? `${runPath(get("session"), get("run"))}/frames/${get("frame")}` : `${sessionPath(get("session"))}/frames/0`;
+  return `${place}/views/${encodeURIComponent(camera.name)}.jpg?show=${[...shown].join(",")}&height=${height}`;
 }
 
 /** Swap a picture only when the next one is decoded, so that nothing flickers; the newest wish wins. */
@@ -32,7 +33,7 @@ function swap(image, address) {
 }
 
 function refresh() {
-  if (panel.hidden || !get("run") || get("frame") === null) return;
+  if (panel.hidden || !get("session") || (get("run") && get("frame") === null)) return;
   for (const view of panel.querySelectorAll(".view")) swap(view.querySelector("img"), source(cameras[Number(view.dataset.at)], 400));
 }
 

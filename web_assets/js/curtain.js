@@ -8,6 +8,7 @@ import { refreshSessions, openSession } from "./rail.js";
 import { get, watch } from "./state.js";
 
 const curtain = document.getElementById("curtain");
+const invitation = document.getElementById("invitation");
 
 function card(heading, text, actions = [], { bar = false } = {}) {
   const box = document.createElement("div");
@@ -34,6 +35,13 @@ function banner(text) {
   curtain.hidden = false;
 }
 
+/** A session without runs: the scene stays free, because its start pose is set there. */
+function invite(entry) {
+  const button = Object.assign(document.createElement("button"), { textContent: "New run", className: "primary small", onclick: () => newRunForm(entry) });
+  invitation.replaceChildren("No run yet. Set where the search begins under “Pose” if the session has no start pose, then", button);
+  invitation.hidden = false;
+}
+
 async function addSample() {
   try {
     const told = await post("/api/samples", { name: "walk" });
@@ -47,6 +55,7 @@ function draw() {
   const work = get("work");
   const entry = sessions?.find((one) => one.name === get("session"));
   curtain.classList.remove("banner");
+  invitation.hidden = true;
   document.body.classList.toggle("disconnected", get("connected") === false);
   if (get("stranger")) return card("The studio was started again", "This page belongs to the one before. Open the address that the new one printed in its terminal.");
   if (get("connected") === false) return banner("Disconnected. What is shown is the last state; trying to reach the studio again …");
@@ -56,8 +65,8 @@ function draw() {
     return card("The tracking process ended", `${work.message} What was tracked is kept. ${work.hint}`, [["Resume", resume, true]]);
   }
   if (work?.state === "compiling" && work.session === get("session")) return card("Compiling the kernels, once", "The first run on this machine takes about half a minute longer.", [], { bar: true });
-  if (entry && !entry.runs.length) return card(entry.title || entry.name, "No run yet. Start one and watch the search.", [["New run", () => newRunForm(entry), true]]);
   curtain.hidden = true;
+  if (entry && !entry.runs.length) invite(entry);
 }
 
 /** Wire the curtain. */
