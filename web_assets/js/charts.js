@@ -4,6 +4,7 @@ import * as echarts from "../vendor/echarts.esm.min.js";
 import { onTheme, token } from "./theme.js";
 
 const MILLISECONDS_BETWEEN_DRAWS = 100;
+const FAMILY = "Inter, system-ui, sans-serif";
 
 /** Three significant figures unless more are needed. */
 export function figure(value) {
@@ -54,15 +55,15 @@ export class Chart {
 }
 
 function nothing(text) {
-  return { xAxis: undefined, yAxis: undefined, series: [], graphic: { type: "text", left: "center", top: "middle", style: { text, fill: token("text-quiet"), font: "450 13px Inter" } } };
+  return { xAxis: undefined, yAxis: undefined, series: [], graphic: { type: "text", left: "center", top: "middle", style: { text, fill: token("text-quiet"), font: `450 13px ${FAMILY}` } } };
 }
 
 function look() {
   return {
     animation: false,
     backgroundColor: "transparent",
-    textStyle: { fontFamily: "Inter", fontSize: 11, color: token("text") },
-    grid: { left: 56, right: 16, top: 34, bottom: 30 },
+    textStyle: { fontFamily: FAMILY, fontSize: 11, color: token("text") },
+    grid: { left: 56, right: 16, top: 42, bottom: 34 },
     tooltip: tooltip(),
   };
 }
@@ -70,7 +71,7 @@ function look() {
 /** The tooltip's look, to be merged with a chart's own formatter. */
 export const tooltip = (more = {}) => ({
   backgroundColor: token("surface-raised"), borderColor: token("line-strong"), confine: true,
-  textStyle: { color: token("text"), fontFamily: "Inter", fontSize: 12 }, ...more,
+  textStyle: { color: token("text"), fontFamily: FAMILY, fontSize: 12 }, ...more,
 });
 
 /** A title at the chart's top left, with its unit in a quieter tone. */
@@ -79,8 +80,8 @@ export const title = (text, unit = "") => ({
   textStyle: {
     fontWeight: "normal",
     rich: {
-      a: { color: token("text"), fontWeight: 600, fontSize: 12, fontFamily: "Inter" },
-      b: { color: token("text-quiet"), fontWeight: 450, fontSize: 11, fontFamily: "Inter", padding: [0, 0, 0, 4] },
+      a: { color: token("text"), fontWeight: 600, fontSize: 12, fontFamily: FAMILY },
+      b: { color: token("text-quiet"), fontWeight: 450, fontSize: 11, fontFamily: FAMILY, padding: [0, 0, 0, 4] },
     },
   },
 });

@@ -1,7 +1,7 @@
 // The scene's frame: viser's own page, in the studio's type and colours, with the page's keys working in it.
 
 import { takeKey } from "./keys.js";
-import { onTheme, token } from "./theme.js";
+import { onTheme, theme, token } from "./theme.js";
 
 const frame = document.getElementById("scene");
 const FONT = "/assets/vendor/inter.woff2";
@@ -10,15 +10,22 @@ const SCENE_KEYS = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown"];
 const style = document.createElement("style");
 
 function look() {
+  const dark = theme() === "dark" ? `
+      --mantine-color-dark-4: ${token("line-strong")} !important;
+      --mantine-color-dark-5: ${token("line")} !important;
+      --mantine-color-dark-6: ${token("surface-raised")} !important;
+      --mantine-color-dark-7: ${token("surface")} !important;` : "";
   return `
     body, body * { font-family: "Inter", system-ui, sans-serif !important; letter-spacing: 0 !important; font-variant-numeric: tabular-nums; }
+    label, label * { font-size: 12px !important; letter-spacing: -.02em !important; }
+    [role="tab"] { padding-inline: 8px !important; font-size: 12.5px !important; }
     * { scrollbar-width: thin; scrollbar-color: ${token("line-strong")} transparent; }
     :root, :root[data-mantine-color-scheme] {
-      --mantine-color-body: ${token("surface")};
-      --mantine-color-text: ${token("text")};
-      --mantine-color-dimmed: ${token("text-quiet")};
-      --mantine-color-default: ${token("surface-raised")};
-      --mantine-color-default-border: ${token("line-strong")};
+      --mantine-color-body: ${token("surface")} !important;
+      --mantine-color-text: ${token("text")} !important;
+      --mantine-color-dimmed: ${token("text-quiet")} !important;
+      --mantine-color-default: ${token("surface-raised")} !important;
+      --mantine-color-default-border: ${token("line-strong")} !important;${dark}
     }`;
 }
 

@@ -62,6 +62,7 @@ function drawTimeline() {
   curve(pen, frames, "error_mm", token("layer-7"), width, height, true);
   pen.fillStyle = token("warn");
   for (const change of summary.settings_changes ?? []) pen.fillRect(position(change.frame, width) - 0.5, 0, 1.5, 7);
+  explain(pen, frames);
   if (get("frame") !== null) {
     const at = position(get("frame"), width);
     pen.fillStyle = token("text");
@@ -69,6 +70,20 @@ function drawTimeline() {
     pen.beginPath();
     pen.arc(at, 5, 4, 0, 7);
     pen.fill();
+  }
+}
+
+/** What the two curves are, at the free end of the line. */
+function explain(pen, frames) {
+  if (frames.length < 2) return;
+  const measured = frames.some((entry) => entry.error_mm !== null && entry.error_mm !== undefined);
+  pen.font = "500 10px Inter, system-ui, sans-serif";
+  pen.textBaseline = "top";
+  let left = PADDING + 4;
+  for (const [word, colour] of [["weight", "text-quiet"], ...(measured ? [["error", "layer-7"]] : [])]) {
+    pen.fillStyle = token(colour);
+    pen.fillText(word, left, 4);
+    left += pen.measureText(word).width + 8;
   }
 }
 
@@ -99,6 +114,7 @@ export function startTimeline() {
   track.addEventListener("pointermove", (event) => event.buttons && goTo(frameAt(event)));
   new ResizeObserver(drawTimeline).observe(track);
   onTheme(drawTimeline);
+  document.fonts.ready.then(drawTimeline);
   watch(["summary", "frame"], () => { drawTimeline(); tellFrame(); });
   const layerLabel = document.getElementById("layer-label");
   watch(["layer", "detail", "whatIf"], () => {

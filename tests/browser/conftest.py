@@ -1,0 +1,56 @@
+"""A real browser before a real studio."""
+
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Playwright, sync_playwright
+from studio_server import StudioServer
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+ARGUMENTS = [
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+]
+ROOT = Path(__file__).resolve().parent.parent.parent
+
+
+def chromium(playwright: Playwright) -> str:
+    """The system's Chromium, else the one that Playwright downloaded; without either the tests fail."""
+    found = next((path for name in BROWSERS if (path := shutil.which(name))), None)
+    own = playwright.chromium.executable_path
+    if found is None and not Path(own).is_file():
+        pytest.fail("No Chromium is installed: run 'make browser' first.", pytrace=False)
+    return found or own
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """Chromium, drawing in software."""
+    with sync_playwright() as playwright:
+        launched = playwright.chromium.launch(
+            executable_path=chromium(playwright), headless=True, args=ARGUMENTS
+        )
+        yield launched
+        launched.close()
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
+    """`studio demo` on a workspace of its own."""
+    studio = StudioServer("demo", tmp_path_factory.mktemp("demo") / "workspace")
+    yield studio
+    studio.stop()
+
+
+@pytest.fixture(scope="session")
+def artefacts() -> Path:
+    """Where screenshots are kept to be looked at (STUDIO_ARTEFACTS, default artefacts/)."""
+    return Path(os.environ.get("STUDIO_ARTEFACTS", ROOT / "artefacts"))

@@ -1,0 +1,103 @@
+"""What viser's server tells the browser, read off the page's own socket: point clouds, visibility, the camera."""
+
+from collections.abc import Callable
+
+import msgspec
+import numpy as np
+import zstandard
+from playwright.sync_api import Page, WebSocket
+
+HEAD = 16
+ALIGNMENT = 8
+
+
+class SceneWire:
+    """Keeps the newest of each thing that the browser was told to draw."""
+
+    def __init__(self, page: Page) -> None:
+        self.clouds: dict[str, np.ndarray] = {}
+        self.visible: dict[str, bool] = {}
+        self.camera_moves = 0
+        self._raw: list[bytes] = []
+        page.on("websocket", self._opened)
+
+    def _opened(self, socket: WebSocket) -> None:
+        if socket.url.endswith("/scene"):
+            socket.on("framereceived", lambda content: self._raw.append(content))
+
+    def read(self) -> "SceneWire":
+        """Take in what came since the last time; returns itself."""
+        raw, self._raw[:] = list(self._raw), []
+        for content in raw:
+            if isinstance(content, bytes):
+                for message in decoded(content):
+                    self._take(message)
+        return self
+
+    def layers(self) -> dict[int, np.ndarray]:
+        """The clouds that are shown, (N, 3) metres by layer number."""
+        self.read()
+        prefix = "/particles/layer "
+        return {
+            int(name.removeprefix(prefix)): points
+            for name, points in self.clouds.items()
+            if name.startswith(prefix) and self.visible.get(name, True)
+        }
+
+    def shown(self, prefix: str) -> bool:
+        """Whether any node under a name is shown."""
+        self.read()
+        return any(visible for name, visible in self.visible.items() if name.startswith(prefix))
+
+    def _take(self, message: dict) -> None:
+        kind, name = message.get("type"), message.get("name", "")
+        if kind == "PointCloudMessage":
+            self._points(name, message["props"])
+        elif kind == "SceneNodeUpdateMessage":
+            self._points(name, message["updates"])
+        elif kind == "SetSceneNodeVisibilityMessage":
+            self.visible[name] = message["visible"]
+        elif kind == "SetCameraPositionMessage":
+            self.camera_moves += 1
+        elif kind == "RemoveSceneNodeMessage":
+            self.clouds.pop(name, None)
+            self.visible.pop(name, None)
+
+    def _points(self, name: str, changes: dict) -> None:
+        points = changes.get("points")
+        if isinstance(points, np.ndarray) and name.startswith("/particles/"):
+            self.clouds[name] = points.reshape(-1, 3)
+
+
+def decoded(content: bytes) -> list[dict]:
+    """The messages of one window: zstd-compressed msgpack, then the arrays that it points to, each aligned."""
+    packed = int.from_bytes(content[8:HEAD], "little")
+    plain = zstandard.ZstdDecompressor().decompress(
+        content[HEAD : HEAD + packed], max_output_size=int.from_bytes(content[:8], "little")
+    )
+    window = msgspec.msgpack.decode(plain)
+    place, buffers = HEAD + packed, []
+    for length in window["binaryBufferLengths"]:
+        place += -place % ALIGNMENT
+        buffers.append(content[place : place + length])
+        place += length
+    return [_with_arrays(message, buffers) for message in window["messages"]]
+
+
+def _with_arrays(value: object, buffers: list[bytes]) -> dict:
+    if isinstance(value, dict):
+        if "__binary_index" in value:
+            return np.frombuffer(buffers[value["__binary_index"]], value["dtype"])  # pyright: ignore[reportReturnType]
+        return {key: _with_arrays(entry, buffers) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_with_arrays(entry, buffers) for entry in value]  # pyright: ignore[reportReturnType]
+    return value  # pyright: ignore[reportReturnType]
+
+
+def until(page: Page, condition: Callable[[], object], patience: float = 60.0) -> None:
+    """Wait for a state that only Python can see, letting the browser's events in meanwhile."""
+    for _ in range(round(patience * 10)):
+        if condition():
+            return
+        page.wait_for_timeout(100)
+    raise AssertionError("it never came about")

@@ -1,0 +1,85 @@
+"""The studio's page as a person uses it, and the page's own state to wait on."""
+
+from pathlib import Path
+
+from page_watch import PageWatch
+from playwright.sync_api import Browser, BrowserContext, FrameLocator, Locator, Page
+from scene_wire import SceneWire
+from studio_server import StudioServer
+
+PATIENCE = 60_000
+READ = "async (name) => (await import('/assets/js/state.js')).get(name)"
+
+
+class StudioPage:
+    """A browser window on a studio."""
+
+    def __init__(self, browser: Browser, studio: StudioServer, *, open_at: str = "") -> None:
+        self.studio = studio
+        self.context: BrowserContext = browser.new_context(
+            viewport={"width": 1280, "height": 800}, color_scheme="dark", accept_downloads=True
+        )
+        self.context.set_default_timeout(PATIENCE)
+        self.page: Page = self.context.new_page()
+        self.watch = PageWatch(self.page, studio.origin)
+        self.wire = SceneWire(self.page)
+        self.page.goto(open_at or studio.address)
+
+    @property
+    def scene(self) -> FrameLocator:
+        """viser's own page."""
+        return self.page.frame_locator("#scene")
+
+    def get(self, name: str) -> object:
+        """An entry of the page's state."""
+        return self.page.evaluate(READ, name)
+
+    def until(self, condition: str) -> None:
+        """Wait until an expression over `get(name)` of the page's state is true."""
+        for _ in range(PATIENCE // 50):
+            if self.page.evaluate(f"async () => {{ const {{ get }} = await import('/assets/js/state.js'); return Boolean({condition}); }}"):
+                return
+            self.page.wait_for_timeout(50)
+        state = {name: self.get(name) for name in ("session", "run", "frame", "layer", "work", "connected")}
+        raise AssertionError(f"never came about: {condition}; the state is {state}")
+
+    def see_scene(self) -> None:
+        """Wait until the scene is drawn and has its panel; the warning of software rendering is closed."""
+        self.scene.locator("canvas").first.wait_for()
+        self.scene.get_by_text("survival rate").first.wait_for()
+        toast = self.scene.locator("#webgl-software-rendering button")
+        if toast.count():
+            toast.dispatch_event("click")
+            toast.wait_for(state="detached")
+
+    def slider(self, label: str) -> Locator:
+        """A slider of viser's panel by its label."""
+        row = self.scene.locator("label", has_text=label).locator("xpath=ancestor::*[.//*[@role='slider']][1]")
+        return row.get_by_role("slider").first
+
+    def key(self, name: str) -> None:
+        """Press a key on the page itself."""
+        self.page.evaluate("document.activeElement.blur()")
+        self.page.keyboard.press(name)
+
+    def choose(self, button: Locator, entry: str) -> None:
+        """Choose an entry of a menu."""
+        button.click()
+        self.page.get_by_role("menuitem", name=entry, exact=True).click()
+
+    def chart(self, name: str) -> str:
+        """A chart's picture as text, to see whether it changed."""
+        return self.page.locator(f"#{name} canvas").evaluate("canvas => canvas.toDataURL()")
+
+    def shoot(self, path: Path, part: str = "") -> None:
+        """Keep a picture of the page, or of a part of it."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if part:
+            self.page.locator(part).screenshot(path=path)
+        else:
+            self.page.screenshot(path=path)
+
+    def close(self) -> None:
+        """Close the window; nothing went wrong in it."""
+        self.context.close()
+        self.watch.check()

@@ -1,0 +1,94 @@
+"""A studio of its own: the command in a subprocess, its printed address, and its API as a script talks to it."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import httpx
+import psutil
+
+PATIENCE = 90.0
+ADDRESS = re.compile(r"Open (http://127\.0\.0\.1:\d+)/\?token=([A-Za-z0-9_-]+)\S*")
+
+
+class StudioServer:
+    """`studio demo` or `studio serve` on a workspace; stopped with SIGINT as a person would."""
+
+    def __init__(self, command: str, workspace: Path, footage: Path | None = None) -> None:
+        self.workspace = workspace
+        self._output = workspace.parent / f"{workspace.name}-output.txt"
+        environment = os.environ | {"STUDIO_WORKSPACE": str(workspace), "PYTHONFAULTHANDLER": "1"}
+        if footage is not None:
+            environment["STUDIO_FOOTAGE_ROOTS"] = str(footage)
+        script = Path(sys.executable).with_name("studio")
+        with self._output.open("wb") as output:
+            self.process = subprocess.Popen(
+                [str(script), command, "--port", "0"], env=environment, stdout=output, stderr=output
+            )
+        found = self._printed()
+        self.address, self.origin = found[0].removeprefix("Open "), found[1]
+        self._client = httpx.Client(
+            base_url=self.origin, headers={"authorization": f"Bearer {found[2]}"}, timeout=PATIENCE
+        )
+
+    def _printed(self) -> re.Match[str]:
+        deadline = time.monotonic() + PATIENCE
+        while True:
+            text = self._output.read_text()
+            if found := ADDRESS.search(text):
+                return found
+            if self.process.poll() is not None or time.monotonic() > deadline:
+                self.process.kill()
+                self.process.wait()
+                raise AssertionError(f"no address was printed: {text}")
+            time.sleep(0.1)
+
+    def get(self, path: str) -> dict:
+        """A JSON answer of the API."""
+        answer = self._client.get(path)
+        assert answer.is_success, answer.text
+        return answer.json()
+
+    def text(self, path: str) -> str:
+        """An answer that is no JSON."""
+        answer = self._client.get(path)
+        assert answer.is_success, answer.text
+        return answer.text
+
+    def post(self, path: str, body: object = None, method: str = "POST") -> dict:
+        """Ask for something."""
+        answer = self._client.request(method, path, json=body)
+        assert answer.is_success, answer.text
+        return answer.json() if answer.content else {}
+
+    def until(self, wanted: Callable[[dict], bool]) -> dict:
+        """The worker's state once it is as wanted."""
+        deadline = time.monotonic() + PATIENCE
+        while not wanted(state := self.get("/api/worker")):
+            assert time.monotonic() < deadline, f"it stayed at {state}"
+            time.sleep(0.1)
+        return state
+
+    def worker(self) -> psutil.Process:
+        """The tracking process: the child that was spawned for it (multiprocessing's own helper is another)."""
+        children = psutil.Process(self.process.pid).children()
+        found = [child for child in children if "spawn_main" in " ".join(child.cmdline())]
+        assert len(found) == 1, [child.cmdline() for child in children]
+        return found[0]
+
+    def stop(self) -> None:
+        """Ctrl-C, and wait until all is closed."""
+        self._client.close()
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+            try:
+                self.process.wait(30.0)
+            except subprocess.TimeoutExpired:
+                self.process.kill()
+                self.process.wait()
+                raise

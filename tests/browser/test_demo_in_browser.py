@@ -1,0 +1,284 @@
+"""`studio demo` and a browser at the printed address: the scene, the slider, the keys, the cameras, the guide."""
+
+import csv
+import io
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser
+from scene_wire import until
+from studio_page import StudioPage
+from studio_server import StudioServer
+
+from studio.body.forward_kinematics import limb_ends
+from studio.scene.particle_view import extremities
+from studio.sessions.workspace import Workspace
+from studio.settings import knob_table
+
+pytestmark = pytest.mark.browser
+
+RUN = "/api/sessions/walk/runs/run-1"
+FRAMES_BEFORE = 6
+SLOW = {"occlusion_aware": True, "edge_samples": 128, "region_samples": 192}
+PANELS = ("variance", "survival", "cameras", "weights", "log")
+SIZES = ((1280, 800), (1920, 1080))
+
+
+@pytest.fixture(scope="module")
+def window(browser: Browser, demo: StudioServer) -> Iterator[StudioPage]:
+    """One window for all tests of this file.
+
+    The demo is tracking when its address is printed. It is held up and made slower here, so that it is not done before
+    a browser that draws in software has opened.
+    """
+    demo.until(lambda state: state["done"] >= FRAMES_BEFORE)
+    demo.post(f"{RUN}/pause")
+    demo.until(lambda state: state["state"] == "paused")
+    demo.post(f"{RUN}/settings", SLOW, "PATCH")
+    demo.until(lambda state: state["state"] == "paused")
+    opened = StudioPage(browser, demo)
+    opened.see_scene()
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def paused(window: StudioPage) -> StudioPage:
+    """The window with some frames tracked and the tracking paused, the newest frame shown."""
+    window.until("get('summary')?.frames.length > 4")
+    if window.page.locator("#track-toggle").inner_text() == "Pause":
+        window.page.click("#track-toggle")
+    window.until("get('work')?.state === 'paused'")
+    window.key("End")
+    window.until("get('frame') === get('summary').frames.at(-1).frame && get('detail')?.frame === get('frame')")
+    return window
+
+
+def run_path(window: StudioPage) -> str:
+    return f"/api/sessions/{window.get('session')}/runs/{window.get('run')}"
+
+
+def stored_clouds(window: StudioPage, frame: int) -> dict[int, np.ndarray]:
+    """The extremities of the particles that the API gives, metres, by layer: what the scene has to draw."""
+    run = Workspace(window.studio.workspace).session(str(window.get("session"))).run(str(window.get("run")))
+    body, count = run.body(), len(window.studio.get(f"{run_path(window)}/frames/{frame}")["layers"])
+    clouds = {}
+    for layer in range(count):
+        told = window.studio.get(f"{run_path(window)}/frames/{frame}/layers/{layer}/particles")
+        ends = limb_ends(body, np.array(told["poses"]))[:, list(extremities(body)), 1]
+        clouds[layer] = ends.reshape(-1, 3) / 1000.0
+    return clouds
+
+
+def differing(shown: dict[int, np.ndarray], clouds: dict[int, np.ndarray]) -> set[int] | None:
+    """The layers whose clouds are others; None while another number of layers is shown."""
+    if shown.keys() != clouds.keys():
+        return None
+    return {
+        layer
+        for layer, cloud in clouds.items()
+        if shown[layer].shape != cloud.shape or not np.allclose(shown[layer], cloud, atol=1e-5)
+    }
+
+
+def drawn(window: StudioPage, clouds: dict[int, np.ndarray]) -> bool:
+    """Whether the browser was told to draw exactly these clouds."""
+    return differing(window.wire.layers(), clouds) == set()
+
+
+def test_the_scene_is_seen_while_the_tracking_goes_on(window: StudioPage) -> None:
+    window.until("get('work')?.state === 'paused' && get('summary')?.frames.length > 0")
+    count = len(window.get("summary")["frames"])  # pyright: ignore[reportIndexIssue]
+    window.page.get_by_role("button", name="Track on").click()
+    window.until("get('work').state === 'tracking'")
+    window.until(f"get('summary').frames.length > {count + 2} && get('frame') > {count}")
+    window.until("get('detail')?.layers.length > 0 && get('follow')")
+    assert "tracking" in window.page.locator("#state-text").inner_text()
+    window.page.click("#track-toggle")
+    window.until("get('work').state === 'paused'")
+    window.page.locator("#state-text", has_text="paused").wait_for()
+    assert window.page.locator("#track-toggle").inner_text() == "Track on"
+    # What is drawn of a stored frame is what the store has.
+    window.key("Home")
+    window.until("get('frame') === 0 && get('detail')?.frame === 0")
+    clouds = stored_clouds(window, 0)
+    until(window.page, lambda: drawn(window, clouds))
+
+
+def test_the_survival_rate_is_moved_and_new_layers_are_drawn(paused: StudioPage) -> None:
+    frame = paused.get("frame")
+    assert isinstance(frame, int)
+    stored = paused.studio.get(f"{run_path(paused)}/frames/{frame}")
+    clouds = stored_clouds(paused, frame)
+    until(paused.page, lambda: drawn(paused, clouds))
+    paused.page.click("[data-panel=survival]")
+    until(paused.page, lambda: paused.page.locator("#chart-alpha canvas").count() == 1)
+    before = paused.chart("chart-alpha")
+    slider = paused.slider("survival rate")
+    value = float(slider.get_attribute("aria-valuenow") or "nan")
+    slider.focus()
+    paused.page.keyboard.press("ArrowRight")
+    wanted = round(value + 0.01, 2)
+    paused.until(f"get('settings')?.values.survival === {wanted}")
+    paused.scene.get_by_text(f"In use since frame {frame}, layer 1.").wait_for()
+    paused.until("get('whatIf')?.length === get('layerCount') && get('work').state === 'paused'")
+    layers = paused.get("whatIf")
+    assert isinstance(layers, list)
+    assert {layer["frame"] for layer in layers} == {frame}
+    assert {layer["alpha_wanted"] for layer in layers} == {wanted}
+
+    # The first cloud is the same, for only the knob differs; the others are new, and so are the charts.
+    until(paused.page, lambda: differing(paused.wire.layers(), clouds) == set(clouds) - {0})
+    until(paused.page, lambda: paused.chart("chart-alpha") != before)
+
+    # The stored answer stays, in the store and beside the new one.
+    assert paused.wire.shown("/stored")
+    paused.page.locator("#what-if", has_text=f"Frame {frame} re-annealed, not stored").wait_for()
+    assert paused.studio.get(f"{run_path(paused)}/frames/{frame}") == stored
+
+
+def test_pictures_of_page_scene_and_charts_are_kept(paused: StudioPage, artefacts: Path) -> None:
+    for theme in ("dark", "light"):
+        if paused.page.evaluate("document.documentElement.dataset.theme") != theme:
+            paused.page.click("#theme")
+        for width, height in SIZES:
+            paused.page.set_viewport_size({"width": width, "height": height})
+            name = f"{theme}-{width}x{height}"
+            for panel in PANELS:
+                paused.page.click(f"[data-panel={panel}]")
+                if panel == "cameras":
+                    until(paused.page, lambda: loaded_views(paused) == 4)
+                paused.page.wait_for_timeout(300)
+                paused.shoot(artefacts / f"charts-{panel}-{name}.png", "#panels")
+            paused.page.click("[data-panel=variance]")
+            paused.page.wait_for_timeout(300)
+            paused.shoot(artefacts / f"page-{name}.png")
+            paused.shoot(artefacts / f"scene-{name}.png", "#stage")
+            assert paused.page.evaluate("document.documentElement.scrollHeight") == height
+            assert paused.page.evaluate("document.documentElement.scrollWidth") == width
+    paused.page.set_viewport_size({"width": 1280, "height": 800})
+    paused.page.click("#theme")
+
+
+def loaded_views(window: StudioPage) -> int:
+    """How many camera views show a picture."""
+    return window.page.locator(".view img").evaluate_all(
+        "images => images.filter((image) => image.complete && image.naturalWidth > 0).length"
+    )
+
+
+def test_the_keyboard_moves_frames_and_layers(paused: StudioPage) -> None:
+    last = paused.get("frame")
+    assert isinstance(last, int)
+    paused.key("ArrowLeft")
+    paused.until(f"get('frame') === {last - 1} && get('detail')?.frame === {last - 1}")
+    clouds = stored_clouds(paused, last - 1)
+    until(paused.page, lambda: drawn(paused, clouds))
+    paused.key("ArrowRight")
+    paused.until(f"get('frame') === {last}")
+    paused.key("Home")
+    paused.until("get('frame') === 0 && get('detail')?.frame === 0")
+    paused.key("Shift+ArrowRight")
+    paused.until("get('layer') === 0")
+    until(paused.page, lambda: paused.wire.layers().keys() == {0})
+    paused.key("Shift+ArrowLeft")
+    paused.until("get('layer') === null")
+    until(paused.page, lambda: len(paused.wire.layers()) > 1)
+    paused.key("End")
+    paused.until(f"get('frame') === {last}")
+
+
+def test_the_keyboard_plays_loops_looks_and_explains(paused: StudioPage) -> None:
+    page = paused.page
+    paused.key("l")
+    assert page.locator("#loop").get_attribute("aria-pressed") == "true"
+    paused.key("Home")
+    paused.key(" ")
+    page.locator("#play[aria-label=Pause]").wait_for()
+    paused.until("get('frame') > 1")
+    paused.key(" ")
+    page.locator("#play[aria-label=Play]").wait_for()
+    paused.key("l")
+    assert page.locator("#loop").get_attribute("aria-pressed") == "false"
+
+    moves = paused.wire.read().camera_moves
+    paused.key("2")
+    until(page, lambda: paused.wire.read().camera_moves > moves)
+    moves = paused.wire.camera_moves
+    paused.key("0")
+    until(page, lambda: paused.wire.read().camera_moves > moves)
+
+    paused.key("?")
+    dialog = page.locator("dialog[open]")
+    dialog.get_by_role("heading", name="Keys").wait_for()
+    assert dialog.locator("tr").count() >= 12
+    page.keyboard.press("Escape")
+    dialog.wait_for(state="detached")
+
+    paused.key("End")
+    paused.key("r")
+    paused.until("get('whatIf')?.length === get('layerCount') && get('work').state === 'paused'")
+
+
+def test_camera_views_with_every_overlay(paused: StudioPage) -> None:
+    page = paused.page
+    page.click("[data-panel=cameras]")
+    until(page, lambda: loaded_views(paused) == 4)
+    for label in ("truth", "mask", "edge map", "sample points", "particles"):
+        before = page.locator(".view img").first.get_attribute("src")
+        page.locator("#tab-tools label", has_text=label).locator("input").check()
+        until(page, lambda was=before: page.locator(".view img").first.get_attribute("src") != was)
+    until(page, lambda: loaded_views(paused) == 4)
+    everything = "show=outline,truth,mask,edges,samples,particles"
+    until(page, lambda: all(everything in str(image.get_attribute("src")) for image in page.locator(".view img").all()))
+    page.locator(".view").nth(1).click()
+    large = page.locator("dialog[open] img")
+    until(page, lambda: large.evaluate("image => image.naturalHeight") >= 480)
+    page.keyboard.press("Escape")
+    for label in ("truth", "mask", "edge map", "sample points", "particles"):
+        page.locator("#tab-tools label", has_text=label).locator("input").uncheck()
+
+
+def test_variances_and_poses_come_as_csv(paused: StudioPage) -> None:
+    page, frame = paused.page, paused.get("frame")
+    page.click("[data-panel=variance]")
+    with page.expect_download() as coming:
+        page.get_by_role("button", name="CSV").click()
+    rows = list(csv.reader(io.StringIO(Path(coming.value.path()).read_text())))
+    stored = list(csv.reader(io.StringIO(paused.studio.text(f"{run_path(paused)}/frames/{frame}/variance.csv"))))
+    assert [row[:3] for row in rows] == [row[:3] for row in stored]
+    assert rows[0] == stored[0]
+    numbers = [[float(value) for value in row[3:]] for row in rows[1:]]
+    np.testing.assert_allclose(numbers, [[float(value) for value in row[3:]] for row in stored[1:]], rtol=1e-8)
+
+    page.locator(".run[aria-selected=true]").hover()
+    with page.expect_download() as coming:
+        paused.choose(page.locator(".run[aria-selected=true] .more"), "Poses as CSV")
+    assert Path(coming.value.path()).read_text() == paused.studio.text(f"{run_path(paused)}/poses.csv")
+
+
+def test_the_guide_lists_every_knob(paused: StudioPage) -> None:
+    with paused.context.expect_page() as coming:
+        paused.page.get_by_role("link", name="Guide").click()
+    guide = coming.value
+    faults: list[str] = []
+    guide.on("response", lambda answer: faults.append(answer.url) if answer.status >= 400 else None)
+    guide.reload()
+    text = guide.locator("main").inner_text()
+    assert [entry.name for entry in knob_table() if entry.name not in text] == []
+    assert faults == []
+    guide.close()
+
+
+def test_tracking_on_uses_the_new_setting(paused: StudioPage) -> None:
+    last = paused.get("frame")
+    assert isinstance(last, int)
+    in_use = json.loads(json.dumps(paused.get("settings")))["values"]["survival"]
+    paused.page.click("#track-toggle")
+    # The search may have been paused inside the next frame, whose first layers ran with the value before.
+    paused.until(f"get('summary').frames.at(-1).frame > {last + 2}")
+    told = paused.studio.get(f"{run_path(paused)}/frames/{last + 2}")
+    assert {layer["alpha_wanted"] for layer in told["layers"]} == {in_use}
