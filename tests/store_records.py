@@ -1,7 +1,11 @@
-"""Made-up layers and results for tests of the store."""
+"""Made-up records, layers and results for tests of the store."""
 
 import numpy as np
 
+from studio.runs.search_space import default_sigma, parameter_names
+from studio.sessions.manifest import now
+from studio.sessions.run_record import RunRecord
+from studio.sessions.session import Session
 from studio.tracking.tracker import Carried, Estimate, FrameResult, LayerRecord, ParticleSet
 
 
@@ -38,4 +42,25 @@ def result_of(frame: int, *, count: int = 12, size: int = 4, layers: int = 3) ->
     estimate = Estimate(poses[0], poses.mean(axis=0), poses[1], -0.5 - frame)
     return FrameResult(
         frame, estimate, layers, layers * count, 1, 12.0, Carried(particles, poses[0], poses[2])
+    )
+
+
+def record_of(session: Session, name: str) -> RunRecord:
+    """A run's record, made without the settings room."""
+    body = session.body()
+    return RunRecord(
+        name=name,
+        session=session.name,
+        created=now(),
+        tracker="annealed",
+        weighting="edge-region",
+        body=body.name,
+        dimensions=dict(body.dimensions),
+        parameters=parameter_names(body),
+        seed=3,
+        first=0,
+        last=8,
+        fps=60.0,
+        settings={"layers": 10},
+        sigma=tuple(default_sigma(body, 60.0).tolist()),
     )

@@ -115,7 +115,7 @@ def test_killed_inside_a_frame_after_settings_changed_in_it(session_on_disk: Ses
         assert [(e.version, e.frame, e.layer) for e in results.settings_history()] == [(1, 0, 0), (2, 2, 2)]
         layers = results.layers(2)
     assert [record.settings_version for record in layers] == [1, 1, 2, 2]
-    assert [record.alpha_wanted for record in layers] == [0.5, 0.5, 0.2, 0.2]
+    assert [record.alpha_wanted for record in layers] == [0.3, 0.3, 0.2, 0.2]
 
 
 def test_knobs_of_the_next_frame_wait_for_it(session_on_disk: Session) -> None:

@@ -5,8 +5,7 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-from store_records import layer_of, result_of
-from test_catalogue import record_of
+from store_records import layer_of, record_of, result_of
 from toy_session import make_session
 
 from studio.errors import NotFoundError, SessionError

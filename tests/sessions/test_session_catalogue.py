@@ -2,35 +2,12 @@
 
 import msgspec
 import pytest
+from store_records import record_of
 from toy_session import make_session
 
-from studio.runs.search_space import default_sigma, parameter_names
 from studio.sessions.catalogue import FILE_NAME
-from studio.sessions.manifest import now
-from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session, described_anew
 from studio.sessions.workspace import Workspace
-
-
-def record_of(session: Session, name: str) -> RunRecord:
-    """A run's record, made without the settings room."""
-    body = session.body()
-    return RunRecord(
-        name=name,
-        session=session.name,
-        created=now(),
-        tracker="annealed",
-        weighting="edge-region",
-        body=body.name,
-        dimensions=dict(body.dimensions),
-        parameters=parameter_names(body),
-        seed=3,
-        first=0,
-        last=8,
-        fps=60.0,
-        settings={"layers": 10},
-        sigma=tuple(default_sigma(body, 60.0).tolist()),
-    )
 
 
 @pytest.fixture
