@@ -12,18 +12,25 @@ ALIGNMENT = 8
 
 
 class SceneWire:
-    """Keeps the newest of each thing that the browser was told to draw."""
+    """Keeps the newest of each thing that the browser was told to draw. viewer : from where it said that it looks."""
 
     def __init__(self, page: Page) -> None:
         self.clouds: dict[str, np.ndarray] = {}
         self.visible: dict[str, bool] = {}
         self.camera_moves = 0
+        self.viewer: tuple[float, ...] = ()
         self._raw: list[bytes] = []
         page.on("websocket", self._opened)
 
     def _opened(self, socket: WebSocket) -> None:
         if socket.url.endswith("/scene"):
             socket.on("framereceived", lambda content: self._raw.append(content))
+            socket.on("framesent", self._sent)
+
+    def _sent(self, content: bytes | str) -> None:
+        message = msgspec.msgpack.decode(content) if isinstance(content, bytes) else {}
+        if isinstance(message, dict) and message.get("type") == "ViewerCameraMessage":
+            self.viewer = tuple(message["position"])
 
     def read(self) -> "SceneWire":
         """Take in what came since the last time; returns itself."""

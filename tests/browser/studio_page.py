@@ -37,7 +37,9 @@ class StudioPage:
     def until(self, condition: str) -> None:
         """Wait until an expression over `get(name)` of the page's state is true."""
         for _ in range(PATIENCE // 50):
-            if self.page.evaluate(f"async () => {{ const {{ get }} = await import('/assets/js/state.js'); return Boolean({condition}); }}"):
+            if self.page.evaluate(
+                f"async () => {{ const {{ get }} = await import('/assets/js/state.js'); return Boolean({condition}); }}"
+            ):
                 return
             self.page.wait_for_timeout(50)
         state = {name: self.get(name) for name in ("session", "run", "frame", "layer", "work", "connected")}
@@ -54,7 +56,9 @@ class StudioPage:
 
     def slider(self, label: str) -> Locator:
         """A slider of viser's panel by its label."""
-        row = self.scene.locator("label", has_text=label).locator("xpath=ancestor::*[.//*[@role='slider']][1]")
+        row = self.scene.locator("label", has_text=label).locator(
+            "xpath=ancestor::*[.//*[@role='slider']][1]"
+        )
         return row.get_by_role("slider").first
 
     def key(self, name: str) -> None:

@@ -82,13 +82,15 @@ class StudioServer:
         return found[0]
 
     def stop(self) -> None:
-        """Ctrl-C, and wait until all is closed."""
+        """Ctrl-C, and wait until all is closed; it must not have ended before by itself."""
         self._client.close()
-        if self.process.poll() is None:
-            self.process.send_signal(signal.SIGINT)
-            try:
-                self.process.wait(30.0)
-            except subprocess.TimeoutExpired:
-                self.process.kill()
-                self.process.wait()
-                raise
+        assert self.process.poll() is None, (
+            f"the studio ended ({self.process.returncode}): {self._output.read_text()}"
+        )
+        self.process.send_signal(signal.SIGINT)
+        try:
+            self.process.wait(30.0)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            raise

@@ -53,7 +53,9 @@ def paused(window: StudioPage) -> StudioPage:
         window.page.click("#track-toggle")
     window.until("get('work')?.state === 'paused'")
     window.key("End")
-    window.until("get('frame') === get('summary').frames.at(-1).frame && get('detail')?.frame === get('frame')")
+    window.until(
+        "get('frame') === get('summary').frames.at(-1).frame && get('detail')?.frame === get('frame')"
+    )
     return window
 
 
@@ -120,6 +122,7 @@ def test_the_survival_rate_is_moved_and_new_layers_are_drawn(paused: StudioPage)
     slider = paused.slider("survival rate")
     value = float(slider.get_attribute("aria-valuenow") or "nan")
     slider.focus()
+    view = paused.wire.viewer
     paused.page.keyboard.press("ArrowRight")
     wanted = round(value + 0.01, 2)
     paused.until(f"get('settings')?.values.survival === {wanted}")
@@ -133,6 +136,10 @@ def test_the_survival_rate_is_moved_and_new_layers_are_drawn(paused: StudioPage)
     # The first cloud is the same, for only the knob differs; the others are new, and so are the charts.
     until(paused.page, lambda: differing(paused.wire.layers(), clouds) == set(clouds) - {0})
     until(paused.page, lambda: paused.chart("chart-alpha") != before)
+
+    # The arrow key moved the slider and nothing else.
+    assert view
+    np.testing.assert_allclose(paused.wire.viewer, view, atol=1e-6)
 
     # The stored answer stays, in the store and beside the new one.
     assert paused.wire.shown("/stored")
@@ -161,6 +168,11 @@ def test_pictures_of_page_scene_and_charts_are_kept(paused: StudioPage, artefact
             assert paused.page.evaluate("document.documentElement.scrollWidth") == width
     paused.page.set_viewport_size({"width": 1280, "height": 800})
     paused.page.click("#theme")
+    paused.key("r")
+    paused.until("get('whatIf')?.length === get('layerCount') && get('work').state === 'paused'")
+    paused.page.click("[data-panel=survival]")
+    paused.page.wait_for_timeout(500)
+    paused.shoot(artefacts / "page-re-annealed-dark-1280x800.png")
 
 
 def loaded_views(window: StudioPage) -> int:
@@ -233,7 +245,12 @@ def test_camera_views_with_every_overlay(paused: StudioPage) -> None:
         until(page, lambda was=before: page.locator(".view img").first.get_attribute("src") != was)
     until(page, lambda: loaded_views(paused) == 4)
     everything = "show=outline,truth,mask,edges,samples,particles"
-    until(page, lambda: all(everything in str(image.get_attribute("src")) for image in page.locator(".view img").all()))
+    until(
+        page,
+        lambda: all(
+            everything in str(image.get_attribute("src")) for image in page.locator(".view img").all()
+        ),
+    )
     page.locator(".view").nth(1).click()
     large = page.locator("dialog[open] img")
     until(page, lambda: large.evaluate("image => image.naturalHeight") >= 480)
@@ -248,11 +265,15 @@ def test_variances_and_poses_come_as_csv(paused: StudioPage) -> None:
     with page.expect_download() as coming:
         page.get_by_role("button", name="CSV").click()
     rows = list(csv.reader(io.StringIO(Path(coming.value.path()).read_text())))
-    stored = list(csv.reader(io.StringIO(paused.studio.text(f"{run_path(paused)}/frames/{frame}/variance.csv"))))
+    stored = list(
+        csv.reader(io.StringIO(paused.studio.text(f"{run_path(paused)}/frames/{frame}/variance.csv")))
+    )
     assert [row[:3] for row in rows] == [row[:3] for row in stored]
     assert rows[0] == stored[0]
     numbers = [[float(value) for value in row[3:]] for row in rows[1:]]
-    np.testing.assert_allclose(numbers, [[float(value) for value in row[3:]] for row in stored[1:]], rtol=1e-8)
+    np.testing.assert_allclose(
+        numbers, [[float(value) for value in row[3:]] for row in stored[1:]], rtol=1e-8
+    )
 
     page.locator(".run[aria-selected=true]").hover()
     with page.expect_download() as coming:

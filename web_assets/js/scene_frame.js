@@ -17,7 +17,7 @@ function look() {
       --mantine-color-dark-7: ${token("surface")} !important;` : "";
   return `
     body, body * { font-family: "Inter", system-ui, sans-serif !important; letter-spacing: 0 !important; font-variant-numeric: tabular-nums; }
-    label, label * { font-size: 12px !important; letter-spacing: -.02em !important; }
+    label, label * { font-size: 12px !important; letter-spacing: -.035em !important; }
     [role="tab"] { padding-inline: 8px !important; font-size: 12.5px !important; }
     * { scrollbar-width: thin; scrollbar-color: ${token("line-strong")} transparent; }
     :root, :root[data-mantine-color-scheme] {
@@ -31,7 +31,6 @@ function look() {
 
 async function dress() {
   const page = frame.contentDocument;
-  if (!page?.body || frame.src === "about:blank") return;
   style.textContent = look();
   page.head.append(style);
   if (![...page.fonts].some((face) => face.family === "Inter")) {
@@ -40,10 +39,17 @@ async function dress() {
   }
 }
 
+/** Keys for a slider or a field must not turn the view as well, which listens further out. */
+function keepToControls(event) {
+  if (event.target.closest?.("[role=slider], [role=tab], input, textarea, select")) event.stopPropagation();
+}
+
 /** Load the scene, dressed as the page. */
 export function startSceneFrame() {
   frame.addEventListener("load", () => {
+    if (frame.src.endsWith("about:blank")) return;
     dress();
+    for (const kind of ["keydown", "keyup"]) frame.contentDocument.body.addEventListener(kind, keepToControls);
     frame.contentWindow.addEventListener("keydown", (event) => { if (!SCENE_KEYS.includes(event.key)) takeKey(event); });
   });
   onTheme(() => { style.textContent = look(); });

@@ -1,0 +1,64 @@
+"""A long run that is watched: what the page asks of the server and what it keeps stay small."""
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser
+from studio_page import StudioPage
+from studio_server import StudioServer
+from toy_session import make_session, true_poses
+
+pytestmark = pytest.mark.browser
+
+FRAMES = 150
+RUN = "/api/sessions/arm/runs/long"
+SUMMARY_SECONDS = 1.5
+MEGABYTE = 1_000_000
+
+
+@pytest.fixture
+def studio(tmp_path: Path) -> Iterator[StudioServer]:
+    """`studio serve` with a quick run of 150 frames."""
+    workspace = tmp_path / "workspace"
+    workspace.mkdir()
+    make_session(workspace / "arm", FRAMES)
+    made = StudioServer("serve", workspace)
+    settings = {"layers": 6, "particles": 60, "start_repeats": 1}
+    start = true_poses(1)[0].tolist()
+    made.post("/api/sessions/arm/runs", {"name": "long", "settings": settings, "start_pose": start})
+    yield made
+    made.stop()
+
+
+def heap(window: StudioPage) -> float:
+    """Bytes of live objects in the page, rubbish collected."""
+    session = window.context.new_cdp_session(window.page)
+    session.send("HeapProfiler.collectGarbage")
+    used = session.send("Runtime.getHeapUsage")["usedSize"]
+    session.detach()
+    return float(used)
+
+
+def test_a_watched_run_asks_little_and_keeps_little(browser: Browser, studio: StudioServer) -> None:
+    window = StudioPage(browser, studio)
+    window.until("get('run') === 'long' && get('connected') === true && get('summary') !== null")
+    window.see_scene()
+    window.page.click("#track-toggle")
+    window.until("get('summary').frames.length > 20")
+    before, begun = heap(window), len(window.watch.requests)
+    clock = window.page.evaluate("performance.now()")
+    window.until("get('work').state === 'finished'")
+    window.until(f"get('summary').frames.length === {FRAMES} && get('frame') === {FRAMES - 1}")
+    window.until("get('detail')?.frame === get('frame') && get('detail').layers.length === 6")
+    seconds = (window.page.evaluate("performance.now()") - clock) / 1000.0
+
+    asked = Counter(window.watch.requests[begun:])
+    details = sum(count for path, count in asked.items() if path.startswith(f"GET {RUN}/frames/"))
+    assert asked[f"GET {RUN}/frames"] <= seconds / SUMMARY_SECONDS + 3
+    assert details <= 3, "the layers come with the events"
+    assert asked["POST /api/scene/show"] <= 3, "the scene follows by itself"
+    assert asked["GET /api/sessions"] <= 3
+    assert heap(window) - before < 8 * MEGABYTE
+    window.close()
