@@ -82,7 +82,9 @@ def read_subject(path: Path) -> Subject:
     try:
         entries = msgspec.toml.decode(path.read_bytes(), type=_SubjectFile)
     except OSError as problem:
-        raise BodyError(f"Subject file {path} cannot be read ({problem}).", "Check the path.") from None
+        raise BodyError(
+            f"Subject file {path} cannot be read ({problem.strerror}).", "Check the path."
+        ) from None
     except (msgspec.DecodeError, UnicodeDecodeError) as problem:
         cause = f"Subject file {path.name}: {str(problem).replace('`$.', '`').replace('`', chr(39))}."
         hint = "It holds body, height_mm, [lengths_mm], [dimensions_mm] and [ratios], numbers in mm."

@@ -75,11 +75,12 @@ class TomlCalibration:
 
 
 def looks_like_calibration(path: Path) -> bool:
-    """Whether a TOML file holds cameras (or cannot be parsed but is named after calibration)."""
+    """Whether a TOML file holds cameras (or cannot be parsed but it, or its folder, is named after
+    calibration)."""
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
-        return "calib" in path.name.lower() or path.name == "cameras.toml"
+        return "calib" in f"{path.parent.name}/{path.name}".lower() or path.name == "cameras.toml"
     return bool(_camera_tables(document))
 
 

@@ -59,7 +59,9 @@ def read_trc(path: Path) -> MarkerMotion:
     """
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as problem:
+    except OSError as problem:
+        raise TruthError(f"'{path}' cannot be read ({problem.strerror}).", "Check the path.") from None
+    except UnicodeDecodeError as problem:
         raise TruthError(f"'{path.name}' cannot be read as text ({problem}).", "Give a TRC file.") from None
     header = _header(path, lines)
     rows = [

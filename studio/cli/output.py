@@ -108,7 +108,7 @@ def progress(title: str) -> Iterator[ProgressCallback]:
         TimeRemainingColumn(),
         TextColumn("{task.fields[speed]}"),
     )
-    with Progress(*columns, console=messages, transient=not messages.is_terminal) as bar:
+    with Progress(*columns, console=messages, disable=not messages.is_terminal) as bar:
         task = bar.add_task(title, total=None, speed="")
 
         def report(step: str, done: int, total: int) -> None:

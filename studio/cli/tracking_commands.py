@@ -2,6 +2,7 @@
 
 import csv
 import dataclasses
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -75,6 +76,8 @@ def track(
 ) -> dict[str, object]:
     """Track a SESSION and store the run; Ctrl-C cancels, what was tracked stays."""
     opened = Workspace().resolve(session)
+    if poses:
+        _check_place(poses)
     first, last = _frame_range(frames)
     measures = read_subject(subject) if subject else None
     request = RunRequest(
@@ -95,8 +98,15 @@ def track(
     run = prepare_run(opened, request)
     for line in run.record.notes:
         note(line)
-    with progress(f"{opened.name} / {run.name}") as report:
-        result = track_to_end(opened, run, report)
+    try:
+        with progress(f"{opened.name} / {run.name}") as report:
+            result = track_to_end(opened, run, report)
+    except KeyboardInterrupt:
+        done = opened.run(run.name).summary().done
+        note(f"{opened.name} / {run.name}: {done} of {run.record.frame_count} frames tracked.")
+        if poses:
+            _write_poses(run, poses)
+        raise
     if poses:
         _write_poses(run, poses)
     text = (
@@ -145,6 +155,14 @@ def _changes(assignments: tuple[str, ...]) -> dict[str, str]:
             raise SettingsError(f"--set '{assignment}' has no value.", "Write --set knob=value.")
         changes[name.strip()] = value.strip()
     return changes
+
+
+def _check_place(poses: Path) -> None:
+    """Refuse, before anything is tracked, a file that could not be written afterwards. Raises RunError."""
+    if poses.is_dir() or not os.access(poses if poses.exists() else poses.parent, os.W_OK):
+        raise RunError(
+            f"The poses cannot be written to '{poses}'.", "Choose a file in a folder that can be written to."
+        )
 
 
 def _write_poses(run: StoredRun, path: Path) -> None:

@@ -90,9 +90,10 @@ class Workspace:
             return self.session(text)
         if "\0" not in text and (Path(text).expanduser() / FILE_NAME).is_file():
             return Session(Path(text).expanduser())
+        known = ", ".join(f"'{entry.name}'" for entry in self.catalogue.read()[0]) or "none yet"
         raise NotFoundError(
             f"There is no session '{text}', neither in '{self.root}' nor as a folder.",
-            "Give the folder that holds session.json, or a name that 'studio runs' lists.",
+            f"Give the folder that holds session.json, or a name of the workspace ({known}).",
         )
 
     def place_for(self, name_or_path: str | Path) -> Path:

@@ -10,7 +10,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 from studio.cli.main import COMMANDS, main
+from studio.runs.tracking_run import Stepped
 from studio.sessions.session import Session
+from studio.worker.open_run import OpenRun
 
 
 def run(*arguments: str) -> Result:
@@ -93,6 +95,7 @@ def test_condensation_prints_its_likelihood_scale(session_on_disk: Session) -> N
         (["--body", "centaur"], "centaur"),
         (["--start-pose", "nowhere.csv"], "nowhere.csv"),
         (["--seed", "-1"], "seed"),
+        (["--poses", "nowhere/poses.csv"], "nowhere/poses.csv"),
     ],
 )
 def test_wrong_settings_leave_the_session_untouched(
@@ -105,6 +108,31 @@ def test_wrong_settings_leave_the_session_untouched(
 
 def test_an_unknown_session_is_named_with_where_it_was_sought() -> None:
     assert "no session 'nobody'" in refused("track", "nobody")
+
+
+def test_an_unknown_session_is_answered_with_those_there_are(session_on_disk: Session) -> None:
+    assert f"'{session_on_disk.name}'" in refused("track", "nobody")
+
+
+def test_ctrl_c_keeps_the_run_and_writes_its_poses(
+    session_on_disk: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    step = OpenRun.step_layer
+
+    def interrupted(opened: OpenRun) -> Stepped:
+        if opened.tracking.done == 1:
+            raise KeyboardInterrupt
+        return step(opened)
+
+    monkeypatch.setattr(OpenRun, "step_layer", interrupted)
+    poses = tmp_path / "poses.csv"
+    asked = ("--frames", "0:3", "--particles", "20", "--layers", "2", "--poses", str(poses), "--json")
+    result = run("track", session_on_disk.name, *asked)
+    assert (result.exit_code, result.stdout) == (130, "")
+    assert "1 of 3 frames" in result.stderr
+    assert len(poses.read_text().splitlines()) == 2
+    (listed,) = told("runs", session_on_disk.name)["runs"]
+    assert (listed["done"], listed["status"]) == (1, "cancelled")
 
 
 def test_evaluate_needs_a_truth(session_on_disk: Session) -> None:

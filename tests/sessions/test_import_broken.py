@@ -90,6 +90,12 @@ def stray_masks(source: Path) -> None:
     write_pictures(source / "masks" / "camera9", [numbered_frame(0)])
 
 
+def cut_calibration(source: Path) -> None:
+    text = (source / "calibration" / "Calib.toml").read_text()
+    (source / "calibration" / "Calib.toml").unlink()
+    (source / "calibration" / "cameras_of_today.toml").write_text(text[: text.rindex("]")])
+
+
 def no_calibration(source: Path) -> None:
     (source / "calibration" / "Calib.toml").unlink()
 
@@ -117,6 +123,7 @@ def no_footage(source: Path) -> None:
         (damaged_mask, FootageError, "frame0003.png"),
         (small_background, FootageError, "128x50"),
         (stray_masks, FootageError, "camera9"),
+        (cut_calibration, CalibrationError, "'cameras_of_today.toml' is not TOML"),
         (no_calibration, CalibrationError, "no calibration"),
         (no_footage, FootageError, "no footage"),
     ],

@@ -1,5 +1,6 @@
 """Importing folders of footage."""
 
+import shutil
 from pathlib import Path
 
 import cv2
@@ -54,6 +55,17 @@ def test_every_optional_part_arrives(tmp_path: Path) -> None:
     start = session.start_pose()
     assert start is not None
     np.testing.assert_allclose(start, BODY.neutral, atol=1e-4)
+
+
+def test_a_camera_without_background_or_masks_is_named(tmp_path: Path) -> None:
+    source = full_source(tmp_path / "source")
+    for path in (source / "background").iterdir():
+        if "2" in path.name:
+            path.unlink()
+    assert not import_source(source, tmp_path / "masked").session.manifest.warnings
+    shutil.rmtree(source / "masks")
+    (warning,) = import_source(source, tmp_path / "made").session.manifest.warnings
+    assert "cam_2 has no background" in warning
 
 
 def test_footage_can_be_referred_to(tmp_path: Path) -> None:

@@ -73,6 +73,7 @@ def measure_source(
         *_without_footage(names, by_camera),
         *crop_warnings(calibration, measured),
         *gap_warnings(measured),
+        *_without_background(measured),
     ]
     count = common_frame_count(measured, warnings)
     rate = common_rate(measured, fps, plan.fps, warnings)
@@ -152,6 +153,14 @@ def _without_footage(names: list[str], by_camera: dict[str, Path]) -> list[str]:
     """A warning where calibrated cameras have no footage."""
     left = [name for name in names if name not in by_camera]
     return [f"Calibrated camera {listed(left)} has no footage and is left out."] if left else []
+
+
+def _without_background(measured: tuple[MeasuredCamera, ...]) -> list[str]:
+    """A warning where some cameras came with a background and others with neither that nor masks."""
+    bare = [entry.camera.name for entry in measured if entry.background is None and entry.masks is None]
+    if not bare or len(bare) == len(measured):
+        return []
+    return [f"Camera {listed(bare)} has no background: it is taken from the footage, less reliably."]
 
 
 def _check_masks(entry: MeasuredCamera, masks: Path, count: int, progress: Progress) -> None:
