@@ -104,7 +104,7 @@ def track(
     except KeyboardInterrupt:
         done = opened.run(run.name).summary().done
         note(f"{opened.name} / {run.name}: {done} of {run.record.frame_count} frames tracked.")
-        if poses:
+        if poses and done:
             _write_poses(run, poses)
         raise
     if poses:
