@@ -1,5 +1,6 @@
 """What every command shares: `--json`, progress on standard error, errors in words with exit code 2."""
 
+import errno
 import functools
 import os
 import sys
@@ -20,6 +21,7 @@ ProgressCallback = Callable[[str, int, int], None]
 CANCELLED = 130
 WRONG_INPUT = 2
 FAULT = 70
+REFUSED_BY_THE_DISK = frozenset((errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOSPC, errno.EDQUOT))
 TRACEBACK_VARIABLE = "STUDIO_TRACEBACK"
 
 messages = Console(stderr=True, highlight=False, soft_wrap=True)
@@ -70,6 +72,10 @@ def errors_in_words() -> Iterator[None]:
     except Exception as error:
         if os.environ.get(TRACEBACK_VARIABLE):
             raise
+        if isinstance(error, OSError) and error.errno in REFUSED_BY_THE_DISK:
+            where = f"'{error.filename}' cannot be used" if error.filename else "The disk refused"
+            _say_wrong(f"{where} ({error.strerror}).", "Check the disk's room and the folder's permissions.")
+            sys.exit(WRONG_INPUT)
         _say_wrong(
             f"{type(error).__name__}: {error}",
             f"This is a fault of the studio: set {TRACEBACK_VARIABLE}=1 to see where.",

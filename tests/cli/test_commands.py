@@ -1,8 +1,11 @@
 """Every command as a stranger calls it: one JSON object, or a cause, a remedy and exit code 2."""
 
 import csv
+import errno
 import json
+import os
 import shutil
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -133,6 +136,18 @@ def test_ctrl_c_keeps_the_run_and_writes_its_poses(
     assert len(poses.read_text().splitlines()) == 2
     (listed,) = told("runs", session_on_disk.name)["runs"]
     assert (listed["done"], listed["status"]) == (1, "cancelled")
+
+
+def test_a_folder_that_cannot_be_written_to_is_no_fault_of_the_studio(
+    session_on_disk: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def read_only(*arguments: object, **options: object) -> str:
+        raise PermissionError(errno.EACCES, "Permission denied", "the-runs-folder")
+
+    monkeypatch.setattr(tempfile, "mkdtemp", read_only)
+    monkeypatch.setattr(os, "mkdir", read_only)
+    said = refused("track", session_on_disk.name, "--frames", "0:1")
+    assert "'the-runs-folder' cannot be used (Permission denied)" in said
 
 
 def test_evaluate_needs_a_truth(session_on_disk: Session) -> None:
