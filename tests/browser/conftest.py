@@ -31,7 +31,7 @@ def chromium(playwright: Playwright) -> str:
     return found or own
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     """Chromium, drawing in software."""
     with sync_playwright() as playwright:
