@@ -4,6 +4,7 @@ import errno
 import functools
 import os
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import ParamSpec
@@ -106,7 +107,13 @@ def note(text: str) -> None:
 
 @contextmanager
 def progress(title: str) -> Iterator[ProgressCallback]:
-    """A bar on standard error with the time that is left; yields `report(step in words, done, total)`."""
+    """Progress on standard error with the time that is left; yields `report(step in words, done, total)`.
+
+    A bar on a terminal; in a log file a line now and then.
+    """
+    if not messages.is_terminal:
+        yield progress_lines(title)
+        return
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -114,7 +121,7 @@ def progress(title: str) -> Iterator[ProgressCallback]:
         TimeRemainingColumn(),
         TextColumn("{task.fields[speed]}"),
     )
-    with Progress(*columns, console=messages, disable=not messages.is_terminal) as bar:
+    with Progress(*columns, console=messages) as bar:
         task = bar.add_task(title, total=None, speed="")
 
         def report(step: str, done: int, total: int) -> None:
@@ -123,3 +130,19 @@ def progress(title: str) -> Iterator[ProgressCallback]:
             bar.update(task, description=step or title, completed=done, total=total, speed=speed)
 
         yield report
+
+
+def progress_lines(title: str, seconds_between: float = 10.0) -> ProgressCallback:
+    """A reporter that prints a line at most every so many seconds."""
+    began = said = time.monotonic()
+
+    def report(step: str, done: int, total: int) -> None:
+        nonlocal said
+        now = time.monotonic()
+        if now - said < seconds_between:
+            return
+        said = now
+        left = f", about {(now - began) * (total - done) / done:.0f} s left" if 0 < done < total else ""
+        note(f"{step or title}: {done} of {total}{left}")
+
+    return report

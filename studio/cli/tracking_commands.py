@@ -14,6 +14,7 @@ from studio.errors import RunError, SettingsError
 from studio.knobs import allowed
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.start_pose_file import start_pose_from_file
+from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
 from studio.settings import knob_table
@@ -58,7 +59,10 @@ def _knob_options(function: Callable[..., object]) -> Callable[..., object]:
     "--set", "changes", multiple=True, metavar="KNOB=VALUE", help="Any other knob; the guide lists them."
 )
 @click.option("--poses", type=click.Path(path_type=Path), help="Write the poses as CSV.")
-@click.option("--name", default="", help="Name of the run; default: numbered.")
+@click.option("--name", default="", help="Name of the run (letters, digits, - and _); default: numbered.")
+@click.option(
+    "--resume", metavar="RUN", help="Track a stored run on, as it was asked for; same result as unbroken."
+)
 @command
 def track(
     session: str,
@@ -72,30 +76,30 @@ def track(
     changes: tuple[str, ...],
     poses: Path | None,
     name: str,
+    resume: str | None,
     **knobs: str | None,
 ) -> dict[str, object]:
     """Track a SESSION and store the run; Ctrl-C cancels, what was tracked stays."""
     opened = Workspace().resolve(session)
     if poses:
         _check_place(poses)
-    first, last = _frame_range(frames)
-    measures = read_subject(subject) if subject else None
-    request = RunRequest(
-        tracker=tracker or "",
-        weighting=weighting or "",
-        body=body,
-        subject=measures,
-        first=first,
-        last=last,
-        seed=seed,
-        changes=_changes(changes) | {key: value for key, value in knobs.items() if value is not None},
-        name=name,
-    )
-    if start_pose:
-        scaled = opened.body(body or None, measures)
-        pose, source = start_pose_from_file(start_pose, scaled, first, opened.manifest.fps)
-        request = dataclasses.replace(request, start_pose=pose, start_source=source)
-    run = prepare_run(opened, request)
+    if resume:
+        run = opened.run(resume)
+    else:
+        first, last = _frame_range(frames)
+        measures = read_subject(subject) if subject else None
+        request = RunRequest(
+            tracker=tracker or "",
+            weighting=weighting or "",
+            body=body,
+            subject=measures,
+            first=first,
+            last=last,
+            seed=seed,
+            changes=_changes(changes) | {key: value for key, value in knobs.items() if value is not None},
+            name=name,
+        )
+        run = prepare_run(opened, _with_start_pose(request, opened, start_pose))
     for line in run.record.notes:
         note(line)
     try:
@@ -110,9 +114,19 @@ def track(
     if poses:
         _write_poses(run, poses)
     text = (
-        f"{opened.name} / {run.name}: {run.record.frame_count} frames in {result.seconds:.1f} s, seed {seed}"
+        f"{opened.name} / {run.name}: {run.record.frame_count} frames in {result.seconds:.1f} s, "
+        f"seed {run.record.seed}"
     )
     return {**_told(run, result), "text": text}
+
+
+def _with_start_pose(request: RunRequest, session: Session, path: Path | None) -> RunRequest:
+    """The request with the start pose of a file; as it is without one."""
+    if path is None:
+        return request
+    scaled = session.body(request.body or None, request.subject)
+    pose, source = start_pose_from_file(path, scaled, request.first, session.manifest.fps)
+    return dataclasses.replace(request, start_pose=pose, start_source=source)
 
 
 def _told(run: StoredRun, result: BatchResult) -> dict[str, object]:

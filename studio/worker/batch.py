@@ -34,6 +34,7 @@ def track_to_end(session: Session, run: StoredRun, report: Report) -> BatchResul
     opened = OpenRun(str(session.path), str(run.folder))
     evaluations, beta = 0, float("nan")
     try:
+        opened.tracking.mark_going_on()
         report("compiling kernels, once", opened.tracking.done, total)
         opened.warm_up()
         while not opened.tracking.finished:

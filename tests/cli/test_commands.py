@@ -13,6 +13,8 @@ import pytest
 from click.testing import CliRunner, Result
 
 from studio.cli.main import COMMANDS, main
+from studio.cli.output import progress_lines
+from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.tracking_run import Stepped
 from studio.sessions.session import Session
 from studio.worker.open_run import OpenRun
@@ -198,3 +200,30 @@ def test_evaluate_prints_numbers_with_their_alignment(tmp_path: Path) -> None:
     assert set(found["per_marker_mm"]) >= {"Head", "RWrist", "LAnkle"}
     start = told("track", session, "--frames", "1:2", "--start-pose", str(walk / "truth" / "walk.trc"))
     assert "markers of walk.trc" in start["start_pose"]
+
+
+def test_a_cancelled_run_is_resumed_with_the_result_of_an_unbroken_one(session_on_disk: Session) -> None:
+    arguments = ("track", session_on_disk.name, "--particles", "30", "--layers", "3", "--frames", "0:4")
+    whole = told(*arguments, "--name", "whole")
+    run_ = prepare_run(
+        session_on_disk, RunRequest(last=4, changes={"particles": 30, "layers": 3}, name="broken")
+    )
+    opened = OpenRun(str(session_on_disk.path), str(run_.folder))
+    for _ in range(8):
+        opened.step_layer()
+    opened.tracking.mark_cancelled()
+    opened.close()
+    assert run_.summary().status == "cancelled"
+    assert told("track", session_on_disk.name, "--resume", "broken")["frames"] == 4
+    poses = []
+    for name in (whole["run"], "broken"):
+        with session_on_disk.run(name).results() as results:
+            poses.append(results.poses()[1])
+    assert np.array_equal(*poses)
+    assert run_.summary().status == "finished"
+
+
+def test_a_log_file_getsprogress_lines_with_the_time_that_is_left(capsys: pytest.CaptureFixture[str]) -> None:
+    report = progress_lines("Tracking", seconds_between=0.0)
+    report("", 3, 9)
+    assert "Tracking: 3 of 9, about" in capsys.readouterr().err
