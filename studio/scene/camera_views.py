@@ -24,6 +24,9 @@ _BAR = 0.008
 _LOOK_DISTANCE = 3.0
 _JPEG_QUALITY = 72
 
+# Metres: far enough to count as another place, never drawn.
+_ASIDE = np.array([0.0, 0.0, 1.0])
+
 
 class CameraView:
     """One camera."""
@@ -166,7 +169,7 @@ class CameraViews:
         self._free.setdefault(client.client_id, remembered)
         plane = self.views[name].plane
         with client.atomic():
-            camera.position = plane.position
+            _put(camera, plane.position)
             camera.look_at = plane.position + plane.forward * _LOOK_DISTANCE
             camera.up_direction = plane.up
             camera.fov = plane.field_of_view(camera.aspect)
@@ -183,10 +186,19 @@ class CameraViews:
             return
         position, look_at, up, fov = remembered
         with client.atomic():
-            client.camera.position = position
+            _put(client.camera, position)
             client.camera.up_direction = up
             client.camera.look_at = look_at
             client.camera.fov = float(fov)
+
+
+def _put(camera: viser.CameraHandle, position: NDArray[np.float64]) -> None:
+    """Move a viewer, also where viser takes it to be there already.
+
+    A slow browser tells where it was after it was moved away; viser believes it and would leave out the way back.
+    """
+    camera.position = position + _ASIDE
+    camera.position = position
 
 
 def frustum_mesh(plane: PicturePlane, depth: float = DEPTH, bar: float = _BAR) -> trimesh.Trimesh:

@@ -19,7 +19,7 @@ class SceneWire:
         self.visible: dict[str, bool] = {}
         self.camera_moves = 0
         self.viewer: tuple[float, ...] = ()
-        self._raw: list[bytes] = []
+        self._raw: list[bytes | str] = []
         page.on("websocket", self._opened)
 
     def _opened(self, socket: WebSocket) -> None:

@@ -203,7 +203,7 @@ def test_the_keyboard_moves_frames_and_layers(paused: StudioPage) -> None:
     paused.until(f"get('frame') === {last}")
 
 
-def test_the_keyboard_plays_loops_looks_and_explains(paused: StudioPage) -> None:
+def test_the_keyboard_plays_loops_looks_and_explains(paused: StudioPage, artefacts: Path) -> None:
     page = paused.page
     paused.key("l")
     assert page.locator("#loop").get_attribute("aria-pressed") == "true"
@@ -227,6 +227,7 @@ def test_the_keyboard_plays_loops_looks_and_explains(paused: StudioPage) -> None
     dialog = page.locator("dialog[open]")
     dialog.get_by_role("heading", name="Keys").wait_for()
     assert dialog.locator("tr").count() >= 12
+    paused.shoot(artefacts / "page-keys-dark-1280x800.png")
     page.keyboard.press("Escape")
     dialog.wait_for(state="detached")
 
@@ -281,17 +282,40 @@ def test_variances_and_poses_come_as_csv(paused: StudioPage) -> None:
     assert Path(coming.value.path()).read_text() == paused.studio.text(f"{run_path(paused)}/poses.csv")
 
 
-def test_the_guide_lists_every_knob(paused: StudioPage) -> None:
+def test_the_guide_lists_every_knob(paused: StudioPage, artefacts: Path) -> None:
     with paused.context.expect_page() as coming:
         paused.page.get_by_role("link", name="Guide").click()
     guide = coming.value
+    guide.wait_for_load_state()
     faults: list[str] = []
     guide.on("response", lambda answer: faults.append(answer.url) if answer.status >= 400 else None)
     guide.reload()
     text = guide.locator("main").inner_text()
     assert [entry.name for entry in knob_table() if entry.name not in text] == []
     assert faults == []
+    guide.screenshot(path=artefacts / "guide-dark-1280x800.png")
+    guide.get_by_role("link", name="knob").first.click()
+    guide.screenshot(path=artefacts / "guide-knobs-dark-1280x800.png")
     guide.close()
+
+
+def test_a_new_answer_can_be_kept(paused: StudioPage) -> None:
+    last = paused.get("frame")
+    assert isinstance(last, int)
+    paused.key("ArrowLeft")
+    paused.key("ArrowLeft")
+    paused.until(f"get('frame') === {last - 2} && get('detail')?.frame === {last - 2}")
+    before = paused.studio.get(f"{run_path(paused)}/frames/{last - 2}")
+    paused.key("r")
+    paused.until("get('whatIf')?.length === get('layerCount') && get('work').state === 'paused'")
+    paused.page.locator("#what-if").get_by_role("button", name="Keep…").click()
+    paused.page.locator("dialog form").get_by_role("button", name="Keep it").click()
+    paused.until(f"get('summary').frames.at(-1).frame === {last - 2} && get('whatIf') === null")
+    after = paused.studio.get(f"{run_path(paused)}/frames/{last - 2}")
+    assert after["pose"] != before["pose"]
+    paused.until(f"get('detail')?.frame === {last - 2}")
+    clouds = stored_clouds(paused, last - 2)
+    until(paused.page, lambda: drawn(paused, clouds))
 
 
 def test_tracking_on_uses_the_new_setting(paused: StudioPage) -> None:

@@ -79,7 +79,7 @@ def test_an_empty_workspace_offers_the_sample(window: StudioPage, artefacts: Pat
     window.shoot(artefacts / "page-empty-dark-1280x800.png")
     card.get_by_role("button", name="Open the sample").click()
     window.until("get('session') === 'walk' && get('run') === null")
-    card.get_by_role("button", name="New run").wait_for()
+    window.page.locator("#invitation").get_by_role("button", name="New run").wait_for()
     thumbnail = session_head(window, "walk").locator("img")
     until(window.page, lambda: thumbnail.evaluate("image => image.naturalWidth") > 0)
 
@@ -102,11 +102,12 @@ def test_a_wrong_folder_is_told_in_the_form(window: StudioPage, footage: Path, a
     assert [entry["name"] for entry in window.studio.get("/api/sessions")["sessions"]] == ["walk"]
 
 
-def test_a_folder_is_imported_and_tracked(imported: StudioPage) -> None:
+def test_a_folder_is_imported_and_tracked(imported: StudioPage, artefacts: Path) -> None:
     page = imported.page
     assert imported.studio.get("/api/sessions/arm")["frame_count"] == FRAMES
     page.locator(".session.open .new-run").click()
     page.locator("dialog form [name=seed]").fill("4")
+    imported.shoot(artefacts / "page-new-run-dark-1280x800.png")
     fill(imported, "Track", last="2", name="short")
     imported.until("get('run') === 'short' && get('work')?.state === 'finished'")
     imported.until("get('summary')?.frames.length === 3 && get('detail')?.frame === get('frame')")

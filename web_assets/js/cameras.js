@@ -2,6 +2,7 @@
 
 import { fetchJson, post, runPath, sessionPath } from "./api.js";
 import { openPicture } from "./dialogs.js";
+import { onEvent } from "./live.js";
 import { complain } from "./messages.js";
 import { get, watch } from "./state.js";
 
@@ -9,11 +10,12 @@ const panel = document.getElementById("panel-cameras");
 const LAYERS = [["outline", "outlines"], ["truth", "truth"], ["mask", "mask"], ["edges", "edge map"], ["samples", "sample points"], ["particles", "particles"]];
 const shown = new Set(JSON.parse(localStorage.getItem("overlays") ?? '["outline"]'));
 let cameras = [];
+let age = 0;  // rises when a frame got another answer, so that its pictures are asked for again
 
 /** A view's address: of the run's frame, or, before there is a run, the session's first picture. */
 function source(camera, height) {
   const place = get("run") ? `${runPath(get("session"), get("run"))}/frames/${get("frame")}` : `${sessionPath(get("session"))}/frames/0`;
-  return `${place}/views/${encodeURIComponent(camera.name)}.jpg?show=${[...shown].join(",")}&height=${height}`;
+  return `${place}/views/${encodeURIComponent(camera.name)}.jpg?show=${[...shown].join(",")}&height=${height}${age ? `&age=${age}` : ""}`;
 }
 
 /** Swap a picture only when the next one is decoded, so that nothing flickers; the newest wish wins. */
@@ -94,5 +96,9 @@ export function startCameras() {
     build();
   });
   watch(["frame", "run", "summary"], refresh);
+  onEvent("frame", (event, here) => {
+    const seen = get("summary")?.frames.at(-1)?.frame ?? -1;
+    if (here && !event.reannealed && event.frame <= seen) { age += 1; refresh(); }
+  });
   document.addEventListener("panel", refresh);
 }

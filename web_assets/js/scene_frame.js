@@ -17,7 +17,7 @@ function look() {
       --mantine-color-dark-7: ${token("surface")} !important;` : "";
   return `
     body, body * { font-family: "Inter", system-ui, sans-serif !important; letter-spacing: 0 !important; font-variant-numeric: tabular-nums; }
-    label, label * { font-size: 12px !important; letter-spacing: -.035em !important; }
+    label, label * { font-size: 11.5px !important; letter-spacing: -.03em !important; }
     [role="tab"] { padding-inline: 8px !important; font-size: 12.5px !important; }
     * { scrollbar-width: thin; scrollbar-color: ${token("line-strong")} transparent; }
     :root, :root[data-mantine-color-scheme] {

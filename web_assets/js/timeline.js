@@ -79,8 +79,12 @@ function explain(pen, frames) {
   const measured = frames.some((entry) => entry.error_mm !== null && entry.error_mm !== undefined);
   pen.font = "500 10px Inter, system-ui, sans-serif";
   pen.textBaseline = "top";
+  pen.lineWidth = 4;
+  pen.lineJoin = "round";
+  pen.strokeStyle = token("accent-soft");
   let left = PADDING + 4;
   for (const [word, colour] of [["weight", "text-quiet"], ...(measured ? [["error", "layer-7"]] : [])]) {
+    pen.strokeText(word, left, 4);
     pen.fillStyle = token(colour);
     pen.fillText(word, left, 4);
     left += pen.measureText(word).width + 8;

@@ -80,6 +80,7 @@ export function varianceCsv(detail, layers) {
 
 /** Wire the two charts to the state. */
 export function startVariance() {
+  const panel = document.getElementById("panel-variance");
   let under = null;
   const wire = (chart) => {
     chart.on("mouseover", ({ value }) => { if (value && under !== value[1]) { under = value[1]; draw(); } });
@@ -92,6 +93,7 @@ export function startVariance() {
     const detail = get("detail");
     const layers = get("whatIf") ?? detail?.layers;
     const shown = detail && layers?.length ? layers : null;
+    panel.classList.toggle("blank", !shown);
     map.draw(() => shown && heat(detail, shown));
     bar.draw(() => shown && bars(detail, shown, Math.min(under ?? get("layer") ?? shown.length - 1, shown.length - 1)));
   };
