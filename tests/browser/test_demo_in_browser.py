@@ -236,7 +236,7 @@ def test_the_keyboard_plays_loops_looks_and_explains(paused: StudioPage, artefac
     paused.until("get('whatIf')?.length === get('layerCount') && get('work').state === 'paused'")
 
 
-def test_camera_views_with_every_overlay(paused: StudioPage) -> None:
+def test_camera_views_with_every_overlay(paused: StudioPage, artefacts: Path) -> None:
     page = paused.page
     page.click("[data-panel=cameras]")
     until(page, lambda: loaded_views(paused) == 4)
@@ -255,6 +255,12 @@ def test_camera_views_with_every_overlay(paused: StudioPage) -> None:
     page.locator(".view").nth(1).click()
     large = page.locator("dialog[open] img")
     until(page, lambda: large.evaluate("image => image.naturalHeight") >= 480)
+    picture, frame = large.bounding_box(), page.locator("dialog[open]").bounding_box()
+    assert picture is not None
+    assert frame is not None
+    assert picture["width"] <= frame["width"], "the whole picture is seen"
+    assert picture["height"] <= frame["height"]
+    paused.shoot(artefacts / "page-camera-enlarged-dark-1280x800.png")
     page.keyboard.press("Escape")
     for label in ("truth", "mask", "edge map", "sample points", "particles"):
         page.locator("#tab-tools label", has_text=label).locator("input").uncheck()
