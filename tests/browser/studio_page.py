@@ -8,6 +8,8 @@ from scene_wire import SceneWire
 from studio_server import StudioServer
 
 PATIENCE = 60_000
+DRAWN = """charts => charts.filter((chart) => chart.clientWidth).every((chart) =>
+  chart.dataset.drawn === `${document.documentElement.dataset.theme} ${chart.clientWidth}x${chart.clientHeight}`)"""
 READ = "async (name) => (await import('/assets/js/state.js')).get(name)"
 
 
@@ -74,6 +76,10 @@ class StudioPage:
     def chart(self, name: str) -> str:
         """A chart's picture as text, to see whether it changed."""
         return self.page.locator(f"#{name} canvas").evaluate("canvas => canvas.toDataURL()")
+
+    def charts_drawn(self) -> bool:
+        """Whether every chart that is seen was drawn for its size and the theme."""
+        return self.page.locator(".chart").evaluate_all(DRAWN)
 
     def shoot(self, path: Path, part: str = "") -> None:
         """Keep a picture of the page, or of a part of it."""

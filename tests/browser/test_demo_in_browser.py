@@ -158,20 +158,23 @@ def test_pictures_of_page_scene_and_charts_are_kept(paused: StudioPage, artefact
                 paused.page.click(f"[data-panel={panel}]")
                 if panel == "cameras":
                     until(paused.page, lambda: loaded_views(paused) == 4)
-                paused.page.wait_for_timeout(300)
+                until(paused.page, paused.charts_drawn)
                 paused.shoot(artefacts / f"charts-{panel}-{name}.png", "#panels")
             paused.page.click("[data-panel=variance]")
-            paused.page.wait_for_timeout(300)
+            until(paused.page, paused.charts_drawn)
+            paused.scene.locator(f"html[data-mantine-color-scheme={theme}]").wait_for(state="attached")
             paused.shoot(artefacts / f"page-{name}.png")
             paused.shoot(artefacts / f"scene-{name}.png", "#stage")
             assert paused.page.evaluate("document.documentElement.scrollHeight") == height
             assert paused.page.evaluate("document.documentElement.scrollWidth") == width
     paused.page.set_viewport_size({"width": 1280, "height": 800})
     paused.page.click("#theme")
+    paused.page.click("[data-panel=survival]")
+    until(paused.page, paused.charts_drawn)
+    before = paused.chart("chart-beta")
     paused.key("r")
     paused.until("get('whatIf')?.length === get('layerCount') && get('work').state === 'paused'")
-    paused.page.click("[data-panel=survival]")
-    paused.page.wait_for_timeout(500)
+    until(paused.page, lambda: paused.chart("chart-beta") != before)
     paused.shoot(artefacts / "page-re-annealed-dark-1280x800.png")
 
 

@@ -1,7 +1,7 @@
 // ECharts with the studio's tokens: one place that knows how a chart looks here.
 
 import * as echarts from "../vendor/echarts.esm.min.js";
-import { onTheme, token } from "./theme.js";
+import { onTheme, theme, token } from "./theme.js";
 
 const MILLISECONDS_BETWEEN_DRAWS = 100;
 const FAMILY = "Inter, system-ui, sans-serif";
@@ -45,12 +45,17 @@ export class Chart {
       this.wire(this.chart);
     }
     this.chart.setOption({ ...look(), ...(this.make() ?? nothing(this.emptyText)) }, { notMerge: true });
+    this.say();
   }
+
+  /** What the picture was drawn for, for whoever waits for it. */
+  say() { this.element.dataset.drawn = `${theme()} ${this.element.clientWidth}x${this.element.clientHeight}`; }
 
   resized() {
     if (!this.element.clientWidth) return;
     this.chart?.resize();
     if (this.stale || !this.chart) this.redraw();
+    else this.say();
   }
 }
 
