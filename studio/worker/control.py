@@ -6,6 +6,7 @@ dies, all are told so by a `StateChanged` with state "lost", and `restart` opens
 says it stands.
 """
 
+import contextlib
 import dataclasses
 import logging
 import math
@@ -143,7 +144,9 @@ class StudioControl:
         if place is not None:
             self.request(commands.Open(session=place[0], run=place[1]))
             if resume and said.state in ("tracking", "compiling"):
-                self.request(commands.Start())
+                # Refused if the process died just after its last frame: then nothing is left to go on with.
+                with contextlib.suppress(RunError):
+                    self.request(commands.Start())
             if changes:
                 self.request(commands.ChangeSettings(changes=changes))
         for names in said.waiting:

@@ -94,9 +94,11 @@ def test_from_a_new_run_to_its_end_and_into_the_trash(page: Page) -> None:
 
 
 def test_when_the_process_is_killed_the_page_is_told_and_start_resumes(page: Page) -> None:
-    page.post("/api/sessions/take1/runs", {"name": "small", "settings": SMALL | {"particles": 200}})
+    page.post(
+        "/api/sessions/take1/runs", {"name": "small", "settings": SMALL | {"particles": 4000, "layers": 40}}
+    )
     page.post(f"{RUN}/start")
-    page.until("frame", frame=0)
+    page.until("layer", layer=1)
     identifier = page.control.process_identifier
     assert identifier is not None
     psutil.Process(identifier).kill()

@@ -1,5 +1,6 @@
 """The real process: it answers while it anneals, dies without a word, and goes on as if it had not."""
 
+import dataclasses
 import os
 import queue
 import signal
@@ -178,7 +179,7 @@ def test_a_silent_process_is_said_to_be_lost_until_it_speaks_again(
 
 def test_what_waits_is_brought_back(control: StudioControl, session_on_disk: Session) -> None:
     for name in ("a", "b"):
-        new_run(session_on_disk, name)
+        new_run(session_on_disk, name, particles=2000, layers=20)
     watching = control.subscribe()
     control.enqueue("toy", "a")
     control.enqueue("toy", "b")
@@ -189,6 +190,24 @@ def test_what_waits_is_brought_back(control: StudioControl, session_on_disk: Ses
     control.restart()
     wait_for(watching, lambda event: in_state("finished")(event) and event.run == "b")
     assert [run.summary().status for run in session_on_disk.runs()] == ["finished", "finished"]
+
+
+def test_a_process_that_dies_after_its_last_frame_is_brought_back_with_what_waits(
+    control: StudioControl, session_on_disk: Session
+) -> None:
+    new_run(session_on_disk, "a", 1)
+    watching = control.subscribe()
+    control.enqueue("toy", "a")
+    wait_for(watching, in_state("finished"))
+    # As if it had died before it could say so.
+    control._said = dataclasses.replace(control.state, state="tracking")
+    psutil.Process(control.process_identifier).kill()
+    wait_for(watching, in_state("lost"))
+    control.restart()
+    assert control.state.state != "failed"
+    new_run(session_on_disk, "b", 1)
+    control.enqueue("toy", "b")
+    wait_for(watching, lambda event: in_state("finished")(event) and event.run == "b")
 
 
 def test_closing_saves_the_frame_at_hand_and_stops_the_process(
