@@ -24,7 +24,7 @@ class PageWatch:
     def check(self) -> None:
         """Nothing happened that should not."""
         faults = [fault for fault in self.faults if not any(text in fault for text in self.allowed)]
-        assert faults == []
+        assert faults == [], "\n".join(faults)
 
     def _console(self, message: ConsoleMessage) -> None:
         if message.type == "error":

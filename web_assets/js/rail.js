@@ -47,9 +47,8 @@ function renameForm(what, path, name, open, done) {
 }
 
 function deleteForm(what, name, path, open, done) {
-  const place = what === "session" ? "It goes to the trash, from which it can be restored." : "It goes to the trash folder of the workspace.";
   openForm({
-    heading: `Delete ${what} ${name}?`, intro: place, action: "Delete", danger: true, rows: [],
+    heading: `Delete ${what} ${name}?`, intro: "It goes to the trash, from which it can be restored.", action: "Delete", danger: true, rows: [],
     send: async () => { await whileClosed(open, () => remove(path)); await done(); },
   });
 }
@@ -173,15 +172,15 @@ function takeArrow(event) {
 async function drawTrash() {
   const line = document.getElementById("trash-line");
   const told = await fetchJson("/api/trash").catch(() => ({ entries: [] }));
-  const sessions = told.entries.filter((entry) => entry.restorable).reverse();
-  line.hidden = !sessions.length;
-  line.replaceChildren(`${sessions.length} in the trash`);
+  const entries = told.entries.filter((entry) => entry.restorable).reverse();
+  line.hidden = !entries.length;
+  line.replaceChildren(`${entries.length} in the trash`);
   const button = element("button", "quiet small", "Restore…");
-  button.onclick = () => openMenu(button, sessions.slice(0, 12).map((entry) => [entry.name, async () => {
+  button.onclick = () => openMenu(button, entries.slice(0, 12).map((entry) => [`${entry.name} (${entry.kind})`, async () => {
     try {
       const told = await post("/api/trash/restore", { entry: entry.id });
       await refreshSessions();
-      openSession(told.name);
+      openSession(told.name, told.run ?? undefined);
     } catch (error) { complain(error); }
   }]));
   line.append(button);
