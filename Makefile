@@ -23,7 +23,8 @@ demo: env
 	$(BIN)/studio demo
 
 test: env browser
-	$(BIN)/pytest -n 2 --dist loadfile
+	$(BIN)/pytest -n 2 --dist loadfile -m "not slow and not browser"
+	$(BIN)/pytest -m "browser and not slow"
 
 test-slow: env browser
 	$(BIN)/pytest -m slow --timeout 3600

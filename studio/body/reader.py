@@ -10,6 +10,7 @@ from studio.body.definition import BodyDefinition
 from studio.body.model import BodyModel
 from studio.body.validation import check_definition
 from studio.errors import BodyError
+from studio.typed_decoding import decode_toml
 
 
 def read_body(path: Path) -> BodyModel:
@@ -28,7 +29,7 @@ def read_body(path: Path) -> BodyModel:
 def parse_body(text: str, name: str, file: str) -> BodyModel:
     """The body of a TOML text; `file` is what errors call it."""
     try:
-        definition = msgspec.toml.decode(text, type=BodyDefinition)
+        definition = decode_toml(text, BodyDefinition)
     except msgspec.ValidationError as problem:
         cause = f"Body file {file}: {_with_names(text, str(problem))}."
         raise BodyError(

@@ -19,6 +19,7 @@ from studio.sessions import run_record as records
 from studio.sessions.manifest import SessionManifest, read_manifest
 from studio.sessions.names import is_name
 from studio.sessions.run_record import RunRecord, read_run_record
+from studio.typed_decoding import decode_json
 
 FILE_NAME = ".catalogue.sqlite"
 VERSION = 1
@@ -156,7 +157,7 @@ def _content(folder: Path, read: Callable[[Path], msgspec.Struct]) -> tuple[byte
 def _sessions(connection: sqlite3.Connection) -> tuple[SessionEntry, ...]:
     rows = connection.execute("SELECT name, content, problem FROM sessions ORDER BY name").fetchall()
     return tuple(
-        SessionEntry(name, msgspec.json.decode(content, type=SessionManifest) if content else None, problem)
+        SessionEntry(name, decode_json(content, SessionManifest) if content else None, problem)
         for name, content, problem in rows
     )
 
@@ -164,7 +165,7 @@ def _sessions(connection: sqlite3.Connection) -> tuple[SessionEntry, ...]:
 def _runs(connection: sqlite3.Connection) -> tuple[RunEntry, ...]:
     rows = connection.execute("SELECT session, name, content, problem FROM runs").fetchall()
     entries = [
-        RunEntry(session, name, msgspec.json.decode(content, type=RunRecord) if content else None, problem)
+        RunEntry(session, name, decode_json(content, RunRecord) if content else None, problem)
         for session, name, content, problem in rows
     ]
     return tuple(

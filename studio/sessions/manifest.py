@@ -13,6 +13,7 @@ import msgspec
 from studio.capture.footage_source import FootageSource
 from studio.errors import NotFoundError, SessionError
 from studio.sessions.atomic_files import write_bytes
+from studio.typed_decoding import decode_json
 
 SCHEMA_VERSION = 1
 FILE_NAME = "session.json"
@@ -86,7 +87,7 @@ def read_manifest(session_folder: Path) -> SessionManifest:
         ) from None
     check_schema(content, path, SCHEMA_VERSION)
     try:
-        return msgspec.json.decode(content, type=SessionManifest)
+        return decode_json(content, SessionManifest)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise SessionError(
             f"'{path}' is not a session's manifest: {error}.",
@@ -111,7 +112,7 @@ class _SchemaOnly(msgspec.Struct):
 def check_schema(content: bytes, path: Path, known: int) -> None:
     """Raises SessionError if the record was written by a newer studio."""
     try:
-        found = msgspec.json.decode(content, type=_SchemaOnly).schema
+        found = decode_json(content, _SchemaOnly).schema
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise SessionError(
             f"'{path}' cannot be read: {error}.", "Put back a copy of the file, or import the session again."

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import msgspec
 
+from studio.typed_decoding import decode_json
+
 FILE_NAME = "log.jsonl"
 LONGEST_TAIL = 1 << 20
 
@@ -36,7 +38,7 @@ def read_log(run_folder: Path, last: int = 200) -> tuple[LogEntry, ...]:
     entries: list[LogEntry] = []
     for line in lines[-last:]:
         try:
-            entries.append(msgspec.json.decode(line, type=LogEntry))
+            entries.append(decode_json(line, LogEntry))
         except msgspec.DecodeError:
             continue
     return tuple(entries)

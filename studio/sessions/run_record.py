@@ -12,6 +12,7 @@ import msgspec
 from studio.errors import NotFoundError, SessionError
 from studio.sessions.atomic_files import write_bytes
 from studio.sessions.manifest import check_schema, readable_json
+from studio.typed_decoding import decode_json
 
 Value = bool | int | float | str
 
@@ -75,7 +76,7 @@ def read_run_record(run_folder: Path) -> RunRecord:
         ) from None
     check_schema(content, path, SCHEMA_VERSION)
     try:
-        return msgspec.json.decode(content, type=RunRecord)
+        return decode_json(content, RunRecord)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise SessionError(f"'{path}' is not a run's record: {error}.", "Start a new run.") from None
 

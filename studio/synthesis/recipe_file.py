@@ -10,6 +10,7 @@ import numpy as np
 from studio.errors import StudioError
 from studio.geometry.camera import Camera
 from studio.synthesis.cameras import corner_rig, placed_camera
+from studio.typed_decoding import decode_toml
 
 RECIPES = Path(__file__).parent / "recipe_files"
 SUFFIX = ".toml"
@@ -107,7 +108,7 @@ def recipe_names() -> tuple[str, ...]:
 def read_recipe(path: Path) -> Recipe:
     """The recipe in a file. Raises StudioError naming file, entry and remedy."""
     try:
-        recipe = msgspec.toml.decode(path.read_bytes(), type=Recipe)
+        recipe = decode_toml(path.read_bytes(), Recipe)
     except OSError as problem:
         raise StudioError(
             f"Recipe '{path}' cannot be read ({problem.strerror}).", "Check the path."

@@ -12,6 +12,7 @@ import msgspec
 from studio.errors import NotFoundError, StudioError
 from studio.sessions.atomic_files import write_bytes
 from studio.settings import knob_table
+from studio.typed_decoding import decode_json
 from studio.web.setting_schemas import PresetView
 
 Value = bool | int | float | str
@@ -109,7 +110,7 @@ def _view(name: str, help_text: str, values: dict[str, Value], own: bool) -> Pre
 def _read(folder: Path) -> dict[str, _Kept]:
     """The kept presets; a missing or damaged file counts as none."""
     try:
-        return msgspec.json.decode((folder / FILE_NAME).read_bytes(), type=dict[str, _Kept])
+        return decode_json((folder / FILE_NAME).read_bytes(), dict[str, _Kept])
     except (OSError, msgspec.DecodeError):
         return {}
 

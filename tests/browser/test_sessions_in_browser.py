@@ -80,8 +80,10 @@ def test_an_empty_workspace_offers_the_sample(window: StudioPage, artefacts: Pat
     card.get_by_role("button", name="Open the sample").click()
     window.until("get('session') === 'walk' && get('run') === null")
     window.page.locator("#invitation").get_by_role("button", name="New run").wait_for()
-    thumbnail = session_head(window, "walk").locator("img")
-    until(window.page, lambda: thumbnail.evaluate("image => image.naturalWidth") > 0)
+    loaded = (
+        "() => [...document.querySelectorAll('.session > .head img')].some((image) => image.naturalWidth > 0)"
+    )
+    window.page.wait_for_function(loaded)
 
 
 def test_a_wrong_folder_is_told_in_the_form(window: StudioPage, footage: Path, artefacts: Path) -> None:
@@ -183,6 +185,6 @@ def test_a_studio_that_is_gone_is_said_and_the_last_state_stays(
     assert window.page.locator("#track-toggle").is_disabled()
     window.shoot(artefacts / "page-disconnected-dark-1280x800.png")
     # The server went away in the middle of whatever the page was asking for.
-    window.watch.allowed += ["net::ERR_", "WebSocket"]
+    window.watch.allowed += ["net::ERR_", "WebSocket", "/api/scene/show"]
 
     window.close()
