@@ -37,7 +37,7 @@ def studio(tmp_path_factory: pytest.TempPathFactory, footage: Path) -> Iterator[
 def window(browser: Browser, studio: StudioServer) -> Iterator[StudioPage]:
     """One window for all tests of this file."""
     opened = StudioPage(browser, studio)
-    # Sessions are renamed and thrown away here: the scene may be asked for one in the very moment that its folder moves.
+    # Sessions are renamed and thrown away here: the scene may be asked for one just when its folder moves.
     opened.watch.allowed.append("/api/scene/show")
     yield opened
     opened.close()
