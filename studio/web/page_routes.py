@@ -10,6 +10,7 @@ from starlette.responses import FileResponse, Response
 
 from studio.errors import StudioError
 from studio.sessions.atomic_files import write_bytes
+from studio.typed_decoding import decode_json
 from studio.web.doors import Doors, doors_of
 
 router = APIRouter(tags=["page"])
@@ -73,6 +74,6 @@ def change_preferences(
 def read_preferences(path: Path) -> dict[str, object]:
     """The stored object; a missing or damaged file counts as empty, for nothing depends on it."""
     try:
-        return msgspec.json.decode(path.read_bytes(), type=dict[str, object])
+        return decode_json(path.read_bytes(), dict[str, object])
     except (OSError, msgspec.DecodeError):
         return {}
