@@ -31,7 +31,8 @@ class Evaluation:
 
     frames : the frames that were measured (those that the truth has a row for). mean_mm : mean over frames
     of the frames' means; std_mm : their standard deviation; worst_mm : the worst frame's mean. lost_frames
-    : how many frames have any limb lost, lost_frame_numbers : which; lost_limbs : limbs lost in any frame.
+    : how many frames have any limb lost, lost_frame_numbers : which; lost_limbs : limbs lost in any frame;
+    lost_by_frame : the limbs lost in each of `frames`.
     per_frame_mm : in the order of `frames`. root_aligned_mm : with the root marker laid on the true one.
     procrustes_mm : after the best turn, scale and move of each frame, None where no frame has three
     markers. unmatched_markers : names that only the body or only the truth knows.
@@ -44,6 +45,7 @@ class Evaluation:
     lost_frames: int
     lost_frame_numbers: tuple[int, ...]
     lost_limbs: tuple[str, ...]
+    lost_by_frame: tuple[tuple[str, ...], ...]
     per_marker_mm: dict[str, float]
     per_frame_mm: tuple[float, ...]
     root_aligned_mm: float
@@ -74,6 +76,9 @@ def evaluate(poses: Array, frames: IntArray, body: BodyModel, truth: MarkerMotio
         lost_frames=int(in_frame.sum()),
         lost_frame_numbers=tuple(int(frame) for frame in numbers[in_frame]),
         lost_limbs=tuple(sorted({limbs[names[index]] for index in np.nonzero(lost)[1]})),
+        lost_by_frame=tuple(
+            tuple(sorted({limbs[names[index]] for index in np.flatnonzero(row)})) for row in lost
+        ),
         per_marker_mm={
             name: float(np.nanmean(distances[:, index]))
             for index, name in enumerate(names)

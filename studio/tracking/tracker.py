@@ -11,6 +11,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.weighting.problem import WHOLE_BODY
+
 Array = NDArray[np.float64]
 
 
@@ -113,14 +115,20 @@ class FrameResult:
 
 
 class FrameProblem(Protocol):
-    """One frame as a function of poses."""
+    """One frame as a function of poses. stage : WHOLE_BODY, or TRUNK_FIRST where only root and trunk are sought."""
 
-    def weigh(self, poses: Array, stage: int = 0) -> Array:
+    def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N, D) poses to (N,) log-weights; -inf never, NaN never."""
         ...
 
-    def feasible(self, poses: Array) -> NDArray[np.bool_]:
-        """(N, D) poses to (N,) whether the body can take them."""
+    def fitness(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+        """(N, D) poses to (N,) the fitness f that a swarm maximises; the log-weight where there is no f."""
+        ...
+
+    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
+        """(N, D) poses to (N,) whether the body can take them: limits kept and, if `limbs_apart`, no limb inside
+        another.
+        """
         ...
 
 

@@ -28,7 +28,7 @@ from studio.weighting.block_threads import run_blocks
 from studio.weighting.bodytrack_kernels import EDGE_STEP, LANES, ROUND, all_scores, chunk_scores
 from studio.weighting.evidence_check import check_sizes, check_views
 from studio.weighting.outlines import OutlineProjector
-from studio.weighting.problem import Limits
+from studio.weighting.problem import HardPriors
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -75,7 +75,7 @@ class BodytrackWeigher:
         check_sizes(cameras)
         self.settings, self.cameras = settings, cameras
         self.projector = OutlineProjector.of_body(body, cameras)
-        self.limits = Limits(body)
+        self.priors = HardPriors(body)
 
     def problem(self, evidence: FrameEvidence) -> "BodytrackProblem":
         """One frame as a function of poses; its edge maps are the benchmark's.
@@ -121,9 +121,13 @@ class BodytrackProblem:
         both = float(edge[0]), float(inside[0])
         return Score(both[0] + both[1], *both, int(counts[0, 0]), int(counts[0, 1]))
 
-    def feasible(self, poses: Array) -> NDArray[np.bool_]:
-        """(N, D) poses to (N,) whether all parameters lie within the body's limits."""
-        return self.weigher.limits.hold(poses)
+    def fitness(self, poses: Array, stage: int = 0) -> Array:
+        """(N,) the log-weights of poses (N, D): this weighting defines no other fitness."""
+        return self.weigh(poses, stage)
+
+    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
+        """(N, D) poses to (N,) whether the body can take them."""
+        return self.weigher.priors.hold(poses, limbs_apart)
 
     @property
     def _capacity(self) -> int:

@@ -47,7 +47,7 @@ from studio.weighting.edge_region_kernels import (
 from studio.weighting.evidence_check import check_sizes, check_views
 from studio.weighting.occlusion_kernels import all_hidden, chunk_hidden
 from studio.weighting.outlines import OutlineProjector
-from studio.weighting.problem import Limits
+from studio.weighting.problem import HardPriors
 
 Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
@@ -123,7 +123,7 @@ class EdgeRegionWeigher:
         check_sizes(cameras)
         self.settings, self.cameras = settings, cameras
         self.projector = OutlineProjector.of_body(body, cameras)
-        self.limits = Limits(body)
+        self.priors = HardPriors(body)
 
     @property
     def samples_per_evaluation(self) -> int:
@@ -194,9 +194,13 @@ class EdgeRegionProblem:
         run_blocks(chunk_hidden, all_hidden, blocks, BLOCKS_A_THREAD, outlines, samples, hidden)
         return hidden
 
-    def feasible(self, poses: Array) -> NDArray[np.bool_]:
-        """(N, D) poses to (N,) whether all parameters lie within the body's limits."""
-        return self.weigher.limits.hold(poses)
+    def fitness(self, poses: Array, stage: int = 0) -> Array:
+        """(N,) the log-weights of poses (N, D): this weighting defines no other fitness."""
+        return self.weigh(poses, stage)
+
+    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
+        """(N, D) poses to (N,) whether the body can take them."""
+        return self.weigher.priors.hold(poses, limbs_apart)
 
 
 def weighting_maps(evidence: FrameEvidence) -> WeightingMaps:

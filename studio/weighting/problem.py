@@ -1,4 +1,4 @@
-"""What every weighting's problem shares: its shape, and the body's limits."""
+"""What every weighting's problem shares: its shape, and which poses the body can take."""
 
 from typing import Protocol
 
@@ -9,27 +9,36 @@ from studio.body.model import BodyModel
 
 Array = NDArray[np.float64]
 
+# Stages of a search: what of the body a weighting may look at.
+WHOLE_BODY, TRUNK_FIRST = 0, 1
+
 
 class FrameFunction(Protocol):
     """One frame as a function of poses: what trackers, a storey above, know as `FrameProblem`."""
 
-    def weigh(self, poses: Array, stage: int = 0) -> Array:
+    def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N, D) poses to (N,) log-weights; -inf never, NaN never."""
         ...
 
-    def feasible(self, poses: Array) -> NDArray[np.bool_]:
-        """(N, D) poses to (N,) whether the body can take them."""
+    def fitness(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+        """(N, D) poses to (N,) the fitness f that a swarm maximises; the log-weight where there is no f."""
+        ...
+
+    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
+        """(N, D) poses to (N,) whether the body can take them: limits kept and, if `limbs_apart`, no limb inside
+        another.
+        """
         ...
 
 
-class Limits:
-    """The lower and upper limits of a body's parameters."""
+class HardPriors:
+    """What a body cannot do (the hard priors of Balan et al. that Fleischmann et al. 2012, 2.3, use)."""
 
     def __init__(self, body: BodyModel) -> None:
         self.lower = np.array([entry.lower for entry in body.parameters])
         self.upper = np.array([entry.upper for entry in body.parameters])
 
-    def hold(self, poses: Array) -> NDArray[np.bool_]:
+    def hold(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
         """(N, D) poses to (N,) whether every parameter lies within its limits, both included."""
         poses = np.asarray(poses, dtype=np.float64)
         return np.all((poses >= self.lower) & (poses <= self.upper), axis=1)

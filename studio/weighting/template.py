@@ -25,7 +25,7 @@ from studio.geometry.camera import Camera
 from studio.weighting.block_threads import run_blocks
 from studio.weighting.evidence_check import check_views
 from studio.weighting.outlines import OutlineProjector
-from studio.weighting.problem import Limits
+from studio.weighting.problem import HardPriors
 from studio.weighting.template_kernels import LANES, all_templates, chunk_templates
 
 Array = NDArray[np.float64]
@@ -51,7 +51,7 @@ class TemplateWeigher:
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: TemplateSettings) -> None:
         self.settings, self.cameras = settings, cameras
         self.projector = OutlineProjector.of_body(body, cameras)
-        self.limits = Limits(body)
+        self.priors = HardPriors(body)
 
     def problem(self, evidence: FrameEvidence) -> "TemplateProblem":
         """One frame as a function of poses. Raises FootageError where masks do not fit the cameras."""
@@ -91,9 +91,13 @@ class TemplateProblem:
         differing = counts[..., 0] + self.silhouette_pixels - 2 * counts[..., 1]
         return differing / (self.views[:, 2] * self.views[:, 3])
 
-    def feasible(self, poses: Array) -> NDArray[np.bool_]:
-        """(N, D) poses to (N,) whether all parameters lie within the body's limits."""
-        return self.weigher.limits.hold(poses)
+    def fitness(self, poses: Array, stage: int = 0) -> Array:
+        """(N,) the log-weights of poses (N, D): this weighting defines no other fitness."""
+        return self.weigh(poses, stage)
+
+    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
+        """(N, D) poses to (N,) whether the body can take them."""
+        return self.weigher.priors.hold(poses, limbs_apart)
 
 
 def packed_silhouettes(evidence: FrameEvidence) -> tuple[Words, IntArray, IntArray]:

@@ -18,6 +18,7 @@ def evaluation(mean: float, lost: tuple[str, ...] = ()) -> Evaluation:
         lost_frames=len(lost),
         lost_frame_numbers=tuple(range(len(lost))),
         lost_limbs=lost,
+        lost_by_frame=(lost, ()),
         per_marker_mm={"Hip": mean},
         per_frame_mm=(mean - 1.0, mean + 1.0),
         root_aligned_mm=mean / 2.0,

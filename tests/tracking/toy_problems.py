@@ -17,7 +17,11 @@ class Bowl:
         self.weighed += len(poses)
         return -np.sum(((poses - self.centre) / self.width) ** 2, axis=1)
 
-    def feasible(self, poses: np.ndarray) -> np.ndarray:
+    def fitness(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
+        """The log-weights."""
+        return self.weigh(poses, stage)
+
+    def feasible(self, poses: np.ndarray, limbs_apart: bool = False) -> np.ndarray:
         """Every pose is possible."""
         return np.ones(len(poses), dtype=bool)
 
@@ -25,7 +29,7 @@ class Bowl:
 class HalfBowl(Bowl):
     """A bowl whose maximum lies where the body cannot go: x0 must not be positive."""
 
-    def feasible(self, poses: np.ndarray) -> np.ndarray:
+    def feasible(self, poses: np.ndarray, limbs_apart: bool = False) -> np.ndarray:
         """Possible where x0 <= 0."""
         return poses[:, 0] <= 0.0
 

@@ -1,0 +1,201 @@
+"""A tracker on a footage, kept in memory only: the trial that most experiments are made of."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.inverse_kinematics import pose_from_markers
+from studio.body.model import BodyModel
+from studio.capture.trc import read_trc
+from studio.errors import NotFoundError, TruthError
+from studio.evaluation.errors import evaluate, rows_of_frames
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.experiments.footage_shelf import FootageShelf
+from studio.geometry.camera import Camera
+from studio.runs.search_space import default_sigma, search_space
+from studio.runs.tracking_run import start_of
+from studio.sessions.session import Session
+from studio.settings import changed_settings, default_settings
+from studio.tracking.catalogue import TRACKERS
+from studio.tracking.frame_loop import search_frame
+from studio.tracking.tracker import LayerRecord
+from studio.weighting.catalogue import WEIGHTINGS
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """One run: all that its poses depend on, plain values.
+
+    footage : a recipe's name, or the path of a session. changes : knobs by flat name. first, last : frames, half
+    open; last None means all. every : only each so many frames are seen (fps is divided, σ0 multiplied). cameras :
+    names, empty for all. body : a body's name or file, "" for the session's own. sigma_scale : multiplies σ0.
+    """
+
+    footage: str
+    tracker: str
+    weighting: str
+    seed: int
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    first: int = 0
+    last: int | None = None
+    every: int = 1
+    cameras: tuple[str, ...] = ()
+    body: str = ""
+    sigma_scale: float = 1.0
+
+    def plain(self) -> dict[str, Any]:
+        """As a trial's arguments."""
+        return asdict(self)
+
+    @classmethod
+    def of_plain(cls, arguments: Mapping[str, Any]) -> "Attempt":
+        """From a trial's arguments, as they come back from JSON."""
+        return cls(**{**arguments, "cameras": tuple(arguments.get("cameras", ()))})
+
+
+@dataclass(frozen=True, slots=True)
+class Tracked:
+    """What an attempt reached, mm without alignment.
+
+    frames : numbers in the footage. per_frame_mm : mean over markers. lost : per frame the names of limbs that are
+    lost (a marker more than 150 mm off). evaluations : poses weighed in a frame after the first. seconds : of the
+    search (weighting and tracker), without reading and preparing pictures.
+    """
+
+    frames: list[int]
+    per_frame_mm: list[float]
+    lost: list[list[str]]
+    mean_mm: float
+    worst_mm: float
+    lost_frames: int
+    lost_limbs: list[str]
+    evaluations: int
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Changed:
+    """How an experiment may spoil what a tracker is given. cameras : of all views. evidence : of each frame."""
+
+    cameras: Callable[[tuple[Camera, ...]], tuple[Camera, ...]] = lambda cameras: cameras
+    evidence: Callable[[FrameEvidence], FrameEvidence] = lambda evidence: evidence
+
+
+UNCHANGED = Changed()
+
+
+def track(
+    attempt: Attempt,
+    shelf: FootageShelf,
+    *,
+    on_layer: Callable[[LayerRecord], None] | None = None,
+    on_frame: Callable[[int, int], None] | None = None,
+    spoilt: Changed = UNCHANGED,
+) -> Tracked:
+    """Track and measure. on_layer : is given every layer. on_frame : frames done, frames in all; may raise to stop.
+
+    Raises TruthError for a footage without truth and what tracking raises.
+    """
+    session = shelf.session(attempt.footage)
+    if session.truth_path is None:
+        raise TruthError(f"Session '{session.name}' has no truth.", "Take one made by 'studio synthesize'.")
+    body = session.body(attempt.body or None)
+    fps = session.manifest.fps
+    space = search_space(body, _sigma(session, body, fps / attempt.every) * attempt.sigma_scale)
+    settings = changed_settings(default_settings(attempt.tracker, attempt.weighting), attempt.changes)
+    weighting = WEIGHTINGS[attempt.weighting]
+    cameras = _cameras(session, attempt.cameras)
+    weigher = weighting.prepare(body, spoilt.cameras(cameras), settings.weighting)
+    frames = range(attempt.first, attempt.last or session.manifest.frame_count, attempt.every)
+    carried = start_of(_start_pose(session, body, attempt.first, fps))
+    poses, evaluations, seconds = np.zeros((len(frames), len(body.parameters))), 0, 0.0
+    for number, frame in enumerate(frames):
+        seen = spoilt.evidence(
+            shelf.evidence(session, cameras, frame, settings.evidence, weighting.edge_kind)
+        )
+        began = time.perf_counter()
+        result = search_frame(
+            TRACKERS[attempt.tracker],
+            weigher.problem(seen),
+            carried,
+            space,
+            seed=attempt.seed,
+            frame=frame,
+            settings_source=lambda: (1, settings.tracker),
+            repeats=settings.tracker.start_repeats if number == 0 else 1,
+            on_layer=on_layer,
+        )
+        if number:
+            seconds += time.perf_counter() - began
+        carried, poses[number], evaluations = result.carried, result.estimate.pose, result.evaluations
+        if on_frame is not None:
+            on_frame(number + 1, len(frames))
+    return measured(session, body, poses, np.array(frames), evaluations, seconds)
+
+
+def measured(
+    session: Session,
+    body: BodyModel,
+    poses: Array,
+    frames: NDArray[np.int64],
+    evaluations: int,
+    seconds: float,
+) -> Tracked:
+    """The errors of poses (K, D) of frames (K,) of a session with truth."""
+    assert session.truth_path is not None
+    truth = read_trc(session.truth_path)
+    found = evaluate(poses, frames, body, truth, session.manifest.fps)
+    return Tracked(
+        frames=[int(frame) for frame in found.frames],
+        per_frame_mm=[round(value, 3) for value in found.per_frame_mm],
+        lost=[list(limbs) for limbs in found.lost_by_frame],
+        mean_mm=round(found.mean_mm, 4),
+        worst_mm=round(found.worst_mm, 3),
+        lost_frames=found.lost_frames,
+        lost_limbs=list(found.lost_limbs),
+        evaluations=evaluations,
+        seconds=round(seconds, 4),
+    )
+
+
+def _sigma(session: Session, body: BodyModel, fps: float) -> Array:
+    """(D,) σ0 at a frame rate: the session's own, else half of the body's largest step."""
+    own = session.sigma(fps, body)
+    return default_sigma(body, fps) if own is None else own
+
+
+def _cameras(session: Session, names: tuple[str, ...]) -> tuple[Camera, ...]:
+    """The session's cameras, or those of them that are named, in the session's order."""
+    known = session.cameras()
+    unknown = set(names) - {camera.name for camera in known}
+    if unknown:
+        words = ", ".join(camera.name for camera in known)
+        raise NotFoundError(f"'{session.name}' has no camera '{min(unknown)}'.", f"It has {words}.")
+    return tuple(camera for camera in known if not names or camera.name in names)
+
+
+def _start_pose(session: Session, body: BodyModel, first: int, fps: float) -> tuple[float, ...] | None:
+    """The session's start pose; for a later first frame the body laid on the true markers of that frame."""
+    own = session.start_pose(body)
+    pose = own if first == 0 else _pose_on_truth(session, body, first, fps, own)
+    return None if pose is None else tuple(float(value) for value in pose)
+
+
+def _pose_on_truth(session: Session, body: BodyModel, frame: int, fps: float, near: Array | None) -> Array:
+    """(D,) the pose whose markers come closest to the true ones of a frame, angles near `near` where given."""
+    assert session.truth_path is not None
+    truth = read_trc(session.truth_path)
+    rows = rows_of_frames(truth, fps)
+    if frame not in rows:
+        raise TruthError(f"The truth has no row for frame {frame}.", "Start at a frame that it has.")
+    known = {marker.name for marker in body.markers}
+    kept = [index for index, name in enumerate(truth.names) if name in known]
+    names = tuple(truth.names[index] for index in kept)
+    points = truth.positions[rows[frame], kept]
+    return pose_from_markers(body, names, points, body.neutral if near is None else near)[0]

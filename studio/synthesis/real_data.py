@@ -1,0 +1,35 @@
+"""Real data that recipes build on (calibrations, body shapes, recorded motion); it is never part of the project.
+
+It lies in the folder that the environment variable STUDIO_REAL_DATA names, by default ../shared/data beside the
+working folder. A recipe names a file in it as "data:lee-walk/CALIB".
+"""
+
+import os
+from pathlib import Path
+
+from studio.errors import StudioError
+
+VARIABLE = "STUDIO_REAL_DATA"
+PREFIX = "data:"
+DEFAULT = Path("..") / "shared" / "data"
+
+
+def real_data_folder() -> Path:
+    """The folder of the real data, whether or not it exists."""
+    return Path(os.environ.get(VARIABLE, "") or DEFAULT)
+
+
+def located(reference: str, recipe_folder: Path) -> Path:
+    """The path of a file that a recipe names: in the real data after "data:", else relative to the recipe.
+
+    Raises StudioError where nothing is there.
+    """
+    if not reference.startswith(PREFIX):
+        path = recipe_folder / reference
+        hint = "Check the recipe's path; it counts from the recipe's own folder."
+    else:
+        path = real_data_folder() / reference.removeprefix(PREFIX)
+        hint = f"Set {VARIABLE} to the folder that holds the real data; see the README."
+    if not path.exists():
+        raise StudioError(f"'{path}' does not exist.", hint)
+    return path
