@@ -60,6 +60,7 @@ def assemble(definition: BodyDefinition, name: str, dimensions: Mapping[str, flo
                 amount(entry.scale_x),
                 amount(entry.scale_y),
                 entry.side,
+                entry.part,
             )
             for entry in definition.limbs
         ),

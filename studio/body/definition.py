@@ -38,6 +38,7 @@ A body file is TOML. Lengths in mm, angles in degrees. The body's name is the fi
     scale_x = 1                       # of the cross-section; number or ratio
     scale_y = 1
     side = "left"                     # left, right or middle
+    part = ""                         # optional: "trunk" or "head", where a weighting treats these apart
 
     [[markers]]                       # named points, between which a subject's lengths are given
     name = "LKnee"
@@ -108,6 +109,7 @@ class LimbEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     scale_x: float | str = 1.0
     scale_y: float | str = 1.0
     side: Literal["left", "right", "middle"] = "middle"
+    part: Literal["trunk", "head", ""] = ""
 
 
 class MarkerEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -63,8 +63,9 @@ class Limb:
     """A truncated elliptical cone along its joint's z, from z = 0 to z = length (which may be negative).
 
     radius_start, radius_end : mm at z = 0 and z = length. scale_x, scale_y : of the cross-section along local
-    x, y. side : "left", "right" or "middle" (colours). Limbs of zero length are kept here but are not counted
-    or drawn: see `BodyModel.drawn`.
+    x, y. side : "left", "right" or "middle" (colours). part : "trunk", "head" or "" (neither), for weightings
+    that treat these apart. Limbs of zero length are kept here but are not counted or drawn: see
+    `BodyModel.drawn`.
     """
 
     name: str
@@ -75,6 +76,7 @@ class Limb:
     scale_x: float
     scale_y: float
     side: str
+    part: str = ""
 
 
 @dataclass(frozen=True, slots=True)

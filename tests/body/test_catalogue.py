@@ -7,6 +7,7 @@ import pytest
 from studio.body.catalogue import list_bodies, load_body
 from studio.body.definition import WORLD
 from studio.body.forward_kinematics import limb_ends, marker_points
+from studio.body.reader import parse_body
 from studio.body.tables import kinematic_tables
 from studio.errors import BodyError
 
@@ -40,6 +41,31 @@ def test_the_shipped_bodies_have_their_parameters_and_limbs() -> None:
         assert (len(body.parameters), len(body.drawn)) == counts, name
         assert body.name == name
         assert kinematic_tables(body).limb_shape.shape == (counts[1], 5)
+
+
+def test_trunk_and_head_are_named_where_there_are_any() -> None:
+    parts = {
+        name: {limb.name: limb.part for limb in load_body(name).drawn if limb.part} for name in list_bodies()
+    }
+    one_torso = {"torso": "trunk", "head": "head"}
+    pelvis_and_thorax = {"pelvis": "trunk", "thorax": "trunk", "head": "head"}
+    assert parts == {
+        "human31": one_torso,
+        "human25": one_torso,
+        "human29": pelvis_and_thorax,
+        "human34": pelvis_and_thorax,
+        "dog": {"loin": "trunk", "chest": "trunk", "head": "head"},
+        "planar_arm4": {},
+        "branched_arms6": {},
+    }
+
+
+def test_a_limb_of_an_unknown_part_is_refused() -> None:
+    wrong = PENDULUM.replace("radius_end = 10", 'radius_end = 10, part = "tail"') % 100
+    with pytest.raises(BodyError, match=r"limb 'rod', part: .*'tail'"):
+        parse_body(wrong, "pendulum", "pendulum.toml")
+    right = PENDULUM.replace("radius_end = 10", 'radius_end = 10, part = "trunk"') % 100
+    assert parse_body(right, "pendulum", "pendulum.toml").limbs[0].part == "trunk"
 
 
 @pytest.mark.parametrize("name", HUMANS)
