@@ -27,8 +27,8 @@ from studio.knobs import knob
 from studio.weighting.block_threads import run_blocks
 from studio.weighting.bodytrack_kernels import EDGE_STEP, LANES, ROUND, all_scores, chunk_scores
 from studio.weighting.evidence_check import check_sizes, check_views
+from studio.weighting.hard_priors import HardPriors
 from studio.weighting.outlines import OutlineProjector
-from studio.weighting.problem import HardPriors
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]

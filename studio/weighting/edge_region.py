@@ -45,9 +45,9 @@ from studio.weighting.edge_region_kernels import (
     record_indices,
 )
 from studio.weighting.evidence_check import check_sizes, check_views
+from studio.weighting.hard_priors import HardPriors
 from studio.weighting.occlusion_kernels import all_hidden, chunk_hidden
 from studio.weighting.outlines import OutlineProjector
-from studio.weighting.problem import HardPriors
 
 Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]

@@ -24,8 +24,8 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 from studio.weighting.block_threads import run_blocks
 from studio.weighting.evidence_check import check_views
+from studio.weighting.hard_priors import HardPriors
 from studio.weighting.outlines import OutlineProjector
-from studio.weighting.problem import HardPriors
 from studio.weighting.template_kernels import LANES, all_templates, chunk_templates
 
 Array = NDArray[np.float64]
