@@ -16,6 +16,10 @@ from studio.experiments.footage_shelf import FootageShelf
 Plain = Any
 
 VERDICTS = ("reproduced", "better", "not reproduced", "answered")
+# What stands in a verdict's place where a trial failed or the conclusion could not be drawn.
+FAILED = "failed"
+# A verdict is firm with so many seeds or more.
+FIRM_SEEDS = 10
 
 
 @dataclass(frozen=True, slots=True)
