@@ -101,7 +101,8 @@ class Experiment:
     name : as typed on the command line. source : paper and figure. claim : the paper's, in our words. footage :
     recipes whose sessions must be rendered first. trials : all that are needed at a scale. measure : one trial's
     plain measurements (a module-level function: it runs in other processes). conclude : from all outcomes, in the
-    order of the trials.
+    order of the trials. alone : the trials measure time: they run one after the other when nothing else does, in a
+    process that may use all cores (every other trial has one core and shares the memory's bandwidth).
     """
 
     name: str
@@ -112,3 +113,4 @@ class Experiment:
     measure: Callable[[Mapping[str, Plain], FootageShelf], dict[str, Plain]]
     conclude: Callable[[Sequence[Outcome]], Findings]
     footage: tuple[str, ...] = ()
+    alone: bool = False

@@ -1,0 +1,43 @@
+"""All experiments that `studio reproduce` knows, in the order of the report."""
+
+import difflib
+from types import MappingProxyType, ModuleType
+
+from studio.errors import NotFoundError
+from studio.experiments.experiment import Experiment
+
+# One line each: the module's EXPERIMENT, or its EXPERIMENTS. A new module is imported above and named here.
+MODULES: tuple[ModuleType, ...] = ()
+
+ALL = "all"
+
+
+def gathered(modules: tuple[ModuleType, ...]) -> dict[str, Experiment]:
+    """The experiments of some modules by name. Raises ValueError where two share a name."""
+    found: dict[str, Experiment] = {}
+    for module in modules:
+        own: tuple[Experiment, ...] = getattr(module, "EXPERIMENTS", None) or (module.EXPERIMENT,)
+        for experiment in own:
+            if experiment.name in found or experiment.name in (ALL, "list"):
+                raise ValueError(f"The name '{experiment.name}' of {module.__name__} is taken.")
+            found[experiment.name] = experiment
+    return found
+
+
+EXPERIMENTS = MappingProxyType(gathered(MODULES))
+
+
+def find_experiments(
+    name: str, among: "MappingProxyType[str, Experiment] | dict[str, Experiment]" = EXPERIMENTS
+) -> tuple[Experiment, ...]:
+    """The experiment of that name, or all for "all". Raises NotFoundError with the nearest names."""
+    if name == ALL:
+        return tuple(among.values())
+    if name in among:
+        return (among[name],)
+    near = difflib.get_close_matches(name, among, n=3, cutoff=0.4)
+    near = near or [known for known in among if name.lower() in known][:3]
+    words = f"Did you mean {' or '.join(near)}? " if near else ""
+    raise NotFoundError(
+        f"There is no experiment '{name}'.", f"{words}'studio reproduce list' names all of them."
+    )
