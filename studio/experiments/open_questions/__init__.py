@@ -1,0 +1,1 @@
+"""What the papers leave open: how much damage each tracker stands."""
