@@ -26,6 +26,7 @@ START, AXES, LENGTH, RADIUS_START, RADIUS_END, BULGE, SCALE_X, SCALE_Y = 0, 3, 1
 FOLD, FOLD_PERIOD, FOLD_PHASE, BOUND, BOUND_RADIUS, COLUMNS = 18, 19, 20, 21, 24, 25
 
 REFERENCE_HEIGHT = 1760.0
+CHEST_FOLLOWS = 0.4
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,18 +116,30 @@ def _grown(piece: Piece, scale: float) -> Piece:
 
 
 def _trunk(bones: Skeleton) -> list[Piece]:
-    """Pelvis and seat in trousers, belly, chest and shoulders in the shirt."""
-    up, wide = bones.trunk, bones.hip_half_width
-    shoulder, low = bones.shoulder[1], up + bones.shoulder[2]
+    """Pelvis and seat in trousers, belly, chest and shoulders in the shirt.
+
+    Where one shoulder lies further out than the other, the chest follows their middle part of the way.
+    """
+    up, (hip_left, hip_right) = bones.trunk, bones.hip_half_width
+    (_, left, left_up), (_, right, right_up) = bones.shoulder
+    middle, low = CHEST_FOLLOWS * 0.5 * (left - right), up + 0.5 * (left_up + right_up)
     return [
-        Piece("pelvis", TRUNK, TROUSERS, (-8, -0.7 * wide, 5), (-8, 0.7 * wide, 5), (110, 110), fold=2.0),
+        Piece(
+            "pelvis",
+            TRUNK,
+            TROUSERS,
+            (-8, -0.7 * hip_right, 5),
+            (-8, 0.7 * hip_left, 5),
+            (110, 110),
+            fold=2.0,
+        ),
         Piece("pelvis", TRUNK, TROUSERS, (-4, 0, 20), (0, 0, 0.16 * up), (136, 128), scale=(0.80, 1.06)),
         Piece(
             "thorax",
             TRUNK,
             SHIRT,
             (-2, 0, 0.13 * up),
-            (0, 0, 0.48 * up),
+            (0, 0.6 * middle, 0.48 * up),
             (140, 138),
             5,
             (0.86, 1.04),
@@ -137,8 +150,8 @@ def _trunk(bones: Skeleton) -> list[Piece]:
             "thorax",
             TRUNK,
             SHIRT,
-            (2, 0, 0.48 * up),
-            (-6, 0, 0.76 * up),
+            (2, 0.6 * middle, 0.48 * up),
+            (-6, middle, 0.76 * up),
             (141, 136),
             6,
             (0.89, 1.07),
@@ -149,16 +162,16 @@ def _trunk(bones: Skeleton) -> list[Piece]:
             "thorax",
             TRUNK,
             SHIRT,
-            (-12, -0.62 * shoulder, low - 18),
-            (-12, 0.62 * shoulder, low - 18),
+            (-12, -0.62 * right, low - 18),
+            (-12, 0.62 * left, low - 18),
             (80, 80),
         ),
         Piece(
             "thorax",
             TRUNK,
             SHIRT,
-            (-14, -0.25 * shoulder, up - 36),
-            (-14, 0.25 * shoulder, up - 36),
+            (-14, -0.25 * right, up - 36),
+            (-14, 0.25 * left, up - 36),
             (56, 56),
         ),
     ]
@@ -181,13 +194,14 @@ def _arm(bones: Skeleton, side: str, index: int) -> list[Piece]:
     group = LEFT_ARM if side == "left" else RIGHT_ARM
     inward = -1.0 if side == "left" else 1.0
     upper, fore, hand = bones.upper_arm[index], bones.forearm[index], bones.hand
+    ahead, out, up = bones.shoulder[index]
     return [
         Piece(
             f"{side}_clavicle",
             group,
             SHIRT,
-            (-4, -0.55 * inward * bones.shoulder[1], bones.shoulder[2] - 10),
-            (0, -0.98 * inward * bones.shoulder[1], bones.shoulder[2] - 2),
+            (0.55 * ahead - 4, -0.55 * inward * out, up - 10),
+            (0.98 * ahead, -0.98 * inward * out, up - 2),
             (63, 60),
         ),
         Piece(

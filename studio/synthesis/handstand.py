@@ -66,7 +66,7 @@ def _add_supporting_arm(
     turns[f"{side}_clavicle"] = turns["thorax"] @ axis_turn(0, np.full(len(lean), sign * 0.25))
     length = skeleton.upper_arm[index] + skeleton.forearm[index]
     spread = np.full(
-        len(lean), sign * np.arcsin(np.clip((half_apart - skeleton.shoulder[1]) / length, -0.5, 0.5))
+        len(lean), sign * np.arcsin(np.clip((half_apart - skeleton.shoulder[index][1]) / length, -0.5, 0.5))
     )
     upper = heading @ axis_turn(1, lean) @ axis_turn(0, spread)
     turns[f"{side}_upper_arm"] = upper

@@ -94,7 +94,7 @@ def stand(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
     for index, side in enumerate(SIDES):
         sign = 1.0 if side == "left" else -1.0
         outward = np.stack([-np.sin(heading), np.cos(heading), zero], axis=-1)
-        hip = root + sign * skeleton.hip_half_width * turns["pelvis"][:, :, 1]
+        hip = root + sign * skeleton.hip_half_width[index] * turns["pelvis"][:, :, 1]
         ankle = sign * 0.065 * skeleton.height * outward + np.array([0.0, 0.0, skeleton.ankle_height])
         thigh, shin = leg_to_ankle(hip, ankle, forward, skeleton.thigh[index], skeleton.shin[index])
         turns |= {f"{side}_thigh": thigh, f"{side}_shin": shin}
@@ -145,7 +145,7 @@ def _along(
     root[:, 2] = _pelvis_height(skeleton, gait, phase, _allowed_height(skeleton, root, turns["pelvis"], feet))
     for side, track in zip(SIDES, feet, strict=True):
         sign, index = (1.0, 0) if side == "left" else (-1.0, 1)
-        hip = root + sign * skeleton.hip_half_width * turns["pelvis"][:, :, 1]
+        hip = root + sign * skeleton.hip_half_width[index] * turns["pelvis"][:, :, 1]
         ahead = turns["pelvis"][:, :, 0] + track.turn[:, :, 0]
         thigh, shin = leg_to_ankle(hip, track.ankle, ahead, skeleton.thigh[index], skeleton.shin[index])
         turns |= {f"{side}_thigh": thigh, f"{side}_shin": shin, f"{side}_foot": track.turn}
@@ -177,7 +177,7 @@ def _allowed_height(skeleton: Skeleton, root: Array, pelvis: Array, feet: list[F
     allowed = np.full(len(root), np.inf)
     for sign, index, track in ((1.0, 0, feet[0]), (-1.0, 1, feet[1])):
         leg = NEARLY_STRAIGHT * (skeleton.thigh[index] + skeleton.shin[index])
-        hip = root + sign * skeleton.hip_half_width * pelvis[:, :, 1]
+        hip = root + sign * skeleton.hip_half_width[index] * pelvis[:, :, 1]
         across = np.linalg.norm((track.ankle - hip)[:, :2], axis=1)
         above = np.sqrt(np.maximum(leg**2 - across**2, 0.0))
         allowed = np.minimum(allowed, track.ankle[:, 2] + above - hip[:, 2])

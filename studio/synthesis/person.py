@@ -44,15 +44,19 @@ SOLE = 0.045
 
 @dataclass(frozen=True, slots=True)
 class Skeleton:
-    """Lengths in mm, one entry per side where there are two (left, right)."""
+    """Lengths in mm, one entry per side where there are two (left, right).
+
+    hip_half_width : of each hip joint from the pelvis centre. shoulder : of each shoulder joint from the neck's
+    base, (forward, outward, up).
+    """
 
     height: float
     trunk: float
     head: float
-    hip_half_width: float
+    hip_half_width: tuple[float, float]
     thigh: tuple[float, float]
     shin: tuple[float, float]
-    shoulder: tuple[float, float, float]
+    shoulder: tuple[tuple[float, float, float], tuple[float, float, float]]
     upper_arm: tuple[float, float]
     forearm: tuple[float, float]
     hand: float
@@ -70,6 +74,7 @@ def skeleton_of_height(height_mm: float, rng: np.random.Generator) -> Skeleton:
     %).
     """
     pair = np.exp(rng.normal(0.0, 0.005, (4, 2)))
+    shoulder = (0.0, SHOULDER_OUT * height_mm, -SHOULDER_DOWN * height_mm)
     thigh, shin, upper_arm, forearm = (
         (float(share * height_mm * two[0]), float(share * height_mm * two[1]))
         for share, two in zip((THIGH, SHIN, UPPER_ARM, FOREARM), pair, strict=True)
@@ -78,10 +83,10 @@ def skeleton_of_height(height_mm: float, rng: np.random.Generator) -> Skeleton:
         height=height_mm,
         trunk=TRUNK * height_mm,
         head=HEAD * height_mm,
-        hip_half_width=HIP_HALF_WIDTH * height_mm,
+        hip_half_width=(HIP_HALF_WIDTH * height_mm, HIP_HALF_WIDTH * height_mm),
         thigh=thigh,
         shin=shin,
-        shoulder=(0.0, SHOULDER_OUT * height_mm, -SHOULDER_DOWN * height_mm),
+        shoulder=(shoulder, shoulder),
         upper_arm=upper_arm,
         forearm=forearm,
         hand=HAND * height_mm,
@@ -124,7 +129,7 @@ def joint_points(motion: PersonMotion) -> dict[str, Array]:
     points["head_top"] = along(points["head"], "head", (0.0, 0.0, bones.head))
     for index, side in enumerate(SIDES):
         sign = 1.0 if side == "left" else -1.0
-        forward, out, down = bones.shoulder
+        forward, out, down = bones.shoulder[index]
         points[f"{side}_clavicle"] = points["head"]
         points[f"{side}_upper_arm"] = along(points["head"], f"{side}_clavicle", (forward, sign * out, down))
         points[f"{side}_forearm"] = along(
@@ -134,7 +139,7 @@ def joint_points(motion: PersonMotion) -> dict[str, Array]:
             points[f"{side}_forearm"], f"{side}_forearm", (0.0, 0.0, -bones.forearm[index])
         )
         points[f"{side}_fingers"] = along(points[f"{side}_hand"], f"{side}_hand", (0.0, 0.0, -bones.hand))
-        points[f"{side}_thigh"] = along(motion.root, "pelvis", (0.0, sign * bones.hip_half_width, 0.0))
+        points[f"{side}_thigh"] = along(motion.root, "pelvis", (0.0, sign * bones.hip_half_width[index], 0.0))
         points[f"{side}_shin"] = along(
             points[f"{side}_thigh"], f"{side}_thigh", (0.0, 0.0, -bones.thigh[index])
         )
