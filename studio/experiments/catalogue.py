@@ -5,9 +5,28 @@ from types import MappingProxyType, ModuleType
 
 from studio.errors import NotFoundError
 from studio.experiments.experiment import Experiment
+from studio.experiments.fleischmann import (
+    computation_time,
+    constraints,
+    fig_3,
+    fig_6,
+    figs_4_5,
+    partitions,
+    table_2,
+)
+from studio.experiments.open_questions import robustness
 
 # One line each: the module's EXPERIMENT, or its EXPERIMENTS. A new module is imported above and named here.
-MODULES: tuple[ModuleType, ...] = ()
+MODULES: tuple[ModuleType, ...] = (
+    table_2,
+    fig_3,
+    figs_4_5,
+    fig_6,
+    partitions,
+    constraints,
+    computation_time,
+    robustness,
+)
 
 ALL = "all"
 
