@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from studio.errors import StudioError
 from studio.geometry.rotations import axis_turn
 from studio.synthesis.gait import (
-    FootTrack,
     Gait,
     Path,
     circle_path,
@@ -22,11 +21,12 @@ from studio.synthesis.gait import (
     winding_path,
 )
 from studio.synthesis.handstand import handstand
-from studio.synthesis.person import SIDES, PersonMotion, Skeleton, yaw_pitch_roll
+from studio.synthesis.person import SIDES, PersonMotion, Skeleton
+from studio.synthesis.posture import add_arm, allowed_height, frame_rate, trunk
 
 Array = NDArray[np.float64]
 Options = dict[str, float]
-BOB, RUNNING_BOB, NEARLY_STRAIGHT = 0.6, 0.018, 0.994
+BOB, RUNNING_BOB = 0.6, 0.018
 
 MotionMaker = Callable[[Skeleton, Array, Options], PersonMotion]
 
@@ -89,7 +89,7 @@ def stand(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
     zero = np.zeros(count)
     root = np.stack([sway * np.sin(1.7 * times), sway * np.sin(1.1 * times + 1.0), zero], axis=-1)
     root[:, 2] = skeleton.standing_hip_height - 9.0
-    turns = _trunk(heading, zero, 0.02 * np.sin(1.3 * times), zero)
+    turns = trunk(heading, zero, 0.02 * np.sin(1.3 * times), zero)
     forward = turns["pelvis"][:, :, 0]
     for index, side in enumerate(SIDES):
         sign = 1.0 if side == "left" else -1.0
@@ -99,8 +99,8 @@ def stand(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
         thigh, shin = leg_to_ankle(hip, ankle, forward, skeleton.thigh[index], skeleton.shin[index])
         turns |= {f"{side}_thigh": thigh, f"{side}_shin": shin}
         turns[f"{side}_foot"] = axis_turn(2, heading + sign * 0.15)
-        _add_arm(turns, side, 0.04 * np.sin(1.5 * times), np.full(count, 0.2), np.full(count, 0.35))
-    return PersonMotion(skeleton, _rate(times), root, turns)
+        add_arm(turns, side, 0.04 * np.sin(1.5 * times), np.full(count, 0.2), np.full(count, 0.35))
+    return PersonMotion(skeleton, frame_rate(times), root, turns)
 
 
 MOTIONS: dict[str, MotionMaker] = {
@@ -138,11 +138,11 @@ def _along(
     root = np.concatenate([place, np.zeros((len(times), 1))], axis=1)
     root[:, 0] -= sideways * np.sin(heading)
     root[:, 1] += sideways * np.cos(heading)
-    turns = _trunk(
+    turns = trunk(
         heading - 0.09 * stride, lean + 0.015 * np.cos(2.0 * phase), 0.16 * stride, 0.03 * np.sin(phase)
     )
     feet = [foot_track(gait, path, times, skeleton, left=side == "left", obstacle=obstacle) for side in SIDES]
-    root[:, 2] = _pelvis_height(skeleton, gait, phase, _allowed_height(skeleton, root, turns["pelvis"], feet))
+    root[:, 2] = _pelvis_height(skeleton, gait, phase, allowed_height(skeleton, root, turns["pelvis"], feet))
     for side, track in zip(SIDES, feet, strict=True):
         sign, index = (1.0, 0) if side == "left" else (-1.0, 1)
         hip = root + sign * skeleton.hip_half_width[index] * turns["pelvis"][:, :, 1]
@@ -151,8 +151,8 @@ def _along(
         turns |= {f"{side}_thigh": thigh, f"{side}_shin": shin, f"{side}_foot": track.turn}
         forward = 0.05 - sign * swing * stride
         bend = elbow + 0.45 * swing * (1.0 - sign * np.cos(phase - 0.3))
-        _add_arm(turns, side, forward, np.full(len(times), 0.24), bend)
-    return PersonMotion(skeleton, _rate(times), root, turns)
+        add_arm(turns, side, forward, np.full(len(times), 0.24), bend)
+    return PersonMotion(skeleton, frame_rate(times), root, turns)
 
 
 def _pelvis_height(skeleton: Skeleton, gait: Gait, phase: Array, allowed: Array) -> Array:
@@ -169,53 +169,3 @@ def _pelvis_height(skeleton: Skeleton, gait: Gait, phase: Array, allowed: Array)
     else:
         bob = -RUNNING_BOB * skeleton.height * np.cos(2.0 * phase - 2.0 * np.pi * gait.duty)
     return bob + float(np.min(allowed - bob))
-
-
-def _allowed_height(skeleton: Skeleton, root: Array, pelvis: Array, feet: list[FootTrack]) -> Array:
-    """(F,) the height above `root` at which the pelvis still lets both ankles be reached without quite
-    straightening a knee."""
-    allowed = np.full(len(root), np.inf)
-    for sign, index, track in ((1.0, 0, feet[0]), (-1.0, 1, feet[1])):
-        leg = NEARLY_STRAIGHT * (skeleton.thigh[index] + skeleton.shin[index])
-        hip = root + sign * skeleton.hip_half_width[index] * pelvis[:, :, 1]
-        across = np.linalg.norm((track.ankle - hip)[:, :2], axis=1)
-        above = np.sqrt(np.maximum(leg**2 - across**2, 0.0))
-        allowed = np.minimum(allowed, track.ankle[:, 2] + above - hip[:, 2])
-    return allowed
-
-
-def _trunk(
-    heading: Array, pitch: Array | float, twist: Array | float, roll: Array | float
-) -> dict[str, Array]:
-    """Pelvis, thorax (twisted against the pelvis about its own axis) and head, which looks where the person
-    goes.
-    """
-    level = np.zeros_like(heading)
-    pelvis = yaw_pitch_roll(heading, level + 0.6 * pitch, level + roll)
-    thorax = pelvis @ axis_turn(1, level + 0.4 * pitch) @ axis_turn(2, level + twist)
-    head = thorax @ yaw_pitch_roll(-0.55 * (level + twist), level + 0.10, -0.6 * (level + roll))
-    return {"pelvis": pelvis, "thorax": thorax, "head": head}
-
-
-def _add_arm(turns: dict[str, Array], side: str, forward: Array, outward: Array, bend: Array) -> None:
-    """An arm swung `forward`, held `outward` and bent by `bend` at the elbow, radians; the clavicle gives
-    way to it a little. Adds clavicle, upper arm, forearm and hand.
-    """
-    sign = 1.0 if side == "left" else -1.0
-    clavicle = turns["thorax"] @ axis_turn(2, -sign * 0.08 * forward) @ axis_turn(0, sign * 0.06 * outward)
-    upper = (
-        turns["thorax"]
-        @ axis_turn(1, -forward)
-        @ axis_turn(0, sign * outward)
-        @ axis_turn(2, -sign * 0.25 + 0.0 * bend)
-    )
-    forearm = upper @ axis_turn(1, -bend)
-    turns |= {f"{side}_clavicle": clavicle, f"{side}_upper_arm": upper, f"{side}_forearm": forearm}
-    turns[f"{side}_hand"] = (
-        forearm @ axis_turn(2, -sign * 0.5 + 0.0 * bend) @ axis_turn(1, -0.15 + 0.0 * bend)
-    )
-
-
-def _rate(times: Array) -> float:
-    """Frames per second of evenly spaced times."""
-    return float(1.0 / (times[1] - times[0])) if len(times) > 1 else 60.0
