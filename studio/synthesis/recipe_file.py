@@ -14,6 +14,7 @@ from studio.typed_decoding import decode_toml
 
 RECIPES = Path(__file__).parent / "recipe_files"
 SUFFIX = ".toml"
+RECORDED = "recorded"
 
 
 class Picture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -68,12 +69,15 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     """Footage to be made.
 
     motion : "walk", "run", "box", "handstand", "stand"; or "arm", which shows `body` itself, seen by one
-    camera, as in Deutscher & Reid 6.1. options : numbers of the motion. tracker, weighting : what runs of
-    the session use by default.
+    camera, as in Deutscher & Reid 6.1; or "recorded", the motion of `motion_file` (.amc, .bvh, .npz, with
+    "data:" in the real data; `skeleton_file` for an .amc whose ASF is not beside it). options : numbers of
+    the motion. tracker, weighting : what runs of the session use by default.
     """
 
     title: str
     motion: str
+    motion_file: str = ""
+    skeleton_file: str = ""
     frames: int
     fps: float = 60.0
     seed: int = 1
@@ -156,6 +160,10 @@ def _problem(recipe: Recipe) -> str:
         (not 0.0 <= picture.noise <= 40.0, f"picture.noise is {picture.noise:g}, not 0 to 40"),
         (not 1 <= picture.samples <= 4, f"picture.samples is {picture.samples}, not 1 to 4"),
         (not 0.0 <= picture.quality <= 51.0, f"picture.quality is {picture.quality:g}, not 0 to 51"),
+        (
+            (recipe.motion == RECORDED) != bool(recipe.motion_file),
+            f"motion '{RECORDED}' and an entry motion_file belong together",
+        ),
         (picture.empty_frames < 1, "picture.empty_frames must be 1 or more"),
         (cameras.rig not in ("", "corners"), f"cameras.rig is '{cameras.rig}', not 'corners'"),
         (

@@ -19,9 +19,11 @@ from studio.sessions.manifest import read_manifest, write_manifest
 from studio.sessions.named_rows import write_pose
 from studio.synthesis.arm_footage import render_arm
 from studio.synthesis.motions import make_motion
-from studio.synthesis.person import PersonMotion, marker_lengths, marker_motion, skeleton_of_height
+from studio.synthesis.person import PersonMotion, Skeleton, marker_lengths, marker_motion, skeleton_of_height
 from studio.synthesis.person_footage import render_person
-from studio.synthesis.recipe_file import Recipe, find_recipe, read_recipe, recipe_cameras
+from studio.synthesis.real_data import located
+from studio.synthesis.recipe_file import RECORDED, Recipe, find_recipe, read_recipe, recipe_cameras
+from studio.synthesis.recorded_clip import read_recording, recorded_person
 
 Progress = Callable[[str, int, int], None]
 
@@ -70,7 +72,7 @@ def render_source(
     else:
         skeleton = skeleton_of_height(recipe.height_mm, rng)
         cameras = _cameras(recipe, recipe_folder, rng)
-        motion = make_motion(recipe.motion, skeleton, recipe.frames, recipe.fps, recipe.options)
+        motion = recipe_motion(recipe, recipe_folder, skeleton)
         truth, subject = marker_motion(motion), person_subject(recipe, motion)
         render_person(recipe, motion, cameras, source, progress)
     (source / "calibration").mkdir()
@@ -82,6 +84,15 @@ def render_source(
         write_subject(subject, source / "subject.toml")
     if recipe.include.start_pose and recipe.motion != ARM:
         _write_start_pose(recipe, subject, truth, rng, source / "start_pose.csv")
+
+
+def recipe_motion(recipe: Recipe, recipe_folder: Path, skeleton: Skeleton) -> PersonMotion:
+    """The written or recorded motion that a recipe asks for. Raises StudioError, for files too."""
+    if recipe.motion != RECORDED:
+        return make_motion(recipe.motion, skeleton, recipe.frames, recipe.fps, recipe.options)
+    own = located(recipe.skeleton_file, recipe_folder) if recipe.skeleton_file else None
+    recorded = read_recording(located(recipe.motion_file, recipe_folder), own)
+    return recorded_person(recorded, skeleton, recipe.frames, recipe.fps, recipe.options)
 
 
 def person_subject(recipe: Recipe, motion: PersonMotion) -> Subject:
