@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from studio.body.subject import read_subject
+from studio.cli.arguments import frame_range
 from studio.cli.output import command, note, progress
 from studio.errors import RunError, SettingsError
 from studio.knobs import allowed
@@ -86,7 +87,7 @@ def track(
     if resume:
         run = opened.run(resume)
     else:
-        first, last = _frame_range(frames)
+        first, last = frame_range(frames)
         measures = read_subject(subject) if subject else None
         request = RunRequest(
             tracker=tracker or "",
@@ -147,17 +148,6 @@ def _told(run: StoredRun, result: BatchResult) -> dict[str, object]:
     if record.tracker == "condensation":
         told["likelihood_scale"] = result.last_beta
     return told
-
-
-def _frame_range(text: str) -> tuple[int, int | None]:
-    """A:B as numbers; either side may be left out. Raises RunError."""
-    first, colon, last = text.partition(":")
-    try:
-        return int(first or 0), int(last) if last else (None if colon else int(first) + 1)
-    except ValueError:
-        raise RunError(
-            f"Frames '{text}' cannot be understood.", "Write A:B, half open from 0, like 0:150."
-        ) from None
 
 
 def _changes(assignments: tuple[str, ...]) -> dict[str, str]:
