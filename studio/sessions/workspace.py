@@ -154,13 +154,13 @@ class Workspace:
     def trash(self, name: str) -> Path:
         """Move a session to the trash folder and return where it lies. Raises SessionError while it is
         tracked."""
-        return self._to_trash(self._idle(name).path, name)
+        return self.to_trash(self._idle(name).path, name)
 
     def trash_run(self, session_name: str, run_name: str) -> Path:
         """Move a run to the trash folder. Raises SessionError while it is tracked."""
         run = self.session(session_name).run(run_name)
         _check_idle(run)
-        return self._to_trash(run.folder, f"{session_name}--{run_name}")
+        return self.to_trash(run.folder, f"{session_name}--{run_name}")
 
     def rename_run(self, session_name: str, run_name: str, new_name: str) -> StoredRun:
         """Give a run another name. Raises SessionError if it is taken or the run is being tracked."""
@@ -175,6 +175,16 @@ class Workspace:
         os.rename(run.folder, place)
         write_run_record(place, record)
         return session.run(new_name)
+
+    def to_trash(self, path: Path, label: str) -> Path:
+        """Move a folder to the trash under a free name that begins with `label`; where it lies then."""
+        trash = self.root / TRASH_NAME
+        trash.mkdir(exist_ok=True)
+        stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime())
+        place = trash / free_name(f"{label[:44]}--{stamp}", {entry.name for entry in trash.iterdir()})
+        os.rename(path, place)
+        atomic_files.sync_folder(trash)
+        return place
 
     def trashed(self) -> tuple[str, ...]:
         """What lies in the trash, oldest first; sessions among it can be given to `restore`."""
@@ -207,15 +217,6 @@ class Workspace:
                 os.rename(path, inside(session.path / RUNS_NAME, name, "run"))
                 return session.run(name)
         raise NotFoundError(f"Session '{owners[0]}' of this run is gone.", "Restore the session first.")
-
-    def _to_trash(self, path: Path, label: str) -> Path:
-        trash = self.root / TRASH_NAME
-        trash.mkdir(exist_ok=True)
-        stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime())
-        place = trash / free_name(f"{label[:44]}--{stamp}", {entry.name for entry in trash.iterdir()})
-        os.rename(path, place)
-        atomic_files.sync_folder(trash)
-        return place
 
     def _free(self, name: str) -> Path:
         """The place for a session of this name. Raises SessionError if there is something."""
