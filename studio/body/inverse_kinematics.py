@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from studio.body.branches import within_limits
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
 from studio.errors import BodyError
@@ -46,8 +47,9 @@ def pose_from_markers(
     """The pose (D,) that brings the named markers to the points, and the remaining distance (RMS, mm).
 
     names : markers of the body. points : (M, 3) world, mm; rows with a NaN are missing and ignored.
-    start : (D,) where the search starts; angles end within half a turn of it where limits allow. Raises
-    BodyError for an unknown marker, for shapes that do not fit and when no point is left.
+    start : (D,) where the search starts, rewritten into the limits first (`branches.within_limits`); angles end
+    within half a turn of it where limits allow. Raises BodyError for an unknown marker, for shapes that do not
+    fit and when no point is left.
     """
     problem = _MarkerProblem(body, names, points, start)
     rng = np.random.default_rng(0)
@@ -87,7 +89,7 @@ class _MarkerProblem:
         self.scale = np.array([1.0 if entry.kind == "angle" else MM_PER_RADIAN for entry in body.parameters])
         self.lower = np.array([entry.lower for entry in body.parameters])
         self.upper = np.array([entry.upper for entry in body.parameters])
-        self.start = np.clip(start, self.lower, self.upper)
+        self.start = np.clip(within_limits(body, start), self.lower, self.upper)
         self.everything = np.arange(len(body.parameters))
         self.root, self.turns, self.moves = _root(body)
 

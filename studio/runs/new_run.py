@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.body.branches import within_limits
 from studio.body.model import BodyModel
 from studio.body.subject import Subject
 from studio.errors import BodyError, RunError
@@ -105,7 +106,7 @@ def checked_frames(session: Session, first: int, last: int | None) -> tuple[int,
 def start_pose(
     session: Session, body: BodyModel, given: Array | None, given_source: str = ""
 ) -> tuple[Array | None, str]:
-    """The pose that the first frame starts from, and where it came from.
+    """The pose that the first frame starts from (its angles rewritten into the limits), and where it came from.
 
     None, where neither the request nor the session has one and every parameter has limits: then the search
     starts uniformly between them (Fig. 12a). Raises RunError without start pose and limits, BodyError for a
@@ -118,7 +119,7 @@ def start_pose(
                 f"A start pose of {body.name} has {len(body.parameters)} finite numbers, this one does not.",
                 "Give radians and mm in the order of the body's parameters.",
             )
-        return pose, given_source or "given"
+        return within_limits(body, pose), given_source or "given"
     stored = session.start_pose(body)
     if stored is not None:
         return stored, "the session's start pose"

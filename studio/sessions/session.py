@@ -9,6 +9,7 @@ import shutil
 from functools import cached_property
 from pathlib import Path
 
+from studio.body.branches import within_limits
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
 from studio.body.subject import Subject, fit_subject, read_subject
@@ -90,10 +91,14 @@ class Session:
     def start_pose(self, body: BodyModel | None = None) -> Array | None:
         """(D,) the session's own start pose in the order of the body's parameters, None without one.
 
-        Raises BodyError if it does not name this body's parameters.
+        Its angles are rewritten into the body's limits (`body.branches`), the attitude stays. Raises BodyError if
+        it does not name this body's parameters.
         """
         path = self.path / START_POSE_NAME
-        return read_pose(path, _parameter_names(body or self.body())) if path.exists() else None
+        if not path.exists():
+            return None
+        model = body or self.body()
+        return within_limits(model, read_pose(path, _parameter_names(model)))
 
     def sigma(self, fps: float | None = None, body: BodyModel | None = None) -> Array | None:
         """(D,) the session's own σ0 from frame to frame at `fps` (default: its own), None without one.

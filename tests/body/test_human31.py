@@ -7,8 +7,9 @@ import cv2
 import numpy as np
 import pytest
 
+from studio.body.branches import within_limits
 from studio.body.catalogue import load_body
-from studio.body.forward_kinematics import limb_ends, limb_frames
+from studio.body.forward_kinematics import limb_ends, limb_frames, marker_points
 from studio.body.subject import fit_subject, subject_from_shape
 from studio.body.tables import kinematic_tables
 from studio.geometry.camera import Camera
@@ -66,11 +67,26 @@ def test_sigma_is_half_a_frames_largest_step_at_sixty_frames_a_second(lee_walk: 
     np.testing.assert_allclose(0.5 * steps / 60.0, sigma, rtol=1e-7)
 
 
-def test_the_initial_pose_is_within_the_limits(lee_walk: Path) -> None:
-    body, pose = load_body("human31"), _numbers(lee_walk / "InitialPose.txt")
+def test_the_initial_pose_lies_within_the_limits_once_it_is_written_on_their_branch(lee_walk: Path) -> None:
+    body, stated = load_body("human31"), _numbers(lee_walk / "InitialPose.txt")
+    pose = within_limits(body, stated)
     for entry, value in zip(body.parameters, pose, strict=True):
         assert entry.lower < value < entry.upper, entry.name
         assert entry.lower < entry.neutral < entry.upper, entry.name
+    changed = {
+        entry.name for entry, one, two in zip(body.parameters, stated, pose, strict=True) if one != two
+    }
+    assert changed == {
+        *("right_hip_rz", "right_knee_ry", "right_shoulder_rz", "right_elbow_ry"),
+        *("left_shoulder_rx", "left_shoulder_ry", "left_shoulder_rz", "left_elbow_ry"),
+    }
+    np.testing.assert_allclose(limb_ends(body, pose), limb_ends(body, stated), rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(marker_points(body, pose), marker_points(body, stated), rtol=0.0, atol=1e-9)
+    # A limb may only have turned by half a turn about its own axis.
+    for one, two in zip(limb_frames(body, pose)[0], limb_frames(body, stated)[0], strict=True):
+        relative = one[:, :3].T @ two[:, :3]
+        np.testing.assert_allclose(np.abs(relative), np.eye(3), atol=1e-9)
+        assert relative[2, 2] > 0.0
 
 
 def test_the_shape_file_gives_the_bodys_own_dimensions(lee_walk: Path) -> None:

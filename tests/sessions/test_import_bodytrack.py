@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from sources import everything_below
 
+from studio.body.forward_kinematics import limb_ends
 from studio.errors import BodyError
 from studio.sessions.importers.catalogue import import_source
 
@@ -32,7 +33,14 @@ def test_the_lee_walk(lee: Path, tmp_path: Path) -> None:
     assert start is not None
     assert sigma is not None
     assert slow is not None
-    np.testing.assert_array_equal(start, np.loadtxt(lee / "InitialPose.txt").ravel())
+    # The file keeps the data's numbers; what is read is the same attitude within the body's limits.
+    initial = np.loadtxt(lee / "InitialPose.txt").ravel()
+    written = np.loadtxt(session.path / "start_pose.csv", delimiter=",", skiprows=1)
+    np.testing.assert_array_equal(written, initial)
+    ends = [limb_ends(session.body(), pose) for pose in (start, initial)]
+    np.testing.assert_allclose(ends[0], ends[1], rtol=0.0, atol=1e-9)
+    for entry, value in zip(session.body().parameters, start, strict=True):
+        assert entry.lower <= value <= entry.upper, entry.name
     stated = np.array((lee / "PoseParameters.txt").read_text().split(), float)[:31]
     np.testing.assert_allclose(sigma, stated)
     np.testing.assert_allclose(slow, 3.0 * stated)

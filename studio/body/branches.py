@@ -1,0 +1,124 @@
+"""The same attitude in other angles: a pose rewritten into its body's limits, where it has another spelling there.
+
+One attitude of a body has several pose vectors: whole turns; of three angles α, β, γ about three different axes
+also α + π, π - β, γ + π; and a limb turned about its own axis by π whose hinge then bends the other way. Limits
+such as "a knee bends backwards" mean one of these spellings, and a pose from elsewhere may be written in another
+(the Lee walk's initial pose is, in both arms and the right leg).
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.forward_kinematics import joint_frames, marker_points
+from studio.body.model import TURN, BodyModel, Joint
+from studio.body.tables import kinematic_tables
+
+Array = NDArray[np.float64]
+
+# How far (mm; and share of a limb's cross-section) a rewritten body may differ: rounding and nothing else.
+SAME = 1e-6
+
+# A limit where there is none.
+BOUNDLESS = 1e12
+
+
+def within_limits(body: BodyModel, pose: Array) -> Array:
+    """(D,) the same attitude within the body's limits, or with the least excess that its spellings have.
+
+    pose : (D,) radians and mm, finite. Joints that keep their limits are left as they are. Axes, ends and
+    cross-sections of all drawn limbs and all markers stay where they are; frames may turn by π about a limb's axis.
+    """
+    lower, upper = _limits(body)
+    best = _wound(np.asarray(pose, dtype=np.float64), lower, upper)
+    here = _attitude(body, best)
+    for spellings in _joint_spellings(body):
+        written = best
+        for spelling in spellings:
+            other = _wound(spelling(written), lower, upper)
+            better = _excess(other, lower, upper) < _excess(best, lower, upper)
+            if better and np.allclose(_attitude(body, other), here, rtol=0.0, atol=SAME):
+                best = other
+    return best
+
+
+class _Spelling:
+    """One other way of writing a joint: maps a pose to a pose."""
+
+    def __init__(self, ball: tuple[int, ...], hinges: list[int], over: bool, turned: bool) -> None:
+        self.ball, self.hinges, self.over, self.turned = ball, hinges, over, turned
+
+    def __call__(self, pose: Array) -> Array:
+        first, second, third = self.ball
+        other = pose.copy()
+        if self.over:
+            other[first], other[second] = pose[first] + math.pi, math.pi - pose[second]
+            other[third] += math.pi
+        if self.turned:
+            other[third] += math.pi
+            other[self.hinges] = -pose[self.hinges]
+        return other
+
+
+def _joint_spellings(body: BodyModel) -> list[list[_Spelling]]:
+    """For each joint with three angles, parents first, what else it can be written as."""
+    found = []
+    for index, joint in enumerate(body.joints):
+        ball = _ball(joint)
+        if ball is None:
+            continue
+        hinges = [_hinge(child) for child in body.joints if child.parent == index]
+        bends = [parameter for parameter in hinges if parameter >= 0]
+        choices = [(True, False), (False, True), (True, True)] if bends else [(True, False)]
+        found.append([_Spelling(ball, bends, over, turned) for over, turned in choices])
+    return found
+
+
+def _ball(joint: Joint) -> tuple[int, ...] | None:
+    """The parameters of three turns in a row about three different axes, None where there are none."""
+    for first in range(len(joint.steps) - 2):
+        steps = joint.steps[first : first + 3]
+        driven = all(step.kind == TURN and step.parameter >= 0 for step in steps)
+        if driven and len({step.axis for step in steps}) == 3:
+            return tuple(step.parameter for step in steps)
+    return None
+
+
+def _hinge(joint: Joint) -> int:
+    """The parameter of a joint that has one angle and no more, else -1."""
+    driven = [step for step in joint.steps if step.parameter >= 0]
+    return driven[0].parameter if len(driven) == 1 and driven[0].kind == TURN else -1
+
+
+def _limits(body: BodyModel) -> tuple[Array, Array]:
+    """(D,) lower and upper limits; lengths and angles limited on one side count as unbounded."""
+    angles = np.array([entry.kind == "angle" for entry in body.parameters])
+    lower = np.array([entry.lower for entry in body.parameters])
+    upper = np.array([entry.upper for entry in body.parameters])
+    limited = angles & np.isfinite(lower) & np.isfinite(upper)
+    return np.where(limited, lower, -BOUNDLESS), np.where(limited, upper, BOUNDLESS)
+
+
+def _wound(pose: Array, lower: Array, upper: Array) -> Array:
+    """The pose with every angle that lies outside its limits taken by whole turns as near their middle as can be."""
+    middle = np.where((pose < lower) | (pose > upper), 0.5 * (lower + upper), pose)
+    return pose - 2.0 * math.pi * np.round((pose - middle) / (2.0 * math.pi))
+
+
+def _excess(pose: Array, lower: Array, upper: Array) -> float:
+    """How far a pose lies outside the limits, the sum over all angles."""
+    return float(np.maximum(np.maximum(lower - pose, pose - upper), 0.0).sum())
+
+
+def _attitude(body: BodyModel, pose: Array) -> Array:
+    """What is to be seen of a pose, as one flat array: limbs' ends, cross-sections and markers."""
+    tables = kinematic_tables(body)
+    frames = joint_frames(body, pose)[0]
+    limbs = frames[tables.limb_joint]
+    ends = limbs[..., 3] + limbs[..., 2] * tables.limb_shape[:, :1]
+    across = limbs[..., :2] * tables.limb_shape[:, None, 3:]
+    sections = across @ across.transpose(0, 2, 1)
+    return np.concatenate(
+        [limbs[..., 3].ravel(), ends.ravel(), sections.ravel(), marker_points(body, pose).ravel()]
+    )
