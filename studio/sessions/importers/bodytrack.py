@@ -36,8 +36,8 @@ def plan_bodytrack(source: Path, calibration: Path | str | None) -> SourcePlan:
     """What such a folder holds. Raises BodyError for parameter files that do not fit the body."""
     body = load_body(BODY)
     count = len(body.parameters)
-    shape = _numbers(source / SHAPE)
-    sigma = _numbers(source / PARAMETERS, SIGMA_MIN_MAX * count)
+    shape = read_numbers(source / SHAPE)
+    sigma = read_numbers(source / PARAMETERS, SIGMA_MIN_MAX * count)
     return SourcePlan(
         source=source,
         calibration=choose_calibration(source, calibration),
@@ -45,7 +45,7 @@ def plan_bodytrack(source: Path, calibration: Path | str | None) -> SourcePlan:
         masks=_folders(source, "FG"),
         fps=RATE,
         subject=None if shape is None else subject_from_shape(body, shape),
-        start_pose=_numbers(source / START, count),
+        start_pose=read_numbers(source / START, count),
         sigma=None if sigma is None else sigma[:count],
         sigma_fps=RATE,
         notes=(
@@ -64,8 +64,11 @@ def _folders(source: Path, prefix: str) -> tuple[Path, ...]:
     return tuple(sorted(found, key=lambda path: natural_key(path.name)))
 
 
-def _numbers(path: Path, count: int | None = None) -> Array | None:
-    """The flat list of numbers in a file, None where there is no such file."""
+def read_numbers(path: Path, count: int | None = None) -> Array | None:
+    """The flat list of numbers in a file, None where there is no such file.
+
+    count : how many there must be. Raises BodyError naming the file and what is wrong with it.
+    """
     if not path.is_file():
         return None
     try:
