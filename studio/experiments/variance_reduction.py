@@ -26,7 +26,7 @@ ENOUGH = 0.8
 SETTINGS = {"layers": 15, "particles": 200, "survival": 0.4, "crossover": 0.0}
 PLANNED = {"adaptive_diffusion": False}
 # Noise that outweighs selection in every joint.
-LOUD = {"adaptive_diffusion": False, "diffusion_scale": 5.0, "limits": "ignore"}
+LOUD = {"adaptive_diffusion": False, "diffusion_scale": 5.0, "constraints": "ignore"}
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,9 +1,10 @@
-"""What a tracker needs to know of a body: names, limits, σ0 and which parameters belong to one limb."""
+"""What a tracker needs to know of a body: names, limits, σ0, which parameters belong to one limb, and the tree."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.model import BodyModel
+from studio.runs.hierarchy import hierarchy_of
 from studio.tracking.tracker import SearchSpace
 
 Array = NDArray[np.float64]
@@ -30,6 +31,7 @@ def search_space(body: BodyModel, sigma: Array) -> SearchSpace:
         upper=np.array([entry.upper for entry in body.parameters]),
         sigma=sigma,
         limb=np.array([number[limb] for limb in limbs], dtype=np.int64),
+        hierarchy=hierarchy_of(body),
     )
 
 

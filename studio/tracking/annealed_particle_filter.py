@@ -20,16 +20,19 @@ from numpy.typing import NDArray
 from studio.tracking.annealing import anneal
 from studio.tracking.crossover import cross
 from studio.tracking.diffusion import (
-    diffuse,
-    diffuse_proportionally,
-    diffuse_shrunk,
+    Spread,
+    noise_about,
     planned_sigma,
-    within_limits,
+    proportional_noise,
+    shrunk_noise,
 )
 from studio.tracking.layer_record import layer_record
 from studio.tracking.particles import (
     estimate,
     expected,
+    first_draw,
+    settle,
+    settled_first,
     uniform_poses,
     unweighted,
     weigh,
@@ -62,8 +65,8 @@ class AnnealedParticleFilter:
             return unweighted(uniform_poses(rng, settings.particles, space))
         survivors = _carried_poses(rng, previous.particles, settings)
         predicted = expected(survivors, previous, settings.dynamics)
-        poses = diffuse(rng, predicted, space.sigma * settings.diffusion_scale)
-        return unweighted(within_limits(poses, space, settings.limits))
+        spread = noise_about(predicted, space.sigma * settings.diffusion_scale)
+        return first_draw(spread, spread.draw(rng), space, settings)
 
     def step_layer(
         self,
@@ -75,7 +78,10 @@ class AnnealedParticleFilter:
         settings: AnnealedSettings,
     ) -> tuple[ParticleSet, LayerRecord]:
         """Steps 3 to 5: weigh (Eq. 3, 6, 11, 12), draw, cross (Eq. 19) and spread (Eq. 7, 13 or 18)."""
-        raw, eligible = weigh(problem, particles.poses, settings.limits)
+        if layer == 0:
+            sigma = space.sigma * settings.diffusion_scale
+            particles = settled_first(rng, particles, problem, space, sigma, settings)
+        raw, eligible = weigh(problem, particles.poses, settings)
         wanted = layer_survivals(settings, layer + 1)[-1]
         annealed = anneal(eligible, wanted)
         weighted = ParticleSet(particles.poses, annealed.log_weights, raw, particles.extra)
@@ -83,8 +89,8 @@ class AnnealedParticleFilter:
             kept = weighted_variance(weighted)
             return weighted, layer_record(layer, weighted, annealed, wanted, resampled=kept, diffused=kept)
         survivors = _survivors(rng, weighted, space, settings)
-        spread = _spread(rng, survivors, layer, space, settings)
-        poses = within_limits(spread, space, settings.limits)
+        spread = _spread(survivors, layer, space, settings)
+        poses = settle(rng, spread, spread.draw(rng), survivors, problem, space, settings)
         record = layer_record(
             layer, weighted, annealed, wanted, resampled=survivors.var(axis=0), diffused=poses.var(axis=0)
         )
@@ -121,14 +127,12 @@ def _survivors(
     return cross(rng, first, second, space, share=settings.crossover, by=settings.crossover_by)
 
 
-def _spread(
-    rng: np.random.Generator, survivors: Array, layer: int, space: SearchSpace, settings: AnnealedSettings
-) -> Array:
-    """(N, D) survivors plus B_m: planned (Eq. 13) or following their own covariance (Eq. 18)."""
+def _spread(survivors: Array, layer: int, space: SearchSpace, settings: AnnealedSettings) -> Spread:
+    """Survivors (N, D) plus B_m: planned (Eq. 13) or following their own covariance (Eq. 18)."""
     if not settings.adaptive_diffusion:
         survivals = layer_survivals(settings, layer + 1)
         sigma = planned_sigma(space.sigma * settings.diffusion_scale, survivals, settings.diffusion_decay)
-        return diffuse(rng, survivors, sigma)
+        return noise_about(survivors, sigma)
     if settings.diffusion_form == "shrink":
-        return diffuse_shrunk(rng, survivors, settings.diffusion_fraction, settings.diffusion_covariance)
-    return diffuse_proportionally(rng, survivors, settings.diffusion_constant, settings.diffusion_covariance)
+        return shrunk_noise(survivors, settings.diffusion_fraction, settings.diffusion_covariance)
+    return proportional_noise(survivors, settings.diffusion_constant, settings.diffusion_covariance)

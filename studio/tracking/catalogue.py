@@ -2,9 +2,11 @@
 
 from studio.tracking.annealed_particle_filter import AnnealedParticleFilter
 from studio.tracking.condensation import Condensation
+from studio.tracking.particle_swarm import ParticleSwarm
 from studio.tracking.tracker import Tracker
 
 TRACKERS: dict[str, Tracker] = {
     "annealed": AnnealedParticleFilter(),
     "condensation": Condensation(),
+    "swarm": ParticleSwarm(),
 }

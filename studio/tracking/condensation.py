@@ -15,9 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.tracking.annealing import Annealed, anneal, normalised, survival_rate
-from studio.tracking.diffusion import diffuse, within_limits
+from studio.tracking.diffusion import noise_about
 from studio.tracking.layer_record import layer_record
-from studio.tracking.particles import estimate, expected, uniform_poses, unweighted, weigh, weighted_variance
+from studio.tracking.particles import (
+    estimate,
+    expected,
+    first_draw,
+    settled_first,
+    uniform_poses,
+    unweighted,
+    weigh,
+    weighted_variance,
+)
 from studio.tracking.resampling import draw
 from studio.tracking.settings import CondensationSettings
 from studio.tracking.tracker import Carried, Estimate, FrameProblem, LayerRecord, ParticleSet, SearchSpace
@@ -48,8 +57,9 @@ class Condensation:
             return unweighted(uniform_poses(rng, settings.particles, space))
         drawn = draw(rng, np.exp(last.log_weights), settings.particles, settings.resampling)
         predicted = expected(last.poses[drawn], previous, settings.dynamics)
-        poses = diffuse(rng, predicted, space.sigma * settings.diffusion_scale)
-        return unweighted(within_limits(poses, space, settings.limits), last.extra)
+        spread = noise_about(predicted, space.sigma * settings.diffusion_scale)
+        first = first_draw(spread, spread.draw(rng), space, settings)
+        return ParticleSet(first.poses, first.log_weights, extra=last.extra | first.extra)
 
     def step_layer(
         self,
@@ -61,7 +71,9 @@ class Condensation:
         settings: CondensationSettings,
     ) -> tuple[ParticleSet, LayerRecord]:
         """Weigh every particle (section 2.1, step 3), with the scale chosen or still being chosen."""
-        raw, eligible = weigh(problem, particles.poses, settings.limits)
+        sigma = space.sigma * settings.diffusion_scale
+        particles = settled_first(rng, particles, problem, space, sigma, settings)
+        raw, eligible = weigh(problem, particles.poses, settings)
         scales = particles.extra.get(SCALES, np.zeros(0))
         wanted = float("nan")
         if len(scales) < settings.scale_frames:

@@ -14,11 +14,10 @@ gained is lost.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-
-from studio.tracking.tracker import SearchSpace
 
 Array = NDArray[np.float64]
 
@@ -34,50 +33,56 @@ def planned_sigma(sigma: Array, survivals: Sequence[float], decay: str) -> Array
     return sigma * (np.sqrt(product) if decay == "variance" else product)
 
 
-def diffuse(rng: np.random.Generator, poses: Array, sigma: Array) -> Array:
+@dataclass(frozen=True, slots=True, eq=False)
+class Spread:
+    """Gaussian noise about N places, which may be drawn again for some of them.
+
+    centres : (N, D). scale : a factor of all noise. deviation : (D,) standard deviations. turn : (D, D) makes
+    independent normals (in its rows' space) correlated before they are multiplied by `deviation`; None: they
+    stay independent.
+    """
+
+    centres: Array
+    scale: float
+    deviation: Array
+    turn: Array | None = None
+
+    def draw(self, rng: np.random.Generator, rows: NDArray[np.int64] | None = None) -> Array:
+        """(K, D) poses about the centres of some rows, of all if None."""
+        centres = self.centres if rows is None else self.centres[rows]
+        normal = rng.standard_normal(centres.shape)
+        if self.turn is not None:
+            normal = normal @ self.turn
+        return centres + self.scale * (normal * self.deviation)
+
+
+def noise_about(poses: Array, sigma: Array) -> Spread:
     """Poses (N, D) plus Gaussian noise of standard deviation sigma (D,) (Eq. 7, 9)."""
-    return poses + rng.standard_normal(poses.shape) * sigma
+    return Spread(poses, 1.0, sigma)
 
 
-def diffuse_shrunk(rng: np.random.Generator, poses: Array, fraction: float, covariance: str) -> Array:
+def shrunk_noise(poses: Array, fraction: float, covariance: str) -> Spread:
     """Poses (N, D) spread anew without changing their mean and covariance in expectation.
 
     fraction : h, noise as a share of the sample's standard deviation. covariance : "diagonal" or "full".
     """
     mean = poses.mean(axis=0)
     kept = mean + np.sqrt(1.0 - fraction * fraction) * (poses - mean)
-    return kept + fraction * _sample_noise(rng, poses, covariance)
+    return Spread(kept, fraction, *_sample_noise(poses, covariance))
 
 
-def diffuse_proportionally(rng: np.random.Generator, poses: Array, constant: float, covariance: str) -> Array:
+def proportional_noise(poses: Array, constant: float, covariance: str) -> Spread:
     """Poses (N, D) plus noise of covariance `constant` × their own (Eq. 18 as written)."""
-    return poses + np.sqrt(constant) * _sample_noise(rng, poses, covariance)
+    return Spread(poses, float(np.sqrt(constant)), *_sample_noise(poses, covariance))
 
 
-def _sample_noise(rng: np.random.Generator, poses: Array, covariance: str) -> Array:
-    """(N, D) Gaussian noise with the sample's own variances, or its whole covariance (Eq. 18's sum over
-    N).
-    """
-    normal = rng.standard_normal(poses.shape)
+def _sample_noise(poses: Array, covariance: str) -> tuple[Array, Array | None]:
+    """Deviation and turn of noise with the sample's variances, or its whole covariance (Eq. 18's sum over N)."""
     deviation = poses.std(axis=0)
     if covariance == "diagonal":
-        return normal * deviation
+        return deviation, None
     # Scaled to unit variances first: millimetres beside radians would drown the small eigenvalues.
     unit = np.where(deviation > 0.0, deviation, 1.0)
     centred = (poses - poses.mean(axis=0)) / unit
     values, vectors = np.linalg.eigh(centred.T @ centred / len(poses))
-    return (normal * np.sqrt(np.maximum(values, 0.0))) @ vectors.T * unit
-
-
-def within_limits(poses: Array, space: SearchSpace, limits: str) -> Array:
-    """Poses (N, D) brought back into [lower, upper].
-
-    limits : "clamp" sets a parameter beyond a limit on it; "reflect" mirrors it at the limit (and clamps what
-    is then beyond the other one); "ignore" changes nothing. NaN never arises, infinite limits do nothing.
-    """
-    if limits == "ignore":
-        return poses
-    if limits == "reflect":
-        poses = np.where(poses < space.lower, 2.0 * space.lower - poses, poses)
-        poses = np.where(poses > space.upper, 2.0 * space.upper - poses, poses)
-    return np.clip(poses, space.lower, space.upper)
+    return unit, np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T

@@ -8,6 +8,7 @@ from typing import Any
 
 from studio.errors import NotFoundError, SettingsError
 from studio.knobs import changed
+from studio.tracking import partitions
 from studio.tracking.catalogue import TRACKERS
 
 # Table 1: 10 particles × 20 iterations, then 20 × 40.
@@ -39,8 +40,7 @@ def knobs_for_evaluations(tracker: str, evaluations: int, layers: int = 10) -> d
             f"{evaluations} evaluations a frame are too few for the tracker '{tracker}'.",
             f"Give it {smallest} or more.",
         )
-    if tracker in TRACKERS:
-        changed(TRACKERS[tracker].settings_type(), knobs)
+    changed(TRACKERS[tracker].settings_type(), knobs)
     return knobs
 
 
@@ -51,8 +51,7 @@ def evaluations_of(tracker: str, settings: Any) -> int:  # noqa: ANN401 - any tr
     if tracker == "condensation":
         return settings.particles
     if tracker == "swarm":
-        first = settings.stage1_particles * settings.stage1_iterations
-        return first + settings.stage2_particles * settings.stage2_iterations
+        return partitions.evaluations(settings)
     raise NotFoundError(f"There is no tracker '{tracker}'.", f"Known: {', '.join(sorted(TRACKERS))}.")
 
 

@@ -4,9 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.errors import RunError
+from studio.tracking.diffusion import Spread, noise_about
+from studio.tracking.hard_priors import Proposals, Rules, possible, settled
 from studio.tracking.tracker import Carried, Estimate, FrameProblem, ParticleSet, SearchSpace
 
 Array = NDArray[np.float64]
+
+CAME_FROM = "came_from"
 
 
 def unweighted(poses: Array, extra: dict[str, Array] | None = None) -> ParticleSet:
@@ -37,23 +41,79 @@ def expected(poses: Array, previous: Carried, dynamics: str) -> Array:
     return poses + (previous.estimate - previous.previous_estimate)
 
 
-def weigh(problem: FrameProblem, poses: Array, limits: str) -> tuple[Array, Array]:
+def weigh(problem: FrameProblem, poses: Array, rules: Rules) -> tuple[Array, Array]:
     """(N,) raw log w, and (N,) the same with -inf for particles that the body cannot take.
 
-    Where the body can take none of them, or limits are ignored, all may survive. Raises RunError for a weight
-    that is not finite.
+    Where the body can take none of them, or constraints are ignored, all may survive. Raises RunError for a
+    weight that is not finite.
     """
-    raw = np.asarray(problem.weigh(poses), dtype=np.float64)
-    if raw.shape != (len(poses),) or not np.isfinite(raw).all():
+    raw = checked_values(problem.weigh(poses), len(poses))
+    if rules.constraints == "ignore":
+        return raw, raw
+    taken = possible(problem, poses, rules)
+    return raw, np.where(taken, raw, -np.inf) if taken.any() else raw
+
+
+def checked_values(values: Array, count: int) -> Array:
+    """What a weighting gave for `count` poses, as float64; raises RunError unless it is that many finite numbers."""
+    raw = np.asarray(values, dtype=np.float64)
+    if raw.shape != (count,) or not np.isfinite(raw).all():
         wrong = raw[~np.isfinite(raw)]
         raise RunError(
             f"The weighting gave {wrong[0] if wrong.size else raw.shape} for a pose.",
             "Check the calibration and the start pose, or report this as a fault of the weighting.",
         )
-    if limits == "ignore":
-        return raw, raw
-    possible = problem.feasible(poses)
-    return raw, np.where(possible, raw, -np.inf) if possible.any() else raw
+    return raw
+
+
+def first_draw(spread: Spread, drawn: Array, space: SearchSpace, rules: Rules) -> ParticleSet:
+    """The unweighted set that a filter's frame begins with, from the poses (N, D) `drawn` about predictions.
+
+    Whether limbs are apart is not known before the frame's problem is: with "redraw" the places that the
+    particles came from travel with the set, for `settled_first`.
+    """
+    if rules.constraints == "clamp":
+        drawn = np.clip(drawn, space.lower, space.upper)
+    came_from = {CAME_FROM: spread.centres} if rules.constraints == "redraw" else {}
+    return unweighted(drawn, came_from)
+
+
+def settled_first(
+    rng: np.random.Generator,
+    particles: ParticleSet,
+    problem: FrameProblem,
+    space: SearchSpace,
+    sigma: Array,
+    rules: Rules,
+) -> ParticleSet:
+    """A frame's first set with what is impossible drawn again; unchanged where nothing says whence it came."""
+    extra = {name: value for name, value in particles.extra.items() if name != CAME_FROM}
+    if CAME_FROM not in particles.extra:
+        return particles
+    spread = noise_about(particles.extra[CAME_FROM], sigma)
+    first = settle(rng, spread, particles.poses, spread.centres, problem, space, rules)
+    return ParticleSet(first, particles.log_weights, particles.raw_log_weights, extra)
+
+
+def settle(
+    rng: np.random.Generator,
+    spread: Spread,
+    drawn: Array,
+    came_from: Array,
+    problem: FrameProblem,
+    space: SearchSpace,
+    rules: Rules,
+) -> Array:
+    """(N, D) poses `drawn` from a spread, as the rules let them stand."""
+    done = settled(
+        problem,
+        space,
+        rules,
+        Proposals.at(drawn),
+        came_from,
+        lambda rows: Proposals.at(spread.draw(rng, rows)),
+    )
+    return done.poses
 
 
 def weighted_mean(particles: ParticleSet) -> Array:

@@ -1,54 +1,12 @@
-"""The knobs of every tracker, one line each; sliders, options, checks and the guide are made from these
+"""The knobs of the particle filters, one line each; sliders, options, checks and the guide are made from these
 lines.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 from studio.errors import SettingsError
 from studio.knobs import knob
-
-
-def _scale(default: float = 1.0) -> Any:  # noqa: ANN401 - a dataclass field, as `knob` returns it
-    return knob(
-        default, 0.1, 5.0, 0.05, label="diffusion scale", takes_effect="next layer",
-        help="Multiplies σ0, the largest expected movement from one frame to the next (Eq. 9).",
-    )  # fmt: skip
-
-
-def _dynamics() -> Any:  # noqa: ANN401
-    return knob(
-        "none", choices=("none", "constant_velocity"), takes_effect="next frame",
-        help="What a frame expects before it looks (Eq. 10): the last pose, or the last movement going on.",
-    )  # fmt: skip
-
-
-def _estimate() -> Any:  # noqa: ANN401
-    return knob(
-        "mean", choices=("mean", "mode"), takes_effect="next layer",
-        help="The pose that is reported: the particles' weighted mean (Eq. 8) or the best of them (Eq. 2).",
-    )  # fmt: skip
-
-
-def _limits() -> Any:  # noqa: ANN401
-    return knob(
-        "clamp", choices=("clamp", "reflect", "ignore"), label="joint limits", takes_effect="next layer",
-        help="What becomes of a particle beyond a limit: set on it, mirrored at it, or left where it is.",
-    )  # fmt: skip
-
-
-def _resampling() -> Any:  # noqa: ANN401
-    return knob(
-        "systematic", choices=("systematic", "multinomial"), takes_effect="next layer",
-        help="How survivors are drawn: evenly spaced (least noise) or one by one as the paper writes it.",
-    )  # fmt: skip
-
-
-def _start_repeats(default: int = 2) -> Any:  # noqa: ANN401
-    return knob(
-        default, 1, 20, 1, label="searches of the first frame", takes_effect="new run",
-        help="How often the first frame is searched over, each search starting where the one before ended.",
-    )  # fmt: skip
+from studio.tracking import shared_knobs
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +50,7 @@ class AnnealedSettings:
         "diagonal", choices=("diagonal", "full"), label="covariance",
         help="Whether adaptive noise follows each parameter on its own or all of them together.",
     )  # fmt: skip
-    diffusion_scale: float = _scale()
+    diffusion_scale: float = shared_knobs.diffusion_scale()
     diffusion_decay: str = knob(
         "variance", choices=("variance", "deviation"), label="decay of Eq. 13",
         help="Without adaptive diffusion: what the survival rates of the layers multiply, σ0² or σ0.",
@@ -106,11 +64,12 @@ class AnnealedSettings:
         takes_effect="next frame",
         help="What the next frame starts from: every particle (Eq. 9), survivors by weight, or the best one.",
     )  # fmt: skip
-    dynamics: str = _dynamics()
-    estimate: str = _estimate()
-    limits: str = _limits()
-    resampling: str = _resampling()
-    start_repeats: int = _start_repeats()
+    dynamics: str = shared_knobs.dynamics()
+    estimate: str = shared_knobs.estimate()
+    constraints: str = shared_knobs.constraints("clamp")
+    limbs_apart: bool = shared_knobs.limbs_apart(False)
+    resampling: str = shared_knobs.resampling()
+    start_repeats: int = shared_knobs.start_repeats()
 
     def __post_init__(self) -> None:
         """Raise SettingsError unless `survival_per_layer` is empty or a list of rates in range."""
@@ -134,12 +93,13 @@ class CondensationSettings:
         5, 1, 100, 1, label="frames for the scale", takes_effect="next frame",
         help="How many weighings choose the likelihood's scale (their geometric mean), which then stays.",
     )  # fmt: skip
-    diffusion_scale: float = _scale()
-    dynamics: str = _dynamics()
-    estimate: str = _estimate()
-    limits: str = _limits()
-    resampling: str = _resampling()
-    start_repeats: int = _start_repeats()
+    diffusion_scale: float = shared_knobs.diffusion_scale()
+    dynamics: str = shared_knobs.dynamics()
+    estimate: str = shared_knobs.estimate()
+    constraints: str = shared_knobs.constraints("clamp")
+    limbs_apart: bool = shared_knobs.limbs_apart(False)
+    resampling: str = shared_knobs.resampling()
+    start_repeats: int = shared_knobs.start_repeats()
 
 
 def layer_survivals(settings: AnnealedSettings, layers: int) -> tuple[float, ...]:

@@ -17,12 +17,28 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Hierarchy:
+    """How the pose vector hangs together, for searches that take a part of it at a time; all arrays are (D,).
+
+    depth : int, 0 for the root's parameters, 1 for what is nearest to it (trunk, head, hips, shoulders), 2 for
+    the rest of each limb. position : bool, the root's lengths. subspace : int, 0, 1, … in the order of the tree:
+    position, orientation, then every limb's nearer and farther part. pair : int, parameters of arms or legs have
+    the number of their kind (both legs the same), all others -1.
+    """
+
+    depth: NDArray[np.int64]
+    position: NDArray[np.bool_]
+    subspace: NDArray[np.int64]
+    pair: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class SearchSpace:
     """What a tracker knows of the pose vector.
 
     names : D parameter names. lower, upper : (D,) limits, ±inf where unbounded. sigma : (D,) σ0, the standard
     deviation of the diffusion from one frame to the next (mm, rad). limb : (D,) int, equal numbers belong to
-    one limb and are neighbours (crossover by whole limbs).
+    one limb and are neighbours (crossover by whole limbs). hierarchy : the body's tree (a swarm's partitions).
     """
 
     names: tuple[str, ...]
@@ -30,6 +46,7 @@ class SearchSpace:
     upper: Array
     sigma: Array
     limb: NDArray[np.int64]
+    hierarchy: Hierarchy
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +93,7 @@ class LayerRecord:
     """All that a person may want to look at of one layer.
 
     frame, layer : layer counts from 0. settings_version : of the settings in use. beta : exponent of Eq. 3.
-    alpha_wanted, alpha_reached : survival rate (Eq. 12), wanted is NaN for trackers without one.
+    alpha_wanted, alpha_reached : survival rate (Eq. 12). All three are NaN for trackers without them (a swarm).
     variance_weighed, variance_resampled, variance_diffused : (D,) variance of every parameter over the set as
     it was weighed, after resampling (before noise), and after noise (Fig. 12 a/d, b/e, c/f). In a frame's
     last layer nothing is diffused: variance_diffused equals variance_resampled. best, mean : (D,) best

@@ -80,9 +80,7 @@ def test_a_start_without_a_pose_needs_limits() -> None:
 def test_variance_falls_as_a_gaussian_says(alpha: float) -> None:
     # Cloud of variance s², w^β = exp(-β x²): with b = 2 β s², α = √(1 + 2b) / (1 + b) fixes b, and the
     # survivors' variance is s² / (1 + b); shrinking keeps it. So every layer narrows by the same factor.
-    space = SearchSpace(
-        ("x",), np.array([-np.inf]), np.array([np.inf]), np.ones(1), np.zeros(1, dtype=np.int64)
-    )
+    space = toy_space(1, limit=np.inf, sigma=1.0)
     settings = AnnealedSettings(layers=5, particles=40000, survival=alpha, crossover=0.0)
     b = (1 - alpha**2 + np.sqrt(1 - alpha**2)) / alpha**2
     previous = Carried(ParticleSet(np.zeros((1, 1)), np.zeros(1)))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from toy_problems import toy_hierarchy
 
 from studio.tracking.crossover import cross, limb_places
 from studio.tracking.tracker import SearchSpace
@@ -11,7 +12,8 @@ def space_of(limbs: list[int]) -> SearchSpace:
     """A space whose parameters belong to the limbs given."""
     count = len(limbs)
     names = tuple(f"x{index}" for index in range(count))
-    return SearchSpace(names, np.full(count, -1.0), np.full(count, 1.0), np.ones(count), np.array(limbs))
+    ones = np.ones(count)
+    return SearchSpace(names, -ones, ones, ones, np.array(limbs), toy_hierarchy(count))
 
 
 def children(share: float, by: str, limbs: list[int], count: int = 20000, seed: int = 0) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from studio.tracking.tracker import SearchSpace
+from studio.tracking.tracker import Hierarchy, SearchSpace
 
 
 class Bowl:
@@ -34,6 +34,14 @@ class HalfBowl(Bowl):
         return poses[:, 0] <= 0.0
 
 
+def toy_hierarchy(count: int = 6) -> Hierarchy:
+    """The first third of the parameters is the root (its first a length); then two limbs of a kind."""
+    third = max(count // 3, 1)
+    place = np.arange(count)
+    depth = np.minimum(place // third, 2)
+    return Hierarchy(depth, place == 0, place, np.where(depth > 0, 0, -1))
+
+
 def toy_space(count: int = 6, limit: float = 5.0, sigma: float = 0.3) -> SearchSpace:
     """`count` parameters within ±limit, three to a limb."""
     return SearchSpace(
@@ -42,4 +50,5 @@ def toy_space(count: int = 6, limit: float = 5.0, sigma: float = 0.3) -> SearchS
         np.full(count, limit),
         np.full(count, sigma),
         np.arange(count) // 3,
+        toy_hierarchy(count),
     )

@@ -1,0 +1,104 @@
+"""The knobs of the swarm (Fleischmann, Austvoll & Kwolek 2012, sections 2.3 and 2.4; defaults of Table 1)."""
+
+from dataclasses import dataclass
+
+from studio.errors import SettingsError
+from studio.knobs import knob
+from studio.tracking import shared_knobs
+
+PARTITIONS = ("soft", "soft-three", "hard-two", "hard-twelve", "global-local", "global")
+# Eq. 2 divides by N - 2.
+FEWEST_ITERATIONS = 3
+# Eq. 3 needs φ = c1 + c2 > 4.
+SMALLEST_C = 2.0
+TWELVE, KINDS_OF_LIMBS = 12, 2
+
+
+@dataclass(frozen=True, slots=True)
+class SwarmSettings:
+    """Knobs of the soft-partitioning particle swarm."""
+
+    title = "Particle swarm"
+
+    stage1_particles: int = knob(
+        10, 2, 2000, 1, label="particles, stage 1", takes_effect="next frame",
+        help="Particles of the first stage, which seeks the root: where the body stands and how it is turned.",
+    )  # fmt: skip
+    stage1_iterations: int = knob(
+        20, FEWEST_ITERATIONS, 400, 1, label="iterations, stage 1", takes_effect="next frame",
+        help="N of the first stage; the first iteration weighs the swarm as it was sampled.",
+    )  # fmt: skip
+    stage2_particles: int = knob(
+        20, 2, 2000, 1, label="particles, stage 2", takes_effect="next frame",
+        help="Particles of the stages after the first, which seek the whole pose.",
+    )  # fmt: skip
+    stage2_iterations: int = knob(
+        40, FEWEST_ITERATIONS, 400, 1, label="iterations, stage 2", takes_effect="next frame",
+        help="N of the stages after the first, together.",
+    )  # fmt: skip
+    c_first: float = knob(
+        2.05, 2.01, 4.0, 0.01, label="c at first",
+        help="c1 = c2 of a stage's second iteration (Eq. 2); above 2, and larger settles sooner.",
+    )  # fmt: skip
+    c_last: float = knob(
+        2.15, 2.01, 4.0, 0.01, label="c at last",
+        help="c1 = c2 of a stage's last iteration (Eq. 2); the constriction follows (Eq. 3).",
+    )  # fmt: skip
+    partition: str = knob(
+        "soft", choices=PARTITIONS, takes_effect="next frame",
+        help="What is sought first, and whether it may move later: each choice weighs as many poses.",
+    )  # fmt: skip
+    start_velocity: str = knob(
+        "uniform", choices=("uniform", "zero"), label="start velocity", takes_effect="next frame",
+        help="Velocities at a stage's start: drawn from -σ to σ as the paper has them, or zero.",
+    )  # fmt: skip
+    position_divisor: float = knob(
+        10.0, 1.0, 100.0, 0.5, label="position divisor", takes_effect="next frame",
+        help="What σ of the root's position is divided by in the soft stages after the first (2.4).",
+    )  # fmt: skip
+    diffusion_scale: float = shared_knobs.diffusion_scale()
+    dynamics: str = shared_knobs.dynamics()
+    estimate: str = knob(
+        "mode", choices=("mode", "mean"), takes_effect="next layer",
+        help="The pose that is reported: the best the swarm has found, or the mean of its particles' bests.",
+    )  # fmt: skip
+    constraints: str = shared_knobs.constraints("redraw")
+    limbs_apart: bool = shared_knobs.limbs_apart(True)
+    start_repeats: int = shared_knobs.start_repeats()
+
+    def __post_init__(self) -> None:
+        """Raise SettingsError for N <= 2 in any stage and for φ <= 4."""
+        for name in ("stage1_iterations", "stage2_iterations"):
+            _check_iterations(name, getattr(self, name), self._stages_sharing(name))
+        for name in ("c_first", "c_last"):
+            value = getattr(self, name)
+            if not value > SMALLEST_C:
+                raise SettingsError(
+                    f"Setting '{name}' cannot be {value:g}: Eq. 3 needs c1 + c2 above 4.",
+                    f"Give a number above {SMALLEST_C:g}.",
+                )
+        if self.partition == "hard-twelve":
+            _check_iterations("stage2_iterations", self.wanted_evaluations // self.stage1_particles, TWELVE)
+
+    @property
+    def wanted_evaluations(self) -> int:
+        """Poses weighed in a frame, but for the rounding of single partitions (`partitions.evaluations`)."""
+        return self.stage1_particles * self.stage1_iterations + self.stage2_particles * self.stage2_iterations
+
+    def _stages_sharing(self, name: str) -> int:
+        """How many stages the iterations are shared out to."""
+        shared = {
+            ("soft-three", "stage2_iterations"): 2,
+            ("global-local", "stage1_iterations"): KINDS_OF_LIMBS,
+        }
+        return shared.get((self.partition, name), 1)
+
+
+def _check_iterations(name: str, iterations: int, stages: int) -> None:
+    """Raise SettingsError if one of `stages` that share the iterations has fewer than Eq. 2 needs."""
+    if iterations // stages < FEWEST_ITERATIONS:
+        over = f" over {stages} stages" if stages > 1 else ""
+        raise SettingsError(
+            f"Setting '{name}' leaves {iterations} iterations{over}: Eq. 2 needs more than 2 in each.",
+            f"Ask for {FEWEST_ITERATIONS * stages} iterations or more.",
+        )
