@@ -9,6 +9,8 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 from studio.weighting.bodytrack import BodytrackSettings, BodytrackWeigher
 from studio.weighting.edge_region import EdgeRegionSettings, EdgeRegionWeigher
+from studio.weighting.edge_region_silhouette import EdgeRegionSilhouetteSettings, EdgeRegionSilhouetteWeigher
+from studio.weighting.edge_silhouette import EdgeSilhouetteSettings, EdgeSilhouetteWeigher
 from studio.weighting.problem import FrameFunction
 from studio.weighting.template import TemplateSettings, TemplateWeigher
 
@@ -39,6 +41,20 @@ WEIGHTINGS: dict[str, Weighting] = {
     entry.name: entry
     for entry in (
         Weighting("edge-region", "Edges and region", EdgeRegionSettings, "proximity", EdgeRegionWeigher),
+        Weighting(
+            "edge-silhouette",
+            "Edges and silhouette",
+            EdgeSilhouetteSettings,
+            "proximity",
+            EdgeSilhouetteWeigher,
+        ),
+        Weighting(
+            "edge-region-silhouette",
+            "Edges, region and silhouette",
+            EdgeRegionSilhouetteSettings,
+            "proximity",
+            EdgeRegionSilhouetteWeigher,
+        ),
         Weighting("bodytrack", "Benchmark's score", BodytrackSettings, "bodytrack", BodytrackWeigher),
         Weighting("template", "Template and silhouette", TemplateSettings, "none", TemplateWeigher),
     )

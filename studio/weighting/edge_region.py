@@ -46,8 +46,8 @@ from studio.weighting.edge_region_kernels import (
 )
 from studio.weighting.evidence_check import check_sizes, check_views
 from studio.weighting.hard_priors import HardPriors
-from studio.weighting.occlusion_kernels import all_hidden, chunk_hidden
 from studio.weighting.outlines import OutlineProjector
+from studio.weighting.visible_edges import hidden_samples, limb_sides
 
 Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
@@ -146,18 +146,28 @@ class EdgeRegionProblem:
 
     def weigh(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights, Eq. 17. Raises BodyError for poses that are no finite (N, D)."""
-        return self._evaluated(poses)[1]
+        outlines = self.weigher.projector.blocks(poses)
+        return self._evaluated(outlines, self.hidden(outlines), len(poses))[1]
 
     def terms(self, poses: Array) -> tuple[Array, Array]:
         """Σe and Σr, each (N, V), of poses (N, D)."""
-        terms = self._evaluated(poses)[0]
+        outlines = self.weigher.projector.blocks(poses)
+        return self.terms_of(outlines, self.hidden(outlines), len(poses))
+
+    def terms_of(
+        self, outlines: NDArray[np.float32], hidden: NDArray[np.uint64], count: int
+    ) -> tuple[Array, Array]:
+        """Σe and Σr, each (N, V), over the limbs in outlines (B, V, L, 160) of N = `count` poses; hidden : of the same
+        limbs.
+        """
+        terms = self._evaluated(outlines, hidden, count)[0]
         return terms[..., 0], terms[..., 1]
 
-    def _evaluated(self, poses: Array) -> tuple[Array, Array]:
+    def _evaluated(
+        self, outlines: NDArray[np.float32], hidden: NDArray[np.uint64], count: int
+    ) -> tuple[Array, Array]:
         """Terms (N, V, 2) and log-weights (N,)."""
-        weigher, settings = self.weigher, self.weigher.settings
-        outlines = weigher.projector.blocks(poses)
-        hidden = self.hidden(outlines)
+        settings = self.weigher.settings
         blocks, views = outlines.shape[:2]
         terms = np.empty((blocks, LANES, views, 2))
         log_weights = np.empty((blocks, LANES))
@@ -170,7 +180,7 @@ class EdgeRegionProblem:
             BLOCKS_A_THREAD,
             *(outlines, hidden, *chunks, self.maps.views, self.maps.values, weights, terms, log_weights),
         )
-        return terms.reshape(-1, views, 2)[: len(poses)], log_weights.ravel()[: len(poses)]
+        return terms.reshape(-1, views, 2)[:count], log_weights.ravel()[:count]
 
     def recorded_indices(self, outlines: NDArray[np.float32]) -> tuple[Words, Words]:
         """The pixels that the kernel reads, for the benchmark and for tests: (B, V, 16, L, chunks, lines, 16) of
@@ -189,10 +199,9 @@ class EdgeRegionProblem:
         blocks, views, limbs = outlines.shape[:3]
         if not self.weigher.settings.occlusion_aware:
             return np.zeros((0, views, limbs, EDGE_LINES, LANES), dtype=np.uint64)
-        hidden = np.empty((blocks, views, limbs, EDGE_LINES, LANES), dtype=np.uint64)
         samples = self.weigher.settings.edge_chunks * CHUNK
-        run_blocks(chunk_hidden, all_hidden, blocks, BLOCKS_A_THREAD, outlines, samples, hidden)
-        return hidden
+        hidden = hidden_samples(outlines, limb_sides(limbs), samples)
+        return hidden.reshape(blocks, views, limbs, EDGE_LINES, LANES)
 
     def fitness(self, poses: Array, stage: int = 0) -> Array:
         """(N,) the log-weights of poses (N, D): this weighting defines no other fitness."""

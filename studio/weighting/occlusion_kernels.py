@@ -1,8 +1,8 @@
-"""Which edge samples of a limb are hidden behind nearer limbs.
+"""Which samples on limbs' edges are hidden behind nearer limbs.
 
-A limb's outline in a view is convex, so the part of another limb's straight side that lies behind it is one
-interval, found by clipping the side against four half-planes. Limbs are ordered by the depth of their
-middles. Sixteen poses at a time, like the outlines.
+A limb's outline in a view is convex, so the part of another limb's straight edge that lies behind it is one
+interval, found by clipping the edge against four half-planes. Limbs are ordered by the depth of their
+middles. Sixteen poses at a time, like the outlines; pairs of limbs that lie apart in all of them are left out.
 """
 
 import numpy as np
@@ -56,61 +56,110 @@ def sample_bits(interval, samples):
     return ones << np.uint64(min(first, 63))
 
 
-@njit(**INLINED)
-def limb_hidden(outline, near, samples, hidden):
-    """Add to `hidden` (32,) the bits of both sides of a limb (160,) that another limb hides, where it is
-    nearer.
+@njit(**OPTIONS)
+def line_hidden(line, near, samples, bits):
+    """Add to `bits` (16,) those of a line (64,) that another limb (160,) hides, where it is nearer.
+
+    line : x and y of its first and of its last point, how its limb is seen, depth of its limb's middle.
     """
     for lane in range(LANES):
         corners = (
             near[lane], near[LANES + lane], near[2 * LANES + lane], near[3 * LANES + lane],
             near[4 * LANES + lane], near[5 * LANES + lane], near[6 * LANES + lane], near[7 * LANES + lane],
         )  # fmt: skip
-        a = outline[lane], outline[LANES + lane], outline[2 * LANES + lane], outline[3 * LANES + lane]
-        b = (
-            outline[6 * LANES + lane],
-            outline[7 * LANES + lane],
-            outline[4 * LANES + lane],
-            outline[5 * LANES + lane],
-        )
-        nearer = near[9 * LANES + lane] < outline[9 * LANES + lane]
-        both_seen = (near[8 * LANES + lane] > -HALF) & (outline[8 * LANES + lane] > -HALF)
-        a_bits = sample_bits(hidden_interval(a, corners), samples)
-        b_bits = sample_bits(hidden_interval(b, corners), samples)
-        nothing = np.uint64(0)
-        hidden[lane] |= a_bits if nearer & both_seen else nothing
-        hidden[LANES + lane] |= b_bits if nearer & both_seen else nothing
+        ends = line[lane], line[LANES + lane], line[2 * LANES + lane], line[3 * LANES + lane]
+        nearer = near[9 * LANES + lane] < line[5 * LANES + lane]
+        both_seen = (near[8 * LANES + lane] > -HALF) & (line[4 * LANES + lane] > -HALF)
+        found = sample_bits(hidden_interval(ends, corners), samples)
+        bits[lane] |= found if nearer & both_seen else np.uint64(0)
 
 
 @njit(**OPTIONS)
-def chunk_hidden(first, last, outlines, samples, hidden):
-    """Bits of the hidden edge samples of the blocks first..last - 1; hidden (B, V, L, 2, 16) uint64.
+def limb_boxes(outlines, block, view, boxes):
+    """Fill (L, 80) of sixteen poses: least and largest x and y of every limb's corners, depth of its middle."""
+    corners = np.zeros(outlines.shape[3], np.float32)
+    for limb in range(outlines.shape[2]):
+        for i in range(corners.shape[0]):
+            corners[i] = outlines[block, view, limb, i]
+        box = boxes[limb]
+        for lane in range(LANES):
+            ax, ay, bx, by = (
+                corners[lane],
+                corners[LANES + lane],
+                corners[2 * LANES + lane],
+                corners[3 * LANES + lane],
+            )
+            cx, cy = corners[4 * LANES + lane], corners[5 * LANES + lane]
+            ex, ey = corners[6 * LANES + lane], corners[7 * LANES + lane]
+            box[lane] = min(min(ax, bx), min(cx, ex))
+            box[LANES + lane] = max(max(ax, bx), max(cx, ex))
+            box[2 * LANES + lane] = min(min(ay, by), min(cy, ey))
+            box[3 * LANES + lane] = max(max(ay, by), max(cy, ey))
+            box[4 * LANES + lane] = corners[9 * LANES + lane]
 
-    samples : on each side of a limb, at most 64.
+
+@njit(**INLINED)
+def may_hide(box, near):
+    """Whether in any of sixteen poses a limb with box `near` (80,) is nearer and over one with `box`."""
+    count = 0
+    for lane in range(LANES):
+        across = (near[lane] <= box[LANES + lane]) & (box[lane] <= near[LANES + lane])
+        along = (near[2 * LANES + lane] <= box[3 * LANES + lane]) & (
+            box[2 * LANES + lane] <= near[3 * LANES + lane]
+        )
+        nearer = near[4 * LANES + lane] < box[4 * LANES + lane]
+        count += np.int64(across & along & nearer)
+    return count > 0
+
+
+@njit(**INLINED)
+def load_line(outlines, block, view, limb, first, last, line):
+    """Fill a line (96,) from one corner of a limb to another; see `line_hidden`."""
+    for i in range(2 * LANES):
+        line[i] = outlines[block, view, limb, np.uint64(2 * LANES) * first + np.uint64(i)]
+        line[2 * LANES + i] = outlines[block, view, limb, np.uint64(2 * LANES) * last + np.uint64(i)]
+        line[4 * LANES + i] = outlines[block, view, limb, 8 * LANES + i]
+
+
+@njit(**OPTIONS)
+def chunk_hidden(first, last, outlines, lines, samples, hidden):
+    """Bits of the hidden samples of the blocks first..last - 1; hidden (B, V, K, 16) uint64.
+
+    lines : (K, 3) limb, its corner where the line begins (0...3: A0 A1 B1 B0), its corner where it ends. samples :
+    on each line, at most 64.
     """
-    outline, near = np.zeros(outlines.shape[3], np.float32), np.zeros(outlines.shape[3], np.float32)
-    bits = np.zeros(2 * LANES, np.uint64)
+    line, near = np.zeros(6 * LANES, np.float32), np.zeros(outlines.shape[3], np.float32)
+    boxes = np.zeros((outlines.shape[2], 5 * LANES), np.float32)
+    bits = np.zeros(LANES, np.uint64)
     count = np.float32(samples)
     for block in range(first, last):
         for view in range(outlines.shape[1]):
-            for limb in range(outlines.shape[2]):
+            limb_boxes(outlines, block, view, boxes)
+            for number in range(lines.shape[0]):
+                limb = lines[number, 0]
+                load_line(
+                    outlines,
+                    block,
+                    view,
+                    limb,
+                    np.uint64(lines[number, 1]),
+                    np.uint64(lines[number, 2]),
+                    line,
+                )
                 bits[:] = np.uint64(0)
-                for i in range(outline.shape[0]):
-                    outline[i] = outlines[block, view, limb, i]
                 for other in range(outlines.shape[2]):
-                    if other == limb:
-                        continue
-                    for i in range(near.shape[0]):
-                        near[i] = outlines[block, view, other, i]
-                    limb_hidden(outline, near, count, bits)
+                    if other != limb and may_hide(boxes[limb], boxes[other]):
+                        for i in range(near.shape[0]):
+                            near[i] = outlines[block, view, other, i]
+                        line_hidden(line, near, count, bits)
                 for lane in range(LANES):
-                    hidden[block, view, limb, 0, lane] = bits[lane]
-                    hidden[block, view, limb, 1, lane] = bits[LANES + lane]
+                    hidden[block, view, number, lane] = bits[lane]
 
 
 @njit(parallel=True, **OPTIONS)
-def all_hidden(chunks, outlines, samples, hidden):
+def all_hidden(chunks, outlines, lines, samples, hidden):
     """`chunk_hidden` of all blocks, shared among `chunks` threads."""
     share = (hidden.shape[0] + chunks - 1) // chunks
     for chunk in prange(chunks):
-        chunk_hidden(chunk * share, min((chunk + 1) * share, hidden.shape[0]), outlines, samples, hidden)
+        last = min((chunk + 1) * share, hidden.shape[0])
+        chunk_hidden(chunk * share, last, outlines, lines, samples, hidden)

@@ -16,18 +16,13 @@ from studio.geometry.projection import project
 from studio.weighting.bodytrack import BodytrackSettings
 from studio.weighting.bodytrack_kernels import EDGE_STEP, INSIDE_STEP, LEAST
 from studio.weighting.edge_region import EdgeRegionSettings
-from studio.weighting.edge_region_kernels import (
-    CHUNK,
-    EDGE_LINES,
-    FIRST_STRIP,
-    LANES,
-    SECOND_STRIP,
-    THIRD_STRIP,
-)
-from studio.weighting.occlusion_kernels import chunk_hidden
+from studio.weighting.edge_region_kernels import CHUNK, FIRST_STRIP, SECOND_STRIP, THIRD_STRIP
+from studio.weighting.edge_silhouette import EdgeSilhouetteSettings
 from studio.weighting.outlines import OutlineProjector
+from studio.weighting.visible_edges import body_edges, hidden_samples, limb_sides
 
 Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 STRIPS = (float(FIRST_STRIP), float(SECOND_STRIP), float(THIRD_STRIP))
 CAP_POINTS = 13
@@ -64,13 +59,13 @@ def overlay_points(
     pose = np.asarray(pose, dtype=np.float64)
     projector = OutlineProjector.of_body(body, cameras)
     corners, seen = projector.corners(pose[None])
-    read = _edges_read(projector, pose, settings)
+    lines, visible = _edges_read(body, projector, pose, settings)
     names = tuple(limb.name for limb in body.drawn)
     found: list[ViewOverlay] = []
     for view, (camera, outlines, state) in enumerate(zip(cameras, corners[0], seen[0], strict=True)):
         edge, region = sample_points(outlines[state >= 0], settings)
-        if read is not None:
-            edge = edge[read[view, state >= 0].ravel()]
+        if lines is not None:
+            edge = _on_lines(outlines, lines, visible[view] & (state[lines[:, 0], None] >= 0))
         contours = _contours(body, camera, pose, outlines)
         found.append(
             ViewOverlay(
@@ -80,16 +75,32 @@ def overlay_points(
     return tuple(found)
 
 
-def _edges_read(projector: OutlineProjector, pose: Array, settings: Any) -> NDArray[np.bool_] | None:  # noqa: ANN401
-    """(V, L, 2, samples) whether an edge sample is in sight, where the weighting asks; None where it does not."""
-    if not isinstance(settings, EdgeRegionSettings) or not settings.occlusion_aware:
-        return None
+def _edges_read(
+    body: BodyModel,
+    projector: OutlineProjector,
+    pose: Array,
+    settings: Any,  # noqa: ANN401
+) -> tuple[IntArray | None, NDArray[np.bool_]]:
+    """Edges (K, 3) as in `visible_edges` and (V, K, samples) which of their samples are in sight, where the weighting
+    asks; None where it does not.
+    """
+    if isinstance(settings, EdgeSilhouetteSettings):
+        lines = body_edges(body).whole
+    elif isinstance(settings, EdgeRegionSettings) and settings.occlusion_aware:
+        lines = limb_sides(projector.limb_count)
+    else:
+        return None, np.zeros(0, dtype=np.bool_)
     samples = settings.edge_chunks * CHUNK
-    blocks = projector.blocks(pose[None])
-    hidden = np.empty((*blocks.shape[:3], EDGE_LINES, LANES), dtype=np.uint64)
-    chunk_hidden(0, 1, blocks, samples, hidden)
+    hidden = hidden_samples(projector.blocks(pose[None]), lines, samples)
     bits = hidden[0, ..., 0, None] >> np.arange(samples, dtype=np.uint64)
-    return (bits & np.uint64(1)) == 0
+    return lines, (bits & np.uint64(1)) == 0
+
+
+def _on_lines(outlines: Array, lines: IntArray, chosen: NDArray[np.bool_]) -> Array:
+    """(P, 2) the samples of edges (K, 3) of outlines (L, 4, 2) that are `chosen` (K, samples)."""
+    begin, end = outlines[lines[:, 0], lines[:, 1]], outlines[lines[:, 0], lines[:, 2]]
+    points = begin[:, None] + _middles(chosen.shape[1])[:, None] * (end - begin)[:, None]
+    return points[chosen]
 
 
 def sample_points(outlines: Array, settings: Any) -> tuple[Array, Array]:  # noqa: ANN401

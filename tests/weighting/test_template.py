@@ -8,7 +8,8 @@ from weighting_scene import inside_outline, looking_at, scattered
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
-from studio.weighting.template import BLOCKS_A_THREAD, TemplateSettings, TemplateWeigher
+from studio.weighting.silhouette_areas import BLOCKS_A_THREAD
+from studio.weighting.template import TemplateSettings, TemplateWeigher
 
 
 def drawn(corners, width, height):

@@ -10,10 +10,19 @@ from studio.evidence.pipeline import EDGE_KINDS
 from studio.evidence.settings import EvidenceSettings
 from studio.knobs import knobs_of
 from studio.weighting.catalogue import WEIGHTINGS
+from studio.weighting.problem import TRUNK_FIRST
+
+STAGED = ("edge-silhouette", "edge-region-silhouette")
 
 
 def test_the_names():
-    assert list(WEIGHTINGS) == ["edge-region", "bodytrack", "template"]
+    assert list(WEIGHTINGS) == [
+        "edge-region",
+        "edge-silhouette",
+        "edge-region-silhouette",
+        "bodytrack",
+        "template",
+    ]
     assert all(name == entry.name for name, entry in WEIGHTINGS.items())
 
 
@@ -29,19 +38,25 @@ def test_every_weighting_keeps_the_contract(name, human, ring, smooth):
     assert weights.dtype == np.float64
     assert np.isfinite(weights).all()
     assert len(np.unique(weights)) > 25
-    np.testing.assert_array_equal(problem.weigh(poses, stage=1), weights)
+    trunk_first = problem.weigh(poses, stage=TRUNK_FIRST)
+    assert np.isfinite(trunk_first).all()
+    assert np.array_equal(trunk_first, weights) == (name not in STAGED)
+    fitness = problem.fitness(poses)
+    assert fitness.shape == (33,)
+    assert np.isfinite(fitness).all()
+    np.testing.assert_array_equal(np.argsort(fitness), np.argsort(weights))
     np.testing.assert_array_equal(poses, before)
     assert problem.feasible(poses).shape == (33,)
     assert problem.weigh(np.zeros((0, 31))).shape == (0,)
 
 
 def test_settings_are_frozen_hashable_and_have_flat_names_of_their_own():
-    names = [entry.name for entry in knobs_of(EvidenceSettings)]
+    evidence = [entry.name for entry in knobs_of(EvidenceSettings)]
     for weighting in WEIGHTINGS.values():
         settings = weighting.settings_type()
         assert hash(settings) == hash(weighting.settings_type())
         assert dataclasses.is_dataclass(settings)
         with pytest.raises((dataclasses.FrozenInstanceError, TypeError)):
             settings.anything = 1
-        names += [entry.name for entry in knobs_of(weighting.settings_type)]
-    assert len(names) == len(set(names))
+        names = evidence + [entry.name for entry in knobs_of(weighting.settings_type)]
+        assert len(names) == len(set(names)), "within a run a name means one knob"

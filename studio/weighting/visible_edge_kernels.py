@@ -1,0 +1,119 @@
+"""The mean of the edge map along visible edges, for many poses (Fleischmann et al. 2012, section 2.2).
+
+An edge is a straight line of n samples, n a multiple of sixteen, from one corner of a limb's outline to another.
+As for Eq. 14 the first pass writes which entries of the map the samples fall on, the second adds those up. Maps are
+bytes, 255 on an edge, followed by two entries that add nothing: NOTHING_SEEN for a sample that falls on no pixel,
+which is counted all the same, and NOT_COUNTED for a hidden one.
+"""
+
+import numpy as np
+from numba import njit, prange
+
+from studio.weighting.edge_region_kernels import (
+    CHUNK,
+    HALF,
+    LANES,
+    NOT_COUNTED,
+    OPTIONS,
+    ZERO,
+    add_up,
+    as_pairs,
+    fill_clipped,
+    hide,
+    line_at,
+    pixel,
+    store_line,
+)
+
+BRIGHTEST = 255
+
+
+@njit(**OPTIONS)
+def edge_lines(outlines, block, view, corners, lines, samples):
+    """Fill lines (K, 64), four rows of sixteen lanes each, of all edges of sixteen poses in one view; pixels, half a
+    pixel on so that truncation rounds."""
+    ends = np.zeros(4 * LANES, np.float32)
+    for number in range(corners.shape[0]):
+        limb = corners[number, 0]
+        first = np.uint64(2 * LANES) * np.uint64(corners[number, 1])
+        last = np.uint64(2 * LANES) * np.uint64(corners[number, 2])
+        for i in range(2 * LANES):
+            ends[i] = outlines[block, view, limb, first + np.uint64(i)]
+            ends[2 * LANES + i] = outlines[block, view, limb, last + np.uint64(i)]
+        line = lines[number]
+        for lane in range(LANES):
+            x, y = ends[lane] + HALF, ends[LANES + lane] + HALF
+            edge = x, y, ends[2 * LANES + lane] + HALF - x, ends[3 * LANES + lane] + HALF - y
+            store_line(line, 0, lane, edge, edge, ZERO, samples)
+
+
+@njit(**OPTIONS)
+def fill_edge(line, indices, number, seen, view):
+    """Indices of an edge's samples, by how its limb is seen."""
+    if seen > HALF:
+        width = np.float32(view[2])
+        for chunk in range(indices.shape[1]):
+            for j in range(CHUNK):
+                indices[number, chunk, 0, j] = pixel(line, chunk * CHUNK + j, width)
+    else:
+        fill_clipped(line, view, seen < -HALF, indices, number, 0)
+
+
+@njit(**OPTIONS)
+def fill_edges(outlines, corners, hidden, block, view, lane, lines, views, indices):
+    """Indices (K, chunks, 1, 16) of all samples of one pose in one view; returns how many are hidden."""
+    not_counted = np.uint32(views[view, 2] * views[view, 3] + NOT_COUNTED)
+    lost = 0
+    for number in range(corners.shape[0]):
+        seen = outlines[block, view, corners[number, 0], 8 * LANES + lane]
+        fill_edge(line_at(lines, number, 0, lane), indices, number, seen, views[view])
+        bits = hidden[block, view, number, lane]
+        if bits:
+            lost += hide(bits, not_counted, indices, number, 0)
+    return lost
+
+
+@njit(**OPTIONS)
+def chunk_edges(first, last, outlines, corners, hidden, chunks, views, maps, found):
+    """Mean of the edge maps, 0...1, over the visible samples of the blocks first..last - 1; 0 where none is visible.
+
+    corners : (K, 3) limb, corner where the edge begins, corner where it ends. hidden : (B, V, K, 16) bits of hidden
+    samples. chunks : how many times sixteen samples an edge has. views : (V, 4) where a view's map begins, nothing,
+    width, height. found : (B, V, 16).
+    """
+    indices = np.zeros((corners.shape[0], chunks, 1, CHUNK), np.uint32)
+    pairs = as_pairs(indices)
+    lines = np.zeros((corners.shape[0], 4 * LANES), np.float32)
+    for block in range(first, last):
+        for view in range(outlines.shape[1]):
+            edge_lines(outlines, block, view, corners, lines, np.float32(chunks * CHUNK))
+            base = np.uint64(views[view, 0])
+            for lane in range(LANES):
+                lost = fill_edges(outlines, corners, hidden, block, view, lane, lines, views, indices)
+                mean = 0.0
+                if lost < indices.size:
+                    mean = add_up(maps, base, pairs) / (BRIGHTEST * (indices.size - lost))
+                found[block, view, lane] = mean
+
+
+@njit(parallel=True, **OPTIONS)
+def all_edges(threads, outlines, corners, hidden, chunks, views, maps, found):
+    """`chunk_edges` of all blocks, shared among threads."""
+    share = (found.shape[0] + threads - 1) // threads
+    for chunk in prange(threads):
+        last = min((chunk + 1) * share, found.shape[0])
+        chunk_edges(chunk * share, last, outlines, corners, hidden, chunks, views, maps, found)
+
+
+@njit(**OPTIONS)
+def record_edges(outlines, corners, hidden, views, indices):
+    """The index stream of `chunk_edges`: (B, V, 16, K, chunks, 1, 16). For tests."""
+    lines = np.zeros((corners.shape[0], 4 * LANES), np.float32)
+    samples = np.float32(indices.shape[4] * CHUNK)
+    for block in range(indices.shape[0]):
+        for view in range(indices.shape[1]):
+            edge_lines(outlines, block, view, corners, lines, samples)
+            for lane in range(LANES):
+                fill_edges(
+                    outlines, corners, hidden, block, view, lane, lines, views, indices[block, view, lane]
+                )

@@ -1,0 +1,126 @@
+"""The edges of a body that a picture may show, and how well an edge map agrees (Fleischmann et al. 2012, section 2.2).
+
+    f_e = mean of the edge map p, 0...1, over samples along the visible edges of the projected limbs
+
+Counted are the edges parallel to the limbs' axes, and "the upper edge of the torso ... because it provides a
+valuable hint for the z-location"; never the head's, whose "shape is only a very crude approximation". In the first
+stage of a search only the trunk's are. A trunk of several limbs has its upper edge where the last of them ends. A body
+without a trunk shows all its edges in both stages.
+
+Every edge has the same number of samples, evenly spread. What lies behind a nearer limb is left out of the mean; a
+sample outside the picture, or of a limb that cannot be projected, is not: it reads 0, so nothing is gained there. A
+view in which no edge is visible gives 0.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.model import BodyModel
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.weighting.block_threads import run_blocks
+from studio.weighting.edge_region_kernels import CHUNK, LANES, PADDING
+from studio.weighting.occlusion_kernels import all_hidden, chunk_hidden
+from studio.weighting.problem import TRUNK_FIRST
+from studio.weighting.visible_edge_kernels import all_edges, chunk_edges, record_edges
+
+Array = NDArray[np.float64]
+Bytes = NDArray[np.uint8]
+Floats = NDArray[np.float32]
+IntArray = NDArray[np.int64]
+Words = NDArray[np.uint64]
+
+TRUNK, HEAD = "trunk", "head"
+SIDES, FAR_EDGE = ((0, 1), (3, 2)), (1, 2)
+"""Corners of an outline (A0 A1 B1 B0) from which to which edges run."""
+BLOCKS_A_THREAD = 24
+"""About half a millisecond of a four-camera frame."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyEdges:
+    """The edges that are looked at, (K, 3): drawn limb, corner where it begins, corner where it ends.
+
+    whole : of the body. trunk : in the first stage of a search.
+    """
+
+    whole: IntArray
+    trunk: IntArray
+
+    def of_stage(self, stage: int) -> IntArray:
+        """The edges of WHOLE_BODY or TRUNK_FIRST."""
+        return self.trunk if stage == TRUNK_FIRST else self.whole
+
+
+def body_edges(body: BodyModel) -> BodyEdges:
+    """The edges of a body that the paper's fitness looks at."""
+    trunk = {index for index, limb in enumerate(body.drawn) if limb.part == TRUNK}
+    tops = _last_of_trunk(body, trunk)
+    whole: list[tuple[int, int, int]] = []
+    for index, limb in enumerate(body.drawn):
+        if limb.part != HEAD:
+            whole += [(index, *side) for side in SIDES]
+        if index in tops:
+            whole.append((index, *FAR_EDGE))
+    edges = np.array(whole, dtype=np.int64).reshape(-1, 3)
+    first = edges[[index in trunk for index in edges[:, 0]]] if trunk else edges
+    return BodyEdges(edges, first)
+
+
+def limb_sides(limbs: int) -> IntArray:
+    """(2 L, 3) both sides of every limb, in the order of the limbs."""
+    return np.array([(limb, *side) for limb in range(limbs) for side in SIDES], dtype=np.int64).reshape(-1, 3)
+
+
+def hidden_samples(outlines: Floats, edges: IntArray, samples: int) -> Words:
+    """(B, V, K, 16) a bit for each of an edge's samples (at most 64) that lies behind a nearer limb."""
+    hidden = np.empty((*outlines.shape[:2], len(edges), LANES), dtype=np.uint64)
+    run_blocks(chunk_hidden, all_hidden, len(outlines), BLOCKS_A_THREAD, *(outlines, edges, samples, hidden))
+    return hidden
+
+
+class EdgeMaps:
+    """The edge maps of a frame, one after another, each followed by its padding."""
+
+    def __init__(self, evidence: FrameEvidence) -> None:
+        parts: list[Bytes] = []
+        self.views = np.zeros((len(evidence.views), 4), dtype=np.int64)
+        start = 0
+        for row, view in zip(self.views, evidence.views, strict=True):
+            parts += [view.edges.ravel(), np.zeros(PADDING, dtype=np.uint8)]
+            row[:] = start, 0, view.edges.shape[1], view.edges.shape[0]
+            start += view.edges.size + PADDING
+        self.values = np.concatenate(parts)
+
+    def fitness(self, outlines: Floats, edges: IntArray, chunks: int, count: int) -> Array:
+        """(N, V) f_e of the first `count` poses of outlines (B, V, L, 160); `chunks` times sixteen samples an edge."""
+        found = np.empty((*outlines.shape[:2], LANES))
+        hidden = hidden_samples(outlines, edges, chunks * CHUNK)
+        run_blocks(
+            chunk_edges,
+            all_edges,
+            len(outlines),
+            BLOCKS_A_THREAD,
+            *(outlines, edges, hidden, chunks, self.views, self.values, found),
+        )
+        return found.transpose(0, 2, 1).reshape(-1, outlines.shape[1])[:count]
+
+    def recorded_indices(self, outlines: Floats, edges: IntArray, chunks: int) -> NDArray[np.uint32]:
+        """(B, V, 16, K, chunks, 1, 16) the pixels that the kernel reads, numbered from 0 in each picture; for tests."""
+        shape = (*outlines.shape[:2], LANES, len(edges), chunks, 1, CHUNK)
+        indices = np.zeros(shape, dtype=np.uint32)
+        hidden = hidden_samples(outlines, edges, chunks * CHUNK)
+        record_edges(outlines, edges, hidden, self.views, indices)
+        return indices
+
+
+def _last_of_trunk(body: BodyModel, trunk: set[int]) -> set[int]:
+    """The trunk's limbs from which none of its other limbs hangs."""
+    above: set[int] = set()
+    for index in trunk:
+        joint = body.joints[body.drawn[index].joint].parent
+        while joint >= 0:
+            above.add(joint)
+            joint = body.joints[joint].parent
+    return {index for index in trunk if body.drawn[index].joint not in above}
