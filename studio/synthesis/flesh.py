@@ -49,15 +49,15 @@ class Piece:
     fold_period: float = 110.0
 
 
-def clothed_pieces(bones: Skeleton) -> tuple[Piece, ...]:
+def clothed_pieces(bones: Skeleton, girth: float = 1.0) -> tuple[Piece, ...]:
     """All pieces of a person in a short-sleeved shirt, long trousers and shoes.
 
-    Girths grow with the height.
+    Girths grow with the height; girth : how much stouter than usual the person is.
     """
     pieces = [*_trunk(bones), *_head(bones)]
     for index, side in enumerate(SIDES):
         pieces += _arm(bones, side, index) + _leg(bones, side, index)
-    scale = bones.height / REFERENCE_HEIGHT
+    scale = girth * bones.height / REFERENCE_HEIGHT
     return tuple(sorted((_grown(piece, scale) for piece in pieces), key=lambda piece: piece.group))
 
 

@@ -65,9 +65,10 @@ class Renderer:
         noise: float,
         samples: int,
         seed: int,
+        girth: float = 1.0,
     ) -> None:
         self._room, self._noise, self._samples, self._seed = room, noise, samples, seed
-        self._tables, self._labels = piece_tables(motion, clothed_pieces(motion.skeleton))
+        self._tables, self._labels = piece_tables(motion, clothed_pieces(motion.skeleton, girth))
         self._views = tuple(_view(room, camera, samples) for camera in cameras)
 
     def empty(self, camera: int, frame: int) -> Bytes:
