@@ -2,6 +2,7 @@
 
 Entries: `rotation_local_xyzw` (F, J, 4), `root_translation_m` (F, 3), `local_translation_m` (J, 3),
 `parent_indices` (J,), `node_names` (J,), `fps`. Metres, z up, facing x with hanging arms in the rest pose.
+The clips hold every frame twice (30 recorded frames a second announced as 60): repetitions are left out.
 """
 
 import zipfile
@@ -34,8 +35,8 @@ def read_humanoid_arrays(path: Path) -> RecordedMotion:
     offsets, parents = entries["local_translation_m"].astype(float), entries["parent_indices"]
     count = len(entries["node_names"])
     shapes = {
-        "rotation_local_xyzw": (turns.shape[:1] + (count, 4), turns.shape),
-        "root_translation_m": (turns.shape[:1] + (3,), root.shape),
+        "rotation_local_xyzw": ((*turns.shape[:1], count, 4), turns.shape),
+        "root_translation_m": ((*turns.shape[:1], 3), root.shape),
         "local_translation_m": ((count, 3), offsets.shape),
         "parent_indices": ((count,), parents.shape),
     }
@@ -52,16 +53,28 @@ def read_humanoid_arrays(path: Path) -> RecordedMotion:
     fps = float(entries["fps"]) if entries["fps"].shape == () else 0.0
     if not 1.0 <= fps <= 1000.0:
         raise _wrong(path, "fps", "is not one number from 1 to 1000")
+    repeated = _repetitions(turns, root)
+    turns, root = turns[::repeated], root[::repeated]
     return moved_skeleton(
         tuple(str(name) for name in entries["node_names"]),
         tuple(int(parent) for parent in parents),
         offsets,
         Rotation.from_quat(turns.reshape(-1, 4)).as_matrix().reshape(len(turns), count, 3, 3),
         root,
-        fps=fps,
+        fps=fps / repeated,
         source=path.name,
         scale=METRE,
     )
+
+
+def _repetitions(turns: Array, root: Array) -> int:
+    """How often every frame is held, up to four times; 1 where frames differ."""
+    frames = np.concatenate([turns.reshape(len(turns), -1), root], axis=1)
+    for times in (4, 3, 2):
+        firsts = np.arange(len(frames)) // times * times
+        if len(frames) > 2 * times and np.array_equal(frames, frames[firsts]):
+            return times
+    return 1
 
 
 def _entries(path: Path) -> dict[str, NDArray[np.generic]]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from studio.errors import StudioError
 from studio.geometry.rotations import axis_turn
+from studio.synthesis.circuit import circuit
 from studio.synthesis.gait import (
     Gait,
     Path,
@@ -21,6 +22,7 @@ from studio.synthesis.gait import (
     winding_path,
 )
 from studio.synthesis.handstand import handstand
+from studio.synthesis.journeys import Journey, Stretch
 from studio.synthesis.person import SIDES, PersonMotion, Skeleton
 from studio.synthesis.posture import add_arm, allowed_height, frame_rate, trunk
 
@@ -58,9 +60,14 @@ def run(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
 
 
 def box(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
-    """Walking straight and stepping over a box at the origin: options height_mm of the box, speed_mm_s."""
+    """Walking straight and stepping over a box at the origin: options height_mm of the box, speed_mm_s, cadence.
+
+    With turn_after_mm above 0 the person turns 180 degrees on the spot that far behind the box and steps over it
+    again (Deutscher & Reid 2005, Fig. 10); turn_steps says in about how many steps, before_mm how far before the box
+    the footage begins.
+    """
     speed = options.get("speed_mm_s", 900.0)
-    gait = Gait(speed, 1.6, 0.60, 0.11 * skeleton.height, 50.0, 0.45)
+    gait = Gait(speed, options.get("cadence", 1.6), 0.60, 0.11 * skeleton.height, 50.0, 0.45)
     # A left footprint's toes end as far before the box's middle as the next right one's heel is behind it.
     toes, heel = 0.70 * skeleton.foot, 0.28 * skeleton.foot
     before = 0.5 * (speed / gait.cadence + toes - heel)
@@ -70,16 +77,34 @@ def box(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
     def obstacle(places: Array) -> Array:
         return clearance * np.exp(-((places[:, 0] / 480.0) ** 4))
 
-    return _along(
-        skeleton,
-        times,
-        gait,
-        line_path((start, 0.0), 0.0),
-        swing=0.28,
-        elbow=0.5,
-        lean=0.07,
-        obstacle=obstacle,
+    path, after = line_path((start, 0.0), 0.0), options.get("turn_after_mm", 0.0)
+    if after > 0.0:
+        step = speed / gait.cadence
+        # Whole steps between the two crossings, so that the feet stand about the box alike.
+        turning = (np.ceil(2.0 * after / step) + options.get("turn_steps", 3.0)) * step - 2.0 * after
+        on_the_spot = Stretch(turning, turn=np.pi, onward=0.0)
+        path = Journey((start, 0.0), 0.0, (Stretch(after - start), on_the_spot), ease=0.18 * step)
+    sooner = max(-start - options["before_mm"], 0.0) / speed if "before_mm" in options else 0.0
+    return _along(skeleton, times + sooner, gait, path, swing=0.28, elbow=0.5, lean=0.07, obstacle=obstacle)
+
+
+def turning_walk(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
+    """A walk to and fro with bends and two quick turns on the spot (as in Deutscher & Reid 2005, Fig. 21): options
+    speed_mm_s, cadence, start_degrees of the first heading, start_x_mm, start_y_mm.
+    """
+    speed = options.get("speed_mm_s", 950.0)
+    gait = Gait(speed, options.get("cadence", 1.95), 0.60, 0.10 * skeleton.height, 40.0, 0.45)
+    step = speed / gait.cadence
+    stretches = (
+        Stretch(1.7 * step, turn=np.radians(-25.0)),
+        Stretch(2.4 * step, turn=np.radians(150.0), onward=0.05),
+        Stretch(2.6 * step, turn=np.radians(70.0)),
+        Stretch(2.8 * step, turn=np.radians(-170.0), onward=0.0),
+        Stretch(3.0 * step, turn=np.radians(-60.0)),
     )
+    start = (options.get("start_x_mm", -500.0), options.get("start_y_mm", -250.0))
+    path = Journey(start, np.radians(options.get("start_degrees", 0.0)), stretches, ease=0.2 * step)
+    return _along(skeleton, times, gait, path, swing=0.33, elbow=0.45, lean=0.05)
 
 
 def stand(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
@@ -107,7 +132,9 @@ MOTIONS: dict[str, MotionMaker] = {
     "walk": walk,
     "run": run,
     "box": box,
+    "turning_walk": turning_walk,
     "handstand": handstand,
+    "circuit": circuit,
     "stand": stand,
 }
 
@@ -130,9 +157,12 @@ def _along(
     lean: float,
     obstacle: Callable[[Array], Array] | None = None,
 ) -> PersonMotion:
-    """A gait along a path, arms swinging against the legs (`swing`, `elbow`, `lean` in radians)."""
+    """A gait along a path, arms swinging against the legs (`swing`, `elbow`, `lean` in radians), less where the
+    path is one that slows down.
+    """
     phase = 2.0 * np.pi * times / gait.cycle
-    stride = np.cos(phase + 0.1)
+    pace = path.pace(gait.speed * times) if isinstance(path, Journey) else np.ones_like(times)
+    stride = (0.3 + 0.7 * pace) * np.cos(phase + 0.1)
     place, heading = path(gait.speed * times)
     sideways = 0.016 * skeleton.height * np.sin(phase - 0.4)
     root = np.concatenate([place, np.zeros((len(times), 1))], axis=1)

@@ -6,17 +6,18 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation, Slerp
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation, RotationSpline
 
 from studio.errors import StudioError
-from studio.geometry.rotations import axis_turn, rotation_from_vector, vector_from_rotation
+from studio.geometry.rotations import axis_turn
 from studio.synthesis.acclaim import read_acclaim
 from studio.synthesis.bvh import read_bvh
-from studio.synthesis.gait import eased, leg_to_ankle
+from studio.synthesis.gait import eased
 from studio.synthesis.humanoid_arrays import read_humanoid_arrays
-from studio.synthesis.person import SIDES, PersonMotion, Skeleton, joint_points
+from studio.synthesis.person import PersonMotion, Skeleton
 from studio.synthesis.recorded_motion import RecordedMotion
-from studio.synthesis.retargeting import on_skeleton
+from studio.synthesis.retargeting import above_floor, on_skeleton
 
 Array = NDArray[np.float64]
 
@@ -31,7 +32,7 @@ CLIP_OPTIONS = {
     "bank": 0.0,  # 0...1: how far the person leans into the bend, as a share of what their speed demands
 }
 GRAVITY = 9810.0
-UP = np.array([0.0, 0.0, 1.0])
+MARGIN_FRAMES = 12
 
 
 def read_recording(path: Path, skeleton: Path | None = None) -> RecordedMotion:
@@ -55,7 +56,7 @@ def recorded_person(
     """
     wanted = _checked(options)
     whole = on_skeleton(recorded, skeleton)
-    times = wanted["start_s"] + wanted["speed"] * np.arange(frames) / fps
+    times: Array = wanted["start_s"] + wanted["speed"] / fps * np.arange(frames, dtype=np.float64)
     if wanted["cycle_s"] > 0.0:
         motion = _repeated(_cycle(recorded, whole, wanted), times - wanted["start_s"], fps)
     else:
@@ -67,24 +68,27 @@ def recorded_person(
 
 
 def sampled(motion: PersonMotion, times: Array, fps: float) -> PersonMotion:
-    """The motion at times (F,) in seconds from its first frame: places between frames on straight lines, turns along
-    the shortest turn. fps : of the result.
+    """The motion at times (F,) in seconds from its first frame, on smooth curves through its frames (cubic splines of
+    places and of turns; times of frames give these frames). fps : of the result.
     """
-    known = np.arange(motion.frame_count) / motion.fps
-    inside = np.clip(times, known[0], known[-1])
-    root = np.stack([np.interp(inside, known, motion.root[:, axis]) for axis in range(3)], axis=-1)
+    last = motion.frame_count - 1
+    inside = np.clip(times * motion.fps, 0.0, last)
+    low = int(np.clip(np.floor(inside.min()) - MARGIN_FRAMES, 0, last - 1))
+    high = int(np.clip(np.ceil(inside.max()) + MARGIN_FRAMES, low + 1, last))
+    known = np.arange(low, high + 1, dtype=np.float64)
     turns = {
-        name: Slerp(known, Rotation.from_matrix(turn))(inside).as_matrix()
+        name: RotationSpline(known, Rotation.from_matrix(turn[low : high + 1]))(inside).as_matrix()
         for name, turn in motion.turns.items()
     }
+    root: Array = CubicSpline(known, motion.root[low : high + 1])(inside)
     return PersonMotion(motion.skeleton, fps, root, turns)
 
 
 def bent(motion: PersonMotion, radius: float, bank: float) -> PersonMotion:
     """A motion that goes straight on the whole, bent to a circle of `radius` mm (below 0: to the right).
 
-    Every frame is moved and turned as a whole by its place along the way. The body above the feet leans into the bend
-    by `bank` times the angle whose tangent is v^2 / (r g); the legs reach for the feet where these are.
+    Every frame is moved and turned as a whole by its place along the way, and leans into the bend about the floor below
+    the pelvis by `bank` times the angle whose tangent is v^2 / (r g).
     """
     first, last = motion.root[0, :2], motion.root[-1, :2]
     heading = float(np.arctan2(*(last - first)[::-1]))
@@ -92,33 +96,14 @@ def bent(motion: PersonMotion, radius: float, bank: float) -> PersonMotion:
     along = straight.root[:, 0]
     angle = along / radius
     way = np.stack([radius * np.sin(angle), radius * (1.0 - np.cos(angle)), np.zeros_like(angle)], axis=-1)
-    turn = axis_turn(2, angle)
-    beside = straight.root * [0.0, 1.0, 1.0]
-    root = way + (turn @ beside[..., None])[..., 0]
-    turns = {name: turn @ own for name, own in straight.turns.items()}
-    whole = PersonMotion(motion.skeleton, motion.fps, root, turns)
     speed = abs(along[-1] - along[0]) * motion.fps / max(len(along) - 1, 1)
-    lean = bank * np.arctan2(speed**2, abs(radius) * GRAVITY) * np.sign(radius)
-    return _leaning(whole, turn @ axis_turn(0, -lean) @ np.swapaxes(turn, 1, 2))
-
-
-def _leaning(motion: PersonMotion, lean: Array) -> PersonMotion:
-    """The body turned by `lean` (F, 3, 3) about the floor below the pelvis, with the feet left where they are."""
-    feet = joint_points(motion)
-    below = motion.root * [1.0, 1.0, 0.0]
-    root = below + (lean @ (motion.root - below)[..., None])[..., 0]
-    turns = {name: turn if name.endswith("_foot") else lean @ turn for name, turn in motion.turns.items()}
-    leant = PersonMotion(motion.skeleton, motion.fps, root, turns)
-    hips = joint_points(leant)
-    for index, side in enumerate(SIDES):
-        turns[f"{side}_thigh"], turns[f"{side}_shin"] = leg_to_ankle(
-            hips[f"{side}_thigh"],
-            feet[f"{side}_foot"],
-            turns[f"{side}_thigh"][:, :, 0],
-            motion.skeleton.thigh[index],
-            motion.skeleton.shin[index],
-        )
-    return leant
+    lean = -bank * np.arctan2(speed**2, abs(radius) * GRAVITY) * np.sign(radius)
+    about = axis_turn(2, angle)
+    level = straight.root * [0.0, 1.0, 0.0]
+    risen = (axis_turn(0, lean) @ (straight.root * [0.0, 0.0, 1.0])[..., None])[..., 0]
+    root = way + (about @ (level + risen)[..., None])[..., 0]
+    turns = {name: about @ axis_turn(0, lean) @ own for name, own in straight.turns.items()}
+    return above_floor(PersonMotion(motion.skeleton, motion.fps, root, turns))
 
 
 def _placed(motion: PersonMotion, turn: float, middle: tuple[float, float]) -> PersonMotion:
@@ -135,14 +120,14 @@ def _placed(motion: PersonMotion, turn: float, middle: tuple[float, float]) -> P
 def _cycle(recorded: RecordedMotion, whole: PersonMotion, wanted: dict[str, float]) -> PersonMotion:
     """One cycle whose last frame has the pose of its first: what they differ by is spread over the cycle."""
     count = max(2, round(wanted["cycle_s"] * whole.fps) + 1)
-    times = wanted["start_s"] + np.arange(count) / whole.fps
+    times: Array = wanted["start_s"] + np.arange(count, dtype=np.float64) / whole.fps
     _long_enough(recorded, times, wanted)
     cycle = sampled(whole, times, whole.fps)
     share = eased(np.linspace(0.0, 1.0, count))[:, None]
     turns = {}
     for name, turn in cycle.turns.items():
-        missing = vector_from_rotation(turn[-1].T @ turn[0])
-        turns[name] = turn @ rotation_from_vector(share * missing)
+        missing = Rotation.from_matrix(turn[-1].T @ turn[0]).as_rotvec()
+        turns[name] = turn @ Rotation.from_rotvec(share * missing).as_matrix()
     root = cycle.root.copy()
     root[:, 2:] += share * (root[0, 2] - root[-1, 2])
     return PersonMotion(cycle.skeleton, cycle.fps, root, turns)

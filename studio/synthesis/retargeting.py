@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from studio.errors import StudioError
-from studio.synthesis.gait import leg_to_ankle
 from studio.synthesis.person import SIDES, PersonMotion, Skeleton, joint_points
 from studio.synthesis.recorded_motion import RecordedMotion
 
@@ -22,8 +22,9 @@ Vector = tuple[float, float, float]
 FORWARD: Vector = (1.0, 0.0, 0.0)
 CMU_ELBOW: Vector = (0.866, 0.0, 0.5)
 """Where the forearms of CMU's T pose bend to: the elbow's axis in the ASF files lies 30 degrees off the vertical."""
-FLOOR_SHARE = 0.05
-SOFT_SOLE_MM = 6.0
+FLOOR_SHARE = 0.1
+SPREAD_S = 0.1
+UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,29 +142,20 @@ def on_skeleton(recorded: RecordedMotion, skeleton: Skeleton) -> PersonMotion:
 
 
 def on_floor(motion: PersonMotion) -> PersonMotion:
-    """The motion lowered or raised as a whole until the lower foot mostly stands on the floor; feet that would
-    still go into it are lifted, hips and knees following.
-    """
+    """The motion moved up or down as a whole until the lower foot mostly stands on the floor, then `above_floor`."""
     lowest = np.min([lowest_of_sole(motion, side) for side in SIDES], axis=0)
-    level = float(np.quantile(lowest, FLOOR_SHARE)) + SOFT_SOLE_MM
-    root = motion.root - np.array([0.0, 0.0, level])
-    lowered = PersonMotion(motion.skeleton, motion.fps, root, dict(motion.turns))
-    points = joint_points(lowered)
-    for index, side in enumerate(SIDES):
-        below = np.maximum(-lowest_of_sole(lowered, side), 0.0)
-        ankle = points[f"{side}_foot"] + below[:, None] * np.array([0.0, 0.0, 1.0])
-        ahead = lowered.turns[f"{side}_thigh"][:, :, 0]
-        thigh, shin = leg_to_ankle(
-            points[f"{side}_thigh"],
-            ankle,
-            ahead,
-            motion.skeleton.thigh[index],
-            motion.skeleton.shin[index],
-        )
-        lifted = (below > 0.0)[:, None, None]
-        lowered.turns[f"{side}_thigh"] = np.where(lifted, thigh, lowered.turns[f"{side}_thigh"])
-        lowered.turns[f"{side}_shin"] = np.where(lifted, shin, lowered.turns[f"{side}_shin"])
-    return lowered
+    level = float(np.quantile(lowest, FLOOR_SHARE))
+    return above_floor(PersonMotion(motion.skeleton, motion.fps, motion.root - level * UP, motion.turns))
+
+
+def above_floor(motion: PersonMotion) -> PersonMotion:
+    """The motion raised for as long as a foot would go into the floor, smoothly and no pose changed."""
+    below = np.max([-lowest_of_sole(motion, side) for side in SIDES], axis=0)
+    spread = max(1, round(SPREAD_S * motion.fps))
+    # The widest the smoothing reaches is as far as the largest depth is held, so that it never undercuts.
+    held = maximum_filter1d(np.maximum(below, 0.0), 2 * spread + 1, mode="nearest")
+    lift = gaussian_filter1d(held, spread / 3.0, radius=spread, mode="nearest")
+    return PersonMotion(motion.skeleton, motion.fps, motion.root + lift[:, None] * UP, motion.turns)
 
 
 def lowest_of_sole(motion: PersonMotion, side: str) -> Array:
@@ -185,6 +177,13 @@ def _middles(recorded: RecordedMotion, family: Family) -> tuple[Array, Array]:
     return places[0], places[1]
 
 
+def _rest_middle(recorded: RecordedMotion, family: Family, segment: str) -> Array:
+    """(3,) the middle between both sides' beginnings of a segment in the rest pose."""
+    begin = family.bone(segment).begin
+    left, right = (recorded.rest[recorded.index(family.named(begin, side))] for side in (0, 1))
+    return 0.5 * (left + right)
+
+
 def _trunk(recorded: RecordedMotion, family: Family) -> dict[str, Array]:
     """Turns of pelvis, thorax and head."""
     hips, shoulders = _middles(recorded, family)
@@ -192,20 +191,14 @@ def _trunk(recorded: RecordedMotion, family: Family) -> dict[str, Array]:
         recorded.index(name) for name in (family.pelvis, family.thorax, family.neck, family.head)
     )
     turns = recorded.rotations
-    rest_hips, rest_shoulders = (
-        0.5
-        * sum(
-            recorded.rest[recorded.index(family.named(family.bone(segment).begin, side))] for side in (0, 1)
-        )
-        for segment in ("thigh", "upper_arm")
-    )
+    rest_up = _rest_middle(recorded, family, "upper_arm") - _rest_middle(recorded, family, "thigh")
     left = np.array([0.0, 1.0, 0.0])
     if family.crown:
         up = recorded.positions[:, recorded.index(family.crown)] - recorded.positions[:, neck]
     else:
         up = turns[:, head] @ np.array([0.0, 0.0, 1.0])
     return {
-        "pelvis": turns[:, pelvis] @ _frames((rest_shoulders - rest_hips)[None], left[None])[0],
+        "pelvis": turns[:, pelvis] @ _frames(rest_up[None], left[None])[0],
         "thorax": _frames(shoulders - hips, turns[:, thorax] @ left),
         "head": _frames(up, turns[:, head] @ left),
     }
