@@ -9,9 +9,11 @@ which is counted all the same, and NOT_COUNTED for a hidden one.
 import numpy as np
 from numba import njit, prange
 
+from studio.weighting.area_kernels import bit_count
 from studio.weighting.edge_region_kernels import (
     CHUNK,
     HALF,
+    INLINED,
     LANES,
     NOT_COUNTED,
     OPTIONS,
@@ -47,29 +49,40 @@ def edge_lines(outlines, block, view, corners, lines, samples):
             store_line(line, 0, lane, edge, edge, ZERO, samples)
 
 
-@njit(**OPTIONS)
-def fill_edge(line, indices, number, seen, view):
-    """Indices of an edge's samples, by how its limb is seen."""
-    if seen > HALF:
-        width = np.float32(view[2])
-        for chunk in range(indices.shape[1]):
-            for j in range(CHUNK):
-                indices[number, chunk, 0, j] = pixel(line, chunk * CHUNK + j, width)
-    else:
-        fill_clipped(line, view, seen < -HALF, indices, number, 0)
+@njit(**INLINED)
+def fill_edge(line, bits, not_counted, width, indices, number):
+    """Indices of the samples of an edge of a limb that is wholly inside the picture."""
+    for chunk in range(indices.shape[1]):
+        gone = np.uint32(bits & np.uint64(0xFFFF))
+        for j in range(CHUNK):
+            index = pixel(line, chunk * CHUNK + j, width)
+            indices[number, chunk, 0, j] = not_counted if (gone >> np.uint32(j)) & np.uint32(1) else index
+        bits >>= np.uint64(CHUNK)
 
 
 @njit(**OPTIONS)
+def fill_edge_clipped(line, bits, not_counted, view, unseen, indices, number):
+    """Indices of the samples of an edge of a limb that may leave the picture, or is not seen at all."""
+    fill_clipped(line, view, unseen, indices, number, 0)
+    if bits:
+        hide(bits, not_counted, indices, number, 0)
+
+
+@njit(**INLINED)
 def fill_edges(outlines, corners, hidden, block, view, lane, lines, views, indices):
     """Indices (K, chunks, 1, 16) of all samples of one pose in one view; returns how many are hidden."""
+    width = np.float32(views[view, 2])
     not_counted = np.uint32(views[view, 2] * views[view, 3] + NOT_COUNTED)
     lost = 0
     for number in range(corners.shape[0]):
         seen = outlines[block, view, corners[number, 0], 8 * LANES + lane]
-        fill_edge(line_at(lines, number, 0, lane), indices, number, seen, views[view])
         bits = hidden[block, view, number, lane]
-        if bits:
-            lost += hide(bits, not_counted, indices, number, 0)
+        line = line_at(lines, number, 0, lane)
+        if seen > HALF:
+            fill_edge(line, bits, not_counted, width, indices, number)
+        else:
+            fill_edge_clipped(line, bits, not_counted, views[view], seen < -HALF, indices, number)
+        lost += bit_count(bits)  # pyright: ignore[reportCallIssue] - Numba gives the context
     return lost
 
 
