@@ -17,6 +17,7 @@ from studio.synthesis.person import Skeleton
 
 Array = NDArray[np.float64]
 Path = Callable[[Array], tuple[Array, Array]]
+Obstacle = Callable[[Array, Array, Array], Array]
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,11 +115,12 @@ def foot_track(
     skeleton: Skeleton,
     *,
     left: bool,
-    obstacle: Callable[[Array], Array] | None = None,
+    obstacle: Obstacle | None = None,
 ) -> FootTrack:
     """The foot's journey over footprints laid beside the path.
 
-    times : (F,) seconds. obstacle : extra height that the ankle must keep above points (F, 2), mm.
+    times : (F,) seconds. obstacle : extra height (F,) mm that the ankle must keep above points (F, 2) on its way from
+    one footprint (F, 2) to the next (F, 2).
     """
     ankle_height, foot_length = skeleton.ankle_height, skeleton.foot
     phase = times / gait.cycle + (0.0 if left else 0.5)
@@ -140,7 +142,8 @@ def foot_track(
     ankle = ground + (level @ pivot[..., None])[..., 0] - (tilted @ pivot[..., None])[..., 0]
     ankle[:, 2] += gait.lift * eased(swing / 0.5) * eased((1.0 - swing) / 0.5)
     if obstacle is not None:
-        ankle[:, 2] += eased(swing / 0.3) * eased((1.0 - swing) / 0.3) * obstacle(flat)
+        ends = [_footprint(gait, path, count + step, left)[0] for step in (0.0, 1.0)]
+        ankle[:, 2] += eased(swing / 0.3) * eased((1.0 - swing) / 0.45) * obstacle(flat, *ends)
     return FootTrack(ankle, tilted, swing)
 
 

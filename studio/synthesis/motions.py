@@ -8,12 +8,14 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from studio.errors import StudioError
 from studio.geometry.rotations import axis_turn
 from studio.synthesis.circuit import circuit
 from studio.synthesis.gait import (
     Gait,
+    Obstacle,
     Path,
     circle_path,
     foot_track,
@@ -28,7 +30,7 @@ from studio.synthesis.posture import add_arm, allowed_height, frame_rate, trunk
 
 Array = NDArray[np.float64]
 Options = dict[str, float]
-BOB, RUNNING_BOB = 0.6, 0.018
+BOB, RUNNING_BOB, RISE_S = 0.6, 0.018, 0.5
 
 MotionMaker = Callable[[Skeleton, Array, Options], PersonMotion]
 
@@ -74,8 +76,9 @@ def box(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
     start = -before - speed * gait.cycle * (0.5 * gait.duty + 1.0)
     clearance = options.get("height_mm", 120.0) + 120.0
 
-    def obstacle(places: Array) -> Array:
-        return clearance * np.exp(-((places[:, 0] / 480.0) ** 4))
+    def obstacle(places: Array, begin: Array, end: Array) -> Array:
+        over = np.where(begin[:, 0] * end[:, 0] < 0.0, clearance, 0.0)
+        return over * np.exp(-((places[:, 0] / 480.0) ** 4))
 
     path, after = line_path((start, 0.0), 0.0), options.get("turn_after_mm", 0.0)
     if after > 0.0:
@@ -155,7 +158,7 @@ def _along(
     swing: float,
     elbow: float,
     lean: float,
-    obstacle: Callable[[Array], Array] | None = None,
+    obstacle: Obstacle | None = None,
 ) -> PersonMotion:
     """A gait along a path, arms swinging against the legs (`swing`, `elbow`, `lean` in radians), less where the
     path is one that slows down.
@@ -172,7 +175,10 @@ def _along(
         heading - 0.09 * stride, lean + 0.015 * np.cos(2.0 * phase), 0.16 * stride, 0.03 * np.sin(phase)
     )
     feet = [foot_track(gait, path, times, skeleton, left=side == "left", obstacle=obstacle) for side in SIDES]
-    root[:, 2] = _pelvis_height(skeleton, gait, phase, allowed_height(skeleton, root, turns["pelvis"], feet))
+    allowed = allowed_height(skeleton, root, turns["pelvis"], feet)
+    root[:, 2] = _pelvis_height(skeleton, gait, phase, allowed)
+    if isinstance(path, Journey):
+        root[:, 2] = _risen(root[:, 2], allowed, frame_rate(times))
     for side, track in zip(SIDES, feet, strict=True):
         sign, index = (1.0, 0) if side == "left" else (-1.0, 1)
         hip = root + sign * skeleton.hip_half_width[index] * turns["pelvis"][:, :, 1]
@@ -199,3 +205,12 @@ def _pelvis_height(skeleton: Skeleton, gait: Gait, phase: Array, allowed: Array)
     else:
         bob = -RUNNING_BOB * skeleton.height * np.cos(2.0 * phase - 2.0 * np.pi * gait.duty)
     return bob + float(np.min(allowed - bob))
+
+
+def _risen(height: Array, allowed: Array, fps: float) -> Array:
+    """(F,) the height raised where turning and stepping ask for bent knees elsewhere only: as high as is `allowed`,
+    the room above it evened out over RISE_S seconds on both sides.
+    """
+    reach = max(1, round(RISE_S * fps))
+    room = minimum_filter1d(allowed - height, 2 * reach + 1, mode="nearest")
+    return height + gaussian_filter1d(room, reach / 3.0, radius=reach, mode="nearest")
