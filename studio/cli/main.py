@@ -16,7 +16,13 @@ COMMANDS = {
     "import": ("session_commands", "import_command", "Make a session from footage and calibration."),
     "track": ("tracking_commands", "track", "Track a session and store the run."),
     "evaluate": ("evaluation_commands", "evaluate_command", "Measure a run against the true markers."),
+    "compare": ("comparison_commands", "compare", "Compare trackers fairly on a session with a truth."),
     "synthesize": ("synthesis_commands", "synthesize_command", "Render footage with exact truth."),
+    "reproduce": (
+        "reproduction_commands",
+        "reproduce_command",
+        "Rerun the papers' experiments: numbers, charts and verdicts.",
+    ),
     "bodies": ("session_commands", "bodies", "List the bodies."),
     "runs": ("session_commands", "runs", "List the runs."),
     "bench": ("evaluation_commands", "bench", "Measure the weighting kernels."),

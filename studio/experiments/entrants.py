@@ -51,8 +51,22 @@ VARIANTS: dict[str, Variant] = {
     ),
 }
 
+PARTITION_WORDS = {
+    "soft-three": "three soft stages: root, trunk and head, all",
+    "hard-two": "two hard stages: the root stays fixed in the second (Fig. 2a)",
+    "hard-twelve": "twelve hard stages along the hierarchy (John, Trucco & Ivekovic)",
+    "global-local": "the whole pose, then legs and arms apart (GLPSO)",
+    "global": "the whole pose at once, no partition",
+}
+VARIANTS |= {
+    f"swarm:{partition}": Variant(words, {"partition": partition})
+    for partition, words in PARTITION_WORDS.items()
+}
+
 LINEUPS: dict[str, tuple[str, ...]] = {
     "improvements": ("annealed:improved", "annealed:eq13", "condensation"),
+    "papers": ("swarm", "annealed:improved", "annealed:eq13", "condensation"),
+    "partitions": ("swarm", *(f"swarm:{partition}" for partition in PARTITION_WORDS)),
 }
 
 

@@ -15,11 +15,13 @@ from starlette.staticfiles import StaticFiles
 from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.workspace import Workspace
 from studio.web import (
+    comparison_routes,
     event_stream,
     guide_routes,
     import_routes,
     page_routes,
     picture_routes,
+    report_routes,
     result_routes,
     run_routes,
     scene_relay,
@@ -53,6 +55,8 @@ ROUTERS = (
     settings_routes.router,
     result_routes.router,
     picture_routes.router,
+    comparison_routes.router,
+    report_routes.router,
     scene_routes.router,
     scene_relay.router,
     event_stream.router,
@@ -112,6 +116,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     finally:
         doors.scene_port = 0
         await import_routes.end_imports(doors)
+        await asyncio.to_thread(doors.desk.close)
         await doors.events.stop()
         await asyncio.to_thread(forget_composers)
         ends = (asyncio.to_thread(doors.stage.stop), asyncio.to_thread(doors.control.close))

@@ -6,6 +6,7 @@ brings them together.
 """
 
 import asyncio
+import dataclasses
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,6 +21,7 @@ from studio.web.event_stream import EventStream
 from studio.web.import_schemas import ImportState
 from studio.web.presets import Preset
 from studio.worker.commands import Close, Command
+from studio.worker.comparison_desk import ComparisonDesk, ComparisonState
 from studio.worker.events import StateChanged
 from studio.worker.watchers import Subscription
 
@@ -148,7 +150,7 @@ class Doors:
 
     scene_port : of the inner viser server, 0 while it is not running. footage_roots : folders that may be
     imported from. presets : the studio's own. log_path : the server's log file. imports, uploads : those
-    under way, by their identifiers.
+    under way, by their identifiers. desk : where comparisons are worked at.
     """
 
     workspace: Workspace
@@ -163,11 +165,19 @@ class Doors:
     uploads: dict[str, dict[str, int]] = field(default_factory=dict)
     stops: dict[str, threading.Event] = field(default_factory=dict)
     jobs: set[asyncio.Task[None]] = field(default_factory=set)
+    desk: ComparisonDesk = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Give comparisons their desk, which tells all watchers how far they are."""
+        self.desk = ComparisonDesk(self._tell_comparison)
 
     @property
     def state_folder(self) -> Path:
         """Where the server keeps what is its own: preferences, presets, unfinished uploads."""
         return self.workspace.root / STATE_NAME
+
+    def _tell_comparison(self, state: ComparisonState) -> None:
+        self.events.publish({"type": "comparison", "run": "", **dataclasses.asdict(state)})
 
 
 def doors_of(request: Request) -> Doors:
@@ -178,8 +188,11 @@ def doors_of(request: Request) -> Doors:
 def let_go(doors: Doors, session: str, run: str = "") -> None:
     """Free a session (or only a run of it) for renaming or deleting: footage, results and scene are closed.
 
-    Raises RunError while the run is being tracked.
+    Raises RunError while the run is being tracked, or trackers are being compared on the session.
     """
+    compared = doors.desk.state
+    if not run and compared is not None and compared.session == session:
+        doors.desk.check_free()
     state = doors.control.state
     if state.state != "lost" and state.session == session and (not run or state.run == run) and state.run:
         doors.control.request(Close())

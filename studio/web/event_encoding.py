@@ -1,7 +1,7 @@
 """Events as JSON: small values only.
 
 Each message has `type` (state, acknowledged, layer, frame, settings, log; the web's own: hello, import,
-sessions, scene), `session` and `run`. NaN and infinities become null. A layer's particles are not in it:
+comparison, sessions, scene), `session` and `run`. NaN and infinities become null. A layer's particles are not in it:
 they are fetched from `/api/sessions/{session}/runs/{run}/frames/{frame}/layers/{layer}/particles`, or drawn
 by the scene.
 """
@@ -111,6 +111,8 @@ def key_of(message: dict[str, object]) -> tuple | None:
         return (kind,)
     if kind == "import":
         return (kind, message.get("identifier"))
+    if kind == "comparison":
+        return (kind, message["session"], message["name"])
     if kind == "layer":
         return (kind, message["frame"], message["layer"], message["reannealed"])
     if kind == "frame":

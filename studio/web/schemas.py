@@ -86,6 +86,7 @@ class SessionLine(Answer):
     notes: list[str]
     warnings: list[str]
     runs: list[RunLine]
+    comparisons: int = 0
     problem: str = ""
 
 
@@ -198,11 +199,11 @@ class SampleRequest(Request):
 
 
 class TrashEntry(Answer):
-    """Something in the trash. name: what it was called; kind: session, run or other; others cannot be restored."""
+    """Something in the trash. name: what it was called; what is "other" cannot be restored."""
 
     id: str
     name: str
-    kind: Literal["session", "run", "other"]
+    kind: Literal["session", "run", "comparison", "other"]
     restorable: bool = True
 
 
@@ -213,10 +214,11 @@ class TrashList(Answer):
 
 
 class Restored(Answer):
-    """Where something came back to. run: "" for a session."""
+    """Where something came back to. name: the session; run, comparison: "" where it is none."""
 
     name: str
     run: str = ""
+    comparison: str = ""
 
 
 class TrashChoice(Request):

@@ -6,6 +6,9 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Response
 
 from studio.errors import NotFoundError, StudioError
+from studio.experiments.comparison_folders import bring_back
+from studio.experiments.kept_comparison import RECORD_NAME as COMPARISON_FILE_NAME
+from studio.experiments.kept_comparison import KeptComparison
 from studio.sessions.manifest import FILE_NAME, read_manifest
 from studio.sessions.names import inside
 from studio.sessions.run_record import FILE_NAME as RUN_FILE_NAME
@@ -96,12 +99,16 @@ def trash(doors: Door) -> TrashList:
 
 @router.post("/trash/restore")
 def restore(choice: TrashChoice, doors: Door) -> Restored:
-    """Bring a session, or a run into its session, back under its own name or one like it."""
+    """Bring a session, or a run or comparison into its session, back under its own name or one like it."""
     if (inside(doors.workspace.root / TRASH_NAME, choice.entry) / RUN_FILE_NAME).is_file():
         run = doors.workspace.restore_run(choice.entry)
         session = run.folder.parent.parent.name
         _changed(doors, session)
         return Restored(name=session, run=run.name)
+    if (inside(doors.workspace.root / TRASH_NAME, choice.entry) / COMPARISON_FILE_NAME).is_file():
+        owner, kept = bring_back(doors.workspace, choice.entry)
+        _changed(doors, owner.name)
+        return Restored(name=owner.name, comparison=kept.name)
     session = doors.workspace.restore(choice.entry).name
     _changed(doors, session)
     return Restored(name=session)
@@ -115,6 +122,9 @@ def trash_entry(place: Path) -> TrashEntry:
         if (place / RUN_FILE_NAME).is_file():
             record = read_run_record(place)
             return TrashEntry(id=place.name, name=f"{record.session} / {record.name}", kind="run")
+        if (place / COMPARISON_FILE_NAME).is_file():
+            asked = KeptComparison(place).record()
+            return TrashEntry(id=place.name, name=f"{asked.plan.session} / {asked.name}", kind="comparison")
     except StudioError:
         pass
     return TrashEntry(id=place.name, name=place.name, kind="other", restorable=False)

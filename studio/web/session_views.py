@@ -5,14 +5,21 @@ import math
 from studio.body.model import BodyModel, Parameter
 from studio.capture.footage_source import CameraSource
 from studio.errors import StudioError
+from studio.experiments.comparison_folders import comparison_count
 from studio.geometry.camera import Camera
 from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session
 from studio.sessions.workspace import SessionSummary
+from studio.settings import DEFAULT_TRACKER, usual_weighting
 from studio.web.run_errors import mean_error
 from studio.web.schemas import BodyView, CameraView, ParameterView, RunLine, SessionDetail, SessionLine
 
-DEFAULT_TRACKER, DEFAULT_WEIGHTING = "annealed", "edge-region"
+# Knobs that say how much is searched: a filter's layers and particles, a swarm's stages.
+SIZES = (
+    ("layers", "particles"),
+    ("stage1_particles", "stage1_iterations"),
+    ("stage2_particles", "stage2_iterations"),
+)
 
 
 def session_line(summary: SessionSummary, session: Session | None) -> SessionLine:
@@ -25,8 +32,8 @@ def session_line(summary: SessionSummary, session: Session | None) -> SessionLin
         title=summary.title,
         created=summary.created,
         body=summary.body,
-        tracker=(session and session.manifest.tracker) or DEFAULT_TRACKER,
-        weighting=(session and session.manifest.weighting) or DEFAULT_WEIGHTING,
+        tracker=_tracker(session),
+        weighting=_weighting(session),
         cameras=len(summary.cameras),
         camera_names=list(summary.cameras),
         frame_count=summary.frames,
@@ -36,6 +43,7 @@ def session_line(summary: SessionSummary, session: Session | None) -> SessionLin
         notes=list(summary.notes),
         warnings=list(summary.warnings),
         runs=runs,
+        comparisons=comparison_count(session) if session else 0,
         problem=summary.problem,
     )
 
@@ -54,10 +62,22 @@ def completed(line: RunLine, session: Session) -> RunLine:
 
 
 def describe(record: RunRecord) -> str:
-    """A run in a few words: tracker, layers × particles, weighting where it is not the usual one."""
-    size = "×".join(str(record.settings[name]) for name in ("layers", "particles") if name in record.settings)
-    unusual = "" if record.weighting == DEFAULT_WEIGHTING else f" · {record.weighting}"
+    """A run in a few words: tracker, layers × particles, weighting where it is not the tracker's usual one."""
+    known = record.settings
+    stages = ["×".join(str(known[name]) for name in names if name in known) for names in SIZES]
+    size = " + ".join(stage for stage in stages if stage)
+    unusual = "" if record.weighting == usual_weighting(record.tracker) else f" · {record.weighting}"
     return f"{record.tracker} {size}".strip() + unusual
+
+
+def _tracker(session: Session | None) -> str:
+    """What runs of a session are tracked with unless told otherwise."""
+    return (session and session.manifest.tracker) or DEFAULT_TRACKER
+
+
+def _weighting(session: Session | None) -> str:
+    """What runs of a session are weighed with unless told otherwise."""
+    return (session and session.manifest.weighting) or usual_weighting(_tracker(session))
 
 
 def session_detail(session: Session) -> SessionDetail:
@@ -78,8 +98,8 @@ def session_detail(session: Session) -> SessionDetail:
             "subject": subject,
             "has_truth": session.truth_path is not None,
             "has_start_pose": session.start_pose(body) is not None,
-            "tracker": manifest.tracker or DEFAULT_TRACKER,
-            "weighting": manifest.weighting or DEFAULT_WEIGHTING,
+            "tracker": _tracker(session),
+            "weighting": _weighting(session),
             "calibration_source": manifest.calibration_source,
             "imported_from": manifest.imported_from,
             "matching": list(manifest.matching),

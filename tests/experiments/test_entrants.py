@@ -48,6 +48,13 @@ def test_lineups_stand_for_their_members() -> None:
     assert improved["annealed:improved"].settings().tracker.crossover == 0.5
 
 
+@pytest.mark.parametrize("evaluations", [1000, 2000, 4000])
+def test_every_partition_of_the_swarm_weighs_as_many_poses(evaluations: int) -> None:
+    for entrant in made("partitions", evaluations=evaluations).values():
+        assert entrant.evaluations == pytest.approx(evaluations, rel=0.01)
+        assert entrant.settings().tracker.partition in entrant.name or entrant.name == "swarm"
+
+
 def test_changes_go_to_whom_they_name() -> None:
     changes = (
         "annealed.survival=0.5",

@@ -69,12 +69,16 @@ function closeWhatIsGone() {
   else if (get("run") && !entry.runs.some((run) => run.name === get("run"))) openSession(entry.name);
 }
 
+/** The page of a session's comparisons; the form of a first one where there is none. */
+const comparisonsPath = (entry) => `/comparisons?session=${encodeURIComponent(entry.name)}${entry.comparisons ? "" : "&new"}`;
+
 function sessionMenu(button, entry) {
   const path = sessionPath(entry.name);
   const open = get("session") === entry.name;
   const run = get("run") ?? undefined;
   openMenu(button, [
     ["New run…", () => newRunForm(entry)],
+    ...(entry.has_truth ? [["Compare trackers…", () => { location.href = comparisonsPath(entry); }]] : []),
     ["Rename…", () => renameForm("session", path, entry.name, open, async (name) => { await refreshSessions(); if (open) openSession(name, run); })],
     ["Duplicate", async () => { try { const made = await post(`${path}/duplicate`); await refreshSessions(); say(`${entry.name} is copied as ${made.name}.`); } catch (error) { complain(error); } }],
     ["Delete…", () => deleteForm("session", entry.name, path, open, async () => { await refreshSessions(); say(`${entry.name} is in the trash.`); if (open) openSession(get("sessions")?.[0]?.name ?? null); })],
@@ -133,7 +137,11 @@ function sessionBlock(entry) {
   runs.setAttribute("role", "group");
   const fresh = element("button", "new-run quiet small", "+ New run");
   fresh.onclick = () => newRunForm(entry);
-  runs.append(...entry.runs.map((run) => runRow(entry, run)), fresh);
+  const compare = element("a", "compare", entry.comparisons ? `${entry.comparisons} ${entry.comparisons === 1 ? "comparison" : "comparisons"}` : "Compare trackers");
+  compare.href = comparisonsPath(entry);
+  const last = element("div", "last-line");
+  last.append(fresh, ...(entry.has_truth ? [compare] : []));
+  runs.append(...entry.runs.map((run) => runRow(entry, run)), last);
   head.title = [entry.title, entry.problem || `${entry.frame_count} frames at ${figure(entry.fps)} per second, ${entry.body}`, ...(entry.warnings ?? [])].join("\n");
   block.append(head, runs);
   return block;
@@ -180,7 +188,8 @@ async function drawTrash() {
     try {
       const told = await post("/api/trash/restore", { entry: entry.id });
       await refreshSessions();
-      openSession(told.name, told.run ?? undefined);
+      if (told.comparison) location.href = `/comparisons?session=${encodeURIComponent(told.name)}&name=${encodeURIComponent(told.comparison)}`;
+      else openSession(told.name, told.run || undefined);
     } catch (error) { complain(error); }
   }]));
   line.append(button);

@@ -20,6 +20,11 @@ export function layerColour(index, count) {
   return rest < 0.01 || low === 9 ? token(`layer-${low}`) : resolved(mix(token(`layer-${low}`), token(`layer-${low + 1}`)));
 }
 
+const SERIES = 8;
+
+/** Colour of what is compared, by its place in the list. */
+export const seriesColour = (index) => token(`series-${index % SERIES}`);
+
 const probe = document.createElement("i");
 probe.hidden = true;
 document.documentElement.append(probe);

@@ -1,0 +1,222 @@
+"""Comparing trackers: start in the background, look, cancel, go on, throw away, download.
+
+A comparison lies in its session's folder and is measured by processes of its own, one comparison at a time; how far
+it is comes as `comparison` events and in every list.
+"""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Response
+
+from studio.errors import NotFoundError, StudioError
+from studio.experiments.comparison import Plan, plan_comparison
+from studio.experiments.comparison_folders import (
+    kept_comparison,
+    kept_comparisons,
+    new_comparison,
+    place_of,
+    throw_away,
+)
+from studio.experiments.entrants import LINEUPS, VARIANTS, WEIGHTING, Lineup
+from studio.experiments.kept_comparison import FRAMES_NAME, RESULT_NAME, KeptComparison
+from studio.sessions.session import Session
+from studio.tracking.catalogue import TRACKERS
+from studio.web.comparison_schemas import (
+    ComparisonChoices,
+    ComparisonDetail,
+    ComparisonLine,
+    ComparisonList,
+    ComparisonRequest,
+    EntrantChoice,
+    LineupChoice,
+)
+from studio.web.doors import Doors, doors_of
+from studio.web.error_responses import log
+from studio.web.schemas import TrashEntry
+from studio.web.session_routes import OpenSession, trash_entry
+from studio.weighting.catalogue import WEIGHTINGS
+from studio.worker.comparison_run import done_before
+
+router = APIRouter(prefix="/api/comparisons", tags=["comparisons"])
+
+ONE = "/{session}/{comparison}"
+GOING = ("running", "cancelling")
+
+Door = Annotated[Doors, Depends(doors_of)]
+
+
+def comparison_of(session: OpenSession, comparison: str) -> KeptComparison:
+    """The comparison that an address names, as a dependency. Raises NameRefused, NotFoundError."""
+    return kept_comparison(session, comparison)
+
+
+Kept = Annotated[KeptComparison, Depends(comparison_of)]
+
+
+@router.get("/choices")
+def choices() -> ComparisonChoices:
+    """Who can be compared: trackers, labels that bring their knobs, line-ups of several."""
+    plain = [
+        EntrantChoice(name=name, tracker=name, help=getattr(entry.settings_type, "title", name))
+        for name, entry in TRACKERS.items()
+    ]
+    labelled = [
+        EntrantChoice(name=name, tracker=name.partition(":")[0], help=entry.help, changes=dict(entry.changes))
+        for name, entry in VARIANTS.items()
+    ]
+    return ComparisonChoices(
+        entrants=plain + labelled,
+        lineups=[LineupChoice(name=name, trackers=list(members)) for name, members in LINEUPS.items()],
+        weightings=list(WEIGHTINGS),
+    )
+
+
+@router.get("")
+def comparisons(doors: Door, session: str | None = None) -> ComparisonList:
+    """The comparisons of a session, or of all."""
+    names = (
+        [session] if session else [entry.name for entry in doors.workspace.sessions() if not entry.problem]
+    )
+    found: list[ComparisonLine] = []
+    for name in names:
+        opened = doors.workspace.session(name)
+        found += [line for kept in kept_comparisons(opened) if (line := _line_or_none(doors, opened, kept))]
+    return ComparisonList(comparisons=found)
+
+
+@router.post("", status_code=202)
+def begin(wish: ComparisonRequest, doors: Door) -> ComparisonLine:
+    """Begin a comparison. 409 while another one runs; 422 for a session without a truth or for wrong knobs."""
+    session = doors.workspace.session(wish.session)
+    plan = _plan(session, wish)
+    doors.desk.check_free()
+    kept = new_comparison(place_of(session, wish.name or ""), plan)
+    return _start(doors, session, kept)
+
+
+@router.get(ONE)
+def detail(session: OpenSession, kept: Kept, doors: Door) -> ComparisonDetail:
+    """Everything about one comparison."""
+    plan = kept.plan(session)
+    return ComparisonDetail(
+        comparison=_line(doors, session, kept),
+        body=plan.body,
+        fps=plan.fps,
+        settings={
+            entrant.name: {WEIGHTING: entrant.weighting, **entrant.changes} for entrant in plan.entrants
+        },
+        result=kept.result(),
+    )
+
+
+@router.post(ONE + "/cancel", status_code=202)
+def cancel(session: OpenSession, kept: Kept, doors: Door) -> ComparisonLine:
+    """Stop it; what is measured stays, and it can go on."""
+    doors.desk.cancel(session.name, kept.name)
+    return _line(doors, session, kept)
+
+
+@router.post(ONE + "/resume", status_code=202)
+def resume(session: OpenSession, kept: Kept, doors: Door) -> ComparisonLine:
+    """Go on with what is not finished. 409 while any comparison runs."""
+    if kept.status() == "finished":
+        return _line(doors, session, kept)
+    return _start(doors, session, kept)
+
+
+@router.delete(ONE)
+def delete(session: OpenSession, kept: Kept, doors: Door) -> TrashEntry:
+    """Move it to the trash. 409 while it runs."""
+    place = throw_away(doors.workspace, session, kept)
+    doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
+    return trash_entry(place)
+
+
+@router.get(ONE + "/result.json", response_class=Response)
+def result_json(session: OpenSession, kept: Kept) -> Response:
+    """The whole result as a file."""
+    return _file(session, kept, RESULT_NAME, "application/json", "json")
+
+
+@router.get(ONE + "/frames.csv", response_class=Response)
+def frames_as_csv(session: OpenSession, kept: Kept) -> Response:
+    """A row a tracker, seed and frame: its error in mm and the limbs lost."""
+    return _file(session, kept, FRAMES_NAME, "text/csv; charset=utf-8", "csv")
+
+
+def _plan(session: Session, wish: ComparisonRequest) -> Plan:
+    """The wish, checked. Raises StudioError for what cannot be compared."""
+    changes: dict[str, dict] = {"": dict(wish.settings)} if wish.settings else {}
+    for entrant in wish.trackers:
+        own = dict(entrant.settings) | ({WEIGHTING: entrant.weighting} if entrant.weighting else {})
+        if own:
+            changes[entrant.name] = own
+    names = tuple(entrant.name for entrant in wish.trackers)
+    lineup = Lineup(names, wish.weighting or "", wish.evaluations, wish.layers, changes)
+    return plan_comparison(
+        session, lineup, range(wish.seeds), first=wish.first, last=wish.last, body=wish.body or ""
+    )
+
+
+def _start(doors: Doors, session: Session, kept: KeptComparison) -> ComparisonLine:
+    doors.desk.start(kept, session)
+    doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
+    return _line(doors, session, kept)
+
+
+def _line_or_none(doors: Doors, session: Session, kept: KeptComparison) -> ComparisonLine | None:
+    """A line; None for a folder that cannot be read, which its own address tells about."""
+    try:
+        return _line(doors, session, kept)
+    except StudioError as error:
+        log.warning("comparison '%s' is left out of the list: %s", kept.folder, error)
+        return None
+
+
+def _line(doors: Doors, session: Session, kept: KeptComparison) -> ComparisonLine:
+    record, plan = kept.record(), kept.plan(session)
+    state = doors.desk.state
+    mine = (
+        state is not None
+        and (state.session, state.name) == (session.name, kept.name)
+        and doors.desk.is_busy()
+    )
+    status = state.state if mine and state and state.state in GOING else kept.status()
+    total = len(plan.seeds) * len(plan.entrants)
+    if status == "finished":
+        done = total
+    else:
+        done = state.done if mine and state and state.total else done_before(kept, plan)
+    line = ComparisonLine(
+        session=session.name,
+        name=kept.name,
+        created=record.created,
+        status=status,  # pyright: ignore[reportArgumentType]
+        trackers=[entrant.name for entrant in plan.entrants],
+        evaluations=plan.evaluations,
+        seeds=len(plan.seeds),
+        first=plan.first,
+        last=plan.last,
+        done=done,
+        total=total,
+        problem=record.problem,
+    )
+    if mine and state and status in GOING:
+        return line.model_copy(update={"step": state.step, "seconds_left": state.seconds_left})
+    return _with_best(line, kept) if status == "finished" else line
+
+
+def _with_best(line: ComparisonLine, kept: KeptComparison) -> ComparisonLine:
+    trackers = (kept.result() or {}).get("trackers", [])
+    if not trackers:
+        return line
+    best = min(trackers, key=lambda entry: entry["mean_mm"])
+    return line.model_copy(update={"best": best["tracker"], "best_mm": best["mean_mm"]})
+
+
+def _file(session: Session, kept: KeptComparison, name: str, kind: str, ending: str) -> Response:
+    path = kept.folder / name
+    if not path.is_file():
+        raise NotFoundError(f"Comparison '{kept.name}' is not finished.", "Wait for it, or let it go on.")
+    headers = {"content-disposition": f'attachment; filename="{session.name}-{kept.name}.{ending}"'}
+    return Response(path.read_bytes(), media_type=kind, headers=headers)

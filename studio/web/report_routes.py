@@ -1,0 +1,83 @@
+"""The studio's further pages: comparisons, and what `studio reproduce` found."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+from fastapi import APIRouter, Depends
+from pydantic import Field
+from starlette.responses import FileResponse, Response
+
+from studio.errors import NotFoundError, SessionError
+from studio.experiments.findings_files import REPORT, RESULTS, SUMMARY
+from studio.typed_decoding import decode_json
+from studio.web.doors import Doors, doors_of
+from studio.web.page_routes import assets_folder
+from studio.web.schemas import Answer
+
+router = APIRouter(tags=["reports"])
+
+REPRODUCTION_FOLDER = "reproduction"
+DOWNLOADS = {RESULTS: "application/json", SUMMARY: "text/markdown; charset=utf-8", REPORT: "text/html"}
+
+Door = Annotated[Doors, Depends(doors_of)]
+
+
+class Reports(Answer):
+    """What was reproduced so far. experiments: documents as results.json has them; none before the first command."""
+
+    software: str = ""
+    date: str = ""
+    experiments: list[dict[str, Any]] = Field(default_factory=list)
+
+
+@router.get("/comparisons", include_in_schema=False)
+def comparisons_page() -> Response:
+    """The page of comparisons."""
+    return _page("comparisons.html")
+
+
+@router.get("/reports", include_in_schema=False)
+def reports_page() -> Response:
+    """The page of reproduced figures."""
+    return _page("reports.html")
+
+
+@router.get("/api/reports")
+def reports(doors: Door) -> Reports:
+    """What `studio reproduce` wrote into the workspace."""
+    path = _folder(doors) / RESULTS
+    if not path.is_file():
+        return Reports()
+    try:
+        return decode_json(path.read_bytes(), _Results).as_reports()
+    except (msgspec.DecodeError, UnicodeDecodeError, OSError) as error:
+        raise SessionError(
+            f"'{path}' cannot be read: {error}.", "Run 'studio reproduce' again; what is measured is kept."
+        ) from None
+
+
+@router.get("/api/reports/{name}", response_class=Response)
+def report_file(name: str, doors: Door) -> Response:
+    """results.json, summary.md or report.html (the whole report in one file) as a download."""
+    path = _folder(doors) / name
+    if name not in DOWNLOADS or not path.is_file():
+        raise NotFoundError(f"There is no report '{name[:40]}'.", "Make one: studio reproduce all --quick.")
+    return FileResponse(path, media_type=DOWNLOADS[name], filename=name)
+
+
+class _Results(msgspec.Struct, frozen=True):
+    software: str = ""
+    date: str = ""
+    experiments: list[dict[str, Any]] = msgspec.field(default_factory=list)
+
+    def as_reports(self) -> Reports:
+        return Reports(software=self.software, date=self.date, experiments=self.experiments)
+
+
+def _folder(doors: Doors) -> Path:
+    return doors.workspace.root / REPRODUCTION_FOLDER
+
+
+def _page(name: str) -> Response:
+    return FileResponse(assets_folder() / name, media_type="text/html", headers={"cache-control": "no-cache"})
