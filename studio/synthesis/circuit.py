@@ -160,7 +160,7 @@ def footfalls(gait: Gait, halt: Halt, *, left: bool, until: float) -> Footfalls:
     leave = halt.end + GOING + (0.0 if left else 0.5 * gait.cycle)
     before = arrive - gait.cycle * np.arange(int(np.ceil((arrive + 2.0) / gait.cycle)) + 1, 0.0, -1.0)
     after = leave + swing + gait.cycle * np.arange(max(int(np.ceil((until - leave) / gait.cycle)), 0) + 3)
-    along = [walked(down + UNDER_HIP * stand, gait.speed, halt) for down in (before, after)]
+    along = [walked(np.add(down, UNDER_HIP * stand), gait.speed, halt) for down in (before, after)]
     rise = ROLL_UP * stand
     rest = walked(np.array([halt.begin]), gait.speed, halt) + (STAGGER if left else -STAGGER)
     return Footfalls(

@@ -31,6 +31,7 @@ def render_person(
         noise=picture.noise,
         samples=picture.samples,
         seed=recipe.seed,
+        girth=recipe.girth,
     )
     with ExitStack() as open_clips:
         footage = _writers(source / "videos", cameras, recipe.fps, picture.quality, open_clips)

@@ -43,7 +43,8 @@ class Placed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Cameras(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which cameras: "corners" (four made-up ones), a calibration file or folder, or `placed` ones."""
+    """Which cameras: "corners" (four made-up ones), a calibration file or folder (in the real data after
+    "data:"), or `placed` ones."""
 
     rig: str = ""
     calibration: str = ""
@@ -68,10 +69,16 @@ class Include(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Footage to be made.
 
-    motion : "walk", "run", "box", "handstand", "stand"; or "arm", which shows `body` itself, seen by one
-    camera, as in Deutscher & Reid 6.1; or "recorded", the motion of `motion_file` (.amc, .bvh, .npz, with
-    "data:" in the real data; `skeleton_file` for an .amc whose ASF is not beside it). options : numbers of
-    the motion. tracker, weighting : what runs of the session use by default.
+    motion : "walk", "run", "box", "handstand", "stand", "circuit" and others (`motions.py`); or "arm", which shows
+    `body` itself, seen by one camera, as in Deutscher & Reid 6.1; or "recorded", the motion of `motion_file` (.amc,
+    .bvh, .npz; `skeleton_file` for an .amc whose ASF is not beside it). options : numbers of the motion. weighting :
+    what runs of the session use by default.
+
+    height_mm : of a person with published proportions. shape : instead, a file of `body`'s dimensions, whose lengths
+    the person's bones have; the session's subject has these dimensions, radii included, and `subject_full.toml`
+    beside it those of the rendered hands and shoes as well. girth : how much stouter than usual the flesh is.
+    sigma : a file whose first numbers are the session's σ0, one for each parameter of `body`, from frame to frame at
+    60 Hz. Files count from the recipe's folder, or lie in the real data after "data:" (`real_data.py`).
     """
 
     title: str
@@ -83,6 +90,9 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     seed: int = 1
     body: str = "human31"
     height_mm: float = 1760.0
+    shape: str = ""
+    girth: float = 1.0
+    sigma: str = ""
     weighting: str = ""
     options: dict[str, float] = {}
     cameras: Cameras = Cameras()
@@ -154,6 +164,11 @@ def _problem(recipe: Recipe) -> str:
         (not 1 <= recipe.frames <= 100_000, f"frames is {recipe.frames}, not 1 to 100000"),
         (not 1.0 <= recipe.fps <= 1000.0, f"fps is {recipe.fps:g}, not 1 to 1000"),
         (not 300.0 <= recipe.height_mm <= 3000.0, f"height_mm is {recipe.height_mm:g}, not 300 to 3000"),
+        (not 0.5 <= recipe.girth <= 2.0, f"girth is {recipe.girth:g}, not 0.5 to 2"),
+        (
+            recipe.motion == "arm" and bool(recipe.shape or recipe.sigma),
+            "shape and sigma belong to a person, not to motion 'arm'",
+        ),
         (not 16 <= picture.width <= 8192, f"picture.width is {picture.width}, not 16 to 8192"),
         (not 16 <= picture.height <= 8192, f"picture.height is {picture.height}, not 16 to 8192"),
         (bool(picture.width % 2 or picture.height % 2), "picture sides must be even for H.264"),

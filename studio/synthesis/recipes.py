@@ -12,11 +12,12 @@ from studio.body.inverse_kinematics import pose_from_markers
 from studio.body.subject import Subject, fit_subject, write_subject
 from studio.capture.calibration_files import read_calibration, write_calibration
 from studio.capture.trc import MarkerMotion, write_trc
-from studio.errors import SessionError
+from studio.errors import BodyError, SessionError
 from studio.geometry.camera import Camera
+from studio.sessions.importers.bodytrack import RATE, read_numbers
 from studio.sessions.importers.catalogue import import_source
 from studio.sessions.manifest import read_manifest, write_manifest
-from studio.sessions.named_rows import write_pose
+from studio.sessions.named_rows import write_pose, write_sigma
 from studio.synthesis.arm_footage import render_arm
 from studio.synthesis.motions import make_motion
 from studio.synthesis.person import PersonMotion, Skeleton, marker_lengths, marker_motion, skeleton_of_height
@@ -24,11 +25,13 @@ from studio.synthesis.person_footage import render_person
 from studio.synthesis.real_data import located
 from studio.synthesis.recipe_file import RECORDED, Recipe, find_recipe, read_recipe, recipe_cameras
 from studio.synthesis.recorded_clip import read_recording, recorded_person
+from studio.synthesis.shape import skeleton_of_subject, subject_of_file, with_hands_and_feet
 
 Progress = Callable[[str, int, int], None]
 
 ARM = "arm"
 RECIPE_COPY = "recipe.toml"
+SUBJECT_FULL, SIGMA_NAME = "subject_full.toml", "sigma.csv"
 
 
 def synthesize(recipe: Path | str, into: Path, progress: Progress | None = None) -> Path:
@@ -47,6 +50,8 @@ def synthesize(recipe: Path | str, into: Path, progress: Progress | None = None)
         source.mkdir()
         render_source(wanted, path.parent, source, progress)
         import_source(source, into, fps=wanted.fps, progress=progress)
+        if (source / SUBJECT_FULL).exists():
+            (into / SUBJECT_FULL).write_bytes((source / SUBJECT_FULL).read_bytes())
     manifest = read_manifest(into)
     changed = msgspec.structs.replace(
         manifest, title=wanted.title, weighting=wanted.weighting, imported_from=f"recipe {path.name}"
@@ -70,10 +75,14 @@ def render_source(
         truth = render_arm(recipe, cameras[0], source, progress)
         cameras, subject = cameras[:1], Subject(body=recipe.body)
     else:
-        skeleton = skeleton_of_height(recipe.height_mm, rng)
+        skeleton, shape = recipe_person(recipe, recipe_folder, rng)
         cameras = _cameras(recipe, recipe_folder, rng)
         motion = recipe_motion(recipe, recipe_folder, skeleton)
-        truth, subject = marker_motion(motion), person_subject(recipe, motion)
+        truth, subject = marker_motion(motion), shape or person_subject(recipe, motion)
+        if shape is not None and recipe.include.subject:
+            write_subject(with_hands_and_feet(shape, skeleton), source / SUBJECT_FULL)
+        if recipe.sigma:
+            _write_sigma(recipe, located(recipe.sigma, recipe_folder), source / SIGMA_NAME)
         render_person(recipe, motion, cameras, source, progress)
     (source / "calibration").mkdir()
     write_calibration(cameras, source / "calibration" / "rendered.toml")
@@ -95,6 +104,19 @@ def recipe_motion(recipe: Recipe, recipe_folder: Path, skeleton: Skeleton) -> Pe
     return recorded_person(recorded, skeleton, recipe.frames, recipe.fps, recipe.options)
 
 
+def recipe_person(
+    recipe: Recipe, recipe_folder: Path, rng: np.random.Generator
+) -> tuple[Skeleton, Subject | None]:
+    """The skeleton of the person that a recipe asks for, and the subject of its shape file where it names one.
+
+    Raises BodyError for a shape that does not fit the recipe's body.
+    """
+    if not recipe.shape:
+        return skeleton_of_height(recipe.height_mm, rng), None
+    subject = subject_of_file(located(recipe.shape, recipe_folder), recipe.body)
+    return skeleton_of_subject(subject), subject
+
+
 def person_subject(recipe: Recipe, motion: PersonMotion) -> Subject:
     """What a tape measure says of the rendered person: height and the distances between neighbouring
     markers.
@@ -106,8 +128,20 @@ def person_subject(recipe: Recipe, motion: PersonMotion) -> Subject:
 def _cameras(recipe: Recipe, recipe_folder: Path, rng: np.random.Generator) -> tuple[Camera, ...]:
     """Made-up cameras, or those of the calibration that the recipe names."""
     if recipe.cameras.calibration:
-        return read_calibration(recipe_folder / recipe.cameras.calibration).cameras
+        return read_calibration(located(recipe.cameras.calibration, recipe_folder)).cameras
     return recipe_cameras(recipe, rng)
+
+
+def _write_sigma(recipe: Recipe, given: Path, path: Path) -> None:
+    """The first numbers of a file as σ0 of the recipe's body, at the rate of the data that they come from."""
+    names = tuple(entry.name for entry in load_body(recipe.body).parameters)
+    numbers = read_numbers(given)
+    if numbers is None or len(numbers) < len(names):
+        raise BodyError(
+            f"'{given.name}' does not begin with the {len(names)} σ of body '{recipe.body}'.",
+            "Name the file of that body's parameters, or leave sigma out.",
+        )
+    write_sigma(path, names, numbers[: len(names)], RATE)
 
 
 def _write_start_pose(

@@ -13,13 +13,15 @@ from studio.body.catalogue import load_body
 from studio.body.subject import Subject, subject_from_shape
 from studio.errors import BodyError
 from studio.sessions.importers.bodytrack import read_numbers
-from studio.synthesis.person import FOOT, HAND, SIDES, Skeleton
+from studio.synthesis.person import HAND, SIDES, Skeleton
 
 # How far in front of and above the neck's base the shoulders are, mm: rounded means of both sides in the Lee walk's
 # start pose. Sideways they are as far as the clavicle's length then leaves.
 SHOULDER_FORWARD, SHOULDER_UP = -40.0, -70.0
 # The Lee walk's shins end this high above the floor, mm (28 and 10 in the start pose).
 ANKLE_HEIGHT = 24.0
+# Length of a shoe, of the height: the silhouettes of the Lee walk show it.
+SHOE = 0.168
 # The rendered shoe begins this far behind the ankle and reaches this far past the toes' joint, mm.
 SHOE_BEHIND, SHOE_BEYOND, FINGERTIPS = 70.0, 27.0, 15.0
 TOES, KNUCKLES = 0.62, 0.90
@@ -58,7 +60,7 @@ def skeleton_of_subject(subject: Subject) -> Skeleton:
         upper_arm=both("upper_arm_length"),
         forearm=both("forearm_length"),
         hand=HAND * height,
-        foot=FOOT * height,
+        foot=SHOE * height,
         ankle_height=ANKLE_HEIGHT,
     )
 
