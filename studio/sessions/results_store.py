@@ -9,13 +9,13 @@ columns. Neither side holds more than the frame at hand.
 import json
 import sqlite3
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from studio.errors import RunError, SessionError
+from studio.sessions.process_lock import ProcessLock
 from studio.sessions.results_codec import pack, pack_layer, pack_result
 from studio.sessions.results_reader import FILE_NAME, ResultsReader
 from studio.tracking.tracker import FrameResult, LayerRecord
@@ -43,34 +43,11 @@ CREATE TABLE IF NOT EXISTS partial_layers (layer INTEGER PRIMARY KEY, blob BLOB 
 """
 
 
-@dataclass(frozen=True, slots=True)
-class _Lock:
-    """Held as an exclusive transaction on an empty database beside the store; freed by the system when a
-    process dies, on every system alike."""
-
-    connection: sqlite3.Connection
-
-    @staticmethod
-    def take(run_folder: Path) -> "_Lock | None":
-        connection = sqlite3.connect(
-            run_folder / LOCK_NAME, timeout=0.0, isolation_level=None, check_same_thread=False
-        )
-        try:
-            connection.execute("BEGIN EXCLUSIVE")
-        except sqlite3.OperationalError:
-            connection.close()
-            return None
-        return _Lock(connection)
-
-    def free(self) -> None:
-        self.connection.close()
-
-
 def is_being_written(run_folder: Path) -> bool:
     """Whether some living process has this run open for tracking."""
     if not (run_folder / LOCK_NAME).exists():
         return False
-    lock = _Lock.take(run_folder)
+    lock = ProcessLock.take(run_folder / LOCK_NAME)
     if lock is None:
         return True
     lock.free()
@@ -95,7 +72,7 @@ class ResultsWriter:
     """
 
     def __init__(self, run_folder: Path) -> None:
-        lock = _Lock.take(run_folder)
+        lock = ProcessLock.take(run_folder / LOCK_NAME)
         if lock is None:
             raise RunError(
                 f"Run '{run_folder.name}' is being tracked by another process.",

@@ -1,0 +1,165 @@
+"""`studio reproduce`."""
+
+import shlex
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+from studio.cli.output import errors_in_words, messages, note, tell
+from studio.experiments.catalogue import EXPERIMENTS, find_experiments
+from studio.experiments.experiment import FAILED, Experiment, Scale
+from studio.experiments.findings_document import Document
+from studio.experiments.findings_files import REPORT, SUMMARY, number_in_words, read_findings
+from studio.experiments.reproduction_plan import FULL_SEEDS, QUICK_SEEDS, scale_of
+from studio.sessions.workspace import workspace_root
+from studio.worker.reproduction import Reproduction, reproduce
+from studio.worker.trial_pace import Report
+
+FOLDER = "reproduction"
+NOT_CONCLUDED = 1
+SECONDS_BETWEEN_LINES = 10.0
+NOT_RUN = "not run yet"
+
+OUT_HELP = f"Folder of everything that is kept; default: '{FOLDER}' in the workspace."
+SEEDS_HELP = f"Seeds of every setting; default {FULL_SEEDS}, with --quick {QUICK_SEEDS}."
+QUICK_HELP = "A look in minutes: fewer seeds, frames and settings."
+PROCESSES_HELP = "How many at once; default: one a core."
+JSON_HELP = "Print one JSON object and nothing else on standard output."
+
+
+@click.command("reproduce")
+@click.argument("name")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help=OUT_HELP)
+@click.option("--quick", is_flag=True, help=QUICK_HELP)
+@click.option("--seeds", type=click.IntRange(1, 1000), metavar="N", help=SEEDS_HELP)
+@click.option("--processes", type=click.IntRange(1, 1024), metavar="N", help=PROCESSES_HELP)
+@click.option("--json", "as_json", is_flag=True, help=JSON_HELP)
+def reproduce_command(
+    name: str, out: Path | None, quick: bool, seeds: int | None, processes: int | None, as_json: bool
+) -> None:
+    """Rerun the experiment NAME of a paper, `all` of them, or `list` what there is.
+
+    Outcomes are kept as they come: the same command goes on where an interrupted one stopped. Writes a report
+    (report.html), numbers (JSON, CSV) and charts (CSV) with the verdict on each of the paper's claims. Exit code 1
+    says that an experiment could not be concluded; a claim that is not reproduced is a result like any other.
+    """
+    with errors_in_words():
+        folder = (out or workspace_root() / FOLDER).expanduser().absolute()
+        if name == "list":
+            tell(_listed(folder), as_json)
+            return
+        found = _run(find_experiments(name), folder, scale_of(seeds, quick), processes)
+        tell(_told(found, folder), as_json)
+        if any(document["verdict"] == FAILED for document in found.documents):
+            sys.exit(NOT_CONCLUDED)
+
+
+def _run(
+    experiments: tuple[Experiment, ...], folder: Path, scale: Scale, processes: int | None
+) -> Reproduction:
+    try:
+        with trial_progress() as report:
+            catalogue = tuple(EXPERIMENTS.values())
+            return reproduce(experiments, folder, scale, report, catalogue=catalogue, processes=processes)
+    except KeyboardInterrupt:
+        typed = shlex.join(["studio", *sys.argv[1:]])
+        note(f"Every finished trial is kept in '{folder}'. Go on with: {typed}")
+        raise
+
+
+def _listed(folder: Path) -> Document:
+    lines = []
+    for experiment in EXPERIMENTS.values():
+        found = read_findings(folder, experiment.name)
+        lines.append(
+            {
+                "name": experiment.name,
+                "title": experiment.title,
+                "source": experiment.source,
+                "claim": experiment.claim,
+                "verdict": found["verdict"] if found else None,
+                "firm": found["firm"] if found else None,
+            }
+        )
+    text = "\n\n".join(
+        f"{line['name']}  ({_verdict(line) if line['verdict'] else NOT_RUN})\n"
+        f"  {line['source']}: {line['title']}\n  {line['claim']}"
+        for line in lines
+    )
+    return {"experiments": lines, "text": text}
+
+
+def _told(found: Reproduction, folder: Path) -> Document:
+    lines = []
+    for document in found.documents:
+        lines.append(f"{document['name']}: {_verdict(document)}")
+        lines += [f"  {number_in_words(number)}" for number in document["numbers"]]
+        lines += [f"  {words}" for words in (document["words"], *document["notes"]) if words]
+    lines.append(f"{found.measured} trials run, {found.kept} kept from before, {found.failed} failed.")
+    lines.append(f"Report: {folder / REPORT}")
+    return {
+        "out": str(folder),
+        "report": str(folder / REPORT),
+        "summary": str(folder / SUMMARY),
+        "trials": {"measured": found.measured, "kept": found.kept, "failed": found.failed},
+        "experiments": list(found.documents),
+        "text": "\n".join(lines),
+    }
+
+
+def _verdict(document: Document) -> str:
+    firm = document["firm"] or document["verdict"] == FAILED
+    return document["verdict"] if firm else f"{document['verdict']}, not firm"
+
+
+@contextmanager
+def trial_progress() -> Iterator[Report]:
+    """Experiment and trial in words, what is done of all, and the time that is left, on standard error.
+
+    A bar on a terminal; in a log file a line now and then.
+    """
+    if not messages.is_terminal:
+        yield _lines()
+        return
+    columns = (
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[left]}"),
+        TextColumn("{task.description}", markup=False),
+    )
+    with Progress(*columns, console=messages) as bar:
+        task = bar.add_task("", total=None, left="")
+
+        def report(step: str, done: int, total: int, seconds: float | None) -> None:
+            bar.update(task, description=step, completed=done, total=total, left=_left(seconds))
+
+        yield report
+
+
+def _lines() -> Report:
+    said = float("-inf")
+
+    def report(step: str, done: int, total: int, seconds: float | None) -> None:
+        nonlocal said
+        now = time.monotonic()
+        if now - said >= SECONDS_BETWEEN_LINES or done == total:
+            said = now
+            left = _left(seconds)
+            note(f"{step}: {done} of {total}{', ' + left if left else ''}")
+
+    return report
+
+
+def _left(seconds: float | None) -> str:
+    if seconds is None:
+        return ""
+    if seconds < 60:
+        return f"about {seconds:.0f} s left"
+    if seconds < 3600:
+        return f"about {seconds / 60:.0f} min left"
+    return f"about {seconds / 3600:.1f} h left"

@@ -1,0 +1,115 @@
+"""Findings as plain values that any JSON reader takes: what the report, the studio's pages and scripts read.
+
+NaN and infinity become null; numbers keep six significant figures, which no chart can show more of.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from studio.experiments.experiment import FAILED, FIRM_SEEDS, Experiment, Findings, Plain, Scale
+from studio.experiments.kept_trials import plain
+from studio.experiments.statistics import firmness
+
+FIGURES = 6
+Document = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Making:
+    """How findings came about.
+
+    scale : what was run. trials : how many. seconds : of all of them, one after the other. software : what drew
+    the conclusion; measured_by : what measured the trials. date : UTC, ISO 8601.
+    """
+
+    scale: Scale
+    trials: int
+    seconds: float
+    software: str
+    measured_by: tuple[str, ...]
+    date: str
+
+
+def as_document(experiment: Experiment, findings: Findings, making: Making) -> Document:
+    """An experiment that was run to its end."""
+    numbers = [_without_nan(asdict(number)) for number in findings.numbers]
+    for number, entry in zip(findings.numbers, numbers, strict=True):
+        entry["firm"] = number.seeds >= FIRM_SEEDS
+    return {
+        **_head(experiment, making),
+        "verdict": findings.verdict,
+        "firm": _seeds(findings, making) >= FIRM_SEEDS,
+        "words": findings.words,
+        "numbers": numbers,
+        "tables": [_without_nan(asdict(table)) for table in findings.tables],
+        "charts": [_without_nan(asdict(chart)) for chart in findings.charts],
+        "settings": _without_nan(plain(findings.settings)),
+        "failures": [],
+        "notes": _notes(findings, making),
+    }
+
+
+def failed_document(experiment: Experiment, reasons: Sequence[tuple[str, str]], making: Making) -> Document:
+    """An experiment without findings. reasons : what failed (a trial's label), and why."""
+    few = [f"{label}: {why}" if label else why for label, why in reasons[:3]]
+    more = f" And {len(reasons) - 3} more." if len(reasons) > 3 else ""
+    return {
+        **_head(experiment, making),
+        "verdict": FAILED,
+        "firm": False,
+        "words": f"Not concluded: {' '.join(few)}{more}",
+        "numbers": [],
+        "tables": [],
+        "charts": [],
+        "settings": {},
+        "failures": [{"label": label, "reason": why} for label, why in reasons],
+        "notes": [],
+    }
+
+
+def _head(experiment: Experiment, making: Making) -> Document:
+    return {
+        "name": experiment.name,
+        "title": experiment.title,
+        "source": experiment.source,
+        "claim": experiment.claim,
+        "seeds": len(making.scale.seeds),
+        "quick": making.scale.quick,
+        "trials": making.trials,
+        "seconds": round(making.seconds, 1),
+        "software": making.software,
+        "date": making.date,
+    }
+
+
+def _seeds(findings: Findings, making: Making) -> int:
+    """How many seeds the verdict rests on: the fewest of a number that was compared with the paper's."""
+    compared = [number.seeds for number in findings.numbers if number.verdict != "answered"]
+    return min(compared, default=len(making.scale.seeds))
+
+
+def _notes(findings: Findings, making: Making) -> list[str]:
+    notes = []
+    few = firmness(_seeds(findings, making))
+    if few:
+        notes.append(f"The verdict is {few}.")
+    if making.scale.quick:
+        notes.append("A quick look: less is run than for the figures of the guide.")
+    others = [version for version in making.measured_by if version != making.software]
+    if others:
+        notes.append(f"Some outcomes were measured by another version ({', '.join(others)}).")
+    return notes
+
+
+def _without_nan(value: Plain) -> Any:  # noqa: ANN401
+    """The value with finite numbers of six figures and null for all other floats."""
+    if isinstance(value, float):
+        return float(f"{value:.{FIGURES}g}") if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {str(key): _without_nan(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_nan(entry) for entry in value]
+    as_number = getattr(value, "item", None)
+    return _without_nan(as_number()) if callable(as_number) else value

@@ -1,0 +1,113 @@
+"""Outcomes on disk, one file each, so that nothing that was measured is measured twice.
+
+A file's name is made from all that an outcome depends on: the function that measures, its arguments, and the
+recipes of the footage that these name. Experiments that ask for the same trial share it; a program that was killed
+goes on where it was. A file is whole or not there.
+"""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import studio
+from studio.experiments.experiment import Experiment, Plain, Trial
+from studio.runs.new_run import software_version
+from studio.sessions.atomic_files import write_text
+
+# What decides on an outcome; pages, commands and reports do not.
+SCIENCE = ("geometry", "body", "capture", "evidence", "weighting", "tracking", "runs", "evaluation")
+
+
+@dataclass(frozen=True, slots=True)
+class KeptOutcome:
+    """What became of a trial.
+
+    measured : plain values, None where it failed. failure : why, "" where it did not. seconds : it took.
+    software : what measured it. finished : UTC, ISO 8601. label, arguments : of the trial, for people who read the
+    file.
+    """
+
+    measured: Mapping[str, Plain] | None
+    failure: str
+    seconds: float
+    software: str
+    finished: str
+    label: str
+    arguments: Mapping[str, Plain]
+
+
+class KeptTrials:
+    """The folder of kept outcomes; one process writes."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def read(self, key: str) -> KeptOutcome | None:
+        """The outcome of that key; None where there is none, or a file that cannot be read as one."""
+        try:
+            return KeptOutcome(**json.loads((self.folder / f"{key}.json").read_text(encoding="utf-8")))
+        except (OSError, ValueError, TypeError):
+            return None
+
+    def write(self, key: str, outcome: KeptOutcome) -> None:
+        """Keep an outcome, in the place of an older one. Raises OSError."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        write_text(self.folder / f"{key}.json", json.dumps(plain(asdict(outcome)), indent=1) + "\n")
+
+
+def trial_key(experiment: Experiment, trial: Trial, recipes: Mapping[str, str]) -> str:
+    """The name under which a trial's outcome is kept. recipes : digests of the experiment's footage, by name."""
+    measure = experiment.measure
+    made_by = {
+        "measure": f"{measure.__module__}.{measure.__qualname__}",
+        "alone": experiment.alone,
+        "arguments": plain(trial.arguments),
+        "footage": {name: recipes[name] for name in footage_of(experiment, trial)},
+    }
+    return hashlib.sha256(json.dumps(made_by, sort_keys=True).encode()).hexdigest()[:24]
+
+
+def footage_of(experiment: Experiment, trial: Trial) -> tuple[str, ...]:
+    """Which of the experiment's footage a trial's arguments name; all of it where they name none."""
+    named = tuple(name for name in experiment.footage if name in _texts(trial.arguments))
+    return named or experiment.footage
+
+
+@cache
+def measured_by() -> str:
+    """The studio's version and a digest of the code that decides on outcomes: "0.1.0+1a2b3c4d"."""
+    package = Path(studio.__file__).parent
+    digest = hashlib.sha256()
+    for room in SCIENCE:
+        for path in sorted((package / room).rglob("*")):
+            if path.suffix in (".py", ".toml"):
+                digest.update(path.read_bytes())
+    return f"{software_version()}+{digest.hexdigest()[:8]}"
+
+
+def plain(value: Plain) -> Any:  # noqa: ANN401
+    """The value as it comes back from JSON (tuples as lists, keys as words, NumPy's numbers as numbers)."""
+    return json.loads(json.dumps(value, default=_plain_value))
+
+
+def _plain_value(value: Any) -> Any:  # noqa: ANN401
+    """NumPy's arrays and numbers, mappings and sets. Raises TypeError for what has no plain form."""
+    as_list = getattr(value, "tolist", None)
+    if callable(as_list):
+        return as_list()
+    if isinstance(value, Mapping):
+        return dict(value)
+    raise TypeError(f"A {type(value).__name__} is no plain value.")
+
+
+def _texts(value: Plain) -> set[str]:
+    """Every word in a plain value."""
+    if isinstance(value, str):
+        return {value}
+    if isinstance(value, Mapping):
+        value = list(value.values())
+    return set().union(*map(_texts, value)) if isinstance(value, list | tuple) else set()

@@ -1,0 +1,98 @@
+"""What a command has to run: the trials of all asked experiments, each once, and the footage that they need."""
+
+import hashlib
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from studio.errors import StudioError
+from studio.experiments.experiment import Experiment, Plain, Scale, Trial
+from studio.experiments.footage_shelf import FootageShelf
+from studio.experiments.kept_trials import footage_of, plain, trial_key
+from studio.synthesis.recipe_file import find_recipe
+from studio.synthesis.recipes import RECIPE_COPY
+
+FULL_SEEDS, QUICK_SEEDS = 10, 3
+
+Measure = Callable[[Mapping[str, Plain], FootageShelf], dict[str, Plain]]
+
+
+@dataclass(frozen=True, slots=True)
+class TrialJob:
+    """A trial, ready to be run in any process.
+
+    key : under which its outcome is kept. experiment : the first that asks for it. footage : recipes that it looks
+    at. alone : nothing else may run then.
+    """
+
+    key: str
+    experiment: str
+    label: str
+    arguments: Mapping[str, Plain]
+    measure: Measure
+    footage: tuple[str, ...]
+    alone: bool
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedExperiment:
+    """An experiment with its trials and their jobs, in the same order. problem : why it cannot be run, or ""."""
+
+    experiment: Experiment
+    scale: Scale
+    trials: tuple[Trial, ...] = ()
+    jobs: tuple[TrialJob, ...] = ()
+    problem: str = ""
+
+
+def scale_of(seeds: int | None = None, quick: bool = False) -> Scale:
+    """How much is run: ten seeds, three for a quick look, or as many as are asked for.
+
+    Raises StudioError for fewer than one.
+    """
+    count = seeds if seeds is not None else QUICK_SEEDS if quick else FULL_SEEDS
+    if count < 1:
+        raise StudioError(f"--seeds is {count}.", "Give one seed or more.")
+    return Scale(tuple(range(count)), quick)
+
+
+def plan(experiment: Experiment, scale: Scale) -> PlannedExperiment:
+    """An experiment's jobs; where they cannot be told, the reason in words."""
+    try:
+        recipes = {name: recipe_digest(name) for name in experiment.footage}
+        trials = experiment.trials(scale)
+    except StudioError as error:
+        return PlannedExperiment(experiment, scale, problem=str(error))
+    jobs = tuple(
+        TrialJob(
+            trial_key(experiment, trial, recipes),
+            experiment.name,
+            trial.label,
+            plain(trial.arguments),
+            experiment.measure,
+            footage_of(experiment, trial),
+            experiment.alone,
+        )
+        for trial in trials
+    )
+    return PlannedExperiment(experiment, scale, trials, jobs)
+
+
+def each_once(planned: Iterable[PlannedExperiment]) -> dict[str, TrialJob]:
+    """All jobs by key, in the order in which they were planned."""
+    found: dict[str, TrialJob] = {}
+    for entry in planned:
+        for job in entry.jobs:
+            found.setdefault(job.key, job)
+    return found
+
+
+def recipe_digest(name: str) -> str:
+    """What a recipe's footage is known by. Raises StudioError for an unknown recipe."""
+    return hashlib.sha256(find_recipe(name).read_bytes()).hexdigest()[:16]
+
+
+def is_rendered(name: str, folder: Path) -> bool:
+    """Whether the footage lies in `folder` as the recipe has it now. Raises StudioError for an unknown recipe."""
+    copy = folder / name / RECIPE_COPY
+    return copy.is_file() and copy.read_bytes() == find_recipe(name).read_bytes()
