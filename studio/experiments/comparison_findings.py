@@ -57,18 +57,18 @@ def error_chart(comparison: Comparison) -> Chart:
 
 
 def seeds_chart(comparison: Comparison) -> Chart:
-    """Each seed's mean error, a point each."""
-    names = tuple(result.tracker for result in comparison.trackers)
+    """Each seed's mean error, the trackers beside one another as the sign test pairs them."""
+    names = tuple(str(seed) for seed in comparison.plan.seeds)
     series = tuple(
         Series(
             result.tracker,
-            tuple(float(at) for _ in result.seeds),
+            tuple(float(at) for at in range(len(names))),
             tuple(seed.mean_mm for seed in result.seeds),
             group=result.tracker,
         )
-        for at, result in enumerate(comparison.trackers)
+        for result in comparison.trackers
     )
-    return Chart("Each seed's mean error", "points", "tracker", "mean error (mm)", series, categories=names)
+    return Chart("Mean error of each seed", "bars", "seed", "mean error (mm)", series, categories=names)
 
 
 def document(comparison: Comparison) -> dict[str, Any]:

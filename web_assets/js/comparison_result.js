@@ -109,6 +109,8 @@ function table({ result }) {
 
 const probability = (p) => (p < 1e-4 ? "p < 0.0001" : `p = ${Number(p.toPrecision(2))}`);
 
+const together = (words) => element("span", { className: "together", textContent: words });
+
 /** The sign tests, a sentence a pair, and what they may not be taken for. */
 function tests(result) {
   const names = result.trackers.map((one) => one.tracker);
@@ -120,7 +122,7 @@ function tests(result) {
     const [seedsWon, seedsAll] = [ahead ? seeds.better : seeds.worse, seeds.better + seeds.worse + seeds.ties];
     const sure = seeds.p < SIGNIFICANT;
     return element("li", {}, swatch(names, winner), element("b", { textContent: winner }), " is nearer than ", element("b", { textContent: other }),
-      ` in ${won} of ${all} frames (${probability(frames.p)}) and with ${seedsWon} of ${seedsAll} seeds (${probability(seeds.p)}`, sure ? ", significant)." : ").");
+      ` in ${won} of ${all} frames `, together(`(${probability(frames.p)})`), ` and with ${seedsWon} of ${seedsAll} seeds `, together(`(${probability(seeds.p)}${sure ? ", significant" : ""}).`));
   });
   const least = 0.5 ** (result.seeds.length - 1);
   const few = least > SIGNIFICANT ? ` With ${result.seeds.length} ${result.seeds.length === 1 ? "seed" : "seeds"} the seeds' p cannot fall below ${Number(least.toPrecision(2))}; six or more can show a difference at 5 %.` : "";

@@ -36,11 +36,11 @@ async function refresh() {
 function entryOf(line) {
   const going = GOING.includes(line.status);
   const mark = line.status === "finished" && line.best
-    ? element("span", { className: "mark" }, element("b", { textContent: `${line.best_mm.toFixed(1)} mm` }), line.best)
+    ? element("span", { className: "mark", textContent: `${line.best_mm.toFixed(1)} mm`, title: line.best })
     : element("span", { className: "mark" }, badge(line.status));
   const row = element("button", { type: "button", className: "entry", title: line.trackers.join(", ") },
     element("span", { className: "name", textContent: line.name }), mark,
-    element("span", { className: "facts", textContent: `${line.trackers.length} trackers · ${line.evaluations} · ${line.seeds} ${line.seeds === 1 ? "seed" : "seeds"}` }),
+    element("span", { className: "facts", textContent: `${line.trackers.length} trackers · ${line.evaluations} poses · ${line.seeds} ${line.seeds === 1 ? "seed" : "seeds"}` }),
     going && element("span", { className: "progress" }, element("i", { style: `width: ${(100 * line.done) / Math.max(1, line.total)}%` })));
   if (same(line, open)) row.setAttribute("aria-current", "true");
   row.onclick = () => openComparison(line).catch(complain);
