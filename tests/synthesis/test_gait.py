@@ -48,7 +48,9 @@ def test_the_stance_is_centred_under_the_hip() -> None:
 def test_an_obstacle_is_cleared() -> None:
     times = np.arange(0.0, 3.0, 1.0 / 120.0)
 
-    def obstacle(places: np.ndarray) -> np.ndarray:
+    def obstacle(places: np.ndarray, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
+        assert np.all(begin[:, 0] <= places[:, 0] + 1e-9)
+        assert np.all(places[:, 0] <= end[:, 0] + 1e-9)
         return np.where(np.abs(places[:, 0] - 1000.0) < 300.0, 200.0, 0.0)
 
     path = line_path((0.0, 0.0), 0.0)
