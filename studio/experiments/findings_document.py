@@ -53,13 +53,17 @@ def as_document(experiment: Experiment, findings: Findings, making: Making) -> D
 
 def failed_document(experiment: Experiment, reasons: Sequence[tuple[str, str]], making: Making) -> Document:
     """An experiment without findings. reasons : what failed (a trial's label), and why."""
-    few = [f"{label}: {why}" if label else why for label, why in reasons[:3]]
-    more = f" And {len(reasons) - 3} more." if len(reasons) > 3 else ""
+    failed = sum(1 for label, _ in reasons if label)
+    first = ": ".join(part for part in reasons[0] if part)
+    if len(reasons) > 1:
+        words = f"Not concluded, for {failed} of {making.trials} trials failed; the first: {first}"
+    else:
+        words = f"Not concluded. {first}"
     return {
         **_head(experiment, making),
         "verdict": FAILED,
         "firm": False,
-        "words": f"Not concluded: {' '.join(few)}{more}",
+        "words": words,
         "numbers": [],
         "tables": [],
         "charts": [],

@@ -13,7 +13,8 @@ from studio.errors import StudioError
 from studio.experiments.findings_document import Document
 from studio.runs.colour_tokens import tokens_file
 
-MODULES = ("js/findings_charts.js", "js/findings.js")
+# Each may import those before it.
+MODULES = ("findings_options.js", "findings_charts.js", "findings.js")
 ECHARTS = "vendor/echarts.esm.min.js"
 TYPE = "vendor/inter.woff2"
 
@@ -61,15 +62,19 @@ addEventListener("afterprint", () => turn(seen));
 def report_html(results: Document) -> str:
     """The page of all results. Raises StudioError where the pages' files are not installed."""
     assets = tokens_file().parent
-    charts, findings = (_text(assets / name) for name in MODULES)
-    findings = findings.replace("./findings_charts.js", _module(charts))
+    addresses: dict[str, str] = {}
+    for name in MODULES:
+        source = _text(assets / "js" / name)
+        for other, address in addresses.items():
+            source = source.replace(f'"./{other}"', f'"{address}"')
+        addresses[name] = _module(source)
     return PAGE.format(
         styles=_text(tokens_file()) + _text(assets / "report.css"),
         type=_address("font/woff2", _content(assets / TYPE)),
         echarts=_module(_text(assets / ECHARTS)),
-        findings=_module(findings),
+        findings=addresses[MODULES[-1]],
         software=html.escape(f"Capture studio {results['software']}"),
-        date=html.escape(results["date"]),
+        date=html.escape(results["date"][:16].replace("T", " ") + " UTC"),
         results=_inside_script(json.dumps(results, allow_nan=False)),
     )
 
