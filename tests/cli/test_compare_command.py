@@ -1,0 +1,136 @@
+"""`studio compare` as a stranger calls it: the agreed JSON, a table, going on after Ctrl-C, refusals in words."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from studio.cli import comparison_commands
+from studio.cli.main import main
+from studio.sessions.session import Session
+from studio.sessions.workspace import Workspace
+
+WALK = Path(__file__).resolve().parents[2] / "sample_sessions" / "walk"
+SMALL = ("--evaluations", "60", "--layers", "3", "--frames", "0:3", "--processes", "1")
+FIELDS = {"tracker", "evaluations", "mean_mm", "worst_mm", "lost_frames", "seconds"}
+
+
+@pytest.fixture
+def walk() -> Session:
+    """The bundled walk in this test's workspace."""
+    workspace = Workspace()
+    workspace.root.mkdir(parents=True, exist_ok=True)
+    shutil.copytree(WALK, workspace.root / "walk", ignore=shutil.ignore_patterns("runs", "comparisons"))
+    return workspace.session("walk")
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(main, ["compare", *arguments], catch_exceptions=False)
+
+
+def told(*arguments: str) -> dict:
+    result = run(*arguments, "--json")
+    assert result.exit_code == 0, result.stderr
+    return json.loads(result.stdout)
+
+
+def test_the_document_is_as_agreed(walk: Session, tmp_path: Path) -> None:
+    out = tmp_path / "found"
+    changes = ("--set", "annealed:b.crossover=0", "--set", "diffusion_scale=0.8")
+    three = ("walk", "--trackers", "annealed,annealed:b,condensation", "--seeds", "2", *SMALL, *changes)
+    found = told(
+        "walk",
+        "--trackers",
+        "annealed,annealed:b,condensation",
+        "--seeds",
+        "2",
+        *SMALL,
+        *changes,
+        "--out",
+        str(out),
+    )
+    assert [entry["tracker"] for entry in found["trackers"]] == ["annealed", "annealed:b", "condensation"]
+    for entry in found["trackers"]:
+        assert entry.keys() == FIELDS | {"seeds"}
+        assert entry["evaluations"] == 60
+        assert [seed["seed"] for seed in entry["seeds"]] == [0, 1]
+        assert all(seed.keys() == FIELDS | {"seed"} for seed in entry["seeds"])
+        assert entry["mean_mm"] == pytest.approx(
+            sum(seed["mean_mm"] for seed in entry["seeds"]) / 2, abs=1e-3
+        )
+        assert entry["worst_mm"] == max(seed["worst_mm"] for seed in entry["seeds"])
+    assert found["settings"]["annealed:b"]["crossover"] == 0
+    assert {found["settings"][name]["diffusion_scale"] for name in found["settings"]} == {0.8}
+    assert len(found["sign_tests"]) == 3
+    assert json.loads((out / "result.json").read_text())["trackers"] == found["trackers"]
+    assert (out / "frames.csv").is_file()
+    assert not (walk.path / "comparisons").exists()
+
+    # The same command finds all of it there; another one is refused that folder.
+    again = run(
+        "walk",
+        "--trackers",
+        "annealed,annealed:b,condensation",
+        "--seeds",
+        "2",
+        *SMALL,
+        *changes,
+        "--out",
+        str(out),
+    )
+    assert "6 of 6 trials are there already" in again.stderr
+    assert again.exit_code == 0
+    other = run("walk", "--trackers", "annealed", "--seeds", "2", *SMALL, "--out", str(out))
+    assert other.exit_code == 2
+    assert "other entrants" in other.stderr
+
+
+def test_after_ctrl_c_the_same_command_goes_on(walk: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    arguments = ("walk", "--trackers", "annealed,condensation", "--seeds", "1", *SMALL)
+    really = comparison_commands.run_comparison
+
+    def interrupted(kept: object, session: object, _report: object, **more: object) -> object:
+        def report(_step: str, done: int, _total: int) -> None:
+            if done == 1:
+                raise KeyboardInterrupt
+
+        return really(kept, session, report, **more)  # pyright: ignore[reportArgumentType]
+
+    monkeypatch.setattr(comparison_commands, "run_comparison", interrupted)
+    stopped = run(*arguments)
+    assert stopped.exit_code == 130
+    assert "finished is kept" in stopped.stderr
+    monkeypatch.undo()
+    monkeypatch.setenv("STUDIO_WORKSPACE", str(walk.path.parent))
+    done = run(*arguments)
+    assert "1 of 2 trials are there already" in done.stderr
+    assert "annealed" in done.stdout
+    assert "is nearer than" in done.stdout
+    assert [path.name for path in (walk.path / "comparisons").iterdir()] == ["comparison-1"]
+
+
+def test_wrong_calls_are_refused_with_a_remedy(walk: Session, session_on_disk: Session) -> None:
+    for arguments, words in (
+        ((session_on_disk.name,), "has no truth"),
+        (("walk", "--trackers", "nobody"), "no tracker 'nobody'"),
+        (("walk", "--trackers", "annealed", "--set", "annealed.nothing=1"), "no setting 'nothing'"),
+        (("walk", "--trackers", "annealed", "--frames", "0:999"), "0:150"),
+        (("walk", "--trackers", "annealed", "--frames", "x"), "cannot be understood"),
+        (("walk", "--trackers", "annealed", "--evaluations", "1"), "too few"),
+        (("walk", "--trackers", "annealed", "--body", "nobody"), "nobody"),
+    ):
+        result = run(*arguments)
+        assert result.exit_code == 2, arguments
+        assert words in result.stderr
+        assert "remedy" in result.stderr
+        assert "Traceback" not in result.stderr
+    assert not (walk.path / "comparisons").exists()
+
+
+def test_help_explains_labels() -> None:
+    text = run("--help").output
+    assert "--set annealed:few.layers=4" in text
+    assert "annealed:eq13:" in text
+    assert "partitions:" in text

@@ -1,0 +1,179 @@
+"""Comparisons and reports through the API: refused before, worked at behind, kept, downloaded, thrown away."""
+
+import csv
+import io
+import json
+import shutil
+import time
+from pathlib import Path
+
+import pytest
+from web_doubles import Studio
+
+from studio.experiments.comparison import plan_comparison
+from studio.experiments.comparison_folders import new_comparison, place_of
+from studio.experiments.entrants import Lineup
+
+WALK = Path(__file__).resolve().parents[2] / "sample_sessions" / "walk"
+WISH = {
+    "session": "walk", "trackers": [{"name": "annealed"}, {"name": "annealed:eq13", "settings": {"survival": 0.5}}],
+    "evaluations": 60, "seeds": 2, "layers": 3, "last": 3,
+}  # fmt: skip
+
+
+@pytest.fixture
+def compared(studio: Studio) -> Studio:
+    """The studio with the bundled walk, which has a truth."""
+    shutil.copytree(
+        WALK, studio.workspace.root / "walk", ignore=shutil.ignore_patterns("runs", "comparisons")
+    )
+    return studio
+
+
+def until(studio: Studio, name: str, *statuses: str) -> dict:
+    """The comparison when it has come to one of these states."""
+    deadline = time.monotonic() + 120.0
+    while time.monotonic() < deadline:
+        told = studio.client.get(f"/api/comparisons/walk/{name}").json()
+        if told["comparison"]["status"] in statuses:
+            return told
+        time.sleep(0.05)
+    raise AssertionError(f"it never was {statuses}")
+
+
+def test_a_comparison_is_made_kept_and_downloaded(compared: Studio) -> None:
+    client = compared.client
+    begun = client.post("/api/comparisons", json=WISH)
+    assert begun.status_code == 202, begun.text
+    assert (begun.json()["name"], begun.json()["total"]) == ("comparison-1", 4)
+    told = until(compared, "comparison-1", "finished", "failed")
+    line, result = told["comparison"], told["result"]
+    assert (line["status"], line["done"], line["trackers"]) == ("finished", 4, ["annealed", "annealed:eq13"])
+    assert told["settings"]["annealed:eq13"]["survival"] == 0.5
+    assert [entry["evaluations"] for entry in result["trackers"]] == [60, 60]
+    best = min(result["trackers"], key=lambda entry: entry["mean_mm"])
+    assert (line["best"], line["best_mm"]) == (best["tracker"], best["mean_mm"])
+    assert result["findings"]["charts"][0]["kind"] == "lines"
+    (listed,) = client.get("/api/comparisons", params={"session": "walk"}).json()["comparisons"]
+    assert listed == line
+    sessions = client.get("/api/sessions").json()["sessions"]
+    assert {entry["name"]: entry["comparisons"] for entry in sessions} == {"take1": 0, "walk": 1}
+
+    document = client.get("/api/comparisons/walk/comparison-1/result.json")
+    assert document.json()["trackers"] == result["trackers"]
+    assert "walk-comparison-1.json" in document.headers["content-disposition"]
+    rows = list(csv.reader(io.StringIO(client.get("/api/comparisons/walk/comparison-1/frames.csv").text)))
+    assert len(rows) == 1 + 2 * 2 * 3
+
+    entry = client.delete("/api/comparisons/walk/comparison-1").json()
+    assert (entry["kind"], entry["restorable"]) == ("comparison", True)
+    assert client.get("/api/comparisons/walk/comparison-1").status_code == 404
+    assert [one["name"] for one in client.get("/api/trash").json()["entries"]] == ["walk / comparison-1"]
+    back = client.post("/api/trash/restore", json={"entry": entry["id"]}).json()
+    assert (back["name"], back["comparison"]) == ("walk", "comparison-1")
+    assert client.get("/api/comparisons/walk/comparison-1").json()["result"]["trackers"] == result["trackers"]
+
+
+def test_one_runs_at_a_time_is_cancelled_and_goes_on(compared: Studio) -> None:
+    client = compared.client
+    client.post("/api/comparisons", json={**WISH, "seeds": 40})
+    second = client.post("/api/comparisons", json={**WISH, "name": "second"})
+    assert second.status_code == 409
+    assert "'comparison-1' of 'walk' is running" in second.json()["message"]
+    assert "second" not in [line["name"] for line in client.get("/api/comparisons").json()["comparisons"]]
+    for refused in (
+        client.delete("/api/comparisons/walk/comparison-1"),
+        client.delete("/api/sessions/walk"),
+        client.patch("/api/sessions/walk", json={"name": "other"}),
+    ):
+        assert refused.status_code == 409, refused.text
+    assert client.post("/api/comparisons/walk/comparison-1/cancel").json()["status"] in (
+        "cancelling",
+        "cancelled",
+    )
+    until(compared, "comparison-1", "cancelled")
+    assert client.get("/api/comparisons/walk/comparison-1/result.json").status_code == 404
+    assert client.post("/api/comparisons/walk/comparison-1/resume").json()["status"] == "running"
+    client.post("/api/comparisons/walk/comparison-1/cancel")
+    until(compared, "comparison-1", "cancelled")
+    assert client.patch("/api/sessions/walk", json={"name": "other"}).status_code == 200
+    assert client.get("/api/comparisons/other/comparison-1").json()["comparison"]["total"] == 80
+
+
+def test_an_interrupted_one_is_offered_to_go_on(compared: Studio) -> None:
+    session = compared.workspace.session("walk")
+    plan = plan_comparison(session, Lineup(("annealed",), "", 60, 3), (0,), last=2)
+    new_comparison(place_of(session), plan)
+    (line,) = compared.client.get("/api/comparisons").json()["comparisons"]
+    assert (line["status"], line["done"], line["total"]) == ("interrupted", 0, 1)
+    assert compared.client.post("/api/comparisons/walk/comparison-1/resume").status_code == 202
+    assert until(compared, "comparison-1", "finished")["comparison"]["best"] == "annealed"
+
+
+@pytest.mark.parametrize(
+    ("change", "status", "words"),
+    [
+        ({"session": "take1"}, 422, "no truth"),
+        ({"session": "nobody"}, 404, "no session"),
+        ({"trackers": []}, 422, "trackers"),
+        ({"trackers": [{"name": "nobody"}]}, 422, "no tracker 'nobody'"),
+        ({"trackers": [{"name": "../x"}]}, 422, "name"),
+        ({"trackers": [{"name": "annealed", "settings": {"layers": 99}}]}, 422, "layers"),
+        ({"trackers": [{"name": "annealed"}, {"name": "annealed"}]}, 422, "twice"),
+        ({"weighting": "none"}, 404, "no weighting"),
+        ({"body": "none"}, 422, "body"),
+        ({"last": 1000}, 409, "0:150"),
+        ({"evaluations": 1}, 422, "too few"),
+        ({"seeds": 0}, 422, "seeds"),
+        ({"name": "a/b"}, 422, "name"),
+        ({"unknown": 1}, 422, "unknown"),
+    ],
+)
+def test_what_cannot_be_compared_is_refused_and_nothing_is_made(
+    compared: Studio, change: dict, status: int, words: str
+) -> None:
+    answer = compared.client.post("/api/comparisons", json={**WISH, **change})
+    assert answer.status_code == status, answer.text
+    assert answer.json().keys() == {"code", "message", "hint", "status"}
+    assert words in answer.json()["message"] + answer.json()["hint"]
+    assert not (compared.workspace.root / "walk" / "comparisons").exists()
+
+
+def test_addresses_lead_nowhere_else(compared: Studio) -> None:
+    for path in ("walk/nothing", "walk/..%2f..", "nobody/x", "take1/comparison-1"):
+        assert compared.client.get(f"/api/comparisons/{path}").status_code in (404, 422), path
+
+
+def test_who_can_take_part_is_told(studio: Studio) -> None:
+    told = studio.client.get("/api/comparisons/choices").json()
+    names = {entry["name"]: entry for entry in told["entrants"]}
+    assert {"annealed", "condensation", "swarm", "annealed:eq13"} <= names.keys()
+    assert names["annealed:eq13"]["changes"]["adaptive_diffusion"] is False
+    for lineup in told["lineups"]:
+        assert set(lineup["trackers"]) <= names.keys()
+    assert "edge-region" in told["weightings"]
+
+
+def test_the_pages_are_served(studio: Studio) -> None:
+    for path in ("/comparisons", "/reports"):
+        answer = studio.client.get(path)
+        assert answer.status_code == 200
+        assert "text/html" in answer.headers["content-type"]
+        assert "script-src 'self'" in answer.headers["content-security-policy"]
+
+
+def test_reports_are_those_of_the_workspace(studio: Studio) -> None:
+    assert studio.client.get("/api/reports").json() == {"software": "", "date": "", "experiments": []}
+    assert studio.client.get("/api/reports/results.json").status_code == 404
+    folder = studio.workspace.root / "reproduction"
+    folder.mkdir()
+    results = {"software": "0.1.0", "date": "2026-11-21", "experiments": [{"name": "table-2", "numbers": []}]}
+    (folder / "results.json").write_text(json.dumps(results))
+    assert studio.client.get("/api/reports").json() == results
+    download = studio.client.get("/api/reports/results.json")
+    assert download.json() == results
+    assert "attachment" in download.headers["content-disposition"]
+    for name in ("reproduction.lock", "..%2fsession.json", "trials"):
+        assert studio.client.get(f"/api/reports/{name}").status_code == 404
+    (folder / "results.json").write_text("{")
+    assert studio.client.get("/api/reports").status_code == 409
