@@ -40,17 +40,7 @@ def test_the_document_is_as_agreed(walk: Session, tmp_path: Path) -> None:
     out = tmp_path / "found"
     changes = ("--set", "annealed:b.crossover=0", "--set", "diffusion_scale=0.8")
     three = ("walk", "--trackers", "annealed,annealed:b,condensation", "--seeds", "2", *SMALL, *changes)
-    found = told(
-        "walk",
-        "--trackers",
-        "annealed,annealed:b,condensation",
-        "--seeds",
-        "2",
-        *SMALL,
-        *changes,
-        "--out",
-        str(out),
-    )
+    found = told(*three, "--out", str(out))
     assert [entry["tracker"] for entry in found["trackers"]] == ["annealed", "annealed:b", "condensation"]
     for entry in found["trackers"]:
         assert entry.keys() == FIELDS | {"seeds"}
@@ -69,17 +59,7 @@ def test_the_document_is_as_agreed(walk: Session, tmp_path: Path) -> None:
     assert not (walk.path / "comparisons").exists()
 
     # The same command finds all of it there; another one is refused that folder.
-    again = run(
-        "walk",
-        "--trackers",
-        "annealed,annealed:b,condensation",
-        "--seeds",
-        "2",
-        *SMALL,
-        *changes,
-        "--out",
-        str(out),
-    )
+    again = run(*three, "--out", str(out))
     assert "6 of 6 trials are there already" in again.stderr
     assert again.exit_code == 0
     other = run("walk", "--trackers", "annealed", "--seeds", "2", *SMALL, "--out", str(out))
