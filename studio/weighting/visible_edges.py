@@ -3,9 +3,9 @@
     f_e = mean of the edge map p, 0...1, over samples along the visible edges of the projected limbs
 
 Counted are the edges parallel to the limbs' axes, and "the upper edge of the torso ... because it provides a
-valuable hint for the z-location"; never the head's, whose "shape is only a very crude approximation". In the first
-stage of a search only the trunk's are. A trunk of several limbs has its upper edge where the last of them ends. A body
-without a trunk shows all its edges in both stages.
+valuable hint for the z-location": the end of a trunk limb that lies nearest to the head. Never the head's, whose
+"shape is only a very crude approximation". In the first stage of a search only the trunk's are; a body without a
+trunk shows all its edges in both stages.
 
 Every edge has the same number of samples, evenly spread. What lies behind a nearer limb is left out of the mean; a
 sample outside the picture, or of a limb that cannot be projected, is not: it reads 0, so nothing is gained there. A
@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.weighting.block_threads import run_blocks
@@ -32,7 +33,7 @@ IntArray = NDArray[np.int64]
 Words = NDArray[np.uint64]
 
 TRUNK, HEAD = "trunk", "head"
-SIDES, FAR_EDGE = ((0, 1), (3, 2)), (1, 2)
+SIDES, NEAR_EDGE, FAR_EDGE = ((0, 1), (3, 2)), (0, 3), (1, 2)
 """Corners of an outline (A0 A1 B1 B0) from which to which edges run."""
 BLOCKS_A_THREAD = 24
 """About half a millisecond of a four-camera frame."""
@@ -55,17 +56,13 @@ class BodyEdges:
 
 def body_edges(body: BodyModel) -> BodyEdges:
     """The edges of a body that the paper's fitness looks at."""
-    trunk = {index for index, limb in enumerate(body.drawn) if limb.part == TRUNK}
-    tops = _last_of_trunk(body, trunk)
-    whole: list[tuple[int, int, int]] = []
-    for index, limb in enumerate(body.drawn):
-        if limb.part != HEAD:
-            whole += [(index, *side) for side in SIDES]
-        if index in tops:
-            whole.append((index, *FAR_EDGE))
-    edges = np.array(whole, dtype=np.int64).reshape(-1, 3)
-    first = edges[[index in trunk for index in edges[:, 0]]] if trunk else edges
-    return BodyEdges(edges, first)
+    trunk = [index for index, limb in enumerate(body.drawn) if limb.part == TRUNK]
+    shown = [(index, *side) for index, limb in enumerate(body.drawn) if limb.part != HEAD for side in SIDES]
+    if not trunk:
+        edges = np.array(shown, dtype=np.int64).reshape(-1, 3)
+        return BodyEdges(edges, edges)
+    edges = np.array([*shown, _upper_edge(body, trunk)], dtype=np.int64)
+    return BodyEdges(edges, edges[np.isin(edges[:, 0], trunk)])
 
 
 def limb_sides(limbs: int) -> IntArray:
@@ -115,12 +112,14 @@ class EdgeMaps:
         return indices
 
 
-def _last_of_trunk(body: BodyModel, trunk: set[int]) -> set[int]:
-    """The trunk's limbs from which none of its other limbs hangs."""
-    above: set[int] = set()
-    for index in trunk:
-        joint = body.joints[body.drawn[index].joint].parent
-        while joint >= 0:
-            above.add(joint)
-            joint = body.joints[joint].parent
-    return {index for index in trunk if body.drawn[index].joint not in above}
+def _upper_edge(body: BodyModel, trunk: list[int]) -> tuple[int, int, int]:
+    """The trunk's edge that lies nearest to where the head begins in the neutral pose; without a head the far end of
+    the last of its limbs.
+    """
+    heads = [index for index, limb in enumerate(body.drawn) if limb.part == HEAD]
+    if not heads:
+        return trunk[-1], *FAR_EDGE
+    ends = limb_ends(body, body.neutral[None])[0]
+    away = np.linalg.norm(ends[trunk] - ends[heads[0], 0], axis=2)
+    number, end = np.unravel_index(np.argmin(away), away.shape)
+    return trunk[int(number)], *(FAR_EDGE if end else NEAR_EDGE)
