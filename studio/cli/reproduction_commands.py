@@ -14,13 +14,12 @@ from studio.cli.output import errors_in_words, messages, note, tell
 from studio.experiments.catalogue import EXPERIMENTS, find_experiments
 from studio.experiments.experiment import FAILED, Experiment, Scale
 from studio.experiments.findings_document import Document
-from studio.experiments.findings_files import REPORT, SUMMARY, number_in_words, read_findings
+from studio.experiments.findings_files import FOLDER, REPORT, SUMMARY, number_in_words, read_findings
 from studio.experiments.reproduction_plan import FULL_SEEDS, QUICK_SEEDS, scale_of
 from studio.sessions.workspace import workspace_root
 from studio.worker.reproduction import Reproduction, reproduce
 from studio.worker.trial_pace import Report
 
-FOLDER = "reproduction"
 NOT_CONCLUDED = 1
 SECONDS_BETWEEN_LINES = 10.0
 NOT_RUN = "not run yet"

@@ -29,6 +29,8 @@ MODULES: tuple[ModuleType, ...] = (
 )
 
 ALL = "all"
+# Words of the command line, and folders beside the experiments' own.
+RESERVED = (ALL, "list", "footage", "trials")
 
 
 def gathered(modules: tuple[ModuleType, ...]) -> dict[str, Experiment]:
@@ -37,7 +39,7 @@ def gathered(modules: tuple[ModuleType, ...]) -> dict[str, Experiment]:
     for module in modules:
         own: tuple[Experiment, ...] = getattr(module, "EXPERIMENTS", None) or (module.EXPERIMENT,)
         for experiment in own:
-            if experiment.name in found or experiment.name in (ALL, "list"):
+            if experiment.name in (*found, *RESERVED):
                 raise ValueError(f"The name '{experiment.name}' of {module.__name__} is taken.")
             found[experiment.name] = experiment
     return found

@@ -19,6 +19,8 @@ from studio.experiments.findings_document import Document
 from studio.experiments.report_document import report_html
 from studio.sessions.atomic_files import write_text
 
+# Where all this lies in the workspace unless said otherwise.
+FOLDER = "reproduction"
 FOOTAGE, TRIALS = "footage", "trials"
 FINDINGS, RESULTS, SUMMARY, REPORT = "findings.json", "results.json", "summary.md", "report.html"
 NUMBER_COLUMNS = ("name", "ours", "low", "high", "unit", "paper", "better", "seeds", "verdict", "firm")

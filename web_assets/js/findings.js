@@ -25,6 +25,8 @@ export function drawFindings(element, experiments, echarts) {
 
 const anchor = (experiment) => `experiment-${experiment.name}`;
 
+const isQuestion = (experiment) => /open question/i.test(experiment.source);
+
 /** A link that scrolls, and leaves the page's address alone. */
 function link(experiment, ...content) {
   const made = make("a", { href: `#${anchor(experiment)}` }, ...content);
@@ -46,7 +48,7 @@ export function badge(verdict, firm = true) {
 }
 
 function contents(experiments) {
-  const groups = Map.groupBy(experiments, (experiment) => experiment.source.split(",").slice(0, -1).join(",") || experiment.source);
+  const groups = Map.groupBy(experiments, (experiment) => experiment.source.match(/^.*?\b\d{4}\b/)?.[0] ?? (isQuestion(experiment) ? "Open questions" : experiment.source));
   const lists = [...groups].map(([source, members]) => [
     make("h3", {}, source),
     make("ol", {}, ...members.map((experiment) => make("li", {}, link(experiment, sign(experiment.verdict), experiment.title)))),
@@ -94,7 +96,7 @@ function section(experiment, echarts, charts) {
     make("header", {}, make("div", {}, make("h2", {}, experiment.title), make("p", { class: "quiet" }, facts.join(" · "), " · ", make("code", {}, experiment.name))),
       badge(experiment.verdict, experiment.firm)),
     make("div", { class: "findings-words" },
-      make("blockquote", {}, make("h3", {}, "The paper's claim"), make("p", {}, experiment.claim)),
+      make("blockquote", {}, make("h3", {}, isQuestion(experiment) ? "The question" : "The paper's claim"), make("p", {}, experiment.claim)),
       make("div", {}, make("h3", {}, "What we see"), make("p", {}, experiment.words), ...experiment.notes.map((note) => make("p", { class: "findings-note" }, note)))),
     failures(experiment), numbers(experiment));
   const grid = make("div", { class: "findings-charts" });

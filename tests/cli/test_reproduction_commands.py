@@ -1,0 +1,92 @@
+"""`studio reproduce` as it is typed."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from toy_experiments import toy
+
+from studio.cli import reproduction_commands
+from studio.cli.main import main
+from studio.experiments import catalogue
+from studio.sessions.workspace import workspace_root
+from studio.worker import reproduction
+
+
+@pytest.fixture(autouse=True)
+def _toys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    known = {
+        "toy-good": toy("toy-good", tmp_path / "log"),
+        "toy-bad": toy("toy-bad", tmp_path / "log", seed0="refuse"),
+    }
+    monkeypatch.setattr(reproduction_commands, "EXPERIMENTS", known)
+    monkeypatch.setattr(
+        reproduction_commands, "find_experiments", lambda name: catalogue.find_experiments(name, known)
+    )
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(main, ["reproduce", *arguments], catch_exceptions=False)
+
+
+def test_a_stranger_sees_what_there_is_and_what_was_found(tmp_path: Path) -> None:
+    assert "toy-good  (not run yet)" in run("list").stdout
+    found = run("toy-good", "--seeds", "2", "--processes", "1")
+    assert found.exit_code == 0
+    assert "toy-good: reproduced, not firm" in found.stdout
+    assert "error, plain: 40 mm [" in found.stdout
+    assert "4 trials run, 0 kept from before, 0 failed." in found.stdout
+    report = workspace_root() / "reproduction" / "report.html"
+    assert f"Report: {report}" in found.stdout
+    assert report.is_file()
+    assert "4 of 4" in found.stderr
+    assert "toy-good  (reproduced, not firm)" in run("list").stdout
+    listed = json.loads(run("list", "--json").stdout)["experiments"]
+    assert [(line["name"], line["verdict"]) for line in listed] == [
+        ("toy-good", "reproduced"),
+        ("toy-bad", None),
+    ]
+
+
+def test_json_is_one_object_and_failures_have_an_exit_code(tmp_path: Path) -> None:
+    found = run(
+        "all", "--quick", "--seeds", "1", "--processes", "1", "--out", str(tmp_path / "here"), "--json"
+    )
+    assert found.exit_code == 1
+    told = json.loads(found.stdout)
+    assert told["out"] == str(tmp_path / "here")
+    assert told["trials"] == {"measured": 2, "kept": 0, "failed": 2}
+    assert [document["verdict"] for document in told["experiments"]] == ["better", "failed"]
+    assert told["experiments"][0]["quick"] is True
+
+
+def test_wrong_calls_are_told_a_remedy(tmp_path: Path) -> None:
+    found = run("toy-goof")
+    assert found.exit_code == 2
+    assert "There is no experiment 'toy-goof'." in found.stderr
+    assert "Did you mean toy-good" in found.stderr
+    assert run("toy-good", "--seeds", "0").exit_code == 2
+    (tmp_path / "file").write_text("")
+    assert run("toy-good", "--out", str(tmp_path / "file")).exit_code == 2
+
+
+def test_after_ctrl_c_it_is_said_how_to_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(reproduction, "run_jobs", interrupted)
+    monkeypatch.setattr(sys, "argv", ["studio", "reproduce", "toy-good", "--seeds", "2"])
+    found = run("toy-good", "--seeds", "2")
+    assert found.exit_code == 130
+    assert "Go on with: studio reproduce toy-good --seeds 2" in found.stderr
+    assert (workspace_root() / "reproduction" / "report.html").is_file()
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [(None, ""), (12.0, "about 12 s left"), (600.0, "about 10 min left"), (9000.0, "about 2.5 h left")],
+)
+def test_the_time_left_in_words(seconds: float | None, words: str) -> None:
+    assert reproduction_commands._left(seconds) == words
