@@ -18,6 +18,11 @@ from studio.tracking.catalogue import TRACKERS
 from studio.weighting.catalogue import WEIGHTINGS
 
 GROUPS = ("tracker", "weighting", "evidence", "recording")
+DEFAULT_TRACKER, DEFAULT_WEIGHTING = "annealed", "edge-region"
+# What a tracker is weighed with where neither run nor session say otherwise: the swarm with its paper's fitness.
+USUAL_WEIGHTINGS = {"swarm": "edge-silhouette"}
+# Knobs of older records: the new name, and the new value where an old one is gone.
+RENAMED: dict[str, tuple[str, dict[object, Value]]] = {"limits": ("constraints", {"reflect": "clamp"})}
 JSON_TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
 
 
@@ -84,7 +89,14 @@ class SettingsHistory:
         return tuple(named)
 
 
-def default_settings(tracker_name: str = "annealed", weighting_name: str = "edge-region") -> RunSettings:
+def usual_weighting(tracker_name: str) -> str:
+    """The weighting of a tracker where nobody asks for another."""
+    return USUAL_WEIGHTINGS.get(tracker_name, DEFAULT_WEIGHTING)
+
+
+def default_settings(
+    tracker_name: str = DEFAULT_TRACKER, weighting_name: str = DEFAULT_WEIGHTING
+) -> RunSettings:
     """The defaults of a tracker and a weighting; raises SettingsError for an unknown name of either."""
     for kind, name, known in (("tracker", tracker_name, TRACKERS), ("weighting", weighting_name, WEIGHTINGS)):
         if name not in known:
@@ -114,8 +126,19 @@ def changed_settings(settings: RunSettings, changes: Mapping[str, object]) -> Ru
 def settings_from_values(
     tracker_name: str, weighting_name: str, recorded: Mapping[str, object]
 ) -> RunSettings:
-    """The settings that a record describes: defaults, changed to the recorded values."""
-    return changed_settings(default_settings(tracker_name, weighting_name), recorded)
+    """The settings that a record describes: defaults, changed to the recorded values; knobs that have another
+    name today are understood.
+    """
+    return changed_settings(default_settings(tracker_name, weighting_name), in_todays_names(recorded))
+
+
+def in_todays_names(recorded: Mapping[str, Any]) -> dict[str, Any]:
+    """Recorded knobs by the names that they have today."""
+    found: dict[str, Any] = {}
+    for name, value in recorded.items():
+        today, changes = RENAMED.get(name, (name, {}))
+        found[today] = changes.get(value, value)
+    return found
 
 
 def all_knobs(settings: RunSettings) -> tuple[Knob, ...]:

@@ -18,6 +18,7 @@ from studio.settings import (
     json_schema,
     knob_table,
     settings_from_values,
+    usual_weighting,
     values,
 )
 from studio.tracking.catalogue import TRACKERS
@@ -103,14 +104,33 @@ def test_a_misspelt_name_gets_the_nearest() -> None:
     assert caught.value.hint == "Did you mean 'particles'?"
 
 
+@pytest.mark.parametrize(
+    ("limits", "constraints"), [("clamp", "clamp"), ("reflect", "clamp"), ("ignore", "ignore")]
+)
+def test_a_record_with_an_older_knob_is_understood(limits: str, constraints: str) -> None:
+    recorded = {**values(default_settings()), "limits": limits}
+    del recorded["constraints"], recorded["limbs_apart"]
+    settings = settings_from_values("annealed", "edge-region", recorded)
+    assert settings == changed_settings(default_settings(), {"constraints": constraints})
+    with pytest.raises(SettingsError, match="'limits'"):
+        changed_settings(default_settings(), {"limits": limits})
+
+
+def test_each_tracker_has_a_usual_weighting() -> None:
+    usual = {tracker: usual_weighting(tracker) for tracker in TRACKERS}
+    assert set(usual.values()) <= set(WEIGHTINGS)
+    assert usual["swarm"] == "edge-silhouette"
+    assert usual["annealed"] == usual["condensation"] == "edge-region"
+
+
 def test_another_trackers_knob_says_whose_settings_these_are() -> None:
     with pytest.raises(SettingsError, match="tracker 'condensation'"):
         changed_settings(default_settings("condensation"), {"layers": 5})
 
 
-@pytest.mark.parametrize(("tracker", "weighting"), [("swarm", "edge-region"), ("annealed", "magic")])
+@pytest.mark.parametrize(("tracker", "weighting"), [("flock", "edge-region"), ("annealed", "magic")])
 def test_unknown_names_are_refused(tracker: str, weighting: str) -> None:
-    with pytest.raises(SettingsError, match=r"There is no (tracker 'swarm'|weighting 'magic')"):
+    with pytest.raises(SettingsError, match=r"There is no (tracker 'flock'|weighting 'magic')"):
         default_settings(tracker, weighting)
 
 

@@ -42,7 +42,9 @@ def _knob_options(function: Callable[..., object]) -> Callable[..., object]:
     "--tracker", type=click.Choice(sorted(TRACKERS)), help="Default: the session's own, else annealed."
 )
 @click.option(
-    "--weighting", type=click.Choice(sorted(WEIGHTINGS)), help="Default: the session's own, else edge-region."
+    "--weighting",
+    type=click.Choice(sorted(WEIGHTINGS)),
+    help="Default: the session's own, else edge-region (swarm: edge-silhouette).",
 )
 @click.option(
     "--body", default="", metavar="NAME", help="Kinematic tree; the session's subject still scales it."

@@ -17,8 +17,9 @@ from studio.experiments.experiment import Outcome, Trial
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import SignTest, sign_test
 from studio.experiments.tracked import Attempt, track
-from studio.runs.new_run import DEFAULT_WEIGHTING, checked_frames, start_pose
+from studio.runs.new_run import checked_frames, start_pose
 from studio.sessions.session import Session
+from studio.settings import DEFAULT_WEIGHTING
 from studio.weighting.catalogue import WEIGHTINGS
 
 MOST_SEEDS = 1000

@@ -22,11 +22,10 @@ from studio.sessions.manifest import now
 from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session, free_run_name
 from studio.sessions.stored_run import StoredRun
-from studio.settings import changed_settings, default_settings, values
+from studio.settings import DEFAULT_TRACKER, changed_settings, default_settings, usual_weighting, values
 
 Array = NDArray[np.float64]
 
-DEFAULT_TRACKER, DEFAULT_WEIGHTING = "annealed", "edge-region"
 DISTRIBUTION = "capture-studio"
 
 
@@ -58,7 +57,7 @@ def prepare_run(session: Session, request: RunRequest | None = None) -> StoredRu
     made."""
     asked = request or RunRequest()
     tracker = asked.tracker or session.manifest.tracker or DEFAULT_TRACKER
-    weighting = asked.weighting or session.manifest.weighting or DEFAULT_WEIGHTING
+    weighting = asked.weighting or session.manifest.weighting or usual_weighting(tracker)
     settings = changed_settings(default_settings(tracker, weighting), asked.changes)
     first, last = checked_frames(session, asked.first, asked.last)
     if not 0 <= asked.seed < 2**63:

@@ -7,6 +7,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from studio.tracking.settings import AnnealedSettings
+from studio.tracking.swarm_settings import SwarmSettings
 
 Value = bool | int | float | str
 
@@ -30,6 +31,24 @@ _IMPROVED: dict[str, Value] = {
         "diffusion_fraction",
         "crossover",
         "crossover_by",
+    )
+}
+
+# So are the swarm paper's figures.
+_PAPERS_SWARM: dict[str, Value] = {
+    name: getattr(SwarmSettings(), name)
+    for name in (
+        "stage1_particles",
+        "stage1_iterations",
+        "stage2_particles",
+        "stage2_iterations",
+        "c_first",
+        "c_last",
+        "partition",
+        "start_velocity",
+        "position_divisor",
+        "constraints",
+        "limbs_apart",
     )
 }
 
@@ -63,6 +82,11 @@ PRESETS = (
             "layers": 10,
             "particles": 200,
         },
+    ),
+    Preset(
+        "paper, swarm",
+        "The swarm as its paper has it: Table 1, two soft stages, impossible poses drawn again.",
+        _PAPERS_SWARM,
     ),
     Preset("fast preview", "A quarter of the work: 5 × 100.", _IMPROVED | {"layers": 5, "particles": 100}),
     Preset(

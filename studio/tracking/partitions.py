@@ -58,9 +58,9 @@ class Moment:
 def layer_count(settings: SwarmSettings) -> int:
     """Iterations of all stages together, whatever the body."""
     if settings.partition == "hard-twelve":
-        return round(settings.wanted_evaluations / settings.stage1_particles)
+        return _nearest(settings.wanted_evaluations, settings.stage1_particles)
     if settings.partition == "global":
-        return round(settings.wanted_evaluations / settings.stage2_particles)
+        return _nearest(settings.wanted_evaluations, settings.stage2_particles)
     return settings.stage1_iterations + settings.stage2_iterations
 
 
@@ -164,6 +164,11 @@ def _or_all(mask: Mask) -> Mask:
 def _calmed(tree: Hierarchy, knobs: SwarmSettings, free: Mask) -> Array:
     """(D,) freedom of a later soft stage: what is free, the position less so."""
     return np.where(tree.position, 1.0 / knobs.position_divisor, 1.0) * free
+
+
+def _nearest(evaluations: int, particles: int) -> int:
+    """Iterations whose total comes nearest; halves are rounded up, as the page does."""
+    return (2 * evaluations + particles) // (2 * particles)
 
 
 def _shared(iterations: int, stages: int) -> tuple[int, ...]:

@@ -11,7 +11,7 @@ import msgspec
 
 from studio.errors import NotFoundError, StudioError
 from studio.sessions.atomic_files import write_bytes
-from studio.settings import knob_table
+from studio.settings import in_todays_names, knob_table
 from studio.typed_decoding import decode_json
 from studio.web.setting_schemas import PresetView
 
@@ -104,7 +104,8 @@ def drop_preset(name: str, folder: Path) -> None:
 
 
 def _view(name: str, help_text: str, values: dict[str, Value], own: bool) -> PresetView:
-    return PresetView(name=name, label=name, help=help_text, values=values, own=own)
+    # A person's preset may be older than a knob's name.
+    return PresetView(name=name, label=name, help=help_text, values=in_todays_names(values), own=own)
 
 
 def _read(folder: Path) -> dict[str, _Kept]:

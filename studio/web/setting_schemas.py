@@ -96,6 +96,12 @@ class Choice(Answer):
     label: str
 
 
+class TrackerChoice(Choice):
+    """weighting : what the tracker is weighed with where nobody asks for another."""
+
+    weighting: str
+
+
 class BodyChoice(Answer):
     """A body that runs may use."""
 
@@ -108,7 +114,7 @@ class BodyChoice(Answer):
 class Choices(Answer):
     """What a new run can be made of. default_body and the like are the session's own."""
 
-    trackers: list[Choice]
+    trackers: list[TrackerChoice]
     weightings: list[Choice]
     bodies: list[BodyChoice]
     presets: list[PresetView]

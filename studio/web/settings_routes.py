@@ -13,14 +13,16 @@ from fastapi import APIRouter, Depends, Query
 
 from studio.body.catalogue import list_bodies, load_body
 from studio.errors import SettingsError, StudioError
-from studio.runs.new_run import DEFAULT_TRACKER, DEFAULT_WEIGHTING
 from studio.sessions.stored_run import StoredRun
 from studio.settings import (
+    DEFAULT_TRACKER,
+    DEFAULT_WEIGHTING,
     all_knobs,
     changed_settings,
     default_settings,
     json_schema,
     settings_from_values,
+    usual_weighting,
     values,
 )
 from studio.tracking.catalogue import TRACKERS
@@ -37,6 +39,7 @@ from studio.web.setting_schemas import (
     PresetRequest,
     ResetRequest,
     SettingsInUse,
+    TrackerChoice,
 )
 from studio.web.setting_views import knob_views, settings_of
 from studio.weighting.catalogue import WEIGHTINGS
@@ -55,7 +58,10 @@ def choices(doors: Door) -> Choices:
     folders = (folder,) if folder.is_dir() else ()
     stamp = tuple((path.name, path.stat().st_mtime_ns) for path in sorted(folder.glob("*.toml")))
     return Choices(
-        trackers=[Choice(name=name, label=_title(entry.settings_type)) for name, entry in TRACKERS.items()],
+        trackers=[
+            TrackerChoice(name=name, label=_title(entry.settings_type), weighting=usual_weighting(name))
+            for name, entry in TRACKERS.items()
+        ],
         weightings=[Choice(name=name, label=entry.label) for name, entry in WEIGHTINGS.items()],
         bodies=list(_bodies(folders, stamp)),
         presets=all_presets(doors.presets, doors.state_folder),

@@ -21,6 +21,7 @@ from studio.scene.settings_panel import SettingsPanel, SettingsTabs
 from studio.scene.show_panel import ShowPanel
 from studio.scene.view_options import ViewOptions
 from studio.settings import all_knobs, changed_settings, default_settings, values
+from studio.tracking.catalogue import TRACKERS
 from studio.tracking.settings import AnnealedSettings
 from studio.worker.events import SettingsApplied, StateChanged
 
@@ -141,10 +142,13 @@ def test_presets_and_resets_are_one_wish(panel: SettingsPanel, asked: Asked, ser
 
 
 def test_every_preset_is_allowed_and_offered_where_its_knobs_exist() -> None:
-    settings = default_settings()
-    for preset in PRESETS:
-        assert changed_settings(settings, preset.values) is not None
-    assert offered(tuple(values(settings))) == PRESETS
+    shown = {tracker: offered(tuple(values(default_settings(tracker)))) for tracker in TRACKERS}
+    for tracker, presets in shown.items():
+        for preset in presets:
+            assert changed_settings(default_settings(tracker), preset.values) is not None
+    assert set(shown["annealed"]) | set(shown["swarm"]) == set(PRESETS)
+    assert [preset.name for preset in shown["swarm"]] == ["paper, swarm"]
+    assert len(shown["annealed"]) > 1
     assert offered(("particles",)) == ()
 
 

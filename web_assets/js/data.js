@@ -45,7 +45,7 @@ async function loadRun() {
   if (!run) return;
   try {
     const told = await fetchJson(runPath(session, run));
-    if (isShown(session, run)) set({ parameters: told.parameters, layerCount: get("layerCount") ?? told.settings.layers ?? null });
+    if (isShown(session, run)) set({ parameters: told.parameters, layerCount: get("layerCount") ?? layersOf(told.settings) });
   } catch (error) { complain(error); }
 }
 
@@ -124,6 +124,16 @@ function takeRest(work) {
   if (inside && get("follow") && !get("whatIf")) showLive(work.frame, false);
 }
 
+/** How many layers a frame takes with these settings, null where one says so itself (studio/tracking/partitions.py). */
+function layersOf(values) {
+  if (values.layers) return values.layers;
+  if (!values.stage1_iterations) return null;
+  const evaluations = values.stage1_particles * values.stage1_iterations + values.stage2_particles * values.stage2_iterations;
+  if (values.partition === "hard-twelve") return Math.round(evaluations / values.stage1_particles);
+  if (values.partition === "global") return Math.round(evaluations / values.stage2_particles);
+  return values.stage1_iterations + values.stage2_iterations;
+}
+
 /** Wire events and state to the API. */
 export function startData() {
   const summaryLater = paced(loadSummary, SUMMARY_MILLISECONDS);
@@ -140,7 +150,7 @@ export function startData() {
     summaryLater();
   });
   onEvent("layer", (event, here) => { if (here) takeLayer(event); });
-  onEvent("settings", (event, here) => { if (here) set({ settings: event, layerCount: event.values.layers ?? null }); });
+  onEvent("settings", (event, here) => { if (here) set({ settings: event, layerCount: layersOf(event.values) }); });
   onEvent("state", (event, here) => {
     if (here && !searching()) { takeRest(event); summaryLater(); sceneLater(); }
     if (event.state !== "tracking") sessionsLater();

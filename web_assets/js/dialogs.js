@@ -45,9 +45,9 @@ function field({ name, label, kind = "text", value = "", choices, hint, ...more 
 
 /**
  * A form. `fields`: rows of field descriptions; `send(values, report)` may throw an error with message and hint, which is
- * shown in place; the dialog closes when it returns.
+ * shown in place; the dialog closes when it returns. `changed(name, form)` is told of every field that a person changes.
  */
-export function openForm({ heading, intro, rows, action, danger = false, send }) {
+export function openForm({ heading, intro, rows, action, danger = false, send, changed = null }) {
   const wrong = element("p", { className: "wrong", hidden: true });
   const remedy = element("p", { className: "hint", hidden: true });
   const submit = element("button", { className: danger ? "danger" : "primary", textContent: action });
@@ -75,6 +75,7 @@ export function openForm({ heading, intro, rows, action, danger = false, send })
       submit.textContent = action;
     }
   };
+  if (changed) form.onchange = (event) => changed(event.target.name, form);
   show(form);
   form.querySelector("input, select")?.focus();
 }

@@ -16,6 +16,8 @@ async function known() {
 /** Open the form for a session; `like` is a run whose settings are taken over. */
 export async function newRunForm(entry, like = null) {
   const { trackers, weightings, bodies, presets } = await known();
+  const usual = (tracker) => trackers.find((one) => one.name === tracker)?.weighting;
+  let chosen = false;
   const bodyChoices = [{ value: "", label: `the session's (${entry.body})` }, ...bodies.map((body) => ({ value: body.name, label: `${body.name} · ${body.parameters} parameters` }))];
   openForm({
     heading: `New run of ${entry.name}`, action: "Track",
@@ -29,6 +31,12 @@ export async function newRunForm(entry, like = null) {
       [{ name: "seed", label: "Seed", kind: "number", min: 0, value: like ? like.seed + 1 : 0, hint: "The same seed gives the same run." },
         { name: "name", label: "Name", value: "", placeholder: "numbered", pattern: "[A-Za-z0-9_\\-]{0,64}" }],
     ],
+    // A tracker brings its usual weighting along, unless the session or the person wants another.
+    changed: (name, form) => {
+      const { tracker, weighting } = form.elements;
+      chosen ||= name === "weighting";
+      if (name === "tracker" && !chosen && usual(entry.tracker) === entry.weighting) weighting.value = usual(tracker.value);
+    },
     send: async (values) => {
       const preset = presets.find((one) => one.name === values.preset);
       const made = await post(`${sessionPath(entry.name)}/runs`, {

@@ -18,7 +18,49 @@ function line(name, layers, key, colour, { dashed = false, stepped = false } = {
   };
 }
 
+// A swarm draws nobody by weight: it has neither rate nor exponent, but a fitness that rises and a cloud that settles.
+const weighs = (layers) => layers.some((layer) => layer.alpha_reached !== null);
+
+const middle = (layer) => layer.log_weight_quantiles?.[2] ?? null;
+
+function fitness(layers, stored) {
+  const best = (all) => all.map((layer) => ({ ...layer, middle: middle(layer) }));
+  const beside = stored ? [line("stored", stored, "best_log_weight", token("ghost"), { dashed: true })] : [];
+  return {
+    title: title("Fitness", "of the swarm in each iteration"),
+    legend: legend(["best", "median", ...(stored ? ["stored"] : [])]),
+    tooltip: tooltip({ trigger: "axis", valueFormatter: figure }),
+    grid: { left: 56, right: 16, top: 52, bottom: 34 },
+    xAxis: layerAxis(layers),
+    yAxis: axis({ type: "value", scale: true, axisLabel: { formatter: figure } }),
+    series: [line("best", layers, "best_log_weight", token("accent")), line("median", best(layers), "middle", token("text-quiet"), { dashed: true }), ...beside],
+  };
+}
+
+/** Root mean square over the parameters that move of a deviation beside its largest in the frame. */
+function spreads(layers) {
+  const most = layers[0].variance_weighed.map((_, at) => Math.max(...layers.map((layer) => layer.variance_weighed[at])));
+  return layers.map((layer) => {
+    const shares = layer.variance_weighed.map((value, at) => value / most[at]).filter((share) => share > 0);
+    return { spread: shares.length ? Math.sqrt(shares.reduce((sum, share) => sum + share, 0) / shares.length) : null };
+  });
+}
+
+function spread(layers, stored) {
+  const beside = stored ? [line("stored", spreads(stored), "spread", token("ghost"), { dashed: true })] : [];
+  return {
+    title: title("Spread of the swarm", "share of its largest, over what moves"),
+    legend: legend(stored ? ["spread", "stored"] : []),
+    tooltip: tooltip({ trigger: "axis", valueFormatter: figure }),
+    grid: { left: 56, right: 16, top: 52, bottom: 34 },
+    xAxis: layerAxis(layers),
+    yAxis: axis({ type: "log", axisLabel: { formatter: figure } }),
+    series: [line("spread", spreads(layers), "spread", token("layer-7")), ...beside],
+  };
+}
+
 function alpha(layers, stored) {
+  if (!weighs(layers)) return fitness(layers, stored);
   const beside = stored ? [line("stored", stored, "alpha_reached", token("ghost"), { dashed: true })] : [];
   return {
     title: title("Survival rate α", "Eq. 12"),
@@ -32,6 +74,7 @@ function alpha(layers, stored) {
 }
 
 function beta(layers, stored) {
+  if (!weighs(layers)) return spread(layers, stored);
   const beside = stored ? [line("stored", stored, "beta", token("ghost"), { dashed: true })] : [];
   return {
     title: title("Exponent β", "weights are raised to it, Eq. 3"),

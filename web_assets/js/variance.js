@@ -12,9 +12,14 @@ const labelsOf = (names) => (names.length > MOST_LEVEL_LABELS
   ? { rotate: 50, interval: 0, fontSize: 9.5, width: 76, overflow: "truncate" }
   : { interval: 0 });
 
+/** Every parameter's variance in the first layer that moves it: in a swarm's stages that may be a later one. */
+function firstVariances(layers) {
+  return layers[0].variance_weighed.map((_, at) => layers.find((layer) => layer.variance_weighed[at] > 0)?.variance_weighed[at] ?? 0);
+}
+
 /** Share of the first layer's variance that is left, before or after diffusion: rows = layers. */
 export function shares(layers, key) {
-  const first = layers[0].variance_weighed;
+  const first = firstVariances(layers);
   return layers.map((layer) => layer[key].map((value, at) => (first[at] > 0 ? value / first[at] : NaN)));
 }
 
@@ -24,7 +29,7 @@ function unitOf(detail, at) {
 
 function cell(detail, layers, layer, at) {
   const record = layers[layer];
-  const share = record.variance_resampled[at] / layers[0].variance_weighed[at];
+  const share = record.variance_resampled[at] / firstVariances(layers)[at];
   const unit = unitOf(detail, at);
   return `<b>${detail.parameters[at].label}</b>, layer ${layer + 1} of ${layers.length}<br>` +
     `as weighed ${figure(record.variance_weighed[at])} ${unit}<br>before diffusion ${figure(record.variance_resampled[at])} ${unit}<br>` +
@@ -35,7 +40,7 @@ function heat(detail, layers) {
   const left = shares(layers, "variance_resampled");
   const rows = Array.from({ length: Math.max(layers.length, get("layerCount") ?? 0) }, (_, at) => String(at + 1));
   const names = detail.parameters.map((parameter) => parameter.label);
-  const cells = left.flatMap((row, layer) => row.map((share, at) => [at, layer, Math.log10(Math.max(share, LOWEST_SHARE))]));
+  const cells = left.flatMap((row, layer) => row.map((share, at) => [at, layer, share > 0 ? Math.log10(Math.max(share, LOWEST_SHARE)) : "-"]));
   return {
     title: title("Variance left before diffusion", `share of the first layer's, frame ${layers[0].frame}${get("whatIf") ? " re-annealed" : ""}`),
     tooltip: tooltip({ formatter: ({ value }) => cell(detail, layers, value[1], value[0]) }),
@@ -53,7 +58,7 @@ function heat(detail, layers) {
 
 function bars(detail, layers, layer) {
   const at = layer ?? layers.length - 1;
-  const first = layers[0].variance_weighed;
+  const first = firstVariances(layers);
   const share = (key) => layers[at][key].map((value, index) => (first[index] > 0 ? (100 * value) / first[index] : null));
   const names = detail.parameters.map((parameter) => parameter.label);
   return {
