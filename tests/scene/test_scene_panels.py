@@ -146,7 +146,7 @@ def test_every_preset_is_allowed_and_offered_where_its_knobs_exist() -> None:
     for tracker, presets in shown.items():
         for preset in presets:
             assert changed_settings(default_settings(tracker), preset.values) is not None
-    assert set(shown["annealed"]) | set(shown["swarm"]) == set(PRESETS)
+    assert all(any(preset in presets for presets in shown.values()) for preset in PRESETS)
     assert [preset.name for preset in shown["swarm"]] == ["paper, swarm"]
     assert len(shown["annealed"]) > 1
     assert offered(("particles",)) == ()
