@@ -9,6 +9,8 @@ from studio.body.tables import kinematic_tables
 from studio.geometry.projection import project
 from studio.weighting.bodytrack import BodytrackSettings, BodytrackWeigher
 from studio.weighting.edge_region import EdgeRegionSettings, EdgeRegionWeigher
+from studio.weighting.edge_region_silhouette import EdgeRegionSilhouetteSettings
+from studio.weighting.edge_silhouette import EdgeSilhouetteSettings, EdgeSilhouetteWeigher
 from studio.weighting.overlay import overlay_points
 from studio.weighting.template import TemplateSettings
 
@@ -104,3 +106,49 @@ def test_the_template_has_no_sample_points(human, ring):
     view = overlay_points(human, ring, human.neutral, TemplateSettings())[0]
     assert view.edge_samples.shape == view.region_samples.shape == (0, 2)
     assert np.isfinite(view.outlines).all()
+
+
+@pytest.mark.parametrize("move", [0.0, 1200.0])
+@pytest.mark.parametrize("samples", [16, 48])
+def test_visible_edge_points_are_the_pixels_that_the_kernel_reads(human, ring, move, samples):
+    settings = EdgeSilhouetteSettings(samples_per_edge=samples)
+    weigher = EdgeSilhouetteWeigher(human, ring, settings)
+    problem = weigher.problem(plain_evidence(ring, 0, 0))
+    pose = scattered(human, 1)[0]
+    pose[3:5] += move
+    outlines = weigher.projector.blocks(pose[None])
+    stream = problem.edges.recorded_indices(outlines, weigher.edges.whole, settings.edge_chunks)
+    total = 0
+    for v, (camera, seen) in enumerate(zip(ring, overlay_points(human, ring, pose, settings), strict=True)):
+        drawn = np.floor(seen.edge_samples + 0.5).astype(int) @ [1, camera.width]
+        kernel = stream[0, v, 0].ravel()
+        np.testing.assert_array_equal(np.sort(drawn), np.sort(kernel[kernel < camera.width * camera.height]))
+        assert seen.region_samples.shape == (0, 2)
+        total += len(drawn)
+    assert 0 < total < 4 * 19 * samples, "some are hidden"
+
+
+def test_the_torsos_upper_edge_is_drawn(human, ring):
+    """Sixteen points on the line between the far corners of the torso, where no limb hides it."""
+    views = overlay_points(human, ring, human.neutral, EdgeSilhouetteSettings())
+    on_top = 0
+    for view in views:
+        _, a, b, _ = view.outlines[view.limbs.index("torso")]
+        along = (view.edge_samples - a) @ _unit(b - a)
+        off = _off(view, a, b)
+        on_top += ((off < 1e-6) & (along > 0) & (along < np.linalg.norm(b - a))).sum()
+    assert on_top >= 16
+
+
+def _off(view, a, b):
+    """Distances of the edge samples from the line through a and b."""
+    direction = _unit(b - a)
+    return np.abs((view.edge_samples - a) @ np.array([-direction[1], direction[0]]))
+
+
+def test_all_three_terms_show_the_edges_and_the_region(human, ring):
+    both = overlay_points(human, ring, human.neutral, EdgeRegionSilhouetteSettings())
+    other = overlay_points(human, ring, human.neutral, EdgeRegionSettings())
+    for mine, theirs in zip(both, other, strict=True):
+        np.testing.assert_array_equal(mine.edge_samples, theirs.edge_samples)
+        np.testing.assert_array_equal(mine.region_samples, theirs.region_samples)

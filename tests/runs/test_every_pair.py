@@ -1,0 +1,90 @@
+"""The contract that every tracker runs with every weighting: end to end on the toy arm, and on a person in four
+pictures, whose trunk the first stage of a search looks at alone."""
+
+import numpy as np
+import pytest
+from toy_session import true_poses
+
+from studio.body.catalogue import load_body
+from studio.body.model import BodyModel
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.experiments.benchmark import made_evidence, ring_of_cameras
+from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.problem_source import ProblemSource
+from studio.runs.search_space import default_sigma, search_space
+from studio.runs.tracking_run import TrackingRun, start_of
+from studio.sessions.session import Session
+from studio.settings import changed_settings, default_settings
+from studio.tracking.catalogue import TRACKERS
+from studio.tracking.evaluations import evaluations_of, knobs_for_evaluations
+from studio.tracking.frame_loop import search_frame
+from studio.tracking.tracker import FrameResult
+from studio.weighting.catalogue import WEIGHTINGS
+
+PAIRS = [(tracker, weighting) for tracker in TRACKERS for weighting in WEIGHTINGS]
+EVALUATIONS = 240
+
+
+@pytest.mark.parametrize(("tracker", "weighting"), PAIRS)
+def test_a_pair_follows_the_arm(session_on_disk: Session, tracker: str, weighting: str) -> None:
+    start = true_poses()[0]
+    changes = {**knobs_for_evaluations(tracker, EVALUATIONS), "start_repeats": 1}
+    run = prepare_run(
+        session_on_disk,
+        RunRequest(
+            tracker=tracker, weighting=weighting, seed=1, start_pose=tuple(start), last=3, changes=changes
+        ),
+    )
+    problems = ProblemSource(session_on_disk, run.body(), run.cameras())
+    tracking = TrackingRun(run, problems)
+    while not tracking.finished:
+        tracking.step_layer()
+    tracking.close()
+    problems.close()
+    with run.results() as results:
+        frames, poses = results.poses()
+        assert frames.tolist() == [0, 1, 2]
+        assert np.isfinite(poses).all()
+        assert results.timeline().evaluations.tolist() == [EVALUATIONS] * 3
+    # The arm moves by 1.2 degrees a frame at most; one camera and few particles hold it within some 15.
+    assert np.abs(poses - true_poses()[:3]).max() < 0.26
+
+
+@pytest.fixture(scope="module")
+def person() -> tuple[BodyModel, dict[str, FrameEvidence]]:
+    """The default body in its neutral pose in four pictures, by kind of edge map."""
+    body = load_body("human31")
+    return body, made_evidence(body, ring_of_cameras(body), np.random.default_rng(0))
+
+
+@pytest.mark.parametrize(("tracker", "weighting"), PAIRS)
+def test_a_pair_moves_a_person_towards_the_pictures(
+    person: tuple[BodyModel, dict[str, FrameEvidence]], tracker: str, weighting: str
+) -> None:
+    body, evidence = person
+    space = search_space(body, default_sigma(body, 60.0))
+    start = body.neutral + 2.0 * space.sigma * np.random.default_rng(5).uniform(-1.0, 1.0, len(space.names))
+    start = np.clip(start, space.lower, space.upper)
+    settings = changed_settings(
+        default_settings(tracker, weighting), knobs_for_evaluations(tracker, EVALUATIONS)
+    ).tracker
+    chosen = WEIGHTINGS[weighting]
+    weigher = chosen.prepare(body, ring_of_cameras(body), chosen.settings_type())
+    problem = weigher.problem(evidence["bodytrack" if chosen.edge_kind == "bodytrack" else "proximity"])
+
+    def searched() -> FrameResult:
+        return search_frame(
+            TRACKERS[tracker],
+            problem,
+            start_of(tuple(start)),
+            space,
+            seed=3,
+            frame=0,
+            settings_source=lambda: (1, settings),
+        )
+
+    result = searched()
+    assert result.evaluations == evaluations_of(tracker, settings) == EVALUATIONS
+    assert np.isfinite(result.estimate.pose).all()
+    assert problem.fitness(result.estimate.mode[None])[0] > problem.fitness(start[None])[0]
+    np.testing.assert_array_equal(searched().estimate.pose, result.estimate.pose)
