@@ -65,8 +65,8 @@ def box(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
     """Walking straight and stepping over a box at the origin: options height_mm of the box, speed_mm_s, cadence.
 
     With turn_after_mm above 0 the person turns 180 degrees on the spot that far behind the box and steps over it
-    again (Deutscher & Reid 2005, Fig. 10); turn_steps says in about how many steps, before_mm how far before the box
-    the footage begins.
+    again (Deutscher & Reid 2005, Fig. 10); turn_steps is how many whole steps more than the way takes they turn in,
+    before_mm how far before the box the footage begins.
     """
     speed = options.get("speed_mm_s", 900.0)
     gait = Gait(speed, options.get("cadence", 1.6), 0.60, 0.11 * skeleton.height, 50.0, 0.45)
@@ -74,7 +74,7 @@ def box(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
     toes, heel = 0.70 * skeleton.foot, 0.28 * skeleton.foot
     before = 0.5 * (speed / gait.cadence + toes - heel)
     start = -before - speed * gait.cycle * (0.5 * gait.duty + 1.0)
-    clearance = options.get("height_mm", 120.0) + 120.0
+    clearance = options.get("height_mm", 120.0) + 150.0
 
     def obstacle(places: Array, begin: Array, end: Array) -> Array:
         over = np.where(begin[:, 0] * end[:, 0] < 0.0, clearance, 0.0)

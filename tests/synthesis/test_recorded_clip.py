@@ -45,7 +45,7 @@ def test_frames_of_the_recording_are_given_back_and_between_them_it_is_smooth() 
     np.testing.assert_allclose(same.root, motion.root[30:60], atol=1e-9)
     for name, turn in same.turns.items():
         np.testing.assert_allclose(turn, motion.turns[name][30:60], atol=1e-9)
-    half = sampled(motion, (np.arange(30, 60) + 0.5) / FPS, FPS)
+    half = sampled(motion, np.linspace(30.5, 59.5, 30) / FPS, FPS)
     angle = 0.5 * np.sin(2.0 * np.pi * (np.arange(30, 60) + 0.5) / FPS)
     expected = axis_turn(2, 0.7) @ axis_turn(1, angle)
     np.testing.assert_allclose(half.turns["left_upper_arm"], expected, atol=1e-4)
