@@ -14,7 +14,12 @@ FRAMES = 9
 
 
 def arrays(**changes: Any) -> dict[str, Any]:  # noqa: ANN401 - arrays of any kind, wrong ones too
-    turns = Rotation.random(FRAMES * 3, rng=np.random.default_rng(4)).as_quat().reshape(FRAMES, 3, 4).astype(np.float32)
+    turns = (
+        Rotation.random(FRAMES * 3, rng=np.random.default_rng(4))
+        .as_quat()
+        .reshape(FRAMES, 3, 4)
+        .astype(np.float32)
+    )
     return {
         "rotation_local_xyzw": turns,
         "root_translation_m": np.arange(FRAMES * 3, dtype=np.float32).reshape(FRAMES, 3) / 10.0,
