@@ -8,10 +8,11 @@ import cv2
 
 from studio.geometry.camera import Camera
 from studio.synthesis.clips import ClipWriter
+from studio.synthesis.office import ROOMS
 from studio.synthesis.person import PersonMotion
 from studio.synthesis.recipe_file import Picture, Recipe
 from studio.synthesis.renderer import Renderer
-from studio.synthesis.room import furnished_room
+from studio.synthesis.wardrobes import WARDROBES
 
 Progress = Callable[[str, int, int], None]
 
@@ -22,17 +23,7 @@ def render_person(
     recipe: Recipe, motion: PersonMotion, cameras: tuple[Camera, ...], source: Path, progress: Progress | None
 ) -> None:
     """Write videos/, and background/ and masks/ as the recipe includes them, into `source`."""
-    height = recipe.options.get("height_mm", STEPPED_OVER_HEIGHT) if recipe.motion == STEPPED_OVER else 0.0
-    picture = recipe.picture
-    renderer = Renderer(
-        furnished_room(height),
-        cameras,
-        motion,
-        noise=picture.noise,
-        samples=picture.samples,
-        seed=recipe.seed,
-        girth=recipe.girth,
-    )
+    picture, renderer = recipe.picture, recipe_renderer(recipe, motion, cameras)
     with ExitStack() as open_clips:
         footage = _writers(source / "videos", cameras, recipe.fps, picture.quality, open_clips)
         masks = (
@@ -53,6 +44,21 @@ def render_person(
             _write_background(
                 renderer, index, camera, source / "background", recipe.include.background, picture
             )
+
+
+def recipe_renderer(recipe: Recipe, motion: PersonMotion, cameras: tuple[Camera, ...]) -> Renderer:
+    """The renderer of a recipe's room and person: the very pictures of its footage, and their exact masks."""
+    height = recipe.options.get("height_mm", STEPPED_OVER_HEIGHT) if recipe.motion == STEPPED_OVER else 0.0
+    return Renderer(
+        ROOMS[recipe.room](height),
+        cameras,
+        motion,
+        noise=recipe.picture.noise,
+        samples=recipe.picture.samples,
+        seed=recipe.seed,
+        girth=recipe.girth,
+        wardrobe=WARDROBES[recipe.wardrobe],
+    )
 
 
 def _writers(

@@ -10,6 +10,8 @@ import numpy as np
 from studio.errors import StudioError
 from studio.geometry.camera import Camera
 from studio.synthesis.cameras import corner_rig, placed_camera
+from studio.synthesis.office import ROOMS
+from studio.synthesis.wardrobes import WARDROBES
 from studio.typed_decoding import decode_toml
 
 RECIPES = Path(__file__).parent / "recipe_files"
@@ -77,6 +79,7 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     height_mm : of a person with published proportions. shape : instead, a file of `body`'s dimensions, whose lengths
     the person's bones have; the session's subject has these dimensions, radii included, and `subject_full.toml`
     beside it those of the rendered hands and shoes as well. girth : how much stouter than usual the flesh is.
+    wardrobe : "striped" or "plain" clothes, which hardly stand out in the "office"; room : that or "furnished".
     sigma : a file whose first numbers are the session's σ0, one for each parameter of `body`, from frame to frame at
     60 Hz. Files count from the recipe's folder, or lie in the real data after "data:" (`real_data.py`).
     """
@@ -92,6 +95,8 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     height_mm: float = 1760.0
     shape: str = ""
     girth: float = 1.0
+    wardrobe: str = "striped"
+    room: str = "furnished"
     sigma: str = ""
     weighting: str = ""
     options: dict[str, float] = {}
@@ -164,6 +169,11 @@ def _problem(recipe: Recipe) -> str:
         (not 1 <= recipe.frames <= 100_000, f"frames is {recipe.frames}, not 1 to 100000"),
         (not 1.0 <= recipe.fps <= 1000.0, f"fps is {recipe.fps:g}, not 1 to 1000"),
         (not 300.0 <= recipe.height_mm <= 3000.0, f"height_mm is {recipe.height_mm:g}, not 300 to 3000"),
+        (recipe.room not in ROOMS, f"room is '{recipe.room}', not one of {', '.join(ROOMS)}"),
+        (
+            recipe.wardrobe not in WARDROBES,
+            f"wardrobe is '{recipe.wardrobe}', not one of {', '.join(WARDROBES)}",
+        ),
         (not 0.5 <= recipe.girth <= 2.0, f"girth is {recipe.girth:g}, not 0.5 to 2"),
         (
             recipe.motion == "arm" and bool(recipe.shape or recipe.sigma),

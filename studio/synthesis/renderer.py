@@ -21,21 +21,12 @@ from studio.synthesis.person import PersonMotion
 from studio.synthesis.room import Room, block_tables
 from studio.synthesis.room_kernels import trace_room
 from studio.synthesis.tracing_kernels import floor_shadow, trace_person
+from studio.synthesis.wardrobes import STRIPED
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 
-WARDROBE = np.array(
-    [
-        (0.80, 0.52, 0.42),  # skin
-        (0.22, 0.34, 0.46),  # shirt
-        (0.15, 0.17, 0.23),  # trousers
-        (0.12, 0.12, 0.13),  # shoes
-        (0.15, 0.10, 0.07),  # hair
-        (0.52, 0.56, 0.58),  # the shirt's stripes
-    ]
-)
 SHADOW_REACH, SHADOW_CELL = 2600.0, 26.0
 EXPOSURE, LENS_BLUR = 1.8, 0.55
 STREAMS_PER_FRAME = 64
@@ -66,8 +57,10 @@ class Renderer:
         samples: int,
         seed: int,
         girth: float = 1.0,
+        wardrobe: Array = STRIPED,
     ) -> None:
         self._room, self._noise, self._samples, self._seed = room, noise, samples, seed
+        self._wardrobe = wardrobe
         self._tables, self._labels = piece_tables(motion, clothed_pieces(motion.skeleton, girth))
         self._views = tuple(_view(room, camera, samples) for camera in cameras)
 
@@ -119,7 +112,7 @@ class Renderer:
             self._tables[frame],
             self._labels,
             self._room.lights,
-            WARDROBE,
+            self._wardrobe,
             light,
             coverage,
         )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-PLAIN, PLANKS, GRAIN, BOOKS, CHECKS, POSTER, TILES = range(7)
+PLAIN, PLANKS, GRAIN, BOOKS, CHECKS, POSTER, TILES, CARPET = range(8)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,11 +72,14 @@ FURNITURE = (
 
 def furnished_room(obstacle_height: float = 0.0) -> Room:
     """The cluttered room; with a box of the given height (mm) at the origin where one is stepped over."""
-    blocks = FURNITURE
-    if obstacle_height > 0.0:
-        half = (50.0, 340.0, 0.5 * obstacle_height)
-        blocks += (Block((0.0, 0.0, half[2]), half, (0.62, 0.50, 0.34), GRAIN, (0.54, 0.42, 0.28)),)
-    return Room((2900.0, 2600.0), 2900.0, blocks, LIGHTS.copy())
+    return Room((2900.0, 2600.0), 2900.0, FURNITURE + obstacle(obstacle_height), LIGHTS.copy())
+
+
+def obstacle(height: float) -> tuple[Block, ...]:
+    """A box of the given height (mm) at the origin to be stepped over; none for height 0."""
+    half = (50.0, 340.0, 0.5 * height)
+    box = Block((0.0, 0.0, half[2]), half, (0.62, 0.50, 0.34), GRAIN, (0.54, 0.42, 0.28))
+    return (box,) if height > 0.0 else ()
 
 
 def block_tables(room: Room) -> tuple[Array, IntArray]:

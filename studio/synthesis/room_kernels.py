@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit, prange
 
 from studio.synthesis.noise_kernels import hashed, value_noise
-from studio.synthesis.room import BOOKS, CHECKS, GRAIN, PLANKS, POSTER, TILES
+from studio.synthesis.room import BOOKS, CARPET, CHECKS, GRAIN, PLANKS, POSTER, TILES
 
 FAR = 1e9
 LAMP_SAMPLES = 12
@@ -89,6 +89,8 @@ def pattern_share(pattern, u, v):
     if pattern == TILES:
         edge = min(u - 210.0 * math.floor(u / 210.0), v - 210.0 * math.floor(v / 210.0))
         return 1.0 if edge < 14.0 else 0.35 * value_noise(u / 25.0, v / 25.0, 4.0), 1.0 + 0.12 * grain
+    if pattern == CARPET:
+        return value_noise(u / 700.0, v / 700.0, 5.0), 1.0 + 0.3 * grain
     return 0.0, 1.0 + 0.05 * grain
 
 

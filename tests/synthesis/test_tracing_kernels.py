@@ -5,9 +5,9 @@ import pytest
 
 from studio.synthesis import flesh
 from studio.synthesis.cameras import pixel_rays, placed_camera
-from studio.synthesis.renderer import WARDROBE
 from studio.synthesis.room import LIGHTS
 from studio.synthesis.tracing_kernels import floor_shadow, trace_person
+from studio.synthesis.wardrobes import STRIPED
 
 CAMERA = placed_camera("one", (2500.0, 300.0, 1700.0), (0.0, 0.0, 900.0), size=(96, 72), focal_px=90.0)
 LABELS = np.zeros((1, 2), np.int64)
@@ -26,7 +26,7 @@ def traced(body: np.ndarray, samples: int, depth: float = 1e6) -> tuple[np.ndarr
     rays = pixel_rays(CAMERA, samples)
     light, coverage = np.zeros((72, 96, 3), np.float32), np.zeros((72, 96), np.float32)
     room = np.full((72, 96), depth, np.float32)
-    trace_person(CAMERA.centre, rays, samples, room, body, LABELS, LIGHTS, WARDROBE, light, coverage)
+    trace_person(CAMERA.centre, rays, samples, room, body, LABELS, LIGHTS, STRIPED, light, coverage)
     return light, coverage, rays
 
 
