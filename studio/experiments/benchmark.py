@@ -25,8 +25,11 @@ from studio.geometry.camera import Camera
 from studio.weighting.bodytrack import BodytrackSettings, BodytrackWeigher
 from studio.weighting.edge_region import EdgeRegionProblem, EdgeRegionSettings, EdgeRegionWeigher
 from studio.weighting.edge_region_kernels import LANES, loads_only
+from studio.weighting.edge_region_silhouette import EdgeRegionSilhouetteSettings, EdgeRegionSilhouetteWeigher
+from studio.weighting.edge_silhouette import EdgeSilhouetteSettings, EdgeSilhouetteWeigher
 from studio.weighting.outlines import OutlineProjector
 from studio.weighting.problem import FrameFunction
+from studio.weighting.silhouette_areas import FULL, HALF
 from studio.weighting.template import TemplateSettings, TemplateWeigher
 
 Array = NDArray[np.float64]
@@ -38,7 +41,6 @@ FOCAL, DISTANCE, ABOVE = 560.0, 3300.0, 1700.0
 DISTORTION = (-0.32, 0.14, 0.0, 0.0, 0.0)
 FRAMES_PER_SECOND = 60.0
 POSES = 1008
-TEMPLATE_POSES = 128
 LIMIT_BLOCKS, LIMIT_PASSES = 4, 20
 """The limit takes about as long as weighing all poses, so that a busy machine disturbs both alike."""
 
@@ -154,15 +156,27 @@ def weighing_contests(
         "edge_region_occlusion_aware": aware.problem(evidence["proximity"]),
         "bodytrack": BodytrackWeigher(body, cameras, BodytrackSettings()).problem(evidence["bodytrack"]),
         "template": TemplateWeigher(body, cameras, TemplateSettings()).problem(evidence["proximity"]),
+        **silhouette_problems(body, cameras, evidence["proximity"]),
     }
-    few = {"template": poses[:TEMPLATE_POSES]}
-    found = [
-        Contest(name, _weighing(entry, few.get(name, poses)), len(few.get(name, poses)))
-        for name, entry in problems.items()
-    ]
+    found = [Contest(name, _weighing(entry, poses), len(poses)) for name, entry in problems.items()]
     if numba.get_num_threads() > 1:
         many = np.concatenate([poses] * 4)
         found.append(Contest("edge_region_two_threads", _weighing(problem, many), len(many), threads=2))
+    return found
+
+
+def silhouette_problems(
+    body: BodyModel, cameras: tuple[Camera, ...], evidence: FrameEvidence
+) -> dict[str, FrameFunction]:
+    """The weightings that look at the bidirectional silhouette, at half and at full resolution."""
+    found: dict[str, FrameFunction] = {}
+    for resolution in (HALF, FULL):
+        edges = EdgeSilhouetteSettings(silhouette_resolution=resolution)
+        three = EdgeRegionSilhouetteSettings(silhouette_resolution=resolution)
+        found[f"edge_silhouette_{resolution}"] = EdgeSilhouetteWeigher(body, cameras, edges).problem(evidence)
+        found[f"edge_region_silhouette_{resolution}"] = EdgeRegionSilhouetteWeigher(
+            body, cameras, three
+        ).problem(evidence)
     return found
 
 

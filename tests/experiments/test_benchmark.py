@@ -40,7 +40,12 @@ def test_what_is_reported(result):
     ratio = edge_region["evaluations_per_second"] / edge_region["load_limit_per_second"]
     assert edge_region["fraction_of_load_limit"] == pytest.approx(ratio, abs=0.001)
     others = result["others_evaluations_per_second"]
-    assert {"edge_region_occlusion_aware", "bodytrack", "template"} <= set(others)
+    silhouettes = {
+        f"{name}_{resolution}"
+        for name in ("edge_silhouette", "edge_region_silhouette")
+        for resolution in ("half", "full")
+    }
+    assert {"edge_region_occlusion_aware", "bodytrack", "template"} | silhouettes <= set(others)
     assert all(rate > 0 for rate in others.values())
 
 
