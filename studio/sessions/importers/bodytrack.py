@@ -2,8 +2,9 @@
 
 `BodyShapeParameters.txt` gives the subject's 58 dimensions, `InitialPose.txt` the 31 parameters of the
 start pose and the first 31 numbers of `PoseParameters.txt` the standard deviations from frame to frame at
-60 Hz (its limits belong to another branch of the angles and are not used). Every file but pictures and
-calibration may be missing.
+60 Hz (its limits belong to another branch of the angles and are not used). The start pose is kept as it is
+written; `Session.start_pose` spells it within the body's limits. Every file but pictures and calibration may
+be missing.
 """
 
 import re
