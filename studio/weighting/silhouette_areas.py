@@ -26,7 +26,7 @@ Words = NDArray[np.uint64]
 FOREGROUND = 128
 """Mask values from here on are silhouette."""
 FULL, HALF = "full", "half"
-BLOCKS_A_THREAD = 8
+BLOCKS_A_THREAD = 16
 """About half a millisecond of ten limbs in four pictures."""
 
 
