@@ -106,11 +106,13 @@ function time(layers, stored) {
 
 /** Wire the three charts to the state. */
 export function startSurvival() {
+  const tab = document.querySelector("[data-panel=survival]");
   const charts = [["chart-alpha", alpha], ["chart-beta", beta], ["chart-time", time]].map(([id, make]) => [new Chart(id, { empty: "No layers yet." }), make]);
   watch(["detail", "whatIf", "layerCount"], () => {
     const [detail, whatIf] = [get("detail")?.layers, get("whatIf")];
     const layers = whatIf ?? detail;
     const stored = whatIf && detail?.length ? detail : null;
+    tab.textContent = layers?.length && !weighs(layers) ? "Fitness & spread" : "Survival & β";
     for (const [chart, make] of charts) chart.draw(() => (layers?.length ? make(layers, stored) : null));
   });
 }

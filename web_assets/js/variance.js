@@ -12,15 +12,23 @@ const labelsOf = (names) => (names.length > MOST_LEVEL_LABELS
   ? { rotate: 50, interval: 0, fontSize: 9.5, width: 76, overflow: "truncate" }
   : { interval: 0 });
 
-/** Every parameter's variance in the first layer that moves it: in a swarm's stages that may be a later one. */
-function firstVariances(layers) {
-  return layers[0].variance_weighed.map((_, at) => layers.find((layer) => layer.variance_weighed[at] > 0)?.variance_weighed[at] ?? 0);
+// Below this share of its largest, a variance is the rounding of a parameter that a stage keeps where it is.
+const ROUNDING = 1e-12;
+const MOST_FRAMED_LAYERS = 24;
+
+/** Of every parameter the first layer that moves it (in a swarm's stages that may be a later one), and its variance then. */
+function firstMoves(layers) {
+  return layers[0].variance_weighed.map((_, at) => {
+    const most = Math.max(...layers.map((layer) => layer.variance_weighed[at]));
+    const number = layers.findIndex((layer) => layer.variance_weighed[at] > ROUNDING * most);
+    return { number, variance: number < 0 ? 0 : layers[number].variance_weighed[at] };
+  });
 }
 
-/** Share of the first layer's variance that is left, before or after diffusion: rows = layers. */
+/** Share of the first variance that is left, before or after diffusion: rows = layers; NaN before it moves. */
 export function shares(layers, key) {
-  const first = firstVariances(layers);
-  return layers.map((layer) => layer[key].map((value, at) => (first[at] > 0 ? value / first[at] : NaN)));
+  const first = firstMoves(layers);
+  return layers.map((layer, number) => layer[key].map((value, at) => (first[at].variance > 0 && number >= first[at].number ? value / first[at].variance : NaN)));
 }
 
 function unitOf(detail, at) {
@@ -29,18 +37,18 @@ function unitOf(detail, at) {
 
 function cell(detail, layers, layer, at) {
   const record = layers[layer];
-  const share = record.variance_resampled[at] / firstVariances(layers)[at];
+  const share = shares(layers, "variance_resampled")[layer][at];
   const unit = unitOf(detail, at);
   return `<b>${detail.parameters[at].label}</b>, layer ${layer + 1} of ${layers.length}<br>` +
     `as weighed ${figure(record.variance_weighed[at])} ${unit}<br>before diffusion ${figure(record.variance_resampled[at])} ${unit}<br>` +
-    `after diffusion ${figure(record.variance_diffused[at])} ${unit}<br>${figure(share * 100)} % of the first layer's`;
+    `after diffusion ${figure(record.variance_diffused[at])} ${unit}<br>${Number.isFinite(share) ? `${figure(share * 100)} % of the first layer's` : "held still in this layer"}`;
 }
 
 function heat(detail, layers) {
   const left = shares(layers, "variance_resampled");
   const rows = Array.from({ length: Math.max(layers.length, get("layerCount") ?? 0) }, (_, at) => String(at + 1));
   const names = detail.parameters.map((parameter) => parameter.label);
-  const cells = left.flatMap((row, layer) => row.map((share, at) => [at, layer, share > 0 ? Math.log10(Math.max(share, LOWEST_SHARE)) : "-"]));
+  const cells = left.flatMap((row, layer) => row.map((share, at) => [at, layer, Number.isFinite(share) ? Math.log10(Math.max(share, LOWEST_SHARE)) : "-"]));
   return {
     title: title("Variance left before diffusion", `share of the first layer's, frame ${layers[0].frame}${get("whatIf") ? " re-annealed" : ""}`),
     tooltip: tooltip({ formatter: ({ value }) => cell(detail, layers, value[1], value[0]) }),
@@ -52,14 +60,13 @@ function heat(detail, layers) {
       inRange: { color: ["heat-lowest", "heat-low", "heat-middle", "heat-high"].map(token) },
       text: ["100 %", "1 %"], textStyle: { color: token("text-quiet"), fontSize: 10 },
     },
-    series: [{ type: "heatmap", data: cells, itemStyle: { borderColor: token("surface"), borderWidth: 1 }, emphasis: { itemStyle: { borderColor: token("text") } } }],
+    series: [{ type: "heatmap", data: cells, itemStyle: { borderColor: token("surface"), borderWidth: rows.length > MOST_FRAMED_LAYERS ? 0 : 1 }, emphasis: { itemStyle: { borderColor: token("text") } } }],
   };
 }
 
 function bars(detail, layers, layer) {
   const at = layer ?? layers.length - 1;
-  const first = firstVariances(layers);
-  const share = (key) => layers[at][key].map((value, index) => (first[index] > 0 ? (100 * value) / first[index] : null));
+  const share = (key) => shares(layers, key)[at].map((value) => (Number.isFinite(value) ? 100 * value : null));
   const names = detail.parameters.map((parameter) => parameter.label);
   return {
     title: title(`Layer ${at + 1} of ${layers.length}`, "of the first layer's variance"),

@@ -37,7 +37,9 @@ export function startWeights() {
   watch(["summary", "frame"], () => {
     const summary = get("summary");
     const some = summary?.frames.length ? summary : null;
-    weight.draw(() => some && overFrames(some, { key: "log_weight", name: "Best weight", unit: "log w", colour: token("accent") }));
+    // A swarm seeks the greatest fitness; the others weigh.
+    const [name, unit] = summary?.describe?.startsWith("swarm") ? ["Best fitness", "f"] : ["Best weight", "log w"];
+    weight.draw(() => some && overFrames(some, { key: "log_weight", name, unit, colour: token("accent") }));
     const measured = some?.frames.some((entry) => entry.error_mm !== null && entry.error_mm !== undefined) ? some : null;
     const note = measured && summary.mean_mm ? `mean ${figure(summary.mean_mm)} mm, worst frame ${figure(summary.worst_mm)} mm, no alignment` : "";
     error.draw(() => measured && overFrames(measured, { key: "error_mm", name: "Error of the markers", unit: "mm", colour: token("layer-7"), note }));
