@@ -27,7 +27,7 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
     with Path(arguments["log"]).open("a") as log:
         log.write(f"{os.getpid()} {arguments['setting']} {arguments['seed']}\n")
     deed = arguments.get("deed", "")
-    if deed == "refuse":
+    if deed == "refuse" or (deed == "once refused" and _first(arguments)):
         raise StudioError("The toy refuses.", "Ask another.")
     if deed == "break":
         raise ZeroDivisionError("toy")

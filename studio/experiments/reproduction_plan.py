@@ -9,7 +9,8 @@ from studio.errors import StudioError
 from studio.experiments.experiment import Experiment, Plain, Scale, Trial
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.kept_trials import footage_of, plain, trial_key
-from studio.synthesis.recipe_file import find_recipe
+from studio.sessions.manifest import read_manifest
+from studio.synthesis.recipe_file import find_recipe, read_recipe
 from studio.synthesis.recipes import RECIPE_COPY
 
 FULL_SEEDS, QUICK_SEEDS = 10, 3
@@ -22,7 +23,7 @@ class TrialJob:
     """A trial, ready to be run in any process.
 
     key : under which its outcome is kept. experiment : the first that asks for it. footage : recipes that it looks
-    at. alone : nothing else may run then.
+    at. frames : how many of them from the first, None for all. alone : nothing else may run then.
     """
 
     key: str
@@ -31,6 +32,7 @@ class TrialJob:
     arguments: Mapping[str, Plain]
     measure: Measure
     footage: tuple[str, ...]
+    frames: int | None
     alone: bool
 
 
@@ -71,6 +73,7 @@ def plan(experiment: Experiment, scale: Scale) -> PlannedExperiment:
             plain(trial.arguments),
             experiment.measure,
             footage_of(experiment, trial),
+            frames_of(trial.arguments),
             experiment.alone,
         )
         for trial in trials
@@ -92,7 +95,34 @@ def recipe_digest(name: str) -> str:
     return hashlib.sha256(find_recipe(name).read_bytes()).hexdigest()[:16]
 
 
-def is_rendered(name: str, folder: Path) -> bool:
-    """Whether the footage lies in `folder` as the recipe has it now. Raises StudioError for an unknown recipe."""
-    copy = folder / name / RECIPE_COPY
-    return copy.is_file() and copy.read_bytes() == find_recipe(name).read_bytes()
+def footage_needed(jobs: Iterable[TrialJob]) -> dict[str, int | None]:
+    """The recipes that jobs look at, and how many frames of each from the first (None: all)."""
+    needed: dict[str, int | None] = {}
+    for job in jobs:
+        for name in job.footage:
+            before = needed.get(name, 0)
+            needed[name] = None if before is None or job.frames is None else max(before, job.frames)
+    return needed
+
+
+def frames_of(arguments: Plain) -> int | None:
+    """The last frame that a trial's arguments name, as `Attempt` does ("last", half open); None where they do not."""
+    if not isinstance(arguments, Mapping):
+        return None
+    if "last" in arguments:
+        return arguments["last"]
+    within = [frames_of(value) for value in arguments.values() if isinstance(value, Mapping)]
+    named = [frames for frames in within if frames is not None]
+    return max(named) if named and len(named) == len(within) else None
+
+
+def is_rendered(name: str, folder: Path, frames: int | None) -> bool:
+    """Whether so many frames of the footage (None: all) lie in `folder` as the recipe has it now.
+
+    Raises StudioError for an unknown recipe, SessionError for a session that cannot be read.
+    """
+    session, recipe = folder / name, find_recipe(name)
+    if not (session / RECIPE_COPY).is_file() or (session / RECIPE_COPY).read_bytes() != recipe.read_bytes():
+        return False
+    whole = read_recipe(recipe).frames
+    return read_manifest(session).frame_count >= min(whole if frames is None else frames, whole)

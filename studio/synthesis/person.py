@@ -5,7 +5,7 @@ the person's left and z up when standing upright with hanging arms. Trunk: the n
 thorax's z axis, which turns about the pelvis centre. Knees and elbows are hinges about y.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,6 +111,12 @@ class PersonMotion:
     def frame_count(self) -> int:
         """Number of frames."""
         return len(self.root)
+
+
+def first_frames(motion: PersonMotion, frames: int | None) -> PersonMotion:
+    """The beginning of a motion; all of it for None."""
+    turns = {name: turn[:frames] for name, turn in motion.turns.items()}
+    return replace(motion, root=motion.root[:frames], turns=turns)
 
 
 def joint_points(motion: PersonMotion) -> dict[str, Array]:

@@ -20,7 +20,14 @@ from studio.sessions.manifest import read_manifest, write_manifest
 from studio.sessions.named_rows import write_pose, write_sigma
 from studio.synthesis.arm_footage import render_arm
 from studio.synthesis.motions import make_motion
-from studio.synthesis.person import PersonMotion, Skeleton, marker_lengths, marker_motion, skeleton_of_height
+from studio.synthesis.person import (
+    PersonMotion,
+    Skeleton,
+    first_frames,
+    marker_lengths,
+    marker_motion,
+    skeleton_of_height,
+)
 from studio.synthesis.person_footage import render_person
 from studio.synthesis.real_data import located
 from studio.synthesis.recipe_file import RECORDED, Recipe, find_recipe, read_recipe, recipe_cameras
@@ -34,12 +41,15 @@ RECIPE_COPY = "recipe.toml"
 SUBJECT_FULL, SIGMA_NAME = "subject_full.toml", "sigma.csv"
 
 
-def synthesize(recipe: Path | str, into: Path, progress: Progress | None = None) -> Path:
+def synthesize(
+    recipe: Path | str, into: Path, progress: Progress | None = None, frames: int | None = None
+) -> Path:
     """Render a recipe's footage and make a session of it; returns the session's folder.
 
     recipe : a TOML file or the name of a bundled recipe. into : the session folder to be made. progress : called
-    with the step in words, what is done of it and how much it is. The same recipe gives the same pictures on any
-    number of threads. Raises StudioError for a recipe that cannot be followed and what `import_source` raises.
+    with the step in words, what is done of it and how much it is. frames : only the first so many of a person's
+    motion, where they are enough. The same recipe gives the same pictures on any number of threads. Raises
+    StudioError for a recipe that cannot be followed and what `import_source` raises.
     """
     path = find_recipe(recipe)
     wanted = read_recipe(path)
@@ -48,7 +58,7 @@ def synthesize(recipe: Path | str, into: Path, progress: Progress | None = None)
     with tempfile.TemporaryDirectory(prefix="studio-synthesis-") as folder:
         source = Path(folder) / into.name
         source.mkdir()
-        render_source(wanted, path.parent, source, progress)
+        render_source(wanted, path.parent, source, progress, frames)
         import_source(source, into, fps=wanted.fps, progress=progress)
         if (source / SUBJECT_FULL).exists():
             (into / SUBJECT_FULL).write_bytes((source / SUBJECT_FULL).read_bytes())
@@ -62,12 +72,17 @@ def synthesize(recipe: Path | str, into: Path, progress: Progress | None = None)
 
 
 def render_source(
-    recipe: Recipe, recipe_folder: Path, source: Path, progress: Progress | None = None
+    recipe: Recipe,
+    recipe_folder: Path,
+    source: Path,
+    progress: Progress | None = None,
+    frames: int | None = None,
 ) -> None:
     """Write the folder that `import` understands: videos, background, masks, calibration, truth, subject,
     start pose.
 
     recipe_folder : where a relative `cameras.calibration` starts. source : an empty folder.
+    frames : as in `synthesize`.
     """
     rng = np.random.default_rng(recipe.seed)
     if recipe.motion == ARM:
@@ -77,7 +92,7 @@ def render_source(
     else:
         skeleton, shape = recipe_person(recipe, recipe_folder, rng)
         cameras = _cameras(recipe, recipe_folder, rng)
-        motion = recipe_motion(recipe, recipe_folder, skeleton)
+        motion = first_frames(recipe_motion(recipe, recipe_folder, skeleton), frames)
         truth, subject = marker_motion(motion), shape or person_subject(recipe, motion)
         if shape is not None and recipe.include.subject:
             write_subject(with_hands_and_feet(shape, skeleton), source / SUBJECT_FULL)

@@ -14,7 +14,14 @@ from studio.experiments.experiment import Experiment, Scale
 from studio.experiments.findings_document import Document
 from studio.experiments.findings_files import FOOTAGE, TRIALS, write_findings, write_overview
 from studio.experiments.kept_trials import KeptOutcome, KeptTrials, measured_by
-from studio.experiments.reproduction_plan import PlannedExperiment, TrialJob, each_once, is_rendered, plan
+from studio.experiments.reproduction_plan import (
+    PlannedExperiment,
+    TrialJob,
+    each_once,
+    footage_needed,
+    is_rendered,
+    plan,
+)
 from studio.sessions.atomic_files import discard, move_into_place, new_folder_beside
 from studio.sessions.manifest import FILE_NAME as MANIFEST
 from studio.sessions.process_lock import ProcessLock
@@ -102,7 +109,7 @@ class _Work:
         self._conclude_what_is_done()
         missing = [job for key, job in self._jobs.items() if key not in self._kept]
         runnable = []
-        problems = self._render({name for job in missing for name in job.footage})
+        problems = self._render(footage_needed(missing))
         for job in missing:
             problem = next((problems[name] for name in job.footage if name in problems), "")
             if problem:
@@ -119,18 +126,18 @@ class _Work:
         self._written = time.monotonic()
         return write_overview(self._out, self._catalogue, measured_by(), now())
 
-    def _render(self, names: set[str]) -> dict[str, str]:
-        """Make the footage that is missing; what cannot be made, with the reason."""
+    def _render(self, needed: dict[str, int | None]) -> dict[str, str]:
+        """Make the footage that is missing; what cannot be made, with the reason. needed : recipes to frames."""
         problems = {}
-        for name in sorted(names):
+        for name, frames in needed.items():
             try:
-                if not is_rendered(name, self._out / FOOTAGE):
-                    self._render_one(name)
+                if not is_rendered(name, self._out / FOOTAGE, frames):
+                    self._render_one(name, frames)
             except StudioError as error:
                 problems[name] = f"The footage '{name}' cannot be made. {error}"
         return problems
 
-    def _render_one(self, name: str) -> None:
+    def _render_one(self, name: str, frames: int | None) -> None:
         place = self._out / FOOTAGE / name
         beside = new_folder_beside(place)
         try:
@@ -138,6 +145,7 @@ class _Work:
                 name,
                 beside / name,
                 lambda step, done, total: self._report(f"footage {name}: {step}", done, total, None),
+                frames,
             )
             discard(place)
             move_into_place(beside / name, place)

@@ -9,7 +9,7 @@ from toy_experiments import toy
 from studio.errors import NotFoundError
 from studio.experiments.catalogue import EXPERIMENTS, find_experiments, gathered
 from studio.experiments.kept_trials import plain
-from studio.experiments.reproduction_plan import each_once, plan, scale_of
+from studio.experiments.reproduction_plan import each_once, footage_needed, frames_of, plan, scale_of
 from studio.synthesis.recipe_file import recipe_names
 
 
@@ -52,3 +52,16 @@ def test_every_experiment_can_be_planned_and_kept(name: str) -> None:
     for job in quick.jobs:
         assert plain(job.arguments) == job.arguments
         assert pickle.loads(pickle.dumps(job)) == job
+
+
+def test_only_the_frames_that_are_looked_at_are_needed(tmp_path) -> None:
+    assert frames_of({"footage": "walk", "last": 90}) == 90
+    assert frames_of({"footage": "walk", "last": None}) is None
+    assert frames_of({"attempt": {"last": 30}, "other": {"last": 50}}) == 50
+    assert frames_of({"attempt": {"last": 30}, "changes": {"layers": 3}}) is None
+    assert frames_of({"seed": 1}) is None
+    jobs = [
+        SimpleNamespace(footage=footage, frames=frames)
+        for footage, frames in ((("a",), 10), (("a", "b"), 30), (("b",), None), (("b",), 5), ((), None))
+    ]
+    assert footage_needed(jobs) == {"a": 30, "b": None}  # pyright: ignore[reportArgumentType]

@@ -99,9 +99,14 @@ def test_a_failing_trial_fails_its_experiment_only(tmp_path: Path, deed: str, re
     assert [failure["label"] for failure in bad["failures"]] == ["plain, seed 1", "clever, seed 1"]
     assert reason in bad["failures"][0]["reason"]
     assert reason in bad["words"]
-    # What failed is tried again, and what was measured is kept.
-    again = run([toy("bad", log, seed1=deed)], out)
-    assert (again.measured, again.kept, again.failed) == (0, 2, 2)
+
+
+def test_what_failed_is_tried_again_and_what_was_measured_is_kept(tmp_path: Path) -> None:
+    log, out = tmp_path / "log", tmp_path / "out"
+    run([toy("bad", log, seed1="once refused")], out)
+    found = run([toy("bad", log, seed1="once refused")], out)
+    assert (found.measured, found.kept, found.failed) == (2, 2, 0)
+    assert found.documents[0]["verdict"] == "reproduced"
 
 
 def test_a_process_that_dies_once_is_replaced(tmp_path: Path) -> None:
@@ -211,12 +216,14 @@ def test_the_workspace_does_not_take_the_folder_for_a_session(tmp_path: Path) ->
 
 
 SCRIPT = """
+import signal
 import sys
 from pathlib import Path
 from toy_experiments import toy
 from studio.experiments.experiment import Scale
 from studio.worker.reproduction import reproduce
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     log, out = map(Path, sys.argv[1:])
     reproduce((toy("toy", log, seed1="wait"),), out, Scale((0, 1)), lambda *_: None, processes=1)
 """

@@ -9,7 +9,7 @@ from studio.worker.trial_pool import next_job
 
 
 def job(key: str, footage: str = "", alone: bool = False) -> TrialJob:
-    return TrialJob(key, "toy", key, {}, measure, (footage,) if footage else (), alone)
+    return TrialJob(key, "toy", key, {}, measure, (footage,) if footage else (), None, alone)
 
 
 def test_a_process_stays_with_its_footage() -> None:
