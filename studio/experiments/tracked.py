@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from studio.body.inverse_kinematics import pose_from_markers
 from studio.body.model import BodyModel
+from studio.body.subject import read_subject
 from studio.capture.trc import read_trc
 from studio.errors import NotFoundError, TruthError
 from studio.evaluation.errors import evaluate, rows_of_frames
@@ -34,7 +35,9 @@ class Attempt:
 
     footage : a recipe's name, or the path of a session. changes : knobs by flat name. first, last : frames, half
     open; last None means all. every : only each so many frames are seen (fps is divided, σ0 multiplied). cameras :
-    names, empty for all. body : a body's name or file, "" for the session's own. sigma_scale : multiplies σ0.
+    names, empty for all. body : a body's name or file, "" for the session's own. subject : a subject file beside the
+    session's own, such as "subject_full.toml" of the Lee-walk twin (with hands and feet), "" for its own. sigma_scale :
+    multiplies σ0.
     """
 
     footage: str
@@ -48,6 +51,7 @@ class Attempt:
     cameras: tuple[str, ...] = ()
     body: str = ""
     sigma_scale: float = 1.0
+    subject: str = ""
 
     def plain(self) -> dict[str, Any]:
         """As a trial's arguments."""
@@ -105,7 +109,8 @@ def track(
     session = shelf.session(attempt.footage)
     if session.truth_path is None:
         raise TruthError(f"Session '{session.name}' has no truth.", "Take one made by 'studio synthesize'.")
-    body = session.body(attempt.body or None)
+    subject = read_subject(session.path / attempt.subject) if attempt.subject else None
+    body = session.body(attempt.body or None, subject)
     fps = session.manifest.fps
     space = search_space(body, _sigma(session, body, fps / attempt.every) * attempt.sigma_scale)
     settings = changed_settings(default_settings(attempt.tracker, attempt.weighting), attempt.changes)

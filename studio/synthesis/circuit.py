@@ -188,7 +188,7 @@ def _circle(options: Options) -> Path:
     """The circle through the start in its heading: distance (mm) to position (F, 2) and heading (F,)."""
     turn = 1.0 if options.get("turn", 1.0) > 0.0 else -1.0
     radius = options.get("radius_mm", 700.0)
-    heading = np.radians(options.get("start_heading_degrees", 0.0))
+    heading = np.radians(options.get("start_heading_degrees", 90.0 * turn))
     start = np.array([options.get("start_x_mm", radius), options.get("start_y_mm", 0.0)])
     centre = start + turn * radius * np.array([-np.sin(heading), np.cos(heading)])
 
