@@ -30,14 +30,14 @@ MELT_WITHIN, MELT_BETWEEN = 26.0, 8.0
 FAR = 1e9
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", fastmath=True, inline="always")
 def soft_minimum(a, b, width):
     """The smaller of two distances, rounded off where they differ by less than `width`."""
     gap = max(width - abs(a - b), 0.0) / width
     return min(a, b) - gap * gap * width * 0.25
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath=True)
 def local_point(px, py, pz, piece):
     """A world point in the piece's frame: x forward, y sideways, z along it."""
     x, y, z = px - piece[START], py - piece[START + 1], pz - piece[START + 2]
@@ -48,7 +48,7 @@ def local_point(px, py, pz, piece):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath=True)
 def piece_distance(px, py, pz, piece):
     """Signed distance from a world point to one piece."""
     x, y, z = local_point(px, py, pz, piece)
@@ -71,7 +71,15 @@ def piece_distance(px, py, pz, piece):
     return distance
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath=True, inline="always")
+def beyond(px, py, pz, piece, limit):
+    """Whether a point is further than `limit` from the ball around a piece: then the piece does not matter."""
+    x, y, z = px - piece[BOUND], py - piece[BOUND + 1], pz - piece[BOUND + 2]
+    reach = limit + piece[BOUND_RADIUS]
+    return reach > 0.0 and x * x + y * y + z * z > reach * reach
+
+
+@njit(cache=True, error_model="numpy", fastmath=True)
 def body_distance(px, py, pz, pieces, labels, active, count):
     """Signed distance to the union of the first `count` pieces named in `active` (in order of their
     groups).
@@ -79,6 +87,8 @@ def body_distance(px, py, pz, pieces, labels, active, count):
     total, group_distance, group = FAR, FAR, -1
     for index in range(count):
         piece = active[index]
+        if beyond(px, py, pz, pieces[piece], min(total, group_distance) + MELT_WITHIN):
+            continue
         distance = piece_distance(px, py, pz, pieces[piece])
         if labels[piece, 1] == group:
             group_distance = soft_minimum(group_distance, distance, MELT_WITHIN)
@@ -88,18 +98,20 @@ def body_distance(px, py, pz, pieces, labels, active, count):
     return soft_minimum(total, group_distance, MELT_BETWEEN)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath=True)
 def nearest_piece(px, py, pz, pieces, active, count):
     """The piece whose own surface is closest: it lends its material."""
     best, found = FAR, -1
     for index in range(count):
+        if beyond(px, py, pz, pieces[active[index]], best):
+            continue
         distance = piece_distance(px, py, pz, pieces[active[index]])
         if distance < best:
             best, found = distance, active[index]
     return found
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath=True)
 def gather(ox, oy, oz, dx, dy, dz, pieces, margin, active):
     """The pieces that a ray may touch: fills `active`, returns their count and the ray's stretch."""
     count, first, last = 0, FAR, 0.0
@@ -117,7 +129,48 @@ def gather(ox, oy, oz, dx, dy, dz, pieces, margin, active):
     return count, max(first, 0.0), last
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath=True)
+def gather_beam(origin, dx, dy, dz, spread, pieces, margin, active):
+    """Like `gather` for all rays that stray no further than spread × distance from one."""
+    count, first, last = 0, FAR, 0.0
+    for piece in range(len(pieces)):
+        x, y = pieces[piece, BOUND] - origin[0], pieces[piece, BOUND + 1] - origin[1]
+        z = pieces[piece, BOUND + 2] - origin[2]
+        along = x * dx + y * dy + z * dz
+        # The piece is met, if at all, within its own reach of `along`; there the beam is this wide.
+        reach = pieces[piece, BOUND_RADIUS] + margin
+        reach += spread * (abs(along) + reach)
+        left = reach * reach - (x * x + y * y + z * z - along * along)
+        if left > 0.0:
+            half = math.sqrt(left)
+            if along + half > 0.0:
+                active[count] = piece
+                count += 1
+                first, last = min(first, along - half), max(last, along + half)
+    return count, max(first, 0.0), last
+
+
+@njit(cache=True, error_model="numpy", fastmath=True)
+def gather_among(origin, dx, dy, dz, pieces, nearby, near_count, margin, active):
+    """Like `gather` among the first `near_count` pieces named in `nearby`."""
+    count, first, last = 0, FAR, 0.0
+    for index in range(near_count):
+        piece = nearby[index]
+        x, y = pieces[piece, BOUND] - origin[0], pieces[piece, BOUND + 1] - origin[1]
+        z = pieces[piece, BOUND + 2] - origin[2]
+        along = x * dx + y * dy + z * dz
+        reach = pieces[piece, BOUND_RADIUS] + margin
+        left = reach * reach - (x * x + y * y + z * z - along * along)
+        if left > 0.0:
+            half = math.sqrt(left)
+            if along + half > 0.0:
+                active[count] = piece
+                count += 1
+                first, last = min(first, along - half), max(last, along + half)
+    return count, max(first, 0.0), last
+
+
+@njit(cache=True, error_model="numpy", fastmath=True)
 def body_normal(px, py, pz, pieces, labels, active, count):
     """Outward unit normal by four samples on a tetrahedron."""
     step = 1.5
@@ -130,7 +183,7 @@ def body_normal(px, py, pz, pieces, labels, active, count):
     return x / size, y / size, z / size
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath=True)
 def light_share(px, py, pz, light, light_radius, pieces, labels, active):
     """How much of a round lamp a point sees past the person: 0 in full shadow, 1 in the open.
 
@@ -156,7 +209,7 @@ def light_share(px, py, pz, light, light_radius, pieces, labels, active):
     return seen * seen * (3.0 - 2.0 * seen)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath=True)
 def no_pieces(pieces):
     """Room for the indices that `gather` writes."""
     return np.zeros(len(pieces), np.int64)

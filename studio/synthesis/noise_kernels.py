@@ -11,7 +11,7 @@ _ACROSS, _DOWN, _DEEP = np.uint32(0x9E3779B1), np.uint32(0x27D4EB2F), np.uint32(
 _TO_UNIT = 1.0 / 4294967296.0
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True, error_model="numpy", fastmath=True, inline="always")
 def hashed(x, y, z):
     """A uniform number in [0, 1) for three integers."""
     h = np.uint32(x) * _ACROSS ^ np.uint32(y) * _DOWN ^ np.uint32(z) * _DEEP
@@ -21,7 +21,7 @@ def hashed(x, y, z):
     return np.float64(h) * _TO_UNIT
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath=True)
 def value_noise(x, y, z):
     """Smooth noise in [0, 1] with features of size 1."""
     fx, fy, fz = math.floor(x), math.floor(y), math.floor(z)
@@ -37,7 +37,7 @@ def value_noise(x, y, z):
     return total
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, error_model="numpy", fastmath=True, parallel=True)
 def add_sensor_noise(picture, deviation, stream, out):
     """Gaussian noise by Box and Muller on hashed counters, then 8 bits.
 

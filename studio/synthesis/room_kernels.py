@@ -16,7 +16,7 @@ WALL_COLOUR, SKIRTING = (0.68, 0.67, 0.63), (0.46, 0.44, 0.42)
 SKIRTING_HEIGHT = 90.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath=True)
 def block_entry(ox, oy, oz, dx, dy, dz, block):
     """Distance along a ray to a turned box and the axis of the face it enters (0..2); (FAR, 0) when it
     misses.
@@ -38,7 +38,7 @@ def block_entry(ox, oy, oz, dx, dy, dz, block):
     return (enter, face) if enter < leave and enter > 0.0 else (FAR, 0)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath=True)
 def first_surface(ox, oy, oz, dx, dy, dz, half_x, half_y, height, blocks):
     """(distance, what, face axis) of the nearest surface; what is a block's index or FLOOR, CEILING, WALL."""
     best, what, face = FAR, FLOOR, 2
@@ -61,7 +61,7 @@ def first_surface(ox, oy, oz, dx, dy, dz, half_x, half_y, height, blocks):
     return best, what, face
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath=True)
 def pattern_share(pattern, u, v):
     """How much of the second colour a pattern shows at (u, v) mm of a face, and a factor for its
     brightness.
@@ -94,7 +94,7 @@ def pattern_share(pattern, u, v):
     return 0.0, 1.0 + 0.05 * grain
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath=True)
 def surface_colour(what, face, px, py, pz, blocks, patterns, colour):
     """Writes the (3,) colour of a point of the room."""
     pattern, share, tone = PLANKS, 0.0, 1.0
@@ -120,7 +120,7 @@ def surface_colour(what, face, px, py, pz, blocks, patterns, colour):
         colour[channel] = (SKIRTING[channel] if low else WALL_COLOUR[channel]) * (1.0 + 0.08 * stain)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath=True)
 def lamp_share(px, py, pz, lights, blocks, salt):
     """How much of the round lamp a point of the room sees past the furniture, 0...1."""
     seen = 0
@@ -142,7 +142,7 @@ def lamp_share(px, py, pz, lights, blocks, salt):
     return seen / LAMP_SAMPLES
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, error_model="numpy", fastmath=True, parallel=True)
 def trace_room(origin, rays, samples, size, lights, blocks, patterns, key, ambient, depth):
     """The empty room.
 

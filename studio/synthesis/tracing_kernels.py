@@ -10,6 +10,8 @@ from studio.synthesis.distance_kernels import (
     body_distance,
     body_normal,
     gather,
+    gather_among,
+    gather_beam,
     light_share,
     local_point,
     nearest_piece,
@@ -20,11 +22,13 @@ from studio.synthesis.noise_kernels import value_noise
 
 SAFETY, TOUCH, STEPS = 0.85, 0.8, 72
 OCCLUSION_REACH = 70.0
+# Pieces this far from a ray (mm) may still melt into what it meets. Pixels are traced in square tiles of this side.
+NEAR, TILE = 12.0, 8
 # Samples of one pixel this close in depth (mm) share one shading: it changes little inside a pixel.
 SAME_SURFACE = 12.0
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath=True)
 def cloth_colour(material, x, y, z, wardrobe):
     """(red, green, blue) of a point in its piece's frame, so that the pattern moves with the limb.
 
@@ -52,7 +56,7 @@ def cloth_colour(material, x, y, z, wardrobe):
     return r * tone, g * tone, b * tone
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", fastmath=True)
 def shaded(px, py, pz, dx, dy, dz, pieces, labels, active, count, shadow_active, lights, wardrobe, out):
     """Light that a point of the person sends to the camera, written to `out` (3,), 0...1.
 
@@ -86,13 +90,50 @@ def shaded(px, py, pz, dx, dy, dz, pieces, labels, active, count, shadow_active,
     out[2] = blue * (key * lights[2, 2] + sky * lights[3, 2] + fill)
 
 
-@njit(cache=True)
-def first_touch(origin, dx, dy, dz, pieces, labels, active):
-    """Distance along a ray to the person and the number of active pieces; (-1, n) when it misses."""
-    count, t, last = gather(origin[0], origin[1], origin[2], dx, dy, dz, pieces, 12.0, active)
+@njit(cache=True, error_model="numpy", fastmath=True)
+def tile_beam(rays, top, bottom, left, right):
+    """The middle direction of a tile's rays and how far, per mm of distance, any of them strays from it."""
+    ray = rays[(top + bottom) // 2, (left + right) // 2]
+    dx, dy, dz = np.float64(ray[0]), np.float64(ray[1]), np.float64(ray[2])
+    spread = 0.0
+    for row in (top, bottom - 1):
+        for column in (left, right - 1):
+            other = rays[row, column]
+            spread = max(spread, (other[0] - dx) ** 2 + (other[1] - dy) ** 2 + (other[2] - dz) ** 2)
+    return dx, dy, dz, 1.05 * math.sqrt(spread)
+
+
+@njit(cache=True, error_model="numpy", fastmath=True)
+def beam_start(origin, dx, dy, dz, spread, pieces, labels, active):
+    """How far all rays of a beam run free of the person, and the number of pieces that any of them may touch (in
+    `active`); (-1, n) when none touches the person.
+    """
+    count, t, last = gather_beam(origin, dx, dy, dz, spread, pieces, NEAR, active)
     if count == 0:
         return -1.0, count
-    distance = 0.0
+    for _ in range(STEPS):
+        if t > last:
+            return -1.0, count
+        distance = body_distance(
+            origin[0] + t * dx, origin[1] + t * dy, origin[2] + t * dz, pieces, labels, active, count
+        )
+        free = distance - spread * t
+        if free < 4.0 * TOUCH:
+            break
+        t += SAFETY * free
+    return t, count
+
+
+@njit(cache=True, error_model="numpy", fastmath=True)
+def first_touch(origin, dx, dy, dz, start, pieces, labels, nearby, near_count, active):
+    """Distance along a ray to the person and the number of active pieces; (-1, n) when it misses.
+
+    start : distance that is known to be free. nearby : the `near_count` pieces that may be touched.
+    """
+    count, t, last = gather_among(origin, dx, dy, dz, pieces, nearby, near_count, NEAR, active)
+    if count == 0:
+        return -1.0, count
+    distance, t = 0.0, max(t, start)
     for _ in range(STEPS):
         if t > last:
             return -1.0, count
@@ -105,51 +146,100 @@ def first_touch(origin, dx, dy, dz, pieces, labels, active):
     return (t, count) if distance < 6.0 * TOUCH else (-1.0, count)
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, error_model="numpy", fastmath=True)
+def trace_pixel(
+    origin,
+    rays,
+    samples,
+    row,
+    column,
+    room_depth,
+    start,
+    nearby,
+    near_count,
+    scratch,
+    pieces,
+    labels,
+    lights,
+    wardrobe,
+    light,
+):
+    """Share of a pixel that the person covers; adds the light of its samples to light[row, column].
+
+    start, nearby, near_count : as `first_touch` takes them. scratch : two rows of room for pieces' indices.
+    """
+    hits, shaded_at, each, colour = 0, -FAR, 1.0 / (samples * samples), np.zeros(3)
+    for sample in range(samples * samples):
+        ray = rays[row * samples + sample // samples, column * samples + sample % samples]
+        dx, dy, dz = np.float64(ray[0]), np.float64(ray[1]), np.float64(ray[2])
+        t, count = first_touch(origin, dx, dy, dz, start, pieces, labels, nearby, near_count, scratch[0])
+        if t < 0.0 or t > room_depth[row, column]:
+            continue
+        hits += 1
+        if abs(t - shaded_at) > SAME_SURFACE:
+            shaded_at = t
+            px, py, pz = origin[0] + t * dx, origin[1] + t * dy, origin[2] + t * dz
+            shaded(
+                px,
+                py,
+                pz,
+                dx,
+                dy,
+                dz,
+                pieces,
+                labels,
+                scratch[0],
+                count,
+                scratch[1],
+                lights,
+                wardrobe,
+                colour,
+            )
+        for channel in range(3):
+            light[row, column, channel] += colour[channel] * each
+    return hits * each
+
+
+@njit(cache=True, error_model="numpy", fastmath=True, parallel=True)
 def trace_person(origin, rays, samples, room_depth, pieces, labels, lights, wardrobe, light, coverage):
-    """The person as seen through a window of the picture.
+    """The person as seen through a window of the picture, tile by tile.
 
     origin : (3,) camera centre. rays : (h * samples, w * samples, 3) unit directions. room_depth : (h, w)
     distance to what stands in the room, mm. Fills light (h, w, 3), premultiplied by coverage (h, w), both
     0...1.
     """
     height, width = coverage.shape
-    for row in prange(height):
-        active, shadow_active, colour = no_pieces(pieces), no_pieces(pieces), np.zeros(3)
-        for column in range(width):
-            hits, shaded_at = 0, -FAR
-            for sample in range(samples * samples):
-                ray = rays[row * samples + sample // samples, column * samples + sample % samples]
-                dx, dy, dz = np.float64(ray[0]), np.float64(ray[1]), np.float64(ray[2])
-                t, count = first_touch(origin, dx, dy, dz, pieces, labels, active)
-                if t < 0.0 or t > room_depth[row, column]:
-                    continue
-                hits += 1
-                if abs(t - shaded_at) > SAME_SURFACE:
-                    shaded_at = t
-                    px, py, pz = origin[0] + t * dx, origin[1] + t * dy, origin[2] + t * dz
-                    shaded(
-                        px,
-                        py,
-                        pz,
-                        dx,
-                        dy,
-                        dz,
-                        pieces,
-                        labels,
-                        active,
-                        count,
-                        shadow_active,
-                        lights,
-                        wardrobe,
-                        colour,
-                    )
-                for channel in range(3):
-                    light[row, column, channel] += colour[channel] / (samples * samples)
-            coverage[row, column] = hits / (samples * samples)
+    down, across = (height + TILE - 1) // TILE, (width + TILE - 1) // TILE
+    for tile in prange(down * across):
+        top, left = TILE * (tile // across), TILE * (tile % across)
+        bottom, right = min(top + TILE, height), min(left + TILE, width)
+        nearby, scratch = no_pieces(pieces), np.zeros((2, len(pieces)), np.int64)
+        dx, dy, dz, spread = tile_beam(rays, top * samples, bottom * samples, left * samples, right * samples)
+        start, near_count = beam_start(origin, dx, dy, dz, spread, pieces, labels, nearby)
+        if start < 0.0:
+            continue
+        for row in range(top, bottom):
+            for column in range(left, right):
+                coverage[row, column] = trace_pixel(
+                    origin,
+                    rays,
+                    samples,
+                    row,
+                    column,
+                    room_depth,
+                    start,
+                    nearby,
+                    near_count,
+                    scratch,
+                    pieces,
+                    labels,
+                    lights,
+                    wardrobe,
+                    light,
+                )
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, error_model="numpy", fastmath=True, parallel=True)
 def floor_shadow(left, near, cell, pieces, labels, lights, key, ambient):
     """What the person leaves of the lamp and of the room's light on the floor.
 
