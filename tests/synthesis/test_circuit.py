@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from studio.errors import StudioError
-from studio.synthesis.circuit import circuit, walked
 from studio.synthesis.circuit import Halt as CircuitHalt
+from studio.synthesis.circuit import circuit, walked
 from studio.synthesis.person import (
     PersonMotion,
     Skeleton,
@@ -121,7 +121,7 @@ def test_knees_bend_forward_and_legs_reach_their_feet(bones: Skeleton, made: Per
     for index, side in enumerate(("left", "right")):
         relative = np.swapaxes(made.turns[f"{side}_thigh"], 1, 2) @ made.turns[f"{side}_shin"]
         flexion = np.arctan2(relative[:, 0, 2], relative[:, 2, 2])
-        assert 0.05 < flexion.min()
+        assert flexion.min() > 0.05
         assert flexion.max() < 1.7
         points = joint_points(made)
         reach = np.linalg.norm(points[f"{side}_foot"] - points[f"{side}_thigh"], axis=1)
@@ -132,7 +132,9 @@ def test_arms_stay_out_of_the_trunk(made: PersonMotion) -> None:
     points = joint_points(made)
     for side in ("left", "right"):
         for joint in ("forearm", "hand"):
-            local = np.swapaxes(made.turns["thorax"], 1, 2) @ (points[f"{side}_{joint}"] - made.root)[..., None]
+            local = (
+                np.swapaxes(made.turns["thorax"], 1, 2) @ (points[f"{side}_{joint}"] - made.root)[..., None]
+            )
             # An ellipse as wide as the trunk and half as much again as an arm's radius.
             away = np.hypot(local[:, 0, 0] / 150.0, local[:, 1, 0] / 175.0)
             assert away.min() > 1.0, (side, joint)

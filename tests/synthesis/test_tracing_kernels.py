@@ -5,6 +5,9 @@ import pytest
 
 from studio.synthesis import flesh
 from studio.synthesis.cameras import pixel_rays, placed_camera
+from studio.synthesis.distance_kernels import body_distance
+from studio.synthesis.motions import make_motion
+from studio.synthesis.person import skeleton_of_height
 from studio.synthesis.room import LIGHTS
 from studio.synthesis.tracing_kernels import floor_shadow, trace_person
 from studio.synthesis.wardrobes import STRIPED
@@ -79,3 +82,39 @@ def test_what_stands_on_the_floor_darkens_it_around() -> None:
     floor_shadow(-600.0, -600.0, 20.0, ball((0.0, 0.0, 100.0), 100.0), LABELS, LIGHTS, key, ambient)
     assert ambient[30, 30] < 0.8
     assert ambient[0, 0] == 1.0
+
+
+def test_tiles_leave_out_nothing_of_a_person() -> None:
+    """Against the distance to the whole body along each ray, tried out closely and with no piece passed over."""
+    bones = skeleton_of_height(1760.0, np.random.default_rng(4))
+    tables, labels = flesh.piece_tables(make_motion("walk", bones, 12, 60.0, {}), flesh.clothed_pieces(bones))
+    body, camera = tables[11], CAMERA
+    seen_from = camera.centre + body[:, flesh.BOUND : flesh.BOUND + 3].mean(axis=0) - [0.0, 0.0, 900.0]
+    rays = pixel_rays(camera, 1)
+    light, coverage = np.zeros((72, 96, 3), np.float32), np.zeros((72, 96), np.float32)
+    far = np.full((72, 96), 1e6, np.float32)
+    trace_person(seen_from, rays, 1, far, body, labels, LIGHTS, STRIPED, light, coverage)
+    nearest = _nearest_approach(seen_from, rays, body, labels)
+    assert 150 < np.count_nonzero(coverage) < 2000
+    assert np.all(coverage[nearest < -1.0] == 1.0)
+    assert np.all(coverage[nearest > 8.0] == 0.0)
+    assert np.count_nonzero((nearest >= -1.0) & (nearest <= 8.0)) < 0.4 * np.count_nonzero(coverage)
+
+
+def _nearest_approach(
+    origin: np.ndarray, rays: np.ndarray, body: np.ndarray, labels: np.ndarray
+) -> np.ndarray:
+    """(h, w) mm: the smallest distance to the body among points every 10 mm along each ray."""
+    everything, nearest = np.arange(len(body)), np.full(rays.shape[:2], np.inf)
+    depths = np.arange(1800.0, 4200.0, 10.0)
+    for row, column in np.ndindex(nearest.shape):
+        away = np.linalg.norm(
+            np.cross(body[:, flesh.BOUND : flesh.BOUND + 3] - origin, rays[row, column].astype(float)), axis=1
+        )
+        if np.all(away > body[:, flesh.BOUND_RADIUS] + 30.0):
+            continue
+        points = origin + depths[:, None] * rays[row, column].astype(float)
+        nearest[row, column] = min(
+            body_distance(x, y, z, body, labels, everything, len(body)) for x, y, z in points
+        )
+    return nearest
