@@ -1,5 +1,6 @@
 """What a page must never do: write errors to the console, have a request fail, contact another host."""
 
+from http import HTTPStatus
 from urllib.parse import urlsplit
 
 from playwright.sync_api import ConsoleMessage, Page, Request, Response
@@ -14,12 +15,20 @@ class PageWatch:
         self.faults: list[str] = []
         self.requests: list[str] = []
         self.allowed: list[str] = []
-        self._host = urlsplit(origin).netloc
+        self._origin, self._host = origin, urlsplit(origin).netloc
         page.on("console", self._console)
         page.on("pageerror", lambda fault: self.faults.append(f"page error: {fault}"))
         page.on("request", self._request)
         page.on("requestfailed", self._failed)
         page.on("response", self._response)
+
+    def allow(self, status: int, path: str) -> None:
+        """Expect answers of that status at an address, and what the browser writes about them; no others."""
+        phrase = HTTPStatus(status).phrase
+        self.allowed += [
+            f"status {status}: {self._origin}{path}",
+            f"{status} ({phrase}) {self._origin}{path}",
+        ]
 
     def check(self) -> None:
         """Nothing happened that should not."""

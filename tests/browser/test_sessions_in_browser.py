@@ -38,7 +38,7 @@ def window(browser: Browser, studio: StudioServer) -> Iterator[StudioPage]:
     """One window for all tests of this file."""
     opened = StudioPage(browser, studio)
     # Sessions are renamed and thrown away here: the scene may be asked for one just when its folder moves.
-    opened.watch.allowed.append("/api/scene/show")
+    opened.watch.allow(404, "/api/scene/show")
     yield opened
     opened.close()
 
@@ -89,7 +89,7 @@ def test_an_empty_workspace_offers_the_sample(window: StudioPage, artefacts: Pat
 
 
 def test_a_wrong_folder_is_told_in_the_form(window: StudioPage, footage: Path, artefacts: Path) -> None:
-    window.watch.allowed.append("404")
+    window.watch.allow(404, "/api/imports")
     window.page.get_by_role("button", name="+ Import").click()
     form = fill(window, "Import", source=str(footage / "nowhere"), name="gone")
     form.locator(".wrong", has_text=f"There is no folder '{footage / 'nowhere'}'.").wait_for()

@@ -29,7 +29,7 @@ export async function refreshSessions() {
 /** Open a session and one of its runs (the newest unless told). */
 export function openSession(session, run) {
   const entry = get("sessions")?.find((one) => one.name === session);
-  const chosen = run ?? entry?.runs?.[0]?.name ?? null;
+  const chosen = run || entry?.runs?.[0]?.name || null;
   if (session === get("session") && chosen === get("run")) return;
   set({ session, run: chosen, summary: null, detail: null, parameters: null, layerCount: null, settings: null, whatIf: null, frame: null, layer: null, follow: true });
   document.body.classList.remove("rail-open");
