@@ -144,6 +144,7 @@ def test_impossible_poses_do_not_survive() -> None:
     settings = AnnealedSettings(layers=6, particles=400)
     particles = FILTER.begin_frame(generator(0, 0, -1), Carried(carried_set()), SPACE, settings)
     problem = HalfBowl(np.ones(6))
+    poses = particles.poses
     for layer in range(6):
         poses = particles.poses
         particles, record = FILTER.step_layer(
