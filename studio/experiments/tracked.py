@@ -36,7 +36,7 @@ class Attempt:
     footage : a recipe's name, or the path of a session. changes : knobs by flat name. first, last : frames, half
     open; last None means all. every : only each so many frames are seen (fps is divided, σ0 multiplied). cameras :
     names, empty for all. body : a body's name or file, "" for the session's own. subject : a subject file beside the
-    session's own, such as "subject_full.toml" of the Lee-walk twin (with hands and feet), "" for its own. sigma_scale :
+    session's own, such as "subject_shape.toml" of the Lee-walk twin (no hands and feet), "" for its own. sigma_scale :
     multiplies σ0.
     """
 

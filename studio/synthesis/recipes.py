@@ -38,7 +38,7 @@ Progress = Callable[[str, int, int], None]
 
 ARM = "arm"
 RECIPE_COPY = "recipe.toml"
-SUBJECT_FULL, SIGMA_NAME = "subject_full.toml", "sigma.csv"
+SUBJECT_OF_SHAPE, SIGMA_NAME = "subject_shape.toml", "sigma.csv"
 
 
 def synthesize(
@@ -60,8 +60,8 @@ def synthesize(
         source.mkdir()
         render_source(wanted, path.parent, source, progress, frames)
         import_source(source, into, fps=wanted.fps, progress=progress)
-        if (source / SUBJECT_FULL).exists():
-            (into / SUBJECT_FULL).write_bytes((source / SUBJECT_FULL).read_bytes())
+        if (source / SUBJECT_OF_SHAPE).exists():
+            (into / SUBJECT_OF_SHAPE).write_bytes((source / SUBJECT_OF_SHAPE).read_bytes())
     manifest = read_manifest(into)
     changed = msgspec.structs.replace(
         manifest, title=wanted.title, weighting=wanted.weighting, imported_from=f"recipe {path.name}"
@@ -93,9 +93,11 @@ def render_source(
         skeleton, shape = recipe_person(recipe, recipe_folder, rng)
         cameras = _cameras(recipe, recipe_folder, rng)
         motion = first_frames(recipe_motion(recipe, recipe_folder, skeleton), frames)
-        truth, subject = marker_motion(motion), shape or person_subject(recipe, motion)
-        if shape is not None and recipe.include.subject:
-            write_subject(with_hands_and_feet(shape, skeleton), source / SUBJECT_FULL)
+        truth, subject = marker_motion(motion), person_subject(recipe, motion)
+        if shape is not None:
+            subject = with_hands_and_feet(shape, skeleton)
+            if recipe.include.subject:
+                write_subject(shape, source / SUBJECT_OF_SHAPE)
         if recipe.sigma:
             _write_sigma(recipe, located(recipe.sigma, recipe_folder), source / SIGMA_NAME)
         render_person(recipe, motion, cameras, source, progress)

@@ -114,15 +114,15 @@ def test_a_recipe_may_name_shape_and_sigma(tmp_path: Path, shape_file: Path) -> 
     session = Session(synthesize(recipe, tmp_path / "made"))
     assert session.manifest.warnings == ()
     body = session.body()
-    assert body.dimensions == sized(shape_file).dimensions
+    of_shape = session.body(subject=read_subject(session.path / "subject_shape.toml"))
+    assert of_shape.dimensions == sized(shape_file).dimensions
     found = session.sigma(60.0)
     assert found is not None
     np.testing.assert_allclose(found, sigma)
     at_20 = session.sigma()
     assert at_20 is not None
     np.testing.assert_allclose(at_20, 3.0 * sigma)
-    full = read_subject(session.path / "subject_full.toml")
-    assert len(session.body(subject=full).drawn) == len(body.drawn) + 4
+    assert len(body.drawn) == len(of_shape.drawn) + 4
     assert session.truth_path is not None
     pose, truth = session.start_pose(), read_trc(session.truth_path)
     assert pose is not None
