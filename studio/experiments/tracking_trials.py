@@ -152,8 +152,6 @@ def sign_words(first: str, ours: Sequence[Tracked], second: str, theirs: Sequenc
     better, worse, _, p_seeds = seeds
     return (
         f"{first} is nearer than {second} in {better} of {better + worse} seeds (sign test p = "
-        f"{p_seeds:.2g}) and in "
-        f"{100.0 * frames[0] / max(1, frames[0] + frames[1]):.0f} % of all frames (p = {frames[3]:.1g}; "
-        "frames of one "
-        f"run follow from each other, so that p flatters)."
+        f"{p_seeds:.2g}) and in {100.0 * frames[0] / max(1, frames[0] + frames[1]):.0f} % of all frames (p "
+        f"= {frames[3]:.1g}; frames of one run follow from each other, so that p flatters)."
     )

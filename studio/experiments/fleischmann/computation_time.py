@@ -146,13 +146,10 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
     milliseconds = float(times.sum(axis=1).mean())
     words = (
         f"A frame of 1000 evaluations takes {milliseconds:.0f} ms here, "
-        f"{1000.0 * PAPER_SECONDS / milliseconds:.0f} times "
-        "less than the paper's 20 s (Matlab, 2012). Rendering and fitness together take "
-        f"{weighing.mean():.0f} % of it, "
-        f"where the paper has 89 %: with fast kernels the pictures' preparation ({shares[:, 0].mean():.0f} "
-        "%) and the "
-        f"swarm's own bookkeeping over 60 iterations ({shares[:, 4].mean():.0f} %) count. Times of one "
-        "machine; shares "
+        f"{1000.0 * PAPER_SECONDS / milliseconds:.0f} times less than the paper's 20 s (Matlab, 2012). "
+        f"Rendering and fitness together take {weighing.mean():.0f} % of it, where the paper has 89 %: "
+        f"with fast kernels the pictures' preparation ({shares[:, 0].mean():.0f} %) and the swarm's own "
+        f"bookkeeping over 60 iterations ({shares[:, 4].mean():.0f} %) count. Times of one machine; shares "
         "are of one run."
     )
     rows = tuple(

@@ -107,8 +107,7 @@ EXPERIMENT = Experiment(
     title="With and without hard priors",
     source=f"{SOURCE}, section 2.3 (after Balan et al. 2005)",
     claim="Joint limits and the ban on limbs inside each other improve tracking significantly, because "
-    "they reduce the "
-    "search space.",
+    "they reduce the search space.",
     trials=trials,
     measure=measure_tracking,
     conclude=conclude,

@@ -60,8 +60,7 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
         numbers += [_standing_number(fps, values, groups[group(fps)]) for fps, values in still.items()]
     words = (
         f"Mean error {numbers[0].ours:.1f} mm at 60 and {numbers[1].ours:.1f} mm at 20 frames a second; "
-        "the worst frames "
-        f"are {np.mean([run.worst_mm for run in fast]):.0f} and "
+        f"the worst frames are {np.mean([run.worst_mm for run in fast]):.0f} and "
         f"{np.mean([run.worst_mm for run in slow]):.0f} mm. "
     )
     if stood:
@@ -100,8 +99,8 @@ EXPERIMENT = Experiment(
     title="Error of single runs at 60 and 20 frames a second",
     source=f"{SOURCE}, Fig. 3",
     claim="The mean error is a little smaller at 60 frames a second and tracking more stable; at 20 the "
-    "largest errors are much "
-    "higher. Tracking is always very good while the person stands still (frames 330 to 430).",
+    "largest errors are much higher. Tracking is always very good while the person stands still (frames "
+    "330 to 430).",
     trials=trials,
     measure=measure_tracking,
     conclude=conclude,

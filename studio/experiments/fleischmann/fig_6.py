@@ -98,8 +98,7 @@ EXPERIMENT = Experiment(
     title="Swarm against annealed particle filter",
     source=f"{SOURCE}, Fig. 6",
     claim="With the same body, fitness, Σ and 1000 evaluations the swarm is significantly better at 20 "
-    "frames a second and "
-    "equally good at 60.",
+    "frames a second and equally good at 60.",
     trials=trials,
     measure=measure_tracking,
     conclude=conclude,

@@ -90,8 +90,7 @@ def _words(fps: int, found: list[Spell], runs: int) -> str:
     longest = max(spell.milliseconds for spell in found)
     return (
         f"At {fps} frames a second {len(found) / runs:.1f} spells a run, {back} of {len(found)} end with "
-        "the limb found "
-        f"again; half of them last up to {middle:.0f} ms, the longest {longest:.0f} ms."
+        f"the limb found again; half of them last up to {middle:.0f} ms, the longest {longest:.0f} ms."
     )
 
 
@@ -129,8 +128,7 @@ EXPERIMENT = Experiment(
     title="Limbs lost and found again",
     source=f"{SOURCE}, Figs. 4 and 5",
     claim="At 20 frames a second legs and arms are lost for a while and found again after some frames; at "
-    "60 tracking is "
-    "accurate enough.",
+    "60 tracking is accurate enough.",
     trials=trials,
     measure=measure_tracking,
     conclude=conclude,

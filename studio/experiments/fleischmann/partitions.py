@@ -126,8 +126,7 @@ EXPERIMENT = Experiment(
     title="Soft, hard, global–local and global partitions",
     source=f"{SOURCE}, section 2.4 and Fig. 2",
     claim="Soft partitioning performs much better than global search or hard partitioning; three soft "
-    "stages bring no "
-    "significant gain over two.",
+    "stages bring no significant gain over two.",
     trials=trials,
     measure=measure_tracking,
     conclude=conclude,

@@ -3,6 +3,9 @@
 The footage is the Lee-walk twin: the real dataset is not complete here, so a walk is rendered for its cameras with
 a person of its subject's dimensions who is not the tracker's model. Frames 330 to 430 stand still, as in the paper.
 At 20 frames a second the twin is rendered anew; σ0 is three times as large (after Eq. 1).
+
+The tracker's body has the subject's dimensions and, unlike the paper's ten cones, hands and feet, for without them
+forearms and shins slide over hands and feet (Table 2 shows what that costs).
 """
 
 from studio.experiments.tracking_trials import Contender
@@ -11,6 +14,8 @@ SOURCE = "Fleischmann, Austvoll & Kwolek 2012"
 TWIN, TWIN_20 = "lee-walk-twin", "lee-walk-twin-20hz"
 FRAMES = 450
 QUICK_FRAMES = 90
+TEN_CONES = "subject_shape.toml"
+"""The subject without hands and feet, beside the twin's own."""
 STANDING = (330.0, 430.0, "standing still")
 EVALUATIONS = 1000
 FITNESS = "edge-silhouette"

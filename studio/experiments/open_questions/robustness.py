@@ -170,9 +170,9 @@ def conclude_of(question: Question, outcomes: Sequence[Outcome]) -> Findings:
     best = min(rows, key=lambda name: errors[name][-1])
     words = (
         " ".join(f"{name} stands {_standing(question, errors[name], losses[name])}." for name in rows)
-        + f" At the last degree ({columns[-1]} {question.axis}) {best} is the nearest: {errors[best][-1]:.0f} mm."
-        f" To stand: a mean below {STANDS_MM:.0f} mm and a limb lost in fewer than {100 * STANDS_LOST:.0f} % of the"
-        " frames."
+        + f" At the last degree ({columns[-1]} {question.axis}) {best} is the nearest: "
+        f"{errors[best][-1]:.0f} mm. To stand: a mean below {STANDS_MM:.0f} mm and a limb lost in fewer "
+        f"than {100 * STANDS_LOST:.0f} % of the frames."
     )
     table = Table(
         "Mean error over seeds (mm), frames with a limb lost (%)",
