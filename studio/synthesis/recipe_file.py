@@ -78,8 +78,9 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     height_mm : of a person with published proportions. shape : instead, a file of `body`'s dimensions, whose lengths
     the person's bones have; the session's subject has these dimensions, radii included, and those of the rendered
-    hands and shoes; `subject_shape.toml` beside it has the file's dimensions alone. girth : how much stouter than usual the flesh is.
-    wardrobe : "striped" or "plain" clothes, which hardly stand out in the "office"; room : that or "furnished".
+    hands and shoes; `subject_shape.toml` beside it has the file's dimensions alone. girth : how much stouter than
+    usual the flesh is. wardrobe : "striped" or "plain" clothes, which hardly stand out in the "office". room : that or
+    "furnished".
     sigma : a file whose first numbers are the session's σ0, one for each parameter of `body`, from frame to frame at
     60 Hz. Files count from the recipe's folder, or lie in the real data after "data:" (`real_data.py`).
     """
