@@ -77,7 +77,16 @@ def _run(
     total = len(work.trials)
     report("", len(found), total)
     jobs = [
-        TrialJob(key, "comparison", trial.label, plain(trial.arguments), measure, (work.plan.footage,), False)
+        TrialJob(
+            key=key,
+            experiment="comparison",
+            label=trial.label,
+            arguments=plain(trial.arguments),
+            measure=measure,
+            footage=(work.plan.footage,),
+            frames=None,
+            alone=False,
+        )
         for key, trial in work.trials.items()
         if key not in found
     ]
