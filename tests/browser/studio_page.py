@@ -14,9 +14,11 @@ READ = "async (name) => (await import('/assets/js/state.js')).get(name)"
 
 
 class StudioPage:
-    """A browser window on a studio."""
+    """A browser window on a studio. with_scene : False leaves the 3-D scene blank (it takes long to draw)."""
 
-    def __init__(self, browser: Browser, studio: StudioServer, *, open_at: str = "") -> None:
+    def __init__(
+        self, browser: Browser, studio: StudioServer, *, open_at: str = "", with_scene: bool = True
+    ) -> None:
         self.studio = studio
         self.context: BrowserContext = browser.new_context(
             viewport={"width": 1280, "height": 800}, color_scheme="dark", accept_downloads=True
@@ -25,6 +27,8 @@ class StudioPage:
         self.page: Page = self.context.new_page()
         self.watch = PageWatch(self.page, studio.origin)
         self.wire = SceneWire(self.page)
+        if not with_scene:
+            self.page.route("**/scene/**", lambda route: route.fulfill(body="", content_type="text/html"))
         self.page.goto(open_at or studio.address)
 
     @property

@@ -1,0 +1,222 @@
+"""Comparisons and reports in the page: asked for, watched, cancelled, gone on with, read, downloaded, thrown away."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Locator
+from scene_wire import until
+from studio_page import StudioPage
+from studio_server import StudioServer
+
+from studio.experiments.charts import Chart, Series
+from studio.experiments.experiment import Experiment, Findings, Number, Scale, Table
+from studio.experiments.findings_document import Making, as_document
+
+pytestmark = pytest.mark.browser
+
+DRAWN = """theme => [...document.querySelectorAll('.findings-canvas')].every((canvas) =>
+  !canvas.dataset.drawn || canvas.dataset.drawn === theme)"""
+FIRST = "/api/comparisons/walk/small"
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
+    """`studio serve` with the sample, which has a truth."""
+    made = StudioServer("serve", tmp_path_factory.mktemp("serve") / "workspace")
+    made.post("/api/samples", {"name": "walk"})
+    yield made
+    made.stop()
+
+
+@pytest.fixture(scope="module")
+def window(browser: Browser, studio: StudioServer) -> Iterator[StudioPage]:
+    """One window for all tests of this file."""
+    opened = StudioPage(browser, studio, with_scene=False)
+    yield opened
+    opened.close()
+
+
+def fill(window: StudioPage, **values: str) -> Locator:
+    """Fill the form of a new comparison."""
+    form = window.page.locator(".compare-form")
+    for name, value in values.items():
+        form.locator(f"[name={name}]").fill(value)
+    return form
+
+
+def shoot(window: StudioPage, artefacts: Path, name: str) -> None:
+    """Pictures in both themes."""
+    page = window.page
+    for theme in ("dark", "light"):
+        if page.evaluate("document.documentElement.dataset.theme") != theme:
+            page.click("#theme")
+        page.wait_for_function(DRAWN, arg=theme)
+        window.shoot(artefacts / f"page-{name}-{theme}-1280x800.png")
+        assert page.evaluate("document.documentElement.scrollWidth") == 1280
+        assert page.evaluate("document.documentElement.scrollHeight") == 800
+    page.click("#theme")
+
+
+def test_the_studio_leads_to_comparing(window: StudioPage, artefacts: Path) -> None:
+    page = window.page
+    window.until("get('session') === 'walk'")
+    page.locator(".session > .head").hover()
+    window.choose(page.locator(".session > .head .more"), "Compare trackers…")
+    page.get_by_role("heading", name="Compare trackers").wait_for()
+    form = page.locator(".compare-form")
+    assert form.locator("[name=session]").input_value() == "walk"
+    assert form.locator("[name=last]").input_value() == "149"
+    names = [row.locator("select").first.input_value() for row in form.locator(".entrant").all()]
+    assert names == ["annealed", "swarm", "condensation"]
+    shoot(window, artefacts, "compare-form")
+
+
+def test_what_cannot_be_compared_is_told_in_the_form(window: StudioPage) -> None:
+    window.watch.allow(422, "/api/comparisons")
+    form = fill(window, evaluations="30")
+    form.get_by_role("button", name="Compare").click()
+    form.locator(".wrong", has_text="too few").wait_for()
+    form.locator("[aria-label=Knobs]").first.fill("survival")
+    form.get_by_role("button", name="Compare").click()
+    form.locator(".wrong", has_text="“survival” changes nothing").wait_for()
+    form.locator("[aria-label=Knobs]").first.fill("survival=7")
+    fill(window, evaluations="200")
+    form.get_by_role("button", name="Compare").click()
+    form.locator(".wrong", has_text="'survival' cannot be '7'").wait_for()
+
+
+def test_it_is_watched_cancelled_and_goes_on(window: StudioPage, artefacts: Path) -> None:
+    page = window.page
+    form = fill(window, evaluations="200", seeds="300", last="9", name="long")
+    form.locator("[aria-label=Knobs]").first.fill("")
+    form.get_by_text("900 trials of 10 frames").wait_for()
+    form.get_by_role("button", name="Compare").click()
+    page.get_by_role("heading", name="annealed, swarm, condensation on walk").wait_for()
+    page.locator(".progress-words", has_text="left · last:").wait_for()
+    shoot(window, artefacts, "comparison-running")
+    page.get_by_role("button", name="Cancel").click()
+    page.locator(".card-box .badge", has_text="cancelled").wait_for()
+    told = window.studio.get("/api/comparisons/walk/long")["comparison"]
+    assert told["status"] == "cancelled"
+    assert 0 < told["done"] < told["total"] == 900
+    page.get_by_role("button", name="Go on").click()
+    page.locator(".card-box .badge", has_text="running").wait_for()
+    page.get_by_role("button", name="Cancel").click()
+    page.locator(".card-box .badge", has_text="cancelled").wait_for()
+    assert window.studio.get("/api/comparisons/walk/long")["comparison"]["done"] >= told["done"]
+
+
+def test_a_small_one_is_shown_when_it_is_done(window: StudioPage) -> None:
+    page = window.page
+    page.get_by_role("button", name="+ New").click()
+    form = fill(window, evaluations="200", seeds="2", last="9", name="small")
+    form.locator("[aria-label=Knobs]").first.fill("survival=0.4, crossover=0.2")
+    form.locator("[aria-label=Label]").first.fill("mine")
+    form.get_by_text("6 trials of 10 frames").wait_for()
+    form.get_by_role("button", name="Compare").click()
+    page.get_by_role("heading", name="annealed:mine, swarm, condensation on walk").wait_for()
+    page.get_by_role("heading", name="Who is nearer").wait_for(timeout=120_000)
+    told = window.studio.get(FIRST)
+    assert told["comparison"]["status"] == "finished"
+    assert told["settings"]["annealed:mine"]["survival"] == 0.4
+
+
+def test_the_result_is_read_and_downloaded(window: StudioPage, artefacts: Path) -> None:
+    page, result = window.page, window.studio.get(FIRST)["result"]
+    rows = page.locator(".figures tbody tr")
+    assert rows.count() == 3
+    for at, tracker in enumerate(result["trackers"]):
+        text = rows.nth(at).inner_text()
+        assert tracker["tracker"] in text
+        assert f"{tracker['mean_mm']:.1f}" in text
+    # Six seeds drawn thin, three means thick.
+    curves = page.locator(".findings-chart").first
+    until(page, lambda: curves.locator(".findings-canvas").get_attribute("data-drawn"))
+    assert curves.locator(".findings-legend button").count() == 3
+    words = page.locator(".words").inner_text()
+    assert words.count(" is nearer than ") == 3
+    assert "it does not prove" in words
+    assert "cannot fall below 0.5" in words
+    shoot(window, artefacts, "comparison")
+    page.locator("#content").evaluate("element => element.scrollTo(0, 1e6)")
+    page.wait_for_function("document.querySelectorAll('.findings-canvas[data-drawn]').length === 2")
+    shoot(window, artefacts, "comparison-below")
+    with page.expect_download() as coming:
+        page.get_by_role("link", name="JSON").click()
+    assert json.loads(Path(coming.value.path()).read_text())["trackers"] == result["trackers"]
+    with page.expect_download() as coming:
+        page.get_by_role("link", name="CSV").click()
+    assert len(Path(coming.value.path()).read_text().splitlines()) == 1 + 3 * 2 * 10
+
+
+def test_again_asks_for_the_same(window: StudioPage) -> None:
+    page = window.page
+    page.get_by_role("button", name="Again…").click()
+    form = page.locator(".compare-form")
+    form.wait_for()
+    assert form.locator("[name=evaluations]").input_value() == "200"
+    assert form.locator("[aria-label=Label]").first.input_value() == "mine"
+    assert "survival=0.4" in form.locator("[aria-label=Knobs]").first.input_value()
+    assert "particles" not in form.locator("[aria-label=Knobs]").first.input_value()
+    form.locator("[aria-label=Line-up]").select_option("improvements")
+    assert form.locator(".entrant").count() == 3
+    form.get_by_text("the planned noise of Eq. 13").wait_for()
+
+
+def test_it_is_listed_with_its_session_thrown_away_and_restored(window: StudioPage) -> None:
+    page = window.page
+    page.get_by_role("link", name="Studio", exact=True).click()
+    window.until("get('session') === 'walk'")
+    page.get_by_role("link", name="2 comparisons").click()
+    page.get_by_role("heading", name="Who is nearer").wait_for()
+    page.get_by_role("button", name="Delete…").click()
+    page.locator("dialog form").get_by_role("button", name="Delete").click()
+    page.get_by_role("heading", name="annealed, swarm, condensation on walk").wait_for()
+    assert page.locator(".entry").count() == 1
+    page.get_by_role("link", name="Studio", exact=True).click()
+    line = page.locator("#trash-line")
+    window.choose(line.get_by_role("button", name="Restore…"), "walk / small (comparison)")
+    page.get_by_role("heading", name="Who is nearer").wait_for()
+
+
+def test_reports_are_empty_until_something_was_reproduced(
+    window: StudioPage, studio: StudioServer, artefacts: Path
+) -> None:
+    page = window.page
+    page.get_by_role("link", name="Reports").click()
+    page.get_by_role("heading", name="Nothing reproduced yet").wait_for()
+    page.get_by_text("studio reproduce all --quick").wait_for()
+    shoot(window, artefacts, "reports-empty")
+    folder = studio.workspace / "reproduction"
+    folder.mkdir()
+    results = {"software": "test", "date": "2026-11-21", "experiments": [found("one"), found("two")]}
+    (folder / "results.json").write_text(json.dumps(results))
+    page.reload()
+    page.get_by_role("heading", name="Summary").wait_for()
+    assert page.locator(".findings-experiment").count() == 2
+    page.locator(".findings-badge", has_text="reproduced").first.wait_for()
+    shoot(window, artefacts, "reports")
+    with page.expect_download() as coming:
+        page.get_by_role("link", name="JSON").click()
+    assert json.loads(Path(coming.value.path()).read_text()) == results
+
+
+def found(name: str) -> dict:
+    """An experiment's document."""
+    experiment = Experiment(
+        name, f"Experiment {name}", "Fleischmann et al. 2012, Table 2", "The mean error is 38.0 mm.",
+        trials=lambda _: (), measure=lambda _arguments, _shelf: {}, conclude=lambda _: Findings("answered", ""),
+    )  # fmt: skip
+    line = Series("ours", (0.0, 1.0, 2.0), (30.0, 36.0, 33.0), group="ours")
+    findings = Findings(
+        "reproduced",
+        "It is as the paper has it.",
+        (Number("mean error", 37.2, 35.9, 38.6, "mm", 38.0, "lower", 10, "reproduced"),),
+        (Table("All seeds", ("seed", "mean (mm)"), ((0, 36.9), (1, 37.5))),),
+        (Chart("Error", "lines", "frame", "error (mm)", (line,)),),
+    )
+    return as_document(
+        experiment, findings, Making(Scale(tuple(range(10))), 10, 12.0, "test", (), "2026-11-21")
+    )
