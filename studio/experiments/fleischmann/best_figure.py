@@ -30,7 +30,7 @@ from studio.experiments.tracking_trials import (
 )
 
 ALL_TERMS = "edge-region-silhouette"
-FINE = {"silhouette_resolution": "full"}
+FINE = {"silhouette_resolution": "full", "silhouette_weight": 3.0, "occlusion_aware": True}
 SWARM_3 = replace(SWARM, weighting=ALL_TERMS)
 FILTER_3 = replace(IMPROVED, weighting=ALL_TERMS)
 
@@ -53,7 +53,7 @@ LINES = (
     Line("improved filter, all three terms", FILTER_3, 1000),
     Line("improved filter, all three terms, 2000", FILTER_3, 2000),
     Line(
-        "the same, silhouettes at full resolution",
+        "the same, exact silhouettes weighted 3, visible edges",
         replace(FILTER_3, changes={**PRIORS, **FINE}),
         2000,
     ),
