@@ -4,8 +4,24 @@ import difflib
 from types import MappingProxyType, ModuleType
 
 from studio.errors import NotFoundError
+from studio.experiments.deutscher_reid import (
+    adaptive_diffusion,
+    crossover,
+    fig_7,
+    fig_8,
+    fig_16,
+    figs_12_to_14,
+    figs_17_and_18,
+    figs_19_and_20,
+    full_body_saving,
+    layers_and_particles,
+    processors,
+    three_cameras,
+)
+from studio.experiments.deutscher_reid import fig_3 as deutscher_fig_3
 from studio.experiments.experiment import Experiment
 from studio.experiments.fleischmann import (
+    best_figure,
     computation_time,
     constraints,
     fig_3,
@@ -18,12 +34,26 @@ from studio.experiments.open_questions import robustness
 
 # One line each: the module's EXPERIMENT, or its EXPERIMENTS. A new module is imported above and named here.
 MODULES: tuple[ModuleType, ...] = (
+    deutscher_fig_3,
+    fig_7,
+    fig_8,
+    three_cameras,
+    layers_and_particles,
+    figs_12_to_14,
+    adaptive_diffusion,
+    fig_16,
+    figs_17_and_18,
+    crossover,
+    figs_19_and_20,
+    full_body_saving,
+    processors,
     table_2,
     fig_3,
     figs_4_5,
     fig_6,
     partitions,
     constraints,
+    best_figure,
     computation_time,
     robustness,
 )

@@ -186,9 +186,12 @@ def _cameras(session: Session, names: tuple[str, ...]) -> tuple[Camera, ...]:
 
 
 def _start_pose(session: Session, body: BodyModel, first: int, fps: float) -> tuple[float, ...] | None:
-    """The session's start pose; for a later first frame the body laid on the true markers of that frame."""
-    own = session.start_pose(body)
-    pose = own if first == 0 else _pose_on_truth(session, body, first, fps, own)
+    """The session's start pose; for a later first frame, and for a body that the session's pose is not of, the body
+    laid on the true markers of that frame.
+    """
+    is_own = body.name == session.manifest.body
+    own = session.start_pose(body) if is_own else None
+    pose = own if first == 0 and is_own else _pose_on_truth(session, body, first, fps, own)
     return None if pose is None else tuple(float(value) for value in pose)
 
 
