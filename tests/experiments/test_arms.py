@@ -5,7 +5,14 @@ import pytest
 
 from studio.body.forward_kinematics import limb_ends
 from studio.body.tables import kinematic_tables
-from studio.experiments.deutscher_reid.arms import TRUE_PART, TemplateArm, localise, silhouette, template_arm, true_pose
+from studio.experiments.deutscher_reid.arms import (
+    TRUE_PART,
+    TemplateArm,
+    localise,
+    silhouette,
+    template_arm,
+    true_pose,
+)
 from studio.geometry.projection import project
 
 BODIES = ("planar_arm4", "branched_arms6")
