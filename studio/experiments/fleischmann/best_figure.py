@@ -83,8 +83,7 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
         f"The best mean is {best.ours:.1f} mm ({best.name.removeprefix('mean error, ')}), without a lost "
         f"limb in {unharmed} of {len(runs)} runs. In order: "
         + "; ".join(f"{line.words} {entry.ours:.1f} mm" for line, entry in zip(LINES, numbers, strict=True))
-        + ". The body counts most (hands and feet), then the third term of the weighting, then the "
-        "tracker; evaluations and resolution change little."
+        + "."
     )
     places = tuple(float(index) for index in range(len(LINES)))
     bars = Series(

@@ -20,7 +20,7 @@ from studio.experiments.tracked import Attempt, Tracked, track
 from studio.experiments.tracking_trials import Contender, group_of
 
 EIGHT = "eight-cameras"
-FRAMES, QUICK_FRAMES = 120, 30
+FRAMES, QUICK_FRAMES = 90, 30
 ALL_TERMS = "edge-region-silhouette"
 STANDS_MM, STANDS_LOST = 60.0, 0.05
 """A tracker stands a degree if the mean over seeds stays below this error, and this share of frames with "
