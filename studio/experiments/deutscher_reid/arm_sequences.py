@@ -18,6 +18,7 @@ from studio.experiments.deutscher_reid.arms import TemplateArm, template_arm
 from studio.experiments.deutscher_reid.fewest_particles import Fewest, fewest, sizes
 from studio.experiments.experiment import Outcome, Scale, Trial
 from studio.experiments.footage_shelf import FootageShelf
+from studio.experiments.tracking_trials import group_of
 from studio.runs.search_space import default_sigma, search_space
 from studio.runs.tracking_run import start_of
 from studio.synthesis.arm_footage import arm_motion
@@ -86,7 +87,6 @@ def trials(
         Trial(
             f"{group(name, body, rate)}, seed {seed}",
             {
-                "group": group(name, body, rate),
                 "body": body,
                 "rate": rate,
                 "knobs": {"layers": LAYERS, **knobs},
@@ -123,5 +123,5 @@ def found_by_group(outcomes: Sequence[Outcome]) -> dict[str, list[Fewest]]:
     """What was found, by group in the order of the trials, seeds in order."""
     found: dict[str, list[Fewest]] = {}
     for outcome in outcomes:
-        found.setdefault(outcome.trial.arguments["group"], []).append(Fewest(**outcome.measured))
+        found.setdefault(group_of(outcome.trial), []).append(Fewest(**outcome.measured))
     return found

@@ -13,12 +13,13 @@ from studio.experiments.deutscher_reid.setting import WEIGHTING, succeeded
 from studio.experiments.experiment import Outcome, Scale, Trial
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.tracked import Attempt, track
+from studio.experiments.tracking_trials import group_of
 
 WALK = "walk"
 FRAMES, FOOTAGE_FRAMES = 40, 150
 # From one seed's first frame to the next one's; no multiple of a stride, so that each begins with another posture.
 STRIDE = 37
-FEWEST, MOST = 16, 4096
+FEWEST, MOST, RUNS = 4, 4096, 3
 QUICK_MOST = 1024
 
 
@@ -34,14 +35,13 @@ def trials(scale: Scale, filters: Mapping[str, Mapping[str, Any]], footage: str 
         Trial(
             f"{name}, seed {seed}",
             {
-                "group": name,
                 "footage": footage,
                 "knobs": dict(knobs),
                 "seed": seed,
                 "first": first_frame(seed),
                 "frames": FRAMES,
                 "sizes": list(grid),
-                "runs": 1,
+                "runs": 1 if scale.quick else RUNS,
             },
         )
         for name, knobs in filters.items()
@@ -72,5 +72,5 @@ def found_by_group(outcomes: Sequence[Outcome]) -> dict[str, list[Fewest]]:
     """What was found, by filter in the order of the trials, seeds in order."""
     found: dict[str, list[Fewest]] = {}
     for outcome in outcomes:
-        found.setdefault(outcome.trial.arguments["group"], []).append(Fewest(**outcome.measured))
+        found.setdefault(group_of(outcome.trial), []).append(Fewest(**outcome.measured))
     return found

@@ -78,7 +78,7 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
     falls = (np.diff(spreads, axis=1) < 0).sum(axis=1)
     numbers = (
         number("first cloud covers the true place", [o.measured["covered"] for o in outcomes], "of 1", 1.0),
-        number("layers with a smaller spread than the one before", falls.tolist(), "", float(layers - 1)),
+        number("layers with a smaller spread than the one before", falls.tolist(), f"of {layers - 1}"),
         share_number("the last cloud is the smallest", (spreads.argmin(axis=1) == layers - 1).tolist()),
         number("spread of the first cloud", spreads[:, 0].tolist(), "mm"),
         number("spread of the last cloud", spreads[:, -1].tolist(), "mm"),

@@ -115,8 +115,8 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
     words = (
         f"Seeds that track (every frame below {LIMIT_MM:g} mm, no limb ever lost) and mean errors: {told}. "
         f"{seconds_told} (the paper: 1.2 s). The verdict is on who tracks and who does not. The "
-        "studio's choice (all three terms, Eq. 18, crossover by limbs, limbs kept apart) is not in the paper; it says what "
-        "the footage allows. Deviations: the paper names no frame rate (60 a second here), its Condensation has a "
+        "studio's choice (all three terms, Eq. 18, crossover by limbs, limbs kept apart) is not in the paper; it says "
+        "what the footage allows. Deviations: the paper names no frame rate (60 a second here), its Condensation has a "
         "likelihood of its own, and its judgement is by eye. "
         f"{EQ17_WORDS}"
     )

@@ -77,7 +77,7 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
         bars("Particles in each of ten layers needed over 40 frames", groups),
         successes("Runs that succeed, by particles", groups),
     )
-    table = per_seed("Fewest particles that succeed", groups)
+    table = per_seed("Fewest particles with which most runs succeed", groups)
     return Findings(together.verdict, words, numbers, (table,), charts, SETTINGS)
 
 
@@ -88,6 +88,7 @@ SETTINGS = {
     "survival": PLAIN["survival"],
     "crossover": IMPROVED["crossover"],
     "weighting": WEIGHTING,
+    "runs a size": body_sequences.RUNS,
     "sizes tried": f"{body_sequences.FEWEST} to {body_sequences.MOST}, two a doubling",
 }
 

@@ -97,7 +97,12 @@ def conclude_layers(outcomes: Sequence[Outcome]) -> Findings:
         **PLAIN,
     }
     return Findings(
-        verdict, words, numbers, (per_seed("Fewest particles that succeed", groups),), charts, settings
+        verdict,
+        words,
+        numbers,
+        (per_seed("Fewest particles with which most runs succeed", groups),),
+        charts,
+        settings,
     )
 
 

@@ -67,7 +67,7 @@ def trials(
     return tuple(
         Trial(
             f"{name}, {body}, seed {seed}",
-            {"group": name, "body": body, "seed": seed, "knobs": {**SETTINGS, **changes, **knobs}},
+            {"body": body, "seed": seed, "knobs": {**SETTINGS, **changes, **knobs}},
         )
         for name, knobs in kinds.items()
         for seed in scale.seeds
@@ -97,7 +97,7 @@ def reductions(outcomes: Sequence[Outcome]) -> dict[str, Reduction]:
     """By kind, in the order of the trials."""
     found: dict[str, list[Mapping[str, Any]]] = {}
     for outcome in outcomes:
-        found.setdefault(outcome.trial.arguments["group"], []).append(outcome.measured)
+        found.setdefault(outcome.trial.label.partition(", ")[0], []).append(outcome.measured)
     return {name: reduction(measured) for name, measured in found.items()}
 
 
