@@ -18,6 +18,7 @@ from studio.worker.events import SettingsApplied
 
 _FOREMOST = 6
 _NO_PRESET = "choose …"
+_AS_BEGUN = "_Settings as the run began._"
 
 Change = Callable[[dict[str, Value]], str]
 Refused = Callable[[StudioError], None]
@@ -55,6 +56,8 @@ class SettingsPanel:
             self._build(settings)
         for name, value in now.items():
             self.inputs[name].show(value)
+        if self._in_use is not None:
+            self._in_use.content = _AS_BEGUN
         self._dress_resets()
 
     def show_applied(self, event: SettingsApplied) -> None:
@@ -84,7 +87,7 @@ class SettingsPanel:
         now = values(settings)
         self._names, self._tracker = tuple(now), settings.tracker_name
         with self._tabs.search, self._folder():
-            self._in_use = self._gui.add_markdown("_Settings as the run began._")
+            self._in_use = self._gui.add_markdown(_AS_BEGUN)
             self._add_presets()
             tracker = knobs_of(type(settings.tracker))
             self._add(tracker[:_FOREMOST], now)

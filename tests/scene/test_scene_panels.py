@@ -152,6 +152,13 @@ def test_every_preset_is_allowed_and_offered_where_its_knobs_exist() -> None:
     assert offered(("particles",)) == ()
 
 
+def test_another_run_does_not_show_since_when_the_one_before_used_its_settings(panel: SettingsPanel) -> None:
+    panel.show_applied(SettingsApplied("s", "r", 3, 128, 2, {"survival": 0.7}))
+    panel.show_settings(default_settings())
+    assert "as the run began" in panel._in_use.content  # pyright: ignore[reportOptionalMemberAccess]
+    assert panel.inputs["survival"].accepted == default_settings().tracker.survival
+
+
 def test_another_tracker_gets_other_controls(panel: SettingsPanel) -> None:
     panel.show_settings(default_settings("condensation", "bodytrack"))
     assert "survival" not in panel.inputs
