@@ -1,0 +1,100 @@
+"""What the swarm and the improved filter reach on the Lee-walk twin and on the bundled walk (long runs).
+
+The twin is rendered once (minutes), or taken from the folder that STUDIO_FOOTAGE names, as `studio reproduce` leaves
+it in its `footage`.
+"""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from studio.experiments.fleischmann.best_figure import FILTER_3, SWARM_3
+from studio.experiments.fleischmann.setting import EQ13, EVALUATIONS, SWARM, TWIN, TWIN_20
+from studio.experiments.footage_shelf import FootageShelf
+from studio.experiments.statistics import sign_test
+from studio.experiments.tracked import Attempt, Tracked, track
+from studio.experiments.tracking_trials import Contender
+from studio.settings import usual_weighting
+from studio.synthesis.recipes import synthesize
+from studio.tracking.evaluations import knobs_for_evaluations
+
+pytestmark = [pytest.mark.slow, pytest.mark.real_data]
+
+SEEDS = range(5)
+SAMPLES = Path(__file__).parents[2] / "sample_sessions"
+
+
+@pytest.fixture(scope="module")
+def footage(tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Path:
+    """The folder of both twins."""
+    kept = os.environ.get("STUDIO_FOOTAGE", "")
+    folder = Path(kept) if kept else tmp_path_factory.mktemp("footage")
+    for name in (TWIN, TWIN_20):
+        if not (folder / name).is_dir():
+            synthesize(name, folder / name)
+    return folder
+
+
+def runs(footage: Path, contender: Contender, name: str = TWIN) -> list[Tracked]:
+    """A contender on the whole footage, every seed."""
+    shelf = FootageShelf(footage)
+    try:
+        return [track(contender.attempt(name, seed, EVALUATIONS), shelf) for seed in SEEDS]
+    finally:
+        shelf.close()
+
+
+def mean(found: list[Tracked]) -> float:
+    return float(np.mean([run.mean_mm for run in found]))
+
+
+@pytest.mark.usefixtures("real_data")
+def test_the_swarm_with_the_papers_fitness_reaches_the_papers_figure(footage: Path) -> None:
+    found = runs(footage, SWARM)
+    assert found[0].evaluations == 1000
+    assert len(found[0].frames) == 450
+    assert mean(found) <= 38.0
+
+
+@pytest.mark.usefixtures("real_data")
+def test_with_all_three_terms_swarm_and_filter_stay_below_30_mm(footage: Path) -> None:
+    swarm, annealed = runs(footage, SWARM_3), runs(footage, FILTER_3)
+    assert mean(swarm) <= 30.0
+    assert mean(annealed) <= 30.0
+    assert sum(not run.lost_limbs for run in annealed) >= 4
+
+
+@pytest.mark.usefixtures("real_data")
+def test_at_20_frames_a_second_the_swarm_beats_the_filter_with_eq_13(footage: Path) -> None:
+    swarm, annealed = runs(footage, SWARM, TWIN_20), runs(footage, EQ13, TWIN_20)
+    nearer = sign_test(
+        [error for run in swarm for error in run.per_frame_mm],
+        [error for run in annealed for error in run.per_frame_mm],
+    )
+    assert nearer.better > nearer.worse
+    assert nearer.p < 0.01
+    assert mean(swarm) < mean(annealed)
+
+
+@pytest.mark.usefixtures("real_data")
+def test_soft_partitions_beat_hard_and_global_ones_at_60_frames_a_second(footage: Path) -> None:
+    soft = mean(runs(footage, SWARM))
+    for partition in ("hard-two", "global"):
+        other = replace(SWARM, changes={**SWARM.changes, "partition": partition})
+        assert soft < mean(runs(footage, other)), partition
+
+
+@pytest.mark.parametrize("tracker", ["swarm", "annealed"])
+def test_the_bundled_walk_with_defaults_and_1000_evaluations(tracker: str) -> None:
+    shelf = FootageShelf(SAMPLES)
+    changes = knobs_for_evaluations(tracker, EVALUATIONS)
+    try:
+        found = [
+            track(Attempt("walk", tracker, usual_weighting(tracker), seed, changes), shelf) for seed in SEEDS
+        ]
+    finally:
+        shelf.close()
+    assert mean(found) <= 40.0
