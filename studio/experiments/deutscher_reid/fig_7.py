@@ -16,6 +16,7 @@ from studio.experiments.deutscher_reid.setting import (
     BODY,
     CIRCLE,
     EQ17_WORDS,
+    QUICK_FRAMES,
     SOURCE,
     WEIGHTING,
     share_number,
@@ -47,9 +48,10 @@ FRAME_STEP, FOOTAGE_FRAMES = 23, 240
 
 def trials(scale: Scale) -> tuple[Trial, ...]:
     """One frame a seed."""
+    first, step = (1, QUICK_FRAMES // 4) if scale.quick else (7, FRAME_STEP)
     return tuple(
-        Trial(f"knee, frame {frame}", {"footage": CIRCLE, "frame": frame})
-        for frame in ((7 + seed * FRAME_STEP) % FOOTAGE_FRAMES for seed in scale.seeds)
+        Trial(f"knee, frame {frame}", {"footage": CIRCLE, "frame": frame, "last": frame + 1})
+        for frame in ((first + seed * step) % FOOTAGE_FRAMES for seed in scale.seeds)
     )
 
 

@@ -15,6 +15,7 @@ from studio.experiments.deutscher_reid.setting import (
     EQ17_WORDS,
     LIMIT_MM,
     PLAIN,
+    QUICK_FRAMES,
     SOURCE,
     STUDIO,
     STUDIO_WEIGHTING,
@@ -35,7 +36,7 @@ from studio.experiments.tracking_trials import (
 )
 
 FPS = 60.0
-FRAMES, QUICK_FRAMES = 240, 90
+FRAMES = 240
 CONDENSATION, LARGE = "Condensation, 4000", "Condensation, 40 000"
 ONE_LAYER, TEN_LAYERS, FEW = (
     "annealed, 1 × 4000, the mode carried",

@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 FRAMES, QUICK_FRAMES = 20, 8
 # From one seed's first frame to the next one's.
-STRIDE, FOOTAGE_FRAMES = 37, 240
+STRIDE, QUICK_STRIDE, FOOTAGE_FRAMES = 37, 20, 240
 KNOBS: Mapping[str, Any] = {**IMPROVED, "layers": 10, "particles": 200}
 # Ranks in the tree: the root; what hangs on the trunk; what lies beyond elbow and knee.
 RANKS = ("torso", "hips, shoulders and head", "elbows, knees and beyond")
@@ -51,7 +51,7 @@ PARTS: Mapping[str, tuple[str, ...]] = {
 
 def trials(scale: Scale) -> tuple[Trial, ...]:
     """One a seed; the same for both figures."""
-    frames = QUICK_FRAMES if scale.quick else FRAMES
+    frames, stride = (QUICK_FRAMES, QUICK_STRIDE) if scale.quick else (FRAMES, STRIDE)
     return tuple(
         Trial(
             f"layers of a whole body, seed {seed}",
@@ -65,7 +65,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
                 last=first + frames,
             ).plain(),
         )
-        for seed, first in ((seed, seed * STRIDE % (FOOTAGE_FRAMES - FRAMES)) for seed in scale.seeds)
+        for seed, first in ((seed, seed * stride % (FOOTAGE_FRAMES - FRAMES)) for seed in scale.seeds)
     )
 
 

@@ -117,8 +117,8 @@ def trials_particles(scale: Scale) -> tuple[Trial, ...]:
                 WEIGHTING,
                 seed,
                 {**knobs, "layers": PAPER_LAYERS, "particles": particles},
-                first=first_frame(seed),
-                last=first_frame(seed) + FRAMES,
+                first=first_frame(seed, scale.quick),
+                last=first_frame(seed, scale.quick) + FRAMES,
             ),
         )
         for name, knobs in FILTERS.items()

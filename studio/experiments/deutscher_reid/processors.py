@@ -34,7 +34,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
     """One a seed."""
     rounds = QUICK_ROUNDS if scale.quick else ROUNDS
     return tuple(
-        Trial(f"processors, seed {seed}", {"footage": CIRCLE, "seed": seed, "rounds": rounds})
+        Trial(f"processors, seed {seed}", {"footage": CIRCLE, "seed": seed, "rounds": rounds, "last": 1})
         for seed in scale.seeds
     )
 

@@ -36,6 +36,8 @@ CIRCLE, BOX = "circle-three-cameras", "box-and-turn"
 TURNS, RUN, HANDSTAND = "walk-with-turns", "run-three-cameras", "handstand-three-cameras"
 
 LIMIT_MM = 100.0
+# Footage is rendered as far as it is looked at; a quick look takes so many frames of each.
+QUICK_FRAMES = 48
 
 EQ18_WORDS = (
     "Eq. 18 prints no constant; with noise on top of the survivors the cloud grows, so they are shrunk towards their "

@@ -20,6 +20,7 @@ from studio.experiments.deutscher_reid.setting import (
     IMPROVED,
     LIMIT_MM,
     PLAIN,
+    QUICK_FRAMES,
     RUN,
     SOURCE,
     STUDIO,
@@ -43,7 +44,6 @@ from studio.experiments.tracking_trials import (
 
 FPS = 60.0
 SIZE: Mapping[str, Any] = {"layers": 10, "particles": 200}
-QUICK_FRAMES = 60
 EQ13, SECTION_6, OWN = "Eq. 13", "section 6", "studio"
 FILTERS: Mapping[str, tuple[str, Mapping[str, Any]]] = {
     EQ13: (WEIGHTING, {**PLAIN, **SIZE}),
@@ -54,18 +54,18 @@ FILTERS: Mapping[str, tuple[str, Mapping[str, Any]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """number : in the paper. filter : the paper's, of FILTERS. body : "" for the footage's own, human29."""
+    """number : in the paper. filter : the paper's, of FILTERS. body : the footage's own, of 29 or 34 parameters."""
 
     number: int
     what: str
     footage: str
     filter: str
-    body: str = ""
+    body: str
 
 
 FIGURES = (
-    Figure(9, "walking in a circle", CIRCLE, EQ13),
-    Figure(10, "stepping over a box, turning and stepping over it again", BOX, EQ13),
+    Figure(9, "walking in a circle", CIRCLE, EQ13, "human29"),
+    Figure(10, "stepping over a box, turning and stepping over it again", BOX, EQ13, "human29"),
     Figure(21, "walking with turns", TURNS, SECTION_6, "human34"),
     Figure(22, "running around", RUN, SECTION_6, "human34"),
     Figure(23, "a handstand", HANDSTAND, SECTION_6, "human34"),
@@ -84,7 +84,6 @@ def _trials(figure: Figure) -> Callable[[Scale], tuple[Trial, ...]]:
                     seed,
                     knobs,
                     last=QUICK_FRAMES if scale.quick else None,
-                    body=figure.body,
                 ),
             )
             for name, (weighting, knobs) in FILTERS.items()
@@ -131,7 +130,7 @@ def concluded(figure: Figure, outcomes: Sequence[Outcome]) -> Findings:
     settings = {
         "footage": figure.footage,
         "frames": len(outcomes[0].measured["frames"]),
-        "body": figure.body or "human29",
+        "body": figure.body,
         **{f"{name}: {knob}": value for name, (_, knobs) in FILTERS.items() for knob, value in knobs.items()},
         **{f"{name}: weighting": weighting for name, (weighting, _) in FILTERS.items()},
     }
