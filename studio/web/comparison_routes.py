@@ -4,6 +4,7 @@ A comparison lies in its session's folder and is measured by processes of its ow
 it is comes as `comparison` events and in every list.
 """
 
+from functools import lru_cache
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Response
@@ -207,11 +208,17 @@ def _line(doors: Doors, session: Session, kept: KeptComparison) -> ComparisonLin
 
 
 def _with_best(line: ComparisonLine, kept: KeptComparison) -> ComparisonLine:
+    path = kept.folder / RESULT_NAME
+    tracker, mean_mm = _best_of(kept, path.stat().st_mtime_ns)
+    return line.model_copy(update={"best": tracker, "best_mm": mean_mm})
+
+
+@lru_cache(maxsize=512)
+def _best_of(kept: KeptComparison, _written: int) -> tuple[str, float | None]:
+    """The tracker with the smallest mean error of a result that was written at a moment."""
     trackers = (kept.result() or {}).get("trackers", [])
-    if not trackers:
-        return line
-    best = min(trackers, key=lambda entry: entry["mean_mm"])
-    return line.model_copy(update={"best": best["tracker"], "best_mm": best["mean_mm"]})
+    best = min(trackers, key=lambda entry: entry["mean_mm"], default=None)
+    return ("", None) if best is None else (best["tracker"], best["mean_mm"])
 
 
 def _file(session: Session, kept: KeptComparison, name: str, kind: str, ending: str) -> Response:
