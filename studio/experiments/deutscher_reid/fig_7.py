@@ -31,6 +31,7 @@ from studio.weighting.catalogue import WEIGHTINGS
 
 Array = NDArray[np.float64]
 
+# How the parameter's name begins, in every body of the catalogue.
 KNEE = "right_knee"
 STEPS = 321
 TERMS: Mapping[str, Mapping[str, float]] = {
@@ -60,7 +61,7 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
     session, frame = shelf.session(arguments["footage"]), int(arguments["frame"])
     body, cameras = session.body(), session.cameras()
     pose = true_poses(session, body, [frame])[0]
-    column = [entry.name for entry in body.parameters].index(KNEE)
+    column = next(index for index, entry in enumerate(body.parameters) if entry.name.startswith(KNEE))
     knee = body.parameters[column]
     angles = np.linspace(knee.lower, knee.upper, STEPS)
     poses = np.tile(pose, (STEPS, 1))
