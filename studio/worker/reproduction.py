@@ -22,7 +22,7 @@ from studio.experiments.reproduction_plan import (
     is_rendered,
     plan,
 )
-from studio.sessions.atomic_files import discard, move_into_place, new_folder_beside
+from studio.sessions.atomic_files import PARTIAL_PREFIX, discard, move_into_place, new_folder_beside
 from studio.sessions.manifest import FILE_NAME as MANIFEST
 from studio.sessions.process_lock import ProcessLock
 from studio.synthesis.recipes import synthesize
@@ -129,6 +129,8 @@ class _Work:
     def _render(self, needed: dict[str, int | None]) -> dict[str, str]:
         """Make the footage that is missing; what cannot be made, with the reason. needed : recipes to frames."""
         problems = {}
+        for left_by_a_killed_command in (self._out / FOOTAGE).glob(f"{PARTIAL_PREFIX}*"):
+            discard(left_by_a_killed_command)
         for name, frames in needed.items():
             try:
                 if not is_rendered(name, self._out / FOOTAGE, frames):

@@ -157,6 +157,7 @@ def test_footage_is_rendered_once_and_again_when_its_recipe_changed(
     monkeypatch.setattr("studio.experiments.reproduction_plan.find_recipe", found)
     monkeypatch.setattr("studio.synthesis.recipes.find_recipe", found)
     experiment = toy("toy", tmp_path / "log", footage=("arm",))
+    (out / "footage" / ".partial-killed" / "arm").mkdir(parents=True)
     assert run([experiment], out, Scale((0,))).measured == 2
     session = out / "footage" / "arm" / "session.json"
     made = session.stat().st_mtime_ns
