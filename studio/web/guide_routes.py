@@ -18,6 +18,8 @@ from studio.weighting.catalogue import WEIGHTINGS
 router = APIRouter(tags=["page"], include_in_schema=False)
 
 PLACE_OF_KNOBS = "{{knobs}}"
+# The summary.md of a full `studio reproduce all`, as it was written.
+PLACE_OF_SUMMARY, SUMMARY = "{{reproduction}}", "reproduction.md"
 PAGE = (
     '<!doctype html>\n<html lang="en">\n<head><meta charset="utf-8"><title>Guide · Capture studio</title>\n'
     '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
@@ -41,14 +43,18 @@ def guide() -> HTMLResponse:
 def rendered() -> str:
     """The whole page, made once."""
     markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
-    tokens = markdown.parse((assets_folder() / "guide" / "guide.md").read_text(encoding="utf-8"))
+    folder = assets_folder() / "guide"
+    summary = (folder / SUMMARY).read_text(encoding="utf-8")
+    text = (folder / "guide.md").read_text(encoding="utf-8").replace(PLACE_OF_SUMMARY, summary)
+    tokens = markdown.parse(text)
     contents: list[str] = []
     for opening, inline in itertools.pairwise(tokens):
         if opening.type == "heading_open" and opening.tag == "h2":
             anchor = anchor_of(inline.content)
             opening.attrSet("id", anchor)
             contents.append(f'<a href="#{anchor}">{html.escape(inline.content)}</a>')
-    content = markdown.renderer.render(tokens, markdown.options, {})
+    # Lines within a table's cell are the one thing that the text cannot say without HTML.
+    content = markdown.renderer.render(tokens, markdown.options, {}).replace("&lt;br&gt;", "<br>")
     content = content.replace(f"<p>{PLACE_OF_KNOBS}</p>", all_knob_tables())
     return PAGE.replace("{contents}", "".join(contents)).replace("{content}", content)
 
