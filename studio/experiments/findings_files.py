@@ -9,6 +9,7 @@ results.json, summary.md, report.html
 import csv
 import io
 import json
+import math
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -24,6 +25,8 @@ FOLDER = "reproduction"
 FOOTAGE, TRIALS = "footage", "trials"
 FINDINGS, RESULTS, SUMMARY, REPORT = "findings.json", "results.json", "summary.md", "report.html"
 NUMBER_COLUMNS = ("name", "ours", "low", "high", "unit", "paper", "better", "seeds", "verdict", "firm")
+
+MOST_DECIMALS = 6
 
 Rows = Iterable[Sequence[Plain]]
 
@@ -98,19 +101,35 @@ def summary_markdown(results: Document) -> str:
 
 
 def number_in_words(number: Document) -> str:
-    """ "mean error: 30.1 mm [29.0, 31.2], paper 38.0: better"."""
+    """ "mean error: 30.1 mm [29.0, 31.2], paper 38: better"."""
+    ours, low, high, paper = figures(number)
     unit = f" {number['unit']}" if number["unit"] else ""
-    words = f"{number['name']}: {figure(number['ours'])}{unit} [{figure(number['low'])}, {figure(number['high'])}]"
+    words = f"{number['name']}: {ours}{unit} [{low}, {high}]"
     if number["paper"] is not None:
-        words += f", paper {figure(number['paper'])}"
+        words += f", paper {paper}"
     return words if number["verdict"] == "answered" else f"{words}: {number['verdict']}"
 
 
-def figure(value: float | None) -> str:
-    """Three significant figures, all of those before the point."""
-    if value is None:
-        return "–"
-    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+def figures(number: Document) -> tuple[str, str, str, str]:
+    """Ours, the interval's ends and the paper's value in words, "–" for null.
+
+    The first three have as many decimals as give the largest of them three figures, or more where an end that is not
+    the paper's value would look like it. `figures` of js/findings_options.js does the same.
+    """
+    own = (number["ours"], number["low"], number["high"])
+    known = [value for value in own if value is not None]
+    largest = max((abs(value) for value in known), default=0.0)
+    decimals = 2 - math.floor(math.log10(largest)) if largest > 0 else 0
+    decimals = 0 if all(value == round(value) for value in known) else min(max(decimals, 0), MOST_DECIMALS)
+    paper = number["paper"]
+    while (
+        decimals < MOST_DECIMALS
+        and paper is not None
+        and any(value != paper and round(value - paper, decimals) == 0 for value in known[1:])
+    ):
+        decimals += 1
+    ours, low, high = ("–" if value is None else f"{value:.{decimals}f}" for value in own)
+    return ours, low, high, "–" if paper is None else f"{paper:g}"
 
 
 def as_csv(rows: Rows) -> str:

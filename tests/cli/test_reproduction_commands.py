@@ -36,7 +36,7 @@ def test_a_stranger_sees_what_there_is_and_what_was_found(tmp_path: Path) -> Non
     found = run("toy-good", "--seeds", "2", "--processes", "1")
     assert found.exit_code == 0
     assert "toy-good: reproduced, not firm" in found.stdout
-    assert "error, plain: 40 mm [" in found.stdout
+    assert "error, plain: 40." in found.stdout
     assert "4 trials run, 0 kept from before, 0 failed." in found.stdout
     report = workspace_root() / "reproduction" / "report.html"
     assert f"Report: {report}" in found.stdout

@@ -17,7 +17,6 @@ from studio.experiments.experiment import Findings, Number, Outcome, Scale
 from studio.experiments.findings_document import Making, as_document, failed_document
 from studio.experiments.findings_files import (
     as_csv,
-    figure,
     number_in_words,
     read_findings,
     summary_markdown,
@@ -119,7 +118,7 @@ def test_the_summary_is_a_table(document: dict) -> None:
     lines = text.splitlines()
     assert [line.count("|") for line in lines[:4]] == [5, 5, 5, 5]
     assert "| reproduced |" in lines[2]
-    assert "error, plain: 40 mm [" in lines[2]
+    assert "error, plain: 40.0 mm [" in lines[2]
     assert ", paper 40: reproduced<br>" in lines[2]
     assert "| failed | Not concluded. seed 1: No ∣ luck. |" in lines[3]
 
@@ -157,16 +156,23 @@ def test_many_failures_are_counted(tmp_path: Path) -> None:
     assert len(told["failures"]) == 4
 
 
-def test_numbers_in_words() -> None:
-    told = {
-        "name": "error",
-        "ours": 1234.5,
-        "low": 0.12345,
-        "high": None,
-        "unit": "",
-        "paper": None,
-        "verdict": "answered",
-    }
-    assert number_in_words(told) == "error: 1234 [0.123, –]"
-    assert figure(99.96) == "100"
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ((1234.5, 0.12345, None, None), "n: 1234 mm [0, –]"),
+        ((34.04, 31.72, 38.21, 38.0), "n: 34.0 mm [31.7, 38.2], paper 38"),
+        ((34.04, 31.72, 37.98, 38.0), "n: 34.04 mm [31.72, 37.98], paper 38"),
+        ((0.554, 0.35, 0.674, 1.0), "n: 0.554 mm [0.350, 0.674], paper 1"),
+        ((1.0, 0.0, 1.0, 1.0), "n: 1 mm [0, 1], paper 1"),
+        ((0.0, 0.0, 0.0, None), "n: 0 mm [0, 0]"),
+    ],
+)
+def test_numbers_in_words(values: tuple, words: str) -> None:
+    ours, low, high, paper = values
+    told = {"name": "n", "ours": ours, "low": low, "high": high, "unit": "mm", "paper": paper}
+    assert number_in_words({**told, "verdict": "answered"}) == words
+    assert number_in_words({**told, "verdict": "better"}) == f"{words}: better"
+
+
+def test_csv_quotes_and_leaves_out_null() -> None:
     assert as_csv([("a,b", None, 1.5)]) == '"a,b",,1.5\n'

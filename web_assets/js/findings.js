@@ -1,7 +1,7 @@
 // What experiments found: a summary with all verdicts, then each with the paper's claim beside what was seen.
 // Used by the report (experiments/report_document.py) and by the studio's pages; looks are in report.css.
 
-import { drawChart, figure, make } from "./findings_charts.js";
+import { drawChart, figures, make } from "./findings_charts.js";
 
 const SIGNS = { reproduced: "✓", better: "▲", "not reproduced": "✕", answered: "●", failed: "!" };
 const FOLDED_ROWS = 14;
@@ -80,11 +80,11 @@ function leading(experiment) {
   const few = (compared.length ? compared : experiment.numbers).slice(0, 2);
   if (!few.length) return [make("div", { class: "quiet" }, experiment.words.split(". ")[0].replace(/\.$/, ""), ".")];
   return few.map((number) => make("div", {}, make("span", { class: "quiet" }, `${number.name}: `), value(number), interval(number),
-    number.paper === null ? null : make("span", { class: "quiet" }, `, paper ${figure(number.paper)}`)));
+    number.paper === null ? null : make("span", { class: "quiet" }, `, paper ${figures(number).paper}`)));
 }
 
-const value = (number) => make("b", {}, figure(number.ours), number.unit ? make("small", {}, ` ${number.unit}`) : null);
-const interval = (number) => make("span", { class: "quiet" }, ` [${figure(number.low)}, ${figure(number.high)}]`);
+const value = (number) => make("b", {}, figures(number).ours, number.unit ? make("small", {}, ` ${number.unit}`) : null);
+const interval = (number) => make("span", { class: "quiet" }, ` [${figures(number).low}, ${figures(number).high}]`);
 
 function head(names, numeric = []) {
   return make("tr", {}, ...names.map((name, index) => make("th", numeric.includes(index) ? { class: "number", scope: "col" } : { scope: "col" }, name)));
@@ -131,7 +131,7 @@ function numbers(experiment) {
     make("td", {}, number.name),
     make("td", { class: "number" }, value(number)),
     make("td", { class: "number" }, interval(number)),
-    make("td", { class: "number" }, number.paper === null ? "–" : figure(number.paper)),
+    make("td", { class: "number" }, figures(number).paper),
     make("td", { class: "picture" }, whisker(number)),
     make("td", { class: "number" }, String(number.seeds)),
     make("td", {}, number.paper === null && number.verdict === "answered" ? "" : badge(number.verdict, number.firm)),

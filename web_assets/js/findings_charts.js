@@ -1,8 +1,8 @@
 // Charts given as plain values (studio/experiments/charts.py), drawn alike in the report and in the studio's pages.
 
-import { figure, heatOption, legendEntries, seriesOption } from "./findings_options.js";
+import { figure, figures, heatOption, legendEntries, seriesOption } from "./findings_options.js";
 
-export { figure };
+export { figure, figures };
 
 const PRINT_WIDTH = 660;
 

@@ -2,6 +2,7 @@
 
 const FAMILY = "Inter, system-ui, sans-serif";
 const SERIES_COLOURS = 8;
+const MOST_DECIMALS = 6;
 const MOST_WHISKERS = 40;
 const MOST_LABELLED_CELLS = 160;
 const MARKS = ["circle", "diamond", "rect", "triangle", "roundRect"];
@@ -17,6 +18,19 @@ export function figure(value) {
   const size = Math.abs(value);
   if (size >= 1e7 || (size > 0 && size < 1e-3)) return value.toExponential(1);
   return size >= 100 ? String(Math.round(value)) : String(Number(value.toPrecision(3)));
+}
+
+/** Ours, the interval's ends and the paper's value of a number in words, as `figures` of findings_files.py has them. */
+export function figures(number) {
+  const own = [number.ours, number.low, number.high];
+  const known = own.filter((value) => value !== null);
+  const largest = Math.max(0, ...known.map(Math.abs));
+  let decimals = largest > 0 ? 2 - Math.floor(Math.log10(largest)) : 0;
+  decimals = known.every(Number.isInteger) ? 0 : Math.min(Math.max(decimals, 0), MOST_DECIMALS);
+  const alike = (value) => number.paper !== null && value !== number.paper && Math.abs(value - number.paper) < 0.5 * 10 ** -decimals;
+  while (decimals < MOST_DECIMALS && known.slice(1).some(alike)) decimals += 1;
+  const [ours, low, high] = own.map((value) => (value === null ? "–" : value.toFixed(decimals)));
+  return { ours, low, high, paper: number.paper === null ? "–" : String(Number(number.paper.toPrecision(6))) };
 }
 
 /** The groups of a chart in the order in which they appear, each with its colour (a CSS expression). What only the
@@ -144,7 +158,8 @@ function logLabel(value, ticks) {
 function flush(chart) {
   const label = { formatter: figure };
   if (chart.kind !== "lines" || !chart.series.some((series) => series.x.length > MOST_WHISKERS)) return { axisLabel: label };
-  return { min: "dataMin", max: "dataMax", axisLabel: { ...label, showMinLabel: true, showMaxLabel: false } };
+  const [least] = bounds(valuesAlong(chart, "x"));
+  return { min: "dataMin", max: "dataMax", axisLabel: { ...label, showMinLabel: least % 10 === 0, showMaxLabel: false } };
 }
 
 function categoryLabels(chart, width) {
