@@ -6,6 +6,8 @@ import pytest
 from web_doubles import TOKEN, Studio
 
 from studio.evidence.settings import EvidenceSettings
+from studio.experiments.catalogue import EXPERIMENTS
+from studio.experiments.experiment import VERDICTS
 from studio.knobs import knobs_of
 from studio.scene.view_options import Shown
 from studio.sessions.stored_run import StoredRun
@@ -38,6 +40,15 @@ def test_every_module_that_a_module_imports_is_there() -> None:
     for path in (assets_folder() / "js").glob("*.js"):
         for name in re.findall(r'from "(\.[^"]+)"', path.read_text(encoding="utf-8")):
             assert (path.parent / name).is_file(), (path.name, name)
+
+
+def test_the_guide_carries_every_experiment_with_its_verdict(studio: Studio) -> None:
+    text = studio.client.get("/guide").text
+    assert "{{reproduction}}" not in text
+    rows = re.findall(r"<tr>\n<td>.*?<code>([\w-]+)</code>.*?</td>\n<td>.*?</td>\n<td>(.*?)</td>", text)
+    told = {name: verdict.removesuffix(" (not firm)") for name, verdict in rows}
+    assert set(told) >= set(EXPERIMENTS)
+    assert {told[name] for name in EXPERIMENTS} <= set(VERDICTS)
 
 
 def test_the_guide_has_every_knob_with_its_range(studio: Studio) -> None:
