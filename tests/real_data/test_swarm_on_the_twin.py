@@ -79,7 +79,7 @@ def test_at_20_frames_a_second_the_swarm_beats_the_filter_with_eq_13(footage: Pa
     assert mean(swarm) < mean(annealed)
 
 
-# Against global search at 60 frames a second soft partitioning wins nothing (`studio reproduce fleischmann-partitions`).
+# Against global search at 60 frames a second it wins nothing (`studio reproduce fleischmann-partitions`).
 @pytest.mark.usefixtures("real_data")
 @pytest.mark.parametrize(
     ("partition", "name"),
