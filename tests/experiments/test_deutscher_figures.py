@@ -305,12 +305,15 @@ def test_processors_are_compared_in_turn(shelf) -> None:
     assert min(measured["frame"]) > min(measured["weighing"]) > 0.0
 
     def made(each: float) -> Findings:
-        times = [100.0, 50.0 / each]
         return processors.conclude(
             [
                 Outcome(
                     trial,
-                    {"threads": [1, 2], "frame": [times[0], times[1] * (0.99 + 0.01 * k)], "weighing": times},
+                    {
+                        "threads": [1, 2],
+                        "frame": [100.0, 90.0],
+                        "weighing": [10.0, 5.0 / each * (0.99 + 0.01 * k)],
+                    },
                 )
                 for k in range(3)
             ]

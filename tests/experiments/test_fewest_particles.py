@@ -26,6 +26,7 @@ from studio.experiments.deutscher_reid.fewest_particles import (
     sizes,
     successes,
 )
+from studio.experiments.deutscher_reid.setting import annealing_as_ten
 from studio.experiments.experiment import Experiment, Findings, Outcome, Scale
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.tracking_trials import group_of
@@ -122,7 +123,8 @@ def test_an_arm_in_motion_is_tracked_with_many_particles_and_not_with_few() -> N
 
 
 def test_a_trial_is_measured_the_same_again_and_survives_json(tmp_path) -> None:
-    trial = arm_sequences.trials(Scale((2,), quick=True), adaptive_diffusion.FILTERS, "planar_arm4", 20.0)[0]
+    filters = adaptive_diffusion.filters(0.5)
+    trial = arm_sequences.trials(Scale((2,), quick=True), filters, "planar_arm4", 20.0)[0]
     arguments = json.loads(json.dumps({**trial.arguments, "frames": 5, "sizes": [8, 32, 128]}))
     shelf = FootageShelf(tmp_path)
     first = json.loads(json.dumps(arm_sequences.measure(arguments, shelf)))
@@ -140,25 +142,20 @@ def concluded(experiment: Experiment, needed: dict[str, float]) -> Findings:
     return experiment.conclude(outcomes)
 
 
-def arm_groups(body: str, **needed: float) -> dict[str, float]:
-    """Particles by group at both rates."""
-    names = {
-        "eq13": "Eq. 13",
-        "adaptive": "adaptive",
-        "cross": "with crossover",
-        "limbs": "with crossover by limbs",
-    }
-    return {group(names[name], body, rate): value for name, value in needed.items() for rate in (RATE, 20.0)}
-
-
 @pytest.mark.parametrize(
     ("slow", "verdict"), [(200.0, "reproduced"), (800.0, "better"), (100.0, "not reproduced")]
 )
 def test_adaptive_diffusion_saves_two_more_or_nothing(slow: float, verdict: str) -> None:
-    found = concluded(adaptive_diffusion.EXPERIMENT, arm_groups("planar_arm4", eq13=slow, adaptive=100.0))
+    experiment = adaptive_diffusion.EXPERIMENT
+    names = {group_of(trial) for trial in experiment.trials(SEEDS)}
+    needed = {name: 100.0 for name in names}
+    # The verdict is on the first case alone.
+    needed[group("Eq. 13, α 0.5", "planar_arm4", RATE)] = slow
+    found = concluded(experiment, needed)
     assert found.verdict == verdict
     assert found.numbers[0].ours == pytest.approx(slow / 100.0)
-    assert found.numbers[0].paper == 2.0
+    assert [entry.paper for entry in found.numbers[:4]] == [2.0] * 4
+    assert found.numbers[1].verdict == "not reproduced"
 
 
 @pytest.mark.parametrize(
@@ -171,12 +168,34 @@ def test_adaptive_diffusion_saves_two_more_or_nothing(slow: float, verdict: str)
     ],
 )
 def test_crossover_saves_on_branches_and_not_on_a_chain(branched: float, chain: float, verdict: str) -> None:
-    needed = arm_groups("planar_arm4", adaptive=100.0, cross=chain)
-    needed |= arm_groups("branched_arms6", adaptive=100.0, cross=branched, limbs=50.0)
-    found = concluded(crossover.EXPERIMENT, needed)
+    experiment = crossover.EXPERIMENT
+    needed = {group_of(trial): 100.0 for trial in experiment.trials(SEEDS)}
+    first = crossover.WITH[0]
+    assert (first.base, first.survival) == ("adaptive", 0.5)
+    needed[group(first.name("parameters"), "branched_arms6", RATE)] = branched
+    needed[group(first.name("parameters"), "planar_arm4", RATE)] = chain
+    found = concluded(experiment, needed)
     assert found.verdict == verdict
-    assert found.numbers[0].ours == pytest.approx(100.0 / branched)
-    assert found.numbers[1].ours == pytest.approx(100.0 / chain)
+    ours = {entry.name: entry.ours for entry in found.numbers}
+    told = "particles saved, {}: adaptive, α 0.5, cut by parameters"
+    assert ours[told.format("branched_arms6")] == pytest.approx(100.0 / branched)
+    assert ours[told.format("planar_arm4")] == pytest.approx(100.0 / chain)
+
+
+def test_every_particle_is_crossed_and_the_chain_is_shared_with_adaptive_diffusion() -> None:
+    trials = crossover.EXPERIMENT.trials(SEEDS)
+    assert {trial.arguments["knobs"]["crossover"] for trial in trials} == {0.0, 1.0}
+    keys = [
+        {json.dumps(trial.arguments, sort_keys=True) for trial in experiment.trials(SEEDS)}
+        for experiment in (adaptive_diffusion.EXPERIMENT, crossover.EXPERIMENT)
+    ]
+    assert len(keys[0] & keys[1]) == 4 * len(SEEDS.seeds)
+
+
+def test_six_layers_may_anneal_as_much_as_ten() -> None:
+    assert annealing_as_ten(10) == 0.5
+    assert annealing_as_ten(6) ** 6 == pytest.approx(0.5**10)
+    assert arm_sequences.SURVIVALS == (0.5, 0.315)
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from studio.body.forward_kinematics import marker_points
 from studio.experiments.deutscher_reid.arms import TemplateArm, template_arm
 from studio.experiments.deutscher_reid.fewest_particles import Fewest, fewest, sizes
+from studio.experiments.deutscher_reid.setting import annealing_as_ten
 from studio.experiments.experiment import Outcome, Scale, Trial
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.tracking_trials import group_of
@@ -36,6 +37,17 @@ QUICK_MOST = 512
 # Pictures a second. At 10 a joint turns up to 9° between two pictures and one joint hides the next one's turn; at 20
 # the search is easy, and what is saved is less.
 RATE, SLOW_RATE = 10.0, 20.0
+CHAIN = "planar_arm4"
+# Section 3.1's for ten layers, and the one with which LAYERS anneal as much.
+SURVIVALS = (0.5, round(annealing_as_ten(LAYERS), 3))
+SETTINGS: Mapping[str, Any] = {
+    "layers": LAYERS,
+    "pictures": FRAMES,
+    "lost where off by more than (mm)": LOST_MM,
+    "runs a size": RUNS,
+    "sizes tried": f"{FEWEST} to {MOST}, two a doubling",
+    "weighting": "template, SSD",
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

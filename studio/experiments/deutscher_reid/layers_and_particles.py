@@ -27,6 +27,7 @@ from studio.experiments.deutscher_reid.setting import (
     PLAIN,
     SOURCE,
     WEIGHTING,
+    annealing_as_ten,
     succeeded,
     success_number,
     times_in_words,
@@ -37,7 +38,7 @@ from studio.experiments.tracked import Attempt, Tracked
 from studio.experiments.tracking_trials import by_group, measure_tracking, summary_table, tracking_trial
 
 LAYERS = (5, 10, 20)
-PAPER_LAYERS, PAPER_SURVIVAL, PAPER_PARTICLES = 10, 0.5, 200
+PAPER_LAYERS, PAPER_PARTICLES = 10, 200
 # "Reduces the number of particles … by more than half".
 HALF = 2.0
 PARTICLES = (50, 100, 200, 400, 800)
@@ -52,7 +53,7 @@ def filters() -> dict[str, dict[str, Any]]:
         f"{layers} layers": {
             **PLAIN,
             "layers": layers,
-            "survival": round(PAPER_SURVIVAL ** (PAPER_LAYERS / layers), 4),
+            "survival": round(annealing_as_ten(layers), 4),
         }
         for layers in LAYERS
     }

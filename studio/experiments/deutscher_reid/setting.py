@@ -48,6 +48,13 @@ EQ18_WORDS = (
 EQ17_WORDS = "Eq. 17 is printed without the minus sign of Eq. 16; it belongs there and is used."
 
 
+def annealing_as_ten(layers: int) -> float:
+    """The survival rate with which so many layers anneal as much as the ten of 0.5 of section 3.1: the product over
+    the layers is the same, and so is the size at which the planned noise of Eq. 13 ends.
+    """
+    return float(0.5 ** (10 / layers))
+
+
 def succeeded(found: Tracked) -> bool:
     """Whether every frame stays below LIMIT_MM and no limb is ever lost."""
     return found.worst_mm < LIMIT_MM and not found.lost_limbs
