@@ -31,7 +31,8 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
         raise StudioError("The toy refuses.", "Ask another.")
     if deed == "break":
         raise ZeroDivisionError("toy")
-    if deed == "die" or (deed == "die once" and _first(arguments)):
+    first_of_all = deed == "die once" and _first(arguments)
+    if arguments["setting"] == "plain" and (deed == "die" or first_of_all):
         os.kill(os.getpid(), signal.SIGKILL)
     if deed == "wait":
         while not Path(arguments["gate"]).exists():

@@ -20,6 +20,8 @@ from studio.sessions.process_lock import ProcessLock
 from studio.sessions.workspace import Workspace
 from studio.worker.reproduction import LOCK, Reproduction, reproduce
 
+# Each process that is started loads the kernels' compiler; a busy machine takes a minute for one.
+pytestmark = pytest.mark.timeout(900)
 ROOT = Path(__file__).resolve().parents[2]
 TWO = Scale((0, 1))
 
@@ -83,20 +85,22 @@ def test_experiments_share_the_trials_that_are_the_same(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("deed", "reason"),
+    ("deed", "reason", "failed"),
     [
-        ("refuse", "The toy refuses. Ask another."),
-        ("break", "ZeroDivisionError: toy (toy_experiments.py, line"),
-        ("die", "The process that ran it ended by signal 9, SIGKILL."),
+        ("refuse", "The toy refuses. Ask another.", ["plain, seed 1", "clever, seed 1"]),
+        ("break", "ZeroDivisionError: toy (toy_experiments.py, line", ["plain, seed 1", "clever, seed 1"]),
+        ("die", "The process that ran it ended by signal 9, SIGKILL.", ["plain, seed 1"]),
     ],
 )
-def test_a_failing_trial_fails_its_experiment_only(tmp_path: Path, deed: str, reason: str) -> None:
+def test_a_failing_trial_fails_its_experiment_only(
+    tmp_path: Path, deed: str, reason: str, failed: list[str]
+) -> None:
     log, out = tmp_path / "log", tmp_path / "out"
     found = run([toy("bad", log, seed1=deed), toy("good", tmp_path / "log2")], out)
     bad, good = found.documents
     assert (bad["verdict"], good["verdict"]) == ("failed", "reproduced")
-    assert found.failed == 2
-    assert [failure["label"] for failure in bad["failures"]] == ["plain, seed 1", "clever, seed 1"]
+    assert found.failed == len(failed)
+    assert [failure["label"] for failure in bad["failures"]] == failed
     assert reason in bad["failures"][0]["reason"]
     assert reason in bad["words"]
 
@@ -113,7 +117,7 @@ def test_a_process_that_dies_once_is_replaced(tmp_path: Path) -> None:
     log = tmp_path / "log"
     found = run([toy("toy", log, seed1="die once")], tmp_path / "out")
     assert found.documents[0]["verdict"] == "reproduced"
-    assert len(lines(log)) == 6
+    assert len(lines(log)) == 5
 
 
 def test_a_conclusion_that_cannot_be_drawn_is_told(tmp_path: Path) -> None:
