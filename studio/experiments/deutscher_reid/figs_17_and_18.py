@@ -30,7 +30,7 @@ BRANCHED = "branched_arms6"
 JOINTS = ("x1", "x2", "x3", "x4", "x5", "x6")
 ARMS = ((0, 1, 2), (3, 4, 5))
 KIND = "adaptive with crossover"
-CROSSED: Mapping[str, Any] = {"adaptive_diffusion": True, "crossover": 0.5, "crossover_by": "parameters"}
+CROSSED: Mapping[str, Any] = {"adaptive_diffusion": True, "crossover": 1.0, "crossover_by": "parameters"}
 LAYERS_18 = 8
 # The particles' ends of a link lie together when they scatter by less than a fifth of its length.
 GATHERED_MM = 50.0

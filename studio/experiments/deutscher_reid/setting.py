@@ -24,11 +24,10 @@ BODY = "human29, the paper's 29 parameters"
 PLAIN: Mapping[str, Any] = {"adaptive_diffusion": False, "crossover": 0.0, "survival": 0.5}
 # Section 6.1 added: noise in proportion to what is still uncertain (Eq. 18).
 ADAPTIVE: Mapping[str, Any] = {"adaptive_diffusion": True, "crossover": 0.0, "survival": 0.5}
-# Section 6.2 added, cut between any two parameters as Eq. 19 has it; the paper does not print the share of children.
-IMPROVED: Mapping[str, Any] = {**ADAPTIVE, "crossover": 0.5, "crossover_by": "parameters"}
-# The studio's own way to cut.
-BY_LIMBS: Mapping[str, Any] = {**IMPROVED, "crossover_by": "limbs"}
-
+# Section 6.2 added: every particle is made from two, cut between any two parameters (6.2.1, Eq. 19).
+IMPROVED: Mapping[str, Any] = {**ADAPTIVE, "crossover": 1.0, "crossover_by": "parameters"}
+# The studio's own way: half of the particles, cut between whole limbs.
+BY_LIMBS: Mapping[str, Any] = {**ADAPTIVE, "crossover": 0.5, "crossover_by": "limbs"}
 # The studio's own choice: all three terms, fewer survivors, no limb inside another.
 STUDIO: Mapping[str, Any] = {**BY_LIMBS, "survival": 0.3, "constraints": "redraw", "limbs_apart": True}
 STUDIO_WEIGHTING = "edge-region-silhouette"
