@@ -178,8 +178,8 @@ def test_crossover_saves_on_branches_and_not_on_a_chain(branched: float, chain: 
     assert found.verdict == verdict
     ours = {entry.name: entry.ours for entry in found.numbers}
     told = "particles saved, {}: adaptive, α 0.5, cut by parameters"
-    assert ours[told.format("branched_arms6")] == pytest.approx(100.0 / branched)
-    assert ours[told.format("planar_arm4")] == pytest.approx(100.0 / chain)
+    assert ours[told.format("branched arms")] == pytest.approx(100.0 / branched)
+    assert ours[told.format("chain")] == pytest.approx(100.0 / chain)
 
 
 def test_every_particle_is_crossed_and_the_chain_is_shared_with_adaptive_diffusion() -> None:

@@ -37,7 +37,8 @@ QUICK_MOST = 512
 # Pictures a second. At 10 a joint turns up to 9° between two pictures and one joint hides the next one's turn; at 20
 # the search is easy, and what is saved is less.
 RATE, SLOW_RATE = 10.0, 20.0
-CHAIN = "planar_arm4"
+CHAIN, BRANCHED = "planar_arm4", "branched_arms6"
+BODY_WORDS = {CHAIN: "chain", BRANCHED: "branched arms"}
 # Section 3.1's for ten layers, and the one with which LAYERS anneal as much.
 SURVIVALS = (0.5, round(annealing_as_ten(LAYERS), 3))
 SETTINGS: Mapping[str, Any] = {
@@ -115,7 +116,7 @@ def trials(
 
 def group(name: str, body: str, rate: float) -> str:
     """Filter, body and rate in words."""
-    return f"{name}, {body}, {rate:g} pictures/s"
+    return f"{name}, {BODY_WORDS[body]}, {rate:g} pictures/s"
 
 
 def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:

@@ -12,6 +12,8 @@ from typing import Any
 
 from studio.experiments.deutscher_reid import arm_sequences
 from studio.experiments.deutscher_reid.arm_sequences import (
+    BODY_WORDS,
+    BRANCHED,
     CHAIN,
     RATE,
     SETTINGS,
@@ -32,7 +34,6 @@ from studio.experiments.deutscher_reid.setting import ADAPTIVE, EQ18_WORDS, PLAI
 from studio.experiments.experiment import Experiment, Findings, Number, Outcome, Scale, Trial
 from studio.experiments.statistics import overall
 
-BRANCHED = "branched_arms6"
 PAPER = {BRANCHED: 2.0, CHAIN: 1.0}
 SHARE = 1.0
 BASES: Mapping[str, Mapping[str, Any]] = {"adaptive": ADAPTIVE, "Eq. 13": PLAIN}
@@ -113,7 +114,7 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
 
 
 def _saving(groups: Mapping[str, Sequence[Fewest]], setting: Setting, body: str, cut: str) -> Number:
-    name = f"particles saved, {body}: {setting.name()}, cut by {cut}"
+    name = f"particles saved, {BODY_WORDS[body]}: {setting.name()}, cut by {cut}"
     without, crossed = (groups[group(words, body, RATE)] for words in (setting.name(), setting.name(cut)))
     return saving(name, without, crossed, PAPER[body])
 

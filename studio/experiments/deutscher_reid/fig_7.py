@@ -135,9 +135,10 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
     words = (
         f"Edges and region together have one dominant mode in {times_in_words(one)} and its peak within "
         f"{NEAR_DEGREES:g}° of the true knee in {times_in_words(near)}; edges alone have one dominant mode in "
-        f"{times_in_words(single['edges'])}, the region alone in {times_in_words(single['region'])}. A "
-        "seed is a frame. "
-        f"{EQ17_WORDS} The paper shows one frame of a sequence of its own and only the combined function."
+        f"{times_in_words(single['edges'])}, the region alone in {times_in_words(single['region'])}; a seed is a frame."
+        f" Between its peak and its lowest point the weight falls by {_contrast(outcomes):.0%}: Eq. 16 is flat, and the "
+        f"exponent of Eq. 3 sharpens it. {EQ17_WORDS} The paper shows one frame of a sequence of its own and only the "
+        "combined function."
     )
     settings = {"footage": CIRCLE, "body": BODY, "parameter": KNEE, "angles": STEPS}
     return Findings(
@@ -161,6 +162,12 @@ def _read(outcome: Outcome, name: str) -> dict[str, Any]:
         "modes": len(modes(weights)),
         "dominant": has_one_dominant_mode(weights),
     }
+
+
+def _contrast(outcomes: Sequence[Outcome]) -> float:
+    """How far the combined weight falls below its peak, as a share of it: mean over the frames."""
+    curves = [np.array(outcome.measured["log_weights"]["both"]) for outcome in outcomes]
+    return float(np.mean([1.0 - np.exp(-np.ptp(curve)) for curve in curves]))
 
 
 def _charts(outcomes: Sequence[Outcome]) -> tuple[Chart, ...]:
