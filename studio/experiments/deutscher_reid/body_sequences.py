@@ -18,7 +18,7 @@ from studio.experiments.tracking_trials import group_of
 FRAMES, FOOTAGE_FRAMES = 40, 240
 # From one seed's first frame to the next one's; no multiple of a stride, so that each begins with another posture.
 STRIDE, QUICK_STRIDE = 37, 4
-FEWEST, MOST, RUNS = 4, 4096, 3
+FEWEST, MOST, RUNS = 4, 2048, 3
 QUICK_MOST = 1024
 
 
