@@ -136,8 +136,8 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
         f"Edges and region together have one dominant mode in {times_in_words(one)} and its peak within "
         f"{NEAR_DEGREES:g}° of the true knee in {times_in_words(near)}; edges alone have one dominant mode in "
         f"{times_in_words(single['edges'])}, the region alone in {times_in_words(single['region'])}. "
-        f"A seed is a frame. Between peak and lowest point the weight falls by {_contrast(outcomes):.0%}: Eq. 16 is flat, and the "
-        f"exponent of Eq. 3 sharpens it. {EQ17_WORDS} The paper shows one frame of a sequence of its own and only the "
+        f"A seed is a frame. Between peak and lowest point the weight falls by {_contrast(outcomes):.0%}: Eq. 16 is "
+        f"flat, and the exponent of Eq. 3 sharpens it. {EQ17_WORDS} The paper shows one frame, and only the "
         "combined function."
     )
     settings = {"footage": CIRCLE, "body": BODY, "parameter": KNEE, "angles": STEPS}
