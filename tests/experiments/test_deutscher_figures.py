@@ -212,6 +212,18 @@ def test_fig_3_measures_clouds_that_draw_together(shelf) -> None:
     assert fig_3.conclude([Outcome(trial, falling)]).verdict == "reproduced"
 
 
+def test_the_pelvis_is_where_its_marker_is(shelf) -> None:
+    session = shelf.session("walk")
+    frames = [0, 9, 60]
+    places = fig_3.true_places(session, frames)
+    body = session.body()
+    names = [entry.name for entry in body.parameters]
+    laid = true_poses(session, body, frames)[:, [names.index(name) for name in fig_3.PLACES]]
+    # The body has not quite the person's proportions, so it is laid on the markers to within some mm.
+    assert np.linalg.norm(places - laid, axis=1).max() < 25.0
+    assert np.linalg.norm(places[2] - places[0]) > 300.0
+
+
 def test_a_cloud_covers_what_lies_within_three_deviations() -> None:
     cloud = np.random.default_rng(1).standard_normal((4000, 2)) * (10.0, 1.0)
     assert fig_3.covers(cloud, np.array([25.0, 0.0]))

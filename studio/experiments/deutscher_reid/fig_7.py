@@ -140,6 +140,13 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
         f"flat, and the exponent of Eq. 3 sharpens it. {EQ17_WORDS} The paper shows one frame, and only the "
         "combined function."
     )
+    rivals = [angle for row in both for angle in row["rivals"]]
+    if rivals:
+        words += (
+            f" Where a second mode is more than half as high, it lies at {min(rivals):.0f} to "
+            f"{max(rivals):.0f}° (the knee "
+            f"bends to {max(outcomes[0].measured['angles']):.0f}°, where the shin is drawn on the thigh)."
+        )
     settings = {"footage": CIRCLE, "body": BODY, "parameter": KNEE, "angles": STEPS}
     return Findings(
         overall(entry.verdict for entry in claims),
@@ -161,6 +168,7 @@ def _read(outcome: Outcome, name: str) -> dict[str, Any]:
         "width": half_width(angles, weights),
         "modes": len(modes(weights)),
         "dominant": has_one_dominant_mode(weights),
+        "rivals": [float(angles[place]) for place, height in modes(weights)[1:] if height > DOMINANT],
     }
 
 

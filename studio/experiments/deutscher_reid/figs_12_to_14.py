@@ -160,7 +160,7 @@ def _reason(adaptive: Reduction, planned: Reduction, loud: Reduction) -> str:
         f"sees little but the joints nearest the root (the first layer leaves {drawn[0]:.0%} of the first joint's "
         f"variance and {drawn[-1]:.0%} of the last one's). Noise that is the same for all joints moves the fall of the "
         f"first by {first:+.1f} layers and of the last by {last:+.1f}, so it narrows the order and does not undo it. "
-        f"Noise that outweighs selection in every joint ({LOUD['diffusion_scale']:g} times as much, and "
+        f"Even noise that outweighs selection in every joint ({LOUD['diffusion_scale']:g} times as much, and "
         "no limits to hold "
         f"it) evens them out in {times_in_words(loud.even.tolist())} (mean layers "
         f"{listed(loud.crossings.mean(axis=0) + 1.0)}), and the arm is then not found: mean error "

@@ -63,7 +63,8 @@ def conclude_fig_17(outcomes: Sequence[Outcome]) -> Findings:
         f"In {times_in_words(in_order)} the variances of x1, x2, x3 and of x4, x5, x6 fall below "
         f"{FALLEN:.0%} one after "
         f"the other from the hinge outwards, and in {times_in_words(in_step)} joints of equal rank fall within one "
-        f"layer (mean layers {listed(found.crossings.mean(axis=0) + 1.0)} of {SETTINGS['layers']}). {EQ18_WORDS}"
+        f"layer (mean layers {listed(found.crossings.mean(axis=0) + 1.0)} of {SETTINGS['layers']}; "
+        f"{SETTINGS['layers'] + 1} stands for a joint that does not fall). {EQ18_WORDS}"
     )
     charts = (reduction_chart("Variance reduction of the branched arms", found, JOINTS),)
     settings = {**SETTINGS, **CROSSED}
