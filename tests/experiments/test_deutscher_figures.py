@@ -14,6 +14,7 @@ from studio.experiments.deutscher_reid import body_sequences, fig_3, fig_7, fig_
 from studio.experiments.deutscher_reid.fewest_particles import Fewest
 from studio.experiments.deutscher_reid.fig_8 import CONDENSATION, LARGE, ONE_LAYER, terminal_failure
 from studio.experiments.deutscher_reid.setting import share_number, succeeded
+from studio.experiments.deutscher_reid.three_cameras import longest_loss
 from studio.experiments.deutscher_reid.true_poses import true_poses
 from studio.experiments.experiment import VERDICTS, Findings, Outcome, Scale, Trial
 from studio.experiments.footage_shelf import FootageShelf
@@ -135,6 +136,11 @@ def test_three_cameras_are_judged_by_the_papers_own_filter(name: str) -> None:
     assert "left arm in 5" in lost.words
     thick = [series for series in good.charts[0].series if not series.thin]
     assert len(thick) == 3
+
+
+def test_the_longest_loss_is_one_limbs_longest_row() -> None:
+    assert longest_loss(run(30.0)) == 0.0
+    assert longest_loss(run(30.0, lost=(3, 4, 5, 9))) == pytest.approx(3 / 60)
 
 
 def test_fig_8_is_reproduced_where_condensation_fails_and_ten_layers_track() -> None:

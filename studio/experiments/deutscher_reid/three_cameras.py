@@ -114,12 +114,14 @@ def concluded(figure: Figure, outcomes: Sequence[Outcome]) -> Findings:
             number(f"{name}: mean error", [run.mean_mm for run in runs], "mm"),
             number(f"{name}: largest frame's mean", [run.worst_mm for run in runs], "mm"),
             number(f"{name}: frames with a limb lost", [_lost_percent(run) for run in runs], "%"),
+            number(f"{name}: longest time with a limb lost", [longest_loss(run) for run in runs], "s"),
         )
     ]
     told = " ".join(
         f"{_described(name)}: {times_in_words([succeeded(run) for run in runs])} succeed, mean "
         f"{np.mean([run.mean_mm for run in runs]):.0f} mm, a limb lost in "
-        f"{np.mean([_lost_percent(run) for run in runs]):.0f} % of the frames{_which(runs)}."
+        f"{np.mean([_lost_percent(run) for run in runs]):.0f} % of the frames{_which(runs)}, for "
+        f"{max(longest_loss(run) for run in runs):.2f} s at most."
         for name, runs in groups.items()
     )
     words = (
@@ -154,6 +156,17 @@ def _described(name: str) -> str:
 
 def _lost_percent(run: Tracked) -> float:
     return 100.0 * run.lost_frames / len(run.frames)
+
+
+def longest_loss(run: Tracked) -> float:
+    """Seconds of the longest row of frames in which one limb is lost."""
+    longest = 0
+    for limb in run.lost_limbs:
+        row = 0
+        for lost in run.lost:
+            row = row + 1 if limb in lost else 0
+            longest = max(longest, row)
+    return longest / FPS
 
 
 def _which(runs: Sequence[Tracked]) -> str:
