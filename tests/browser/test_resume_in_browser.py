@@ -12,7 +12,7 @@ from studio_server import StudioServer
 pytestmark = pytest.mark.browser
 
 RUNS = "/api/sessions/walk/runs"
-FRAMES, SEED = 12, 5
+FRAMES, SEED = 100, 5
 KNOBS = {"occlusion_aware": True, "edge_samples": 128, "start_repeats": 2}
 
 
