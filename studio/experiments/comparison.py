@@ -2,11 +2,11 @@
 evaluations a frame, the same seeds.
 
 A comparison is a plan, its trials (one a tracker and seed, any of them in any process) and what follows from all of
-them: `trials`, `measure`, `conclude`. Trials are those of the experiments, so a kept outcome is used again.
+them: `trials`, `conclude`. Trials are made and measured as those of the experiments are (`tracking_trials`).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,9 +14,9 @@ import numpy as np
 from studio.errors import NotFoundError, RunError, TruthError
 from studio.experiments.entrants import Entrant, Lineup, entrants
 from studio.experiments.experiment import Outcome, Trial
-from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import SignTest, sign_test
-from studio.experiments.tracked import Attempt, track
+from studio.experiments.tracked import Attempt
+from studio.experiments.tracking_trials import tracking_trial
 from studio.runs.new_run import checked_frames, start_pose
 from studio.sessions.session import Session
 from studio.settings import DEFAULT_WEIGHTING
@@ -155,15 +155,10 @@ def plan_comparison(
 def trials(plan: Plan) -> tuple[Trial, ...]:
     """One a tracker and seed; every tracker's first seed first, so that an early look compares them all."""
     return tuple(
-        Trial(f"{entrant.name}, seed {seed}", _attempt(plan, entrant, seed).plain())
+        tracking_trial(entrant.name, _attempt(plan, entrant, seed))
         for seed in plan.seeds
         for entrant in plan.entrants
     )
-
-
-def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
-    """Track one trial: the fields of `Tracked`."""
-    return asdict(track(Attempt.of_plain(arguments), shelf))
 
 
 def conclude(plan: Plan, outcomes: Sequence[Outcome]) -> Comparison:

@@ -13,11 +13,12 @@ from typing import Any
 import msgspec
 
 from studio.errors import NotFoundError, SessionError
-from studio.experiments.comparison import Comparison, Plan, conclude, measure, trials
+from studio.experiments.comparison import Comparison, Plan, conclude, trials
 from studio.experiments.comparison_findings import document, findings, frames_csv
 from studio.experiments.experiment import Experiment, Scale, Trial
 from studio.experiments.findings_document import Making, as_document
 from studio.experiments.kept_trials import KeptTrials, measured_by, plain
+from studio.experiments.tracking_trials import measure_tracking
 from studio.sessions import atomic_files
 from studio.sessions.manifest import check_schema, now, readable_json
 from studio.sessions.process_lock import ProcessLock
@@ -155,7 +156,7 @@ def _findings_document(comparison: Comparison) -> dict[str, Any]:
         source=f"{plan.evaluations} evaluations a frame",
         claim="",
         trials=lambda _: trials(plan),
-        measure=measure,
+        measure=measure_tracking,
         conclude=lambda outcomes: findings(conclude(plan, outcomes)),
     )
     seconds = sum(result.seconds for result in comparison.trackers)

@@ -17,7 +17,7 @@ from studio.evaluation.errors import evaluate, rows_of_frames
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.experiments.footage_shelf import FootageShelf
 from studio.geometry.camera import Camera
-from studio.runs.search_space import default_sigma, search_space
+from studio.runs.search_space import search_space, session_sigma
 from studio.runs.tracking_run import start_of
 from studio.sessions.session import Session
 from studio.settings import changed_settings, default_settings
@@ -112,7 +112,7 @@ def track(
     subject = read_subject(session.path / attempt.subject) if attempt.subject else None
     body = session.body(attempt.body or None, subject)
     fps = session.manifest.fps
-    space = search_space(body, _sigma(session, body, fps / attempt.every) * attempt.sigma_scale)
+    space = search_space(body, session_sigma(session, body, fps / attempt.every) * attempt.sigma_scale)
     settings = changed_settings(default_settings(attempt.tracker, attempt.weighting), attempt.changes)
     weighting = WEIGHTINGS[attempt.weighting]
     cameras = _cameras(session, attempt.cameras)
@@ -167,12 +167,6 @@ def measured(
         evaluations=evaluations,
         seconds=round(seconds, 4),
     )
-
-
-def _sigma(session: Session, body: BodyModel, fps: float) -> Array:
-    """(D,) σ0 at a frame rate: the session's own, else half of the body's largest step."""
-    own = session.sigma(fps, body)
-    return default_sigma(body, fps) if own is None else own
 
 
 def _cameras(session: Session, names: tuple[str, ...]) -> tuple[Camera, ...]:

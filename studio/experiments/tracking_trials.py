@@ -6,7 +6,7 @@ runs from several sides share them.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from studio.experiments.tracked import Attempt, Tracked, track
 from studio.tracking.evaluations import knobs_for_evaluations
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,12 +52,17 @@ def group_of(trial: Trial) -> str:
     return trial.label.rpartition(", seed ")[0]
 
 
+def grouped(outcomes: Sequence[Outcome], made: Callable[..., T]) -> dict[str, list[T]]:
+    """What was measured, by group in the order of the trials, seeds in order. made : from the plain fields."""
+    found: dict[str, list[T]] = {}
+    for outcome in outcomes:
+        found.setdefault(group_of(outcome.trial), []).append(made(**outcome.measured))
+    return found
+
+
 def by_group(outcomes: Sequence[Outcome]) -> dict[str, list[Tracked]]:
     """What was tracked, by group in the order of the trials, seeds in order."""
-    found: dict[str, list[Tracked]] = {}
-    for outcome in outcomes:
-        found.setdefault(group_of(outcome.trial), []).append(Tracked(**outcome.measured))
-    return found
+    return grouped(outcomes, Tracked)
 
 
 def curves(
@@ -88,8 +94,7 @@ def error_rows(runs: Sequence[Tracked]) -> Array:
 def summary_table(title: str, groups: Mapping[str, Sequence[Tracked]]) -> Table:
     """A line a group: error, worst frame, lost limbs, time."""
     columns = (
-        "setting", "seeds", "evaluations a frame", "mean (mm)", "highest seed (mm)", "mean of worst frames "
-        "(mm)",
+        "setting", "seeds", "evaluations a frame", "mean (mm)", "highest seed (mm)", "mean of worst frames (mm)",
         "largest (mm)", "frames with a limb lost (%)", "runs without loss", "search (ms a frame)",
     )  # fmt: skip
     rows = []

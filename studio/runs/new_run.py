@@ -17,7 +17,7 @@ from studio.body.branches import within_limits
 from studio.body.model import BodyModel
 from studio.body.subject import Subject
 from studio.errors import BodyError, RunError
-from studio.runs.search_space import default_sigma, parameter_names
+from studio.runs.search_space import parameter_names, session_sigma
 from studio.sessions.manifest import now
 from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session, free_run_name
@@ -64,7 +64,6 @@ def prepare_run(session: Session, request: RunRequest | None = None) -> StoredRu
         raise RunError(f"The seed {asked.seed} cannot be used.", "Give a whole number of 0 or more.")
     body, notes = session.body_with_notes(asked.body or None, asked.subject)
     start, source = start_pose(session, body, asked.start_pose, asked.start_source)
-    sigma = session.sigma(session.manifest.fps, body)
     record = RunRecord(
         name=asked.name or free_run_name(session),
         session=session.name,
@@ -79,9 +78,7 @@ def prepare_run(session: Session, request: RunRequest | None = None) -> StoredRu
         last=last,
         fps=session.manifest.fps,
         settings=dict(values(settings)),
-        sigma=tuple(
-            float(value) for value in (default_sigma(body, session.manifest.fps) if sigma is None else sigma)
-        ),
+        sigma=tuple(float(value) for value in session_sigma(session, body, session.manifest.fps)),
         start_pose=None if start is None else tuple(float(value) for value in start),
         start_source=source,
         software=software_version(),

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from studio.body.model import BodyModel
 from studio.runs.hierarchy import hierarchy_of
+from studio.sessions.session import Session
 from studio.tracking.tracker import SearchSpace
 
 Array = NDArray[np.float64]
@@ -19,6 +20,12 @@ def default_sigma(body: BodyModel, fps: float) -> Array:
     The paper gives the value as the diagonal of a covariance; it is read as a standard deviation.
     """
     return np.array([SHARE_OF_MAX_STEP * entry.max_step / fps for entry in body.parameters])
+
+
+def session_sigma(session: Session, body: BodyModel, fps: float) -> Array:
+    """(D,) σ0 from frame to frame at `fps`: the session's own, else the body's default."""
+    own = session.sigma(fps, body)
+    return default_sigma(body, fps) if own is None else own
 
 
 def search_space(body: BodyModel, sigma: Array) -> SearchSpace:

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from studio.errors import RunError
-from studio.experiments.comparison import Comparison, Plan, conclude, measure, trials
+from studio.experiments.comparison import Comparison, Plan, conclude, trials
 from studio.experiments.experiment import Outcome, Trial
 from studio.experiments.kept_comparison import KeptComparison, trial_key
 from studio.experiments.kept_trials import KeptOutcome, measured_by, plain
 from studio.experiments.reproduction_plan import TrialJob
+from studio.experiments.tracking_trials import measure_tracking
 from studio.sessions.manifest import now
 from studio.sessions.session import Session
 from studio.worker.trial_pool import run_jobs
@@ -82,7 +83,7 @@ def _run(
             experiment="comparison",
             label=trial.label,
             arguments=plain(trial.arguments),
-            measure=measure,
+            measure=measure_tracking,
             footage=(work.plan.footage,),
             frames=None,
             alone=False,

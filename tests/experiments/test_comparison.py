@@ -15,7 +15,6 @@ from studio.experiments.comparison import (
     Plan,
     conclude,
     mean_curve,
-    measure,
     plan_comparison,
     trials,
 )
@@ -23,6 +22,7 @@ from studio.experiments.comparison_findings import document, findings, frames_cs
 from studio.experiments.entrants import Lineup, read_assignments
 from studio.experiments.experiment import Outcome
 from studio.experiments.footage_shelf import FootageShelf
+from studio.experiments.tracking_trials import measure_tracking
 from studio.sessions.session import Session
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -66,8 +66,8 @@ def test_a_trial_tracks_the_session_with_its_own_seed() -> None:
     shelf = FootageShelf(Path("nowhere"))
     try:
         (trial,) = trials(drawn)
-        found = measure(json.loads(json.dumps(dict(trial.arguments))), shelf)
-        again = measure(trial.arguments, shelf)
+        found = measure_tracking(json.loads(json.dumps(dict(trial.arguments))), shelf)
+        again = measure_tracking(trial.arguments, shelf)
     finally:
         shelf.close()
     assert found["evaluations"] == 200
@@ -154,7 +154,7 @@ def test_the_improved_filter_keeps_every_limb_on_the_bundled_walk() -> None:
     drawn = plan_comparison(Session(WALK), Lineup(("improvements",), "", 2000), tuple(range(10)))
     shelf = FootageShelf(Path("nowhere"))
     try:
-        outcomes = [Outcome(trial, measure(trial.arguments, shelf)) for trial in trials(drawn)]
+        outcomes = [Outcome(trial, measure_tracking(trial.arguments, shelf)) for trial in trials(drawn)]
     finally:
         shelf.close()
     comparison = conclude(drawn, outcomes)

@@ -14,12 +14,12 @@ from studio.experiments.deutscher_reid.arm_sequences import (
     SETTINGS,
     SLOW_RATE,
     SURVIVALS,
-    found_by_group,
     group,
 )
 from studio.experiments.deutscher_reid.fewest_particles import (
     bars,
     censored_in_words,
+    found_by_group,
     needed,
     per_seed,
     saving,

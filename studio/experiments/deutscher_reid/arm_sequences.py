@@ -6,7 +6,7 @@ swings as in the studio's footage of arms, up to 90° a second; σ0 is half of t
 to the next (3.1); tracking is successful while no joint or tip is ever more than LOST_MM off, a quarter of a link.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import marker_points
 from studio.experiments.deutscher_reid.arms import TemplateArm, template_arm
-from studio.experiments.deutscher_reid.fewest_particles import Fewest, fewest, sizes
+from studio.experiments.deutscher_reid.fewest_particles import fewest, sizes
 from studio.experiments.deutscher_reid.setting import annealing_as_ten
-from studio.experiments.experiment import Outcome, Scale, Trial
+from studio.experiments.experiment import Scale, Trial
 from studio.experiments.footage_shelf import FootageShelf
-from studio.experiments.tracking_trials import group_of
 from studio.runs.search_space import default_sigma, search_space
 from studio.runs.tracking_run import start_of
 from studio.synthesis.arm_footage import arm_motion
@@ -130,11 +129,3 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
         return is_tracked(sequence, settings, 1000 * seed + run)
 
     return fewest(succeeds, arguments["sizes"], arguments["runs"]).plain()
-
-
-def found_by_group(outcomes: Sequence[Outcome]) -> dict[str, list[Fewest]]:
-    """What was found, by group in the order of the trials, seeds in order."""
-    found: dict[str, list[Fewest]] = {}
-    for outcome in outcomes:
-        found.setdefault(group_of(outcome.trial), []).append(Fewest(**outcome.measured))
-    return found

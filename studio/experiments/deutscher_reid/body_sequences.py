@@ -5,15 +5,14 @@ The paper does not say on which footage its factor of 4 was seen (6.3). Every se
 pose laid on the true markers; success is that of `setting`: every frame below 100 mm, no limb lost.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
-from studio.experiments.deutscher_reid.fewest_particles import Fewest, fewest, sizes
+from studio.experiments.deutscher_reid.fewest_particles import fewest, sizes
 from studio.experiments.deutscher_reid.setting import CIRCLE, WEIGHTING, succeeded
-from studio.experiments.experiment import Outcome, Scale, Trial
+from studio.experiments.experiment import Scale, Trial
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.tracked import Attempt, track
-from studio.experiments.tracking_trials import group_of
 
 FRAMES, FOOTAGE_FRAMES = 40, 240
 # From one seed's first frame to the next one's; no multiple of a stride, so that each begins with another posture.
@@ -66,11 +65,3 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
         return succeeded(track(attempt, shelf))
 
     return fewest(succeeds, arguments["sizes"], arguments["runs"]).plain()
-
-
-def found_by_group(outcomes: Sequence[Outcome]) -> dict[str, list[Fewest]]:
-    """What was found, by filter in the order of the trials, seeds in order."""
-    found: dict[str, list[Fewest]] = {}
-    for outcome in outcomes:
-        found.setdefault(group_of(outcome.trial), []).append(Fewest(**outcome.measured))
-    return found

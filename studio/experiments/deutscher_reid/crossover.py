@@ -18,13 +18,13 @@ from studio.experiments.deutscher_reid.arm_sequences import (
     RATE,
     SETTINGS,
     SURVIVALS,
-    found_by_group,
     group,
 )
 from studio.experiments.deutscher_reid.fewest_particles import (
     Fewest,
     bars,
     censored_in_words,
+    found_by_group,
     needed,
     per_seed,
     saving,

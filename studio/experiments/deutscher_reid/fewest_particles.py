@@ -18,8 +18,9 @@ import numpy as np
 
 from studio.experiments.charts import Chart, Series
 from studio.experiments.deutscher_reid.setting import geometric_mean
-from studio.experiments.experiment import Number, Table
+from studio.experiments.experiment import Number, Outcome, Table
 from studio.experiments.statistics import bootstrap_interval, number
+from studio.experiments.tracking_trials import grouped
 
 ABOVE, BELOW = "above", "below"
 
@@ -149,3 +150,8 @@ def per_seed(title: str, groups: Mapping[str, Sequence[Fewest]]) -> Table:
         for name, found in groups.items()
     )
     return Table(title, ("filter", *(f"seed {index}" for index in range(count))), rows)
+
+
+def found_by_group(outcomes: Sequence[Outcome]) -> dict[str, list[Fewest]]:
+    """What was found, by group in the order of the trials, seeds in order."""
+    return grouped(outcomes, Fewest)

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 from studio.experiments.deutscher_reid import body_sequences
-from studio.experiments.deutscher_reid.body_sequences import found_by_group
 from studio.experiments.deutscher_reid.fewest_particles import (
     bars,
     censored_in_words,
+    found_by_group,
     needed,
     per_seed,
     saving,

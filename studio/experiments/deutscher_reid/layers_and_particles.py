@@ -10,10 +10,11 @@ from typing import Any
 
 from studio.experiments.charts import Chart, Series
 from studio.experiments.deutscher_reid import body_sequences
-from studio.experiments.deutscher_reid.body_sequences import FRAMES, first_frame, found_by_group
+from studio.experiments.deutscher_reid.body_sequences import FRAMES, first_frame
 from studio.experiments.deutscher_reid.fewest_particles import (
     bars,
     censored_in_words,
+    found_by_group,
     needed,
     per_seed,
     saving,

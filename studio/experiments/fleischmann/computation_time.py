@@ -18,7 +18,7 @@ from studio.experiments.fleischmann.setting import EVALUATIONS, SOURCE, SWARM, T
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import number
 from studio.runs.problem_source import ProblemSource
-from studio.runs.search_space import default_sigma, search_space
+from studio.runs.search_space import search_space, session_sigma
 from studio.runs.tracking_run import start_of
 from studio.settings import changed_settings, default_settings
 from studio.tracking.catalogue import TRACKERS
@@ -80,8 +80,7 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
     """Milliseconds a frame of every part, means over some frames after the kernels are warm."""
     session = shelf.session(TWIN)
     body, fps = session.body(), session.manifest.fps
-    own = session.sigma(fps, body)
-    space = search_space(body, default_sigma(body, fps) if own is None else own)
+    space = search_space(body, session_sigma(session, body, fps))
     wanted = {**knobs_for_evaluations(SWARM.tracker, EVALUATIONS), **SWARM.changes}
     settings = changed_settings(default_settings(SWARM.tracker, SWARM.weighting), wanted)
     weigher = WEIGHTINGS[SWARM.weighting].prepare(body, session.cameras(), settings.weighting)

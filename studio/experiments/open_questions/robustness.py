@@ -17,7 +17,7 @@ from studio.experiments.fleischmann.setting import EQ13, EVALUATIONS, IMPROVED, 
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.open_questions.damage import DAMAGES
 from studio.experiments.tracked import Attempt, Tracked, track
-from studio.experiments.tracking_trials import Contender, group_of
+from studio.experiments.tracking_trials import Contender, by_group
 
 EIGHT = "eight-cameras"
 FRAMES, QUICK_FRAMES = 90, 30
@@ -152,9 +152,7 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
 
 def conclude_of(question: Question, outcomes: Sequence[Outcome]) -> Findings:
     """The heat maps of error and of losses, and up to which degree each contender stands."""
-    cells: dict[str, list[Tracked]] = {}
-    for outcome in outcomes:
-        cells.setdefault(group_of(outcome.trial), []).append(Tracked(**outcome.measured))
+    cells = by_group(outcomes)
     errors = {
         entry.name: [_mean_error(cells[group(entry, question, degree)]) for degree in question.degrees]
         for entry in CONTENDERS
