@@ -1,0 +1,1 @@
+"""What a body tends to do: clusters of elementary movements, and an automaton over them."""

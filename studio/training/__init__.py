@@ -1,0 +1,1 @@
+"""Behaviour models out of recorded motion: reading, retargeting, oversampling, learning."""
