@@ -8,6 +8,7 @@ open (twists of straight limbs).
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +65,13 @@ def pose_from_markers(
         if error < EXACT:
             break
     return problem.unwound(best), error
+
+
+def known_markers(body: BodyModel, names: Sequence[str]) -> tuple[list[int], tuple[str, ...]]:
+    """Which of `names` are markers of the body: their places in `names`, and these names."""
+    known = {marker.name for marker in body.markers}
+    places = [place for place, name in enumerate(names) if name in known]
+    return places, tuple(names[place] for place in places)
 
 
 class _MarkerProblem:

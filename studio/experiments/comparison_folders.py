@@ -12,8 +12,9 @@ from studio.experiments.kept_comparison import RECORD_NAME, ComparisonRecord, Ke
 from studio.experiments.kept_trials import plain
 from studio.runs.new_run import software_version
 from studio.sessions import atomic_files
-from studio.sessions.manifest import now, readable_json
+from studio.sessions.manifest import now
 from studio.sessions.names import checked_name, free_name, inside, is_name
+from studio.sessions.record_files import write_record
 from studio.sessions.session import Session
 from studio.sessions.workspace import TRASH_NAME, Workspace
 
@@ -25,7 +26,7 @@ def new_comparison(folder: Path, plan: Plan) -> KeptComparison:
     record = ComparisonRecord(name=folder.name, created=now(), software=software_version(), plan=plan)
     made = atomic_files.new_folder_beside(folder)
     try:
-        atomic_files.write_bytes(made / RECORD_NAME, readable_json(record))
+        write_record(made / RECORD_NAME, record)
         atomic_files.move_into_place(made, folder)
     except FileExistsError:
         raise SessionError(

@@ -12,7 +12,6 @@ from typing import Any
 
 import msgspec
 
-from studio.errors import NotFoundError, SessionError
 from studio.experiments.comparison import Comparison, Plan, conclude, trials
 from studio.experiments.comparison_findings import document, findings, frames_csv
 from studio.experiments.experiment import Experiment, Scale, Trial
@@ -20,8 +19,9 @@ from studio.experiments.findings_document import Making, as_document
 from studio.experiments.kept_trials import KeptTrials, measured_by, plain
 from studio.experiments.tracking_trials import measure_tracking
 from studio.sessions import atomic_files
-from studio.sessions.manifest import check_schema, now, readable_json
+from studio.sessions.manifest import now
 from studio.sessions.process_lock import ProcessLock
+from studio.sessions.record_files import read_record, write_record
 from studio.sessions.session import Session
 from studio.typed_decoding import decode_json
 
@@ -63,18 +63,14 @@ class KeptComparison:
 
     def record(self) -> ComparisonRecord:
         """What was asked. Raises NotFoundError where there is nothing, SessionError where it cannot be read."""
-        path = self.folder / RECORD_NAME
-        try:
-            content = path.read_bytes()
-        except (FileNotFoundError, NotADirectoryError):
-            raise NotFoundError(
-                f"There is no comparison '{self.name}'.", "Start one with 'studio compare'."
-            ) from None
-        check_schema(content, path, SCHEMA_VERSION)
-        try:
-            return decode_json(content, ComparisonRecord)
-        except (msgspec.DecodeError, UnicodeDecodeError) as error:
-            raise SessionError(f"'{path}' is no comparison's record: {error}.", "Start a new one.") from None
+        return read_record(
+            self.folder / RECORD_NAME,
+            ComparisonRecord,
+            SCHEMA_VERSION,
+            missing=(f"There is no comparison '{self.name}'.", "Start one with 'studio compare'."),
+            what="a comparison's record",
+            remedy="Start a new one.",
+        )
 
     def plan(self, session: Session | None = None) -> Plan:
         """What was asked; of the session where it lies now, if one is given."""
@@ -110,7 +106,7 @@ class KeptComparison:
     def end(self, how: str, problem: str = "") -> None:
         """Write down that it was broken off ("cancelled", "failed") or goes on ("")."""
         ended = msgspec.structs.replace(self.record(), ended=how, problem=problem)
-        atomic_files.write_bytes(self.folder / RECORD_NAME, readable_json(ended))
+        write_record(self.folder / RECORD_NAME, ended)
 
     def finish(self, comparison: Comparison) -> None:
         """Write the result, the frames first, so that whoever sees a result finds both."""

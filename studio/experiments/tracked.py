@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.body.inverse_kinematics import pose_from_markers
+from studio.body.inverse_kinematics import known_markers, pose_from_markers
 from studio.body.model import BodyModel
 from studio.body.subject import read_subject
 from studio.capture.trc import read_trc
@@ -196,8 +196,6 @@ def _pose_on_truth(session: Session, body: BodyModel, frame: int, fps: float, ne
     rows = rows_of_frames(truth, fps)
     if frame not in rows:
         raise TruthError(f"The truth has no row for frame {frame}.", "Start at a frame that it has.")
-    known = {marker.name for marker in body.markers}
-    kept = [index for index, name in enumerate(truth.names) if name in known]
-    names = tuple(truth.names[index] for index in kept)
+    kept, names = known_markers(body, truth.names)
     points = truth.positions[rows[frame], kept]
     return pose_from_markers(body, names, points, body.neutral if near is None else near)[0]

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.body.inverse_kinematics import pose_from_markers
+from studio.body.inverse_kinematics import known_markers, pose_from_markers
 from studio.body.model import BodyModel
 from studio.capture.trc import read_trc
 from studio.errors import RunError, TruthError
@@ -38,13 +38,13 @@ def start_pose_from_file(path: Path, body: BodyModel, frame: int, fps: float) ->
             f"'{path.name}' has no row for frame {frame} at {fps:g} frames per second.",
             f"Its rows are frames {rows.min()} to {rows.max()}.",
         )
-    known = {marker.name for marker in body.markers}
     points = motion.positions[found[0]]
-    kept = [at for at, name in enumerate(motion.names) if name in known and np.isfinite(points[at]).all()]
+    kept = [at for at in known_markers(body, motion.names)[0] if np.isfinite(points[at]).all()]
     if len(kept) < FEWEST_MARKERS:
+        known = ", ".join(sorted(marker.name for marker in body.markers)) or "the body has no markers"
         raise TruthError(
             f"'{path.name}' has {len(kept)} markers that body '{body.name}' knows in frame {frame}.",
-            f"Name at least {FEWEST_MARKERS} of: {', '.join(sorted(known)) or 'the body has no markers'}.",
+            f"Name at least {FEWEST_MARKERS} of: {known}.",
         )
     names = tuple(motion.names[at] for at in kept)
     pose, error = pose_from_markers(body, names, points[kept], body.neutral)

@@ -11,9 +11,7 @@ from pathlib import Path
 import msgspec
 
 from studio.capture.footage_source import FootageSource
-from studio.errors import NotFoundError, SessionError
-from studio.sessions.atomic_files import write_bytes
-from studio.typed_decoding import decode_json
+from studio.sessions.record_files import read_record, write_record
 
 SCHEMA_VERSION = 1
 FILE_NAME = "session.json"
@@ -73,52 +71,19 @@ def read_manifest(session_folder: Path) -> SessionManifest:
 
     Raises NotFoundError where there is none, SessionError where it cannot be understood.
     """
-    path = session_folder / FILE_NAME
-    try:
-        content = path.read_bytes()
-    except (FileNotFoundError, NotADirectoryError):
-        raise NotFoundError(
+    return read_record(
+        session_folder / FILE_NAME,
+        SessionManifest,
+        SCHEMA_VERSION,
+        missing=(
             f"There is no session in '{session_folder}'.",
             "Make one with 'studio import SOURCE --into SESSION'.",
-        ) from None
-    except OSError as error:
-        raise SessionError(
-            f"'{path}' cannot be read ({error.strerror}).", "Check the folder's permissions."
-        ) from None
-    check_schema(content, path, SCHEMA_VERSION)
-    try:
-        return decode_json(content, SessionManifest)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise SessionError(
-            f"'{path}' is not a session's manifest: {error}.",
-            "Import the session again, or correct the entry.",
-        ) from None
+        ),
+        what="a session's manifest",
+        remedy="Import the session again, or correct the entry.",
+    )
 
 
 def write_manifest(session_folder: Path, manifest: SessionManifest) -> None:
     """Write `session.json` in one step."""
-    write_bytes(session_folder / FILE_NAME, readable_json(manifest))
-
-
-def readable_json(record: msgspec.Struct) -> bytes:
-    """A record as indented JSON that ends with a line break."""
-    return msgspec.json.format(msgspec.json.encode(record), indent=2) + b"\n"
-
-
-class _SchemaOnly(msgspec.Struct):
-    schema: int = SCHEMA_VERSION
-
-
-def check_schema(content: bytes, path: Path, known: int) -> None:
-    """Raises SessionError if the record was written by a newer studio."""
-    try:
-        found = decode_json(content, _SchemaOnly).schema
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise SessionError(
-            f"'{path}' cannot be read: {error}.", "Put back a copy of the file, or import the session again."
-        ) from None
-    if found > known:
-        raise SessionError(
-            f"'{path}' has schema version {found}, this studio knows versions up to {known}.",
-            "Open it with a newer studio.",
-        )
+    write_record(session_folder / FILE_NAME, manifest)

@@ -9,10 +9,7 @@ from pathlib import Path
 
 import msgspec
 
-from studio.errors import NotFoundError, SessionError
-from studio.sessions.atomic_files import write_bytes
-from studio.sessions.manifest import check_schema, readable_json
-from studio.typed_decoding import decode_json
+from studio.sessions.record_files import read_record, write_record
 
 Value = bool | int | float | str
 
@@ -63,24 +60,16 @@ def read_run_record(run_folder: Path) -> RunRecord:
 
     Raises NotFoundError where there is none, SessionError where it cannot be understood.
     """
-    path = run_folder / FILE_NAME
-    try:
-        content = path.read_bytes()
-    except (FileNotFoundError, NotADirectoryError):
-        raise NotFoundError(
-            f"There is no run '{run_folder.name}'.", "List the runs with 'studio runs'."
-        ) from None
-    except OSError as error:
-        raise SessionError(
-            f"'{path}' cannot be read ({error.strerror}).", "Check the folder's permissions."
-        ) from None
-    check_schema(content, path, SCHEMA_VERSION)
-    try:
-        return decode_json(content, RunRecord)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise SessionError(f"'{path}' is not a run's record: {error}.", "Start a new run.") from None
+    return read_record(
+        run_folder / FILE_NAME,
+        RunRecord,
+        SCHEMA_VERSION,
+        missing=(f"There is no run '{run_folder.name}'.", "List the runs with 'studio runs'."),
+        what="a run's record",
+        remedy="Start a new run.",
+    )
 
 
 def write_run_record(run_folder: Path, record: RunRecord) -> None:
     """Write `run.json` in one step."""
-    write_bytes(run_folder / FILE_NAME, readable_json(record))
+    write_record(run_folder / FILE_NAME, record)

@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from studio.body.catalogue import load_body
-from studio.body.inverse_kinematics import pose_from_markers
+from studio.body.inverse_kinematics import known_markers, pose_from_markers
 from studio.body.subject import Subject, fit_subject, write_subject
 from studio.capture.calibration_files import read_calibration, write_calibration
 from studio.capture.trc import MarkerMotion, write_trc
@@ -169,9 +169,8 @@ def _write_start_pose(
     truth).
     """
     body, _ = fit_subject(load_body(recipe.body), subject)
-    known = {marker.name for marker in body.markers}
-    kept = [index for index, name in enumerate(truth.names) if name in known]
+    kept, names = known_markers(body, truth.names)
     points = truth.positions[0, kept]
     points = points + rng.normal(0.0, recipe.include.start_pose_noise_mm, points.shape)
-    pose, _ = pose_from_markers(body, tuple(truth.names[index] for index in kept), points, body.neutral)
+    pose, _ = pose_from_markers(body, names, points, body.neutral)
     write_pose(path, tuple(entry.name for entry in body.parameters), pose)

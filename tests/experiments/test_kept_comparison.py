@@ -131,5 +131,5 @@ def test_the_trash_gives_it_back(walk: Session, kept: KeptComparison) -> None:
 
 def test_a_damaged_record_is_told_in_words(kept: KeptComparison) -> None:
     (kept.folder / "comparison.json").write_text('{"schema": 1, "name": 3}')
-    with pytest.raises(SessionError, match="no comparison's record"):
+    with pytest.raises(SessionError, match="not a comparison's record"):
         kept.record()

@@ -8,7 +8,7 @@ import pytest
 
 from studio.experiments.catalogue import EXPERIMENTS
 from studio.experiments.experiment import VERDICTS, Experiment, Findings, Outcome, Scale, Trial
-from studio.experiments.fleischmann.figs_4_5 import spells
+from studio.experiments.lost_limbs import spells
 from studio.experiments.tracked import Attempt, Tracked
 from studio.experiments.tracking_trials import by_group, curves, group_of, tracking_trial
 
@@ -129,11 +129,11 @@ def test_partitions_ask_that_soft_is_better_than_all_but_three_stages() -> None:
 def test_spells_are_rows_of_frames_with_a_limb_lost() -> None:
     (trial, *_) = EXPERIMENTS["fleischmann-fig-3"].trials(SCALE)
     run = Tracked(**made(trial, 40.0, lost=(3, 4, 5, 9, 448, 449)).measured)
-    found = spells(run, 50.0)
-    assert [(spell.limb, spell.milliseconds, spell.found_again) for spell in found] == [
-        ("left arm", 60.0, True),
-        ("left arm", 20.0, True),
-        ("left arm", 40.0, False),
+    found = spells(run.lost)
+    assert [(spell.limb, spell.frames, spell.found_again) for spell in found] == [
+        ("left arm", 3, True),
+        ("left arm", 1, True),
+        ("left arm", 2, False),
     ]
 
 

@@ -32,6 +32,7 @@ from studio.experiments.deutscher_reid.setting import (
     times_in_words,
 )
 from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Trial
+from studio.experiments.lost_limbs import spells
 from studio.experiments.statistics import number
 from studio.experiments.tracked import Attempt, Tracked
 from studio.experiments.tracking_trials import (
@@ -160,13 +161,7 @@ def _lost_percent(run: Tracked) -> float:
 
 def longest_loss(run: Tracked) -> float:
     """Seconds of the longest row of frames in which one limb is lost."""
-    longest = 0
-    for limb in run.lost_limbs:
-        row = 0
-        for lost in run.lost:
-            row = row + 1 if limb in lost else 0
-            longest = max(longest, row)
-    return longest / FPS
+    return max((spell.frames for spell in spells(run.lost)), default=0) / FPS
 
 
 def _which(runs: Sequence[Tracked]) -> str:

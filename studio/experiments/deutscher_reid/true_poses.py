@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.body.inverse_kinematics import pose_from_markers
+from studio.body.inverse_kinematics import known_markers, pose_from_markers
 from studio.body.model import BodyModel
 from studio.capture.trc import read_trc
 from studio.errors import TruthError
@@ -25,9 +25,7 @@ def true_poses(session: Session, body: BodyModel, frames: list[int]) -> Array:
     missing = [frame for frame in frames if frame not in rows]
     if missing:
         raise TruthError(f"The truth has no row for frame {missing[0]}.", "Take frames that it has.")
-    known = {marker.name for marker in body.markers}
-    kept = [index for index, name in enumerate(truth.names) if name in known]
-    names = tuple(truth.names[index] for index in kept)
+    kept, names = known_markers(body, truth.names)
     own = session.start_pose(body) if body.name == session.manifest.body else None
     pose, found = body.neutral if own is None else own, []
     # From the start onwards, so that a heading that has turned far is followed.

@@ -6,7 +6,6 @@ such frames, and it ends well when the limb is found again before the footage en
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,40 +13,15 @@ from studio.experiments.charts import Chart, Series
 from studio.experiments.experiment import Experiment, Findings, Number, Outcome, Table
 from studio.experiments.fleischmann.fig_3 import group, trials
 from studio.experiments.fleischmann.setting import EVALUATIONS, PRIORS, RATES, SOURCE, SWARM
+from studio.experiments.lost_limbs import Spell, spells
 from studio.experiments.statistics import number, overall, ratio_interval
-from studio.experiments.tracked import Tracked
 from studio.experiments.tracking_trials import by_group, claimed_verdict, curves, measure_tracking
-
-
-@dataclass(frozen=True, slots=True)
-class Spell:
-    """A limb lost: how long, and whether it was found again."""
-
-    limb: str
-    milliseconds: float
-    found_again: bool
-
-
-def spells(run: Tracked, fps: float) -> list[Spell]:
-    """All spells of a run, limb by limb."""
-    found: list[Spell] = []
-    for limb in sorted({limb for limbs in run.lost for limb in limbs}):
-        length = 0
-        for limbs in run.lost:
-            if limb in limbs:
-                length += 1
-            elif length:
-                found.append(Spell(limb, 1000.0 * length / fps, True))
-                length = 0
-        if length:
-            found.append(Spell(limb, 1000.0 * length / fps, False))
-    return found
 
 
 def conclude(outcomes: Sequence[Outcome]) -> Findings:
     """How many limbs are lost at either rate, for how long, and how many come back."""
     groups = by_group(outcomes)
-    lost = {fps: [spells(run, fps) for run in groups[group(fps)]] for fps in RATES}
+    lost = {fps: [spells(run.lost) for run in groups[group(fps)]] for fps in RATES}
     share = {fps: [100.0 * run.lost_frames / len(run.frames) for run in groups[group(fps)]] for fps in RATES}
     every = {fps: [spell for run in lost[fps] for spell in run] for fps in RATES}
     again = [float(np.mean([spell.found_again for spell in run])) for run in lost[20] if run]
@@ -82,12 +56,17 @@ def _fewer(fast: list[float], slow: list[float]) -> Number:
     return Number(name, ratio, low, high, "×", None, "lower", len(slow), claimed_verdict(low, high, "lower"))
 
 
+def _milliseconds(spell: Spell, fps: float) -> float:
+    """How long a spell lasts."""
+    return 1000.0 * spell.frames / fps
+
+
 def _words(fps: int, found: list[Spell], runs: int) -> str:
     if not found:
         return f"At {fps} frames a second no limb is lost in {runs} runs."
     back = sum(spell.found_again for spell in found)
-    middle = float(np.median([spell.milliseconds for spell in found]))
-    longest = max(spell.milliseconds for spell in found)
+    middle = float(np.median([_milliseconds(spell, fps) for spell in found]))
+    longest = max(_milliseconds(spell, fps) for spell in found)
     return (
         f"At {fps} frames a second {len(found) / runs:.1f} spells a run, {back} of {len(found)} end with "
         f"the limb found again; half of them last up to {middle:.0f} ms, the longest {longest:.0f} ms."
@@ -101,9 +80,16 @@ def _table(every: dict[int, list[Spell]]) -> Table:
         for limb, count in sorted(Counter(spell.limb for spell in found).items()):
             of_limb = [spell for spell in found if spell.limb == limb]
             back = sum(spell.found_again for spell in of_limb)
-            middle = float(np.median([spell.milliseconds for spell in of_limb]))
+            middle = float(np.median([_milliseconds(spell, fps) for spell in of_limb]))
             rows.append(
-                (fps, limb, count, back, round(middle), round(max(spell.milliseconds for spell in of_limb)))
+                (
+                    fps,
+                    limb,
+                    count,
+                    back,
+                    round(middle),
+                    round(max(_milliseconds(spell, fps) for spell in of_limb)),
+                )
             )
     columns = ("frames a second", "limb", "spells, all runs", "found again", "median (ms)", "longest (ms)")
     return Table("Limbs lost", columns, tuple(rows))
