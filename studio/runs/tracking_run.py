@@ -103,6 +103,7 @@ class TrackingRun:
             settings_version=int(numbers[1]),
             evaluations=int(numbers[2]),
             milliseconds=float(numbers[3]),
+            expected=partial.state.get("search_expected"),
         )
         self._search = self._new_search(partial.frame, state)
         self._layers = self._reader.layers(partial.frame)
@@ -157,6 +158,8 @@ class TrackingRun:
         assert state.particles is not None
         numbers = [state.layer_count, state.settings_version, state.evaluations, state.milliseconds]
         arrays = particle_arrays(state.particles) | {"search_numbers": np.array(numbers, dtype=np.float64)}
+        if state.expected is not None:
+            arrays["search_expected"] = state.expected
         self._writer.write_partial(self.next_frame, state.layers_done, arrays, self._layers)
         self._saved = True
 

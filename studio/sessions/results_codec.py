@@ -6,6 +6,7 @@ few entries.
 """
 
 import io
+import math
 
 import numpy as np
 import zstandard
@@ -65,6 +66,7 @@ def pack_layer(record: LayerRecord, particles: int | None = None) -> bytes:
                     record.alpha_reached,
                     record.best_log_weight,
                     record.milliseconds,
+                    record.model_free_share,
                 ],
                 dtype=np.float64,
             ),
@@ -103,6 +105,8 @@ def unpack_layer(blob: bytes) -> LayerRecord:
         poses=arrays["poses"],
         log_weights=arrays["log_weights"],
         milliseconds=float(numbers[7]),
+        # Layers stored before there were behaviour models end here.
+        model_free_share=float(numbers[8]) if len(numbers) > 8 else math.nan,
     )
 
 
@@ -149,13 +153,16 @@ def carried_arrays(carried: Carried) -> dict[str, Array]:
         arrays["previous_estimate"] = carried.previous_estimate
     if carried.particles is not None:
         arrays.update(particle_arrays(carried.particles))
+    arrays.update({f"memory_{name}": values for name, values in carried.memory.items()})
     return arrays
 
 
 def carried_from(arrays: dict[str, Array]) -> Carried:
     """The inverse of `carried_arrays`."""
     particles = particles_from(arrays) if "set_poses" in arrays else None
-    return Carried(particles, arrays.get("estimate"), arrays.get("previous_estimate"))
+    return Carried(
+        particles, arrays.get("estimate"), arrays.get("previous_estimate"), _with_prefix(arrays, "memory_")
+    )
 
 
 def particle_arrays(particles: ParticleSet) -> dict[str, Array]:
@@ -171,7 +178,9 @@ def particle_arrays(particles: ParticleSet) -> dict[str, Array]:
 
 def particles_from(arrays: dict[str, Array]) -> ParticleSet:
     """The inverse of `particle_arrays`."""
-    extra = {
-        name.removeprefix("extra_"): values for name, values in arrays.items() if name.startswith("extra_")
-    }
+    extra = _with_prefix(arrays, "extra_")
     return ParticleSet(arrays["set_poses"], arrays["set_log_weights"], arrays["set_raw_log_weights"], extra)
+
+
+def _with_prefix(arrays: dict[str, Array], prefix: str) -> dict[str, Array]:
+    return {name.removeprefix(prefix): values for name, values in arrays.items() if name.startswith(prefix)}

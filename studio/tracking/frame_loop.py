@@ -8,8 +8,8 @@ settings, wherever it was interrupted.
 
 import dataclasses
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,9 @@ import numpy as np
 from studio.errors import RunError
 from studio.knobs import knobs_of
 from studio.tracking.tracker import (
+    Array,
     Carried,
+    Foreseeing,
     FrameProblem,
     FrameResult,
     LayerRecord,
@@ -26,6 +28,7 @@ from studio.tracking.tracker import (
     Tracker,
     generator,
 )
+from studio.weighting.problem import Expectant
 
 # The version of the settings and the tracker's own settings, as they are at this moment.
 SettingsSource = Callable[[], tuple[int, Any]]
@@ -39,7 +42,8 @@ class SearchState:
     particles : the set that the next layer weighs (None before the first; the last search's weighted set
     where a repeat begins, or at the end). settings : read when the search began; its "next frame" knobs hold
     until the search ends. settings_version : of the settings used last. evaluations : poses weighed.
-    milliseconds : time of the layers.
+    milliseconds : time of the layers. expected : (S, D) where this search expected the body before it began (None
+    before the first layer). memory : what the weighting learnt in this frame, once all layers are done.
     """
 
     layers_done: int = 0
@@ -49,6 +53,8 @@ class SearchState:
     settings_version: int = 0
     evaluations: int = 0
     milliseconds: float = 0.0
+    expected: Array | None = None
+    memory: Mapping[str, Array] = field(default_factory=dict)
 
 
 class FrameSearch:
@@ -72,6 +78,12 @@ class FrameSearch:
         self.tracker, self.previous, self.space = tracker, previous, space
         self.seed, self.frame, self.repeats = seed, frame, repeats
         self.state = state or SearchState()
+        self._prepared: tuple[FrameProblem, int, FrameProblem] | None = None
+
+    @property
+    def problem(self) -> FrameProblem | None:
+        """What the last layer done by this object was weighed with, told what the search expected; None before."""
+        return None if self._prepared is None else self._prepared[2]
 
     @property
     def finished(self) -> bool:
@@ -92,19 +104,27 @@ class FrameSearch:
         in_use = held_over(settings, held)
         count = self.tracker.layer_count(in_use)
         repeat, layer = divmod(state.layers_done, count)
-        particles = self._beginning(repeat, in_use) if layer == 0 else state.particles
+        particles, expected = state.particles, state.expected
+        if layer == 0:
+            particles = self._beginning(repeat, in_use)
+            expected = self._expected(particles, in_use)
         assert particles is not None
+        told = problem if expected is None else self._told(problem, repeat, expected)
         rng = generator(self.seed, self.frame, state.layers_done)
-        following, record = self.tracker.step_layer(rng, particles, layer, problem, self.space, in_use)
+        following, record = self.tracker.step_layer(rng, particles, layer, told, self.space, in_use)
+        is_last = state.layers_done + 1 == self.repeats * count
+        memory = self._remembered(told, following, in_use) if is_last else {}
         milliseconds = 1000.0 * (time.perf_counter() - began)
         self.state = SearchState(
-            state.layers_done + 1,
-            count,
-            following,
-            held,
-            version,
-            state.evaluations + len(record.poses),
-            state.milliseconds + milliseconds,
+            layers_done=state.layers_done + 1,
+            layer_count=count,
+            particles=following,
+            settings=held,
+            settings_version=version,
+            evaluations=state.evaluations + len(record.poses),
+            milliseconds=state.milliseconds + milliseconds,
+            expected=expected,
+            memory=memory,
         )
         return dataclasses.replace(
             record,
@@ -131,7 +151,7 @@ class FrameSearch:
             evaluations=state.evaluations,
             settings_version=state.settings_version,
             milliseconds=state.milliseconds,
-            carried=Carried(state.particles, estimate.pose, self.previous.estimate),
+            carried=Carried(state.particles, estimate.pose, self.previous.estimate, state.memory),
         )
 
     def _beginning(self, repeat: int, settings: Any) -> ParticleSet:  # noqa: ANN401
@@ -139,6 +159,33 @@ class FrameSearch:
         rng = beginning_generator(self.seed, self.frame, repeat)
         start = self.previous if repeat == 0 else Carried(self.state.particles)
         return self.tracker.begin_frame(rng, start, self.space, settings)
+
+    def _expected(self, particles: ParticleSet, settings: Any) -> Array:  # noqa: ANN401
+        """(S, D) where a search that begins with these particles expects the body: what the tracker says, else their
+        mean, and beside either the pose that was reported last, if there is one.
+        """
+        if isinstance(self.tracker, Foreseeing):
+            poses = self.tracker.expectations(particles, self.space, settings)
+        else:
+            poses = particles.poses.mean(axis=0)[None]
+        last = self.previous.estimate
+        return poses if last is None else np.concatenate([poses, last[None]])
+
+    def _told(self, problem: FrameProblem, repeat: int, expected: Array) -> FrameProblem:
+        """The problem, told once a search what is expected, if it wants to know."""
+        kept = self._prepared
+        if kept is None or kept[0] is not problem or kept[1] != repeat:
+            told = problem
+            if isinstance(problem, Expectant):
+                told = problem.expecting(expected, self.previous.memory)
+            kept = self._prepared = (problem, repeat, told)
+        return kept[2]
+
+    def _remembered(self, told: FrameProblem, particles: ParticleSet, settings: Any) -> Mapping[str, Array]:  # noqa: ANN401
+        """What the weighting hands to the next frame, having seen this one's estimate."""
+        if not isinstance(told, Expectant):
+            return self.previous.memory
+        return told.remembered(self.tracker.end_frame(particles, self.space, settings).pose)
 
 
 def search_frame(

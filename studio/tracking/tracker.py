@@ -5,13 +5,18 @@ function with another argument. A swarm's iteration, a filter's annealing level 
 are all "layers", counted from 0 in the order they are run (the paper's layer m of M is our layer M - m).
 """
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from studio.weighting.problem import WHOLE_BODY
+
+if TYPE_CHECKING:
+    from studio.behaviour.model import BehaviourModel
 
 Array = NDArray[np.float64]
 
@@ -39,6 +44,7 @@ class SearchSpace:
     names : D parameter names. lower, upper : (D,) limits, ±inf where unbounded. sigma : (D,) σ0, the standard
     deviation of the diffusion from one frame to the next (mm, rad). limb : (D,) int, equal numbers belong to
     one limb and are neighbours (crossover by whole limbs). hierarchy : the body's tree (a swarm's partitions).
+    behaviour : what the body tends to do, at the footage's rate; None where a run has no model.
     """
 
     names: tuple[str, ...]
@@ -47,6 +53,7 @@ class SearchSpace:
     sigma: Array
     limb: NDArray[np.int64]
     hierarchy: Hierarchy
+    behaviour: "BehaviourModel | None" = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,12 +77,14 @@ class Carried:
 
     particles : the weighted set at the end of the frame; None = start uniformly over the space's limits.
     estimate, previous_estimate : (D,) the last two reported poses (dynamics, Eq. 10); None where there is
-    none yet.
+    none yet. memory : what the weighting learnt so far (`weighting.problem.Expectant`), which trackers hand on
+    unread.
     """
 
     particles: ParticleSet | None
     estimate: Array | None = None
     previous_estimate: Array | None = None
+    memory: Mapping[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +107,8 @@ class LayerRecord:
     it was weighed, after resampling (before noise), and after noise (Fig. 12 a/d, b/e, c/f). In a frame's
     last layer nothing is diffused: variance_diffused equals variance_resampled. best, mean : (D,) best
     particle, weighted mean. best_log_weight : raw log w of the best. poses : (N, D) the set as weighed.
-    log_weights : (N,) raw log w, before β. milliseconds : time of the layer.
+    log_weights : (N,) raw log w, before β. milliseconds : time of the layer. model_free_share : of a frame's first
+    layer, how many of its particles were moved without the behaviour model; NaN where none guides them.
     """
 
     frame: int
@@ -116,6 +126,7 @@ class LayerRecord:
     poses: Array
     log_weights: Array
     milliseconds: float
+    model_free_share: float = math.nan
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -198,6 +209,15 @@ class Tracker(Protocol):
 
     def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: Any) -> Estimate:  # noqa: ANN401
         """The pose that is reported, from the last layer's weighted set."""
+        ...
+
+
+@runtime_checkable
+class Foreseeing(Protocol):
+    """A tracker that can say where it expects the body in several places at once (motion clusters, say)."""
+
+    def expectations(self, particles: ParticleSet, space: SearchSpace, settings: Any) -> Array:  # noqa: ANN401
+        """(S, D) expected poses, the likeliest first, from the unweighted set that the first layer will weigh."""
         ...
 
 
