@@ -68,6 +68,7 @@ def layer_summary(record: LayerRecord) -> dict[str, object]:
         "beta": record.beta,
         "alpha_wanted": record.alpha_wanted,
         "alpha_reached": record.alpha_reached,
+        "model_free_share": record.model_free_share,
         "variance_weighed": record.variance_weighed,
         "variance_resampled": record.variance_resampled,
         "variance_diffused": record.variance_diffused,

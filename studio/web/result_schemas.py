@@ -46,6 +46,9 @@ class LayerView(Answer):
     beta: Number
     alpha_wanted: Number
     alpha_reached: Number
+    model_free_share: Number = Field(
+        None, description="Of a frame's first layer: particles moved without the behaviour model."
+    )
     variance_weighed: Numbers
     variance_resampled: Numbers
     variance_diffused: Numbers
