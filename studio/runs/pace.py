@@ -1,6 +1,7 @@
 """How fast a run goes and how long it will take, measured over its last frames."""
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 REMEMBERED = 30
@@ -20,16 +21,17 @@ class Pace:
     """Remembers how long the last frames took. Time spent paused is never told to it."""
 
     def __init__(self) -> None:
-        self._seconds: deque[float] = deque(maxlen=REMEMBERED)
+        self._frames: deque[tuple[float, ...]] = deque(maxlen=REMEMBERED)
 
-    def add(self, seconds: float) -> None:
-        """Note that a frame took so long, evidence and storing included."""
-        self._seconds.append(seconds)
+    def add(self, layers: Sequence[float]) -> None:
+        """Note how many seconds each layer of a frame took, evidence and storing included."""
+        self._frames.append(tuple(layers))
 
-    def progress(self, done: int, total: int) -> Progress:
-        """The estimate, from the mean of the last frames."""
-        spent = sum(self._seconds)
+    def progress(self, done: int, total: int, least: float = 0.0) -> Progress:
+        """The estimate, from the mean of the last frames. least : seconds that a layer is made to take from now
+        on."""
+        spent = sum(max(seconds, least) for layers in self._frames for seconds in layers)
         if spent <= 0.0:
             return Progress(done, total, float("nan"), float("nan"))
-        rate = len(self._seconds) / spent
+        rate = len(self._frames) / spent
         return Progress(done, total, rate, (total - done) / rate)

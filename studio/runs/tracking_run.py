@@ -84,7 +84,7 @@ class TrackingRun:
         self._carried: tuple[int, Carried] | None = None
         self._search: FrameSearch | None = None
         self._layers: list[LayerRecord] = []
-        self._spent = 0.0
+        self._spent: list[float] = []
         self._saved = True
         self._take_up_partial()
 
@@ -137,10 +137,10 @@ class TrackingRun:
         if result is not None:
             self._writer.write_frame(result, self._layers, settings.recording.record_particles)
             self._next(result)
-        self._spent += time.perf_counter() - began
+        self._spent.append(time.perf_counter() - began)
         if result is not None:
             self._pace.add(self._spent)
-            self._spent = 0.0
+            self._spent = []
         return Stepped(record, result, settings if is_new else None)
 
     def _next(self, result: FrameResult) -> None:
@@ -178,9 +178,9 @@ class TrackingRun:
         """ "cancelled" if a person ended the run, else ""."""
         return self._reader.ended()
 
-    def progress(self) -> Progress:
-        """How far the run got and how long the rest will take."""
-        return self._pace.progress(self.done, self.record.frame_count)
+    def progress(self, least: float = 0.0) -> Progress:
+        """How far the run got and how long the rest will take. least : seconds that a layer is made to take."""
+        return self._pace.progress(self.done, self.record.frame_count, least)
 
     # ----------------------------------------------------------------- settings
 

@@ -107,3 +107,14 @@ class ChangeSettings(Command):
     """
 
     changes: dict[str, bool | int | float | str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class SetPace(Command):
+    """Let each layer of a run that is tracked take at least so many seconds, 0 to 10; 0 : as fast as it can.
+
+    For watching only: no result changes, no run records it; it holds until the process ends, and a restart brings
+    it back. Steps and re-annealing are not slowed, and every command is served while a layer's time runs.
+    """
+
+    seconds_a_layer: float = 0.0

@@ -129,17 +129,19 @@ class StudioControl:
     def restart(self, resume: bool = True) -> None:
         """Start the process again and open the run that was open; runs that waited wait again.
 
-        resume : track on if it was tracking. Settings that were changed and not yet in use are changed again.
-        Raises StudioError if the run cannot be opened.
+        resume : track on if it was tracking. Settings that were changed and not yet in use are changed again, and
+        the search goes at the pace that it had. Raises StudioError if the run cannot be opened.
         """
         with self._lock:
             said, changes, old = self._said, dict(self._changes), self._process
             self._process = None
-            self._said = self._state = nothing_open()
+            self._said = self._state = nothing_open(said.seconds_a_layer)
             self._changes.clear()
         if old is not None:
             old.end(0.0)
         self.start()
+        if said.seconds_a_layer:
+            self.request(commands.SetPace(seconds_a_layer=said.seconds_a_layer))
         place = self._places.get((said.session, said.run))
         if place is not None:
             self.request(commands.Open(session=place[0], run=place[1]))
@@ -242,9 +244,10 @@ class _Answer:
         self.arrived.set()
 
 
-def nothing_open() -> StateChanged:
+def nothing_open(seconds_a_layer: float = 0.0) -> StateChanged:
     """The state of a process with no run open."""
-    return StateChanged("", "", "idle", 0, 0, 0, 0, 0, math.nan, math.nan)
+    nothing = (0, 0, 0, 0, 0, math.nan, math.nan)
+    return StateChanged("", "", "idle", *nothing, seconds_a_layer=seconds_a_layer)
 
 
 def _refusal(event: Acknowledged) -> StudioError:

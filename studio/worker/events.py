@@ -25,7 +25,8 @@ class StateChanged(Event):
     frame, layer : where the search stands. first, last : frames of the run, half open. done : frames
     finished. frames_per_second and seconds_left : measured, NaN while unknown. message, hint : for failed and
     lost. waiting : (session, run) names of the runs that are tracked after this one. selected : the frame
-    that re-anneal works on, -1 for none.
+    that re-anneal works on, -1 for none. seconds_a_layer : what each tracked layer takes at least, 0 as fast as
+    it can (`commands.SetPace`); both estimates hold for this pace.
     """
 
     state: str
@@ -40,6 +41,7 @@ class StateChanged(Event):
     hint: str = ""
     waiting: tuple[tuple[str, str], ...] = ()
     selected: int = -1
+    seconds_a_layer: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

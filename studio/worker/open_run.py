@@ -14,12 +14,16 @@ from studio.sessions.run_log import append_to_log
 from studio.sessions.session import Session
 from studio.worker.settings_mailbox import SettingsMailbox
 
+PAUSED, FINISHED = "paused", "finished"
 VIEW_THREADS = 2
 """Cameras of a frame that are decoded and masked at once."""
 
 
 class OpenRun:
-    """One run, opened for tracking. Closing it saves it whole and frees its memory."""
+    """One run, opened for tracking. Closing it saves it whole and frees its memory.
+
+    keep_answer : the question's answer becomes the run's own. ask_again : ask once more with newer settings.
+    """
 
     def __init__(self, session_folder: str, run_folder: str) -> None:
         self.session = Session(Path(session_folder))
@@ -44,6 +48,7 @@ class OpenRun:
         self.tracking.settings_source = self.mailbox.latest
         self.selected = -1
         self.question: Reannealing | None = None
+        self.keep_answer = self.ask_again = False
 
     @property
     def session_name(self) -> str:
@@ -59,6 +64,11 @@ class OpenRun:
     def weighting(self) -> str:
         """Name of the weighting, whose kernels compile when they are first used."""
         return self.stored.record.weighting
+
+    @property
+    def resting(self) -> str:
+        """The state of the run while nothing is done to it: finished, cancelled or paused."""
+        return FINISHED if self.tracking.finished else self.tracking.ended or PAUSED
 
     def warm_up(self) -> None:
         """Weigh one pose, so that what has to be compiled is compiled before a frame's time is taken."""
@@ -93,6 +103,10 @@ class OpenRun:
         version, settings = self.mailbox.latest()
         self.question = Reannealing(self.tracking, target, version, settings)
         return target
+
+    def drop_question(self) -> None:
+        """Leave what is being asked unanswered."""
+        self.question, self.keep_answer, self.ask_again = None, False, False
 
     def select(self, frame: int) -> None:
         """Make `frame` the one that questions are about. Raises NotFoundError if it cannot be annealed

@@ -55,10 +55,13 @@ def run_process(inbox: Connection, outbox: Connection) -> None:
 
 
 def _loop(job: TrackingJob, inbox: Connection) -> None:
-    """Serve every command that waits, then do a layer if there is one to do."""
+    """Serve every command that waits, then do a layer if there is one to do.
+
+    While a run is watched at a pace, the time that is left of its last layer is spent listening.
+    """
     while not job.stopped:
         try:
-            while inbox.poll(0.0 if job.busy else WAIT_SECONDS):
+            while inbox.poll(job.rest if job.busy else WAIT_SECONDS):
                 command: Command = inbox.recv()
                 job.serve(command)
                 if job.stopped:

@@ -9,33 +9,36 @@ from studio.knobs import Value
 from studio.settings import RunSettings, values
 from studio.worker.events import Event, LogLine, SettingsApplied, StateChanged
 from studio.worker.open_run import OpenRun
+from studio.worker.search_pace import SearchPace
+from studio.worker.waiting_runs import WaitingRuns
 
 IDLE = "idle"
 
 
 class Reporter:
-    """Makes events of what happened and posts them; `post` never waits."""
+    """Makes events of what happened and posts them; `post` never waits.
 
-    def __init__(self, post: Callable[[Event], None]) -> None:
+    pace : how slowly the search goes. waiting : the runs to come.
+    """
+
+    def __init__(self, post: Callable[[Event], None], pace: SearchPace, waiting: WaitingRuns) -> None:
         self.post = post
         self.state_name = IDLE
+        self._pace, self._waiting = pace, waiting
+        self._words = ("", "")
         self._values: dict[str, Value] = {}
 
-    def state(
-        self,
-        run: OpenRun | None,
-        name: str,
-        waiting: tuple[tuple[str, str], ...] = (),
-        message: str = "",
-        hint: str = "",
-    ) -> None:
-        """Say where the search stands. waiting : names of the sessions and runs to come."""
-        self.state_name = name
+    def state(self, run: OpenRun | None, name: str, message: str = "", hint: str = "") -> None:
+        """Say where the search stands."""
+        self.state_name, self._words = name, (message, hint)
+        pace, waiting = self._pace.seconds_a_layer, self._waiting.names
         if run is None:
-            self.post(StateChanged("", "", name, 0, 0, 0, 0, 0, math.nan, math.nan, message, hint, waiting))
+            nothing = (0, 0, 0, 0, 0, math.nan, math.nan)
+            said = StateChanged("", "", name, *nothing, message, hint, waiting, seconds_a_layer=pace)
+            self.post(said)
             return
         tracking, record = run.tracking, run.stored.record
-        progress = tracking.progress()
+        progress = tracking.progress(pace)
         question = run.question
         self.post(
             StateChanged(
@@ -52,8 +55,13 @@ class Reporter:
                 hint=hint,
                 waiting=waiting,
                 selected=run.selected,
+                seconds_a_layer=pace,
             )
         )
+
+    def state_again(self, run: OpenRun | None) -> None:
+        """Say the same state with what is new beside it; the reason why a run failed stays."""
+        self.state(run, self.state_name, *self._words)
 
     def settings(self, run: OpenRun, version: int, settings: RunSettings, frame: int, layer: int) -> None:
         """Say which settings are in use since (frame, layer), and which of them differ from those said
@@ -72,3 +80,8 @@ class Reporter:
 def names_of(run: OpenRun | None) -> tuple[str, str]:
     """Names of session and run, empty where none is open."""
     return (run.session_name, run.run_name) if run is not None else ("", "")
+
+
+def unforeseen(error: Exception) -> str:
+    """A fault of the program in one sentence."""
+    return f"The tracking process met a fault it does not know: {type(error).__name__}: {error}."

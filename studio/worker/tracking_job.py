@@ -6,6 +6,7 @@ between two layers of a frame. Everything that is to be known comes out as event
 
 import contextlib
 import math
+import time
 import traceback
 from collections.abc import Callable
 from pathlib import Path
@@ -14,25 +15,27 @@ from typing import Any
 from studio.errors import RunError, StudioError
 from studio.worker import commands
 from studio.worker.events import Acknowledged, Event, FrameFinished, LayerFinished
-from studio.worker.open_run import OpenRun
-from studio.worker.reporter import IDLE, Reporter, names_of
+from studio.worker.open_run import FINISHED, PAUSED, OpenRun
+from studio.worker.reporter import IDLE, Reporter, names_of, unforeseen
+from studio.worker.search_pace import SearchPace
+from studio.worker.waiting_runs import WaitingRuns
 
-COMPILING, TRACKING, PAUSED, REANNEALING = "compiling", "tracking", "paused", "reannealing"
-FINISHED, CANCELLED, FAILED = "finished", "cancelled", "failed"
+COMPILING, TRACKING, REANNEALING = "compiling", "tracking", "reannealing"
+CANCELLED, FAILED = "cancelled", "failed"
 RUN_ON, TO_FRAME_END, ONE_LAYER = "run on", "to the frame's end", "one layer"
 
 
 class TrackingJob:
-    """The process's work. post : takes each event; it never waits."""
+    """The process's work. post : takes each event; it never waits. clock : seconds, rising."""
 
-    def __init__(self, post: Callable[[Event], None]) -> None:
+    def __init__(self, post: Callable[[Event], None], clock: Callable[[], float] = time.monotonic) -> None:
         self.stopped = False
-        self._say = Reporter(post)
+        self._pace = SearchPace(clock)
+        self._waiting = WaitingRuns()
+        self._say = Reporter(post, self._pace, self._waiting)
         self._run: OpenRun | None = None
         self._goal = RUN_ON
         self._asked_at = math.nan
-        self._keep_answer = self._ask_again = False
-        self._waiting: list[tuple[str, str]] = []
         self._compiled: set[str] = set()
         self._actions: dict[type[commands.Command], Callable[[Any], None]] = {
             commands.Open: lambda asked: self._open(asked.session, asked.run),
@@ -46,6 +49,7 @@ class TrackingJob:
             commands.Reanneal: self._reanneal,
             commands.Cancel: self._cancel,
             commands.ChangeSettings: self._change_settings,
+            commands.SetPace: self._set_pace,
             commands.Close: self._let_go,
             commands.Stop: self._stop,
         }
@@ -54,6 +58,15 @@ class TrackingJob:
     def busy(self) -> bool:
         """Whether `advance` has something to do."""
         return self._run is not None and (self._tracking or self._run.question is not None)
+
+    @property
+    def rest(self) -> float:
+        """Seconds until `advance` is due: what is left of a layer's time while a run is watched at a pace.
+
+        Steps and re-annealing are never held back.
+        """
+        asked = self._run is not None and self._run.question is not None
+        return 0.0 if asked or self._goal != RUN_ON else self._pace.left
 
     @property
     def _tracking(self) -> bool:
@@ -68,7 +81,7 @@ class TrackingJob:
             refusal = (error.message, error.hint, error.code)
         except Exception as error:
             self._say.log(self._run, "error", traceback.format_exc())
-            refusal = (_unforeseen(error), "See the log.", "fault")
+            refusal = (unforeseen(error), "See the log.", "fault")
         told = (command.identifier, type(command).__name__, not refusal[2])
         self._say.post(Acknowledged(*names_of(self._run), *told, *refusal))
 
@@ -87,7 +100,7 @@ class TrackingJob:
             self._fail(run, error.message, error.hint)
         except Exception as error:
             self._say.log(run, "error", traceback.format_exc())
-            self._fail(run, _unforeseen(error), "See the log; 'start' tries the frame again.")
+            self._fail(run, unforeseen(error), "See the log; 'start' tries the frame again.")
 
     def close(self) -> None:
         """Save and close the open run."""
@@ -110,6 +123,7 @@ class TrackingJob:
         self._compiled.add(run.weighting)
 
     def _advance_tracking(self, run: OpenRun) -> None:
+        self._pace.begin()
         stepped = run.step_layer()
         record, result = stepped.record, stepped.result
         if stepped.applied is not None:
@@ -136,23 +150,23 @@ class TrackingJob:
         self._say.post(LayerFinished(*names_of(run), record, True, self._asked_at))
         if not question.finished:
             return
-        result, kept = question.result(), self._keep_answer
+        result, kept = question.result(), run.keep_answer
         if kept:
             question.keep()
-        run.question, self._keep_answer = None, False
+        run.question, run.keep_answer = None, False
         self._say.post(FrameFinished(*names_of(run), result, not kept))
-        if self._ask_again:
-            self._ask_again = False
+        if run.ask_again:
+            run.ask_again = False
             run.ask(question.frame)
         else:
-            self._state(self._resting(run))
+            self._state(run.resting)
 
     # ------------------------------------------------------------------ commands
 
     def _open(self, session: str, run_folder: str) -> None:
         opened = self._run
         if opened is not None and opened.stored.folder == Path(run_folder).resolve():
-            self._state(self._say.state_name)
+            self._say.state_again(self._run)
             return
         # The new one is opened before the old one is let go, so that a refusal changes nothing.
         following = OpenRun(session, run_folder)
@@ -161,7 +175,7 @@ class TrackingJob:
         version, settings = following.mailbox.latest()
         entry = following.tracking.history.entries[-1]
         self._say.settings(following, version, settings, entry.frame, entry.layer)
-        self._state(self._resting(following))
+        self._state(following.resting)
 
     def _enqueue(self, asked: commands.Enqueue) -> None:
         place, run = (asked.session, asked.run), self._run
@@ -171,22 +185,18 @@ class TrackingJob:
             return
         if run is not None and run.stored.folder == Path(asked.run).resolve():
             raise RunError(f"Run '{run.run_name}' is being tracked already.", "Wait for its end.")
-        if place not in self._waiting:
-            self._waiting.append(place)
+        self._waiting.add(place)
         self._state(TRACKING)
 
     def _dequeue(self, asked: commands.Dequeue) -> None:
-        place = (asked.session, asked.run)
-        if place not in self._waiting:
-            raise RunError(f"Run '{Path(asked.run).name}' does not wait.", "Cancel it if it is tracked.")
-        self._waiting.remove(place)
-        self._state(self._say.state_name)
+        self._waiting.remove((asked.session, asked.run))
+        self._say.state_again(self._run)
 
     def _begin(self, goal: str, asked_at: float = math.nan) -> None:
         run = self._opened()
         if run.tracking.finished:
             raise RunError(f"Run '{run.run_name}' has no frame left.", "Re-anneal one, or start a new run.")
-        self._drop_question(run)
+        run.drop_question()
         run.tracking.mark_going_on()
         self._goal, self._asked_at = goal, asked_at if goal == ONE_LAYER else math.nan
         if goal == RUN_ON:
@@ -195,26 +205,30 @@ class TrackingJob:
 
     def _pause(self, _: commands.Pause) -> None:
         run = self._opened()
-        self._drop_question(run)
+        run.drop_question()
         if self._say.state_name in (TRACKING, REANNEALING):
             self._settle(run)
 
     def _seek(self, asked: commands.Seek) -> None:
         self._opened().select(asked.frame)
-        self._state(self._say.state_name)
+        self._say.state_again(self._run)
+
+    def _set_pace(self, asked: commands.SetPace) -> None:
+        self._pace.set(asked.seconds_a_layer)
+        self._say.state_again(self._run)
 
     def _reanneal(self, asked: commands.Reanneal) -> None:
         run = self._opened()
         run.selected = run.ask(asked.frame)
         run.tracking.save()
-        self._keep_answer, self._ask_again, self._asked_at = asked.keep, False, asked.asked_at
+        run.keep_answer, run.ask_again, self._asked_at = asked.keep, False, asked.asked_at
         self._state(REANNEALING)
 
     def _cancel(self, _: commands.Cancel) -> None:
         run = self._opened()
         if run.tracking.finished:
             raise RunError(f"Run '{run.run_name}' is finished.", "Delete it if it is not wanted.")
-        self._drop_question(run)
+        run.drop_question()
         run.tracking.mark_cancelled()
         self._say.log(run, "info", f"Cancelled at frame {run.tracking.next_frame}.")
         self._state(CANCELLED)
@@ -235,7 +249,7 @@ class TrackingJob:
             self._state(REANNEALING)
         else:
             # The answer on its way is let out first: a slider that is dragged would else never show one.
-            self._ask_again = True
+            run.ask_again = True
 
     def _let_go(self, _: commands.Close) -> None:
         if self._tracking:
@@ -254,36 +268,27 @@ class TrackingJob:
             raise RunError("No run is open.", "Open one, or start a new one.")
         return self._run
 
-    def _drop_question(self, run: OpenRun) -> None:
-        run.question, self._ask_again, self._keep_answer = None, False, False
-
     def _settle(self, run: OpenRun) -> None:
         """Stop where the search stands, saved whole."""
         run.tracking.save()
-        self._state(self._resting(run))
-
-    def _resting(self, run: OpenRun) -> str:
-        if run.tracking.finished:
-            return FINISHED
-        return run.tracking.ended or PAUSED
+        self._state(run.resting)
 
     def _begin_waiting(self) -> None:
         """Track the first of those that wait that can be tracked."""
-        while self._waiting:
-            session, run = self._waiting.pop(0)
+        while (place := self._waiting.next()) is not None:
             try:
-                self._open(session, run)
+                self._open(*place)
                 self._begin(RUN_ON)
                 return
             except StudioError as error:
-                self._say.log(self._run, "error", f"Run '{Path(run).name}' could not start: {error}")
+                self._say.log(self._run, "error", f"Run '{Path(place[1]).name}' could not start: {error}")
 
     def _fail(self, run: OpenRun, message: str, hint: str) -> None:
         """Say that the layer could not be done; the search stands before it, and what is stored stays."""
         self._say.log(run, "error", f"{message} {hint}".strip())
         if run.question is not None:
-            self._drop_question(run)
-            self._state(self._resting(run), message, hint)
+            run.drop_question()
+            self._state(run.resting, message, hint)
             return
         with contextlib.suppress(StudioError):
             run.tracking.save()
@@ -291,10 +296,4 @@ class TrackingJob:
         self._begin_waiting()
 
     def _state(self, name: str, message: str = "", hint: str = "") -> None:
-        waiting = tuple((Path(session).name, Path(run).name) for session, run in self._waiting)
-        self._say.state(self._run, name, waiting, message, hint)
-
-
-def _unforeseen(error: Exception) -> str:
-    """A fault of the program in one sentence."""
-    return f"The tracking process met a fault it does not know: {type(error).__name__}: {error}."
+        self._say.state(self._run, name, message, hint)

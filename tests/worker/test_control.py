@@ -252,3 +252,19 @@ def test_the_process_ends_when_the_server_is_killed(session_on_disk: Session) ->
     server.wait()
     server.stdout.close()
     process.wait(PATIENCE)
+
+
+def test_the_pace_comes_back_with_the_process(control: StudioControl) -> None:
+    watching = control.subscribe()
+    control.request(commands.SetPace(seconds_a_layer=0.2))
+    wait_for(watching, lambda event: isinstance(event, StateChanged) and event.seconds_a_layer == 0.2)
+    first = control.process_identifier
+    psutil.Process(first).kill()
+    wait_for(watching, in_state("lost"))
+    control.restart()
+    again = wait_for(watching, in_state("idle"))
+    assert isinstance(again, StateChanged)
+    assert again.seconds_a_layer == control.state.seconds_a_layer == 0.2
+    assert control.process_identifier != first
+    with pytest.raises(SettingsError, match="-1 seconds"):
+        control.request(commands.SetPace(seconds_a_layer=-1.0))
