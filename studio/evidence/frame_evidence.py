@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.evidence.yuv_background import YuvBackground
+
 Bytes = NDArray[np.uint8]
 
 
@@ -14,12 +16,15 @@ class ViewEvidence:
 
     picture : (H, W, 3) uint8 BGR. mask : (H, W) uint8, 0 background, 255 foreground.
     edges : (H, W) uint8 edge proximity map, 255 = on an edge (Eq. 14's p = edges / 255).
+    background : the camera's empty view where the hull is to be carved from pixels; None: from the mask. A view
+    with a background may come with a mask that is all 0, because nobody asked for one.
     """
 
     camera: str
     picture: Bytes
     mask: Bytes
     edges: Bytes
+    background: YuvBackground | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,13 +6,11 @@ for half a millisecond's work each or more: on a machine whose cores are all bus
 say) waiting for a second thread to be scheduled can take longer than all of a layer's weights.
 """
 
-import threading
 from collections.abc import Callable
 
 import numba
 
-# Numba's plain thread pool aborts the process when two Python threads launch parallel kernels at once.
-_ONE_LAUNCH = threading.Lock()
+from studio.parallel_launch import ONE_LAUNCH
 
 
 def run_blocks(
@@ -26,5 +24,5 @@ def run_blocks(
     if threads <= 1:
         chunk(0, blocks, *arguments)
         return
-    with _ONE_LAUNCH:
+    with ONE_LAUNCH:
         everything(threads, *arguments)

@@ -1,0 +1,74 @@
+"""The background as a full Gaussian in YUV for each pixel, with a second one for shadow (Caillette et al. 2007, 6.1).
+
+Y = 0.299 R + 0.587 G + 0.114 B, U = 0.492 (B - Y), V = 0.877 (R - Y), not rounded. The shadow's Gaussian has the
+same covariance and a mean whose Y is 10 % lower; of the two that one is taken whose mean luminance is nearer to
+the pixel's (the paper: "a simple test on the luminance"). The paper sums "Mahalanobis distances d_M" and compares
+them with a χ² threshold of 3 degrees of freedom a pixel: that is the distribution of the *squared* distance, which
+is what is computed here.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Bytes = NDArray[np.uint8]
+Floats = NDArray[np.float32]
+
+SHADOW = 0.1
+"""Share of the luminance that a shadow takes away."""
+LEAST_NOISE = 4.0
+"""Grey levels: the smallest standard deviation of a pixel in any direction of BGR."""
+LUMINANCE = np.array([0.114, 0.587, 0.299])
+"""Of B, G and R."""
+YUV_OF_BGR: Array = np.stack(
+    [LUMINANCE, 0.492 * (np.array([1.0, 0, 0]) - LUMINANCE), 0.877 * (np.array([0, 0, 1.0]) - LUMINANCE)]
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class YuvBackground:
+    """One camera's empty view. mean : (H, W, 3) float32 YUV. precision : (H, W, 3, 3) float32, inverse covariance."""
+
+    mean: Floats
+    precision: Floats
+
+    def packed(self) -> Floats:
+        """(H W, 9) float32 for the kernels: the mean, then precision 00, 11, 22, 01, 02, 12."""
+        p = self.precision
+        parts = (p[..., 0, 0], p[..., 1, 1], p[..., 2, 2], p[..., 0, 1], p[..., 0, 2], p[..., 1, 2])
+        rows = np.concatenate([self.mean, np.stack(parts, axis=-1)], axis=-1)
+        return np.ascontiguousarray(rows.reshape(-1, 9), dtype=np.float32)
+
+    def squared_distances(self, picture: Bytes, shadow: float = SHADOW) -> Array:
+        """(H, W) squared Mahalanobis distance of each pixel of a BGR picture from background or shadow."""
+        seen = picture @ YUV_OF_BGR.T
+        mean = self.mean.astype(np.float64)
+        in_shadow = seen[..., 0] < (1.0 - 0.5 * shadow) * mean[..., 0]
+        mean[..., 0] *= np.where(in_shadow, 1.0 - shadow, 1.0)
+        away = seen - mean
+        return np.einsum("hwi,hwij,hwj->hw", away, self.precision, away)
+
+
+def learn_background(pictures: Sequence[Bytes], least_noise: float = LEAST_NOISE) -> YuvBackground:
+    """The Gaussian of each pixel of an empty clip, or of a plate (one picture).
+
+    pictures : (H, W, 3) uint8 BGR each, at least one. least_noise : grey levels; no direction of BGR has a smaller
+    standard deviation, so a plate, or a pixel that never changes, has a covariance that can be inverted.
+    """
+    height, width = pictures[0].shape[:2]
+    total = np.zeros((height, width, 3))
+    products = np.zeros((height, width, 3, 3))
+    for picture in pictures:
+        level = picture.astype(np.float64)
+        total += level
+        products += level[..., :, None] * level[..., None, :]
+    mean = total / len(pictures)
+    covariance = products / len(pictures) - mean[..., :, None] * mean[..., None, :]
+    spread, axes = np.linalg.eigh(covariance)
+    # Where background and noise are linear in the colours so is YUV: the floor may be laid in BGR, where noise is even.
+    axes = np.linalg.inv(YUV_OF_BGR).T @ axes
+    precision = (axes / np.maximum(spread, least_noise**2)[..., None, :]) @ np.swapaxes(axes, -1, -2)
+    return YuvBackground((mean @ YUV_OF_BGR.T).astype(np.float32), precision.astype(np.float32))

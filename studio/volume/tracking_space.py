@@ -1,0 +1,114 @@
+"""The tracking space: the box of the world, standing on the floor, that the cameras watch."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.errors import CalibrationError
+from studio.geometry.camera import Camera
+from studio.geometry.projection import project
+from studio.volume.hull_cameras import radius_limit
+
+Array = NDArray[np.float64]
+
+HEIGHT = 2300.0
+"""mm: a tall person with raised arms."""
+LEVELS = (300.0, 1000.0, 1700.0)
+"""mm above the floor: a place is watched when its knees, hips and head are."""
+GRID = 96
+LEAST_SIDE, MOST_SIDE = 1200.0, 12000.0
+FEWEST_PLACES = 12
+"""Places of the grid that make a space: fewer are a sliver in which nobody stands."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Box:
+    """An upright box of the world. lower, upper : (3,) mm.
+
+    The octree's root is the cube that stands on the middle of the box's floor with `edge` as its side; voxels
+    outside the box are never looked at.
+    """
+
+    lower: Array
+    upper: Array
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite([self.lower, self.upper]).all() and (self.upper > self.lower).all()):
+            raise CalibrationError(
+                f"A tracking space from {self.lower} to {self.upper} mm is empty.",
+                "Give a lower and an upper corner in mm, the upper one greater in x, y and z.",
+            )
+
+    @property
+    def edge(self) -> float:
+        """Side of the octree's cube, mm."""
+        return float((self.upper - self.lower).max())
+
+    @property
+    def corner(self) -> Array:
+        """(3,) the cube's lower corner, mm."""
+        middle = 0.5 * (self.lower[:2] + self.upper[:2])
+        return np.array([*(middle - 0.5 * self.edge), self.lower[2]])
+
+
+def box_of(
+    cameras: Sequence[Camera], *, floor: float = 0.0, height: float = HEIGHT, margin: float = 0.0
+) -> Box:
+    """The space that all cameras watch, or as many as watch the same places.
+
+    floor : height of the floor, mm: nothing below it is looked at. height : of the space, mm. margin : mm added on
+    the four sides. A place counts as watched when knees, hips and head of who stands there are in the picture.
+    Raises CalibrationError where fewer than two cameras (of several) watch a common place.
+    """
+    if not cameras:
+        raise CalibrationError("There is no camera to watch a tracking space.", "Give a calibration.")
+    middle, reach = _surroundings(cameras, floor + 0.5 * height)
+    steps = np.linspace(-reach, reach, GRID)
+    x, y = np.meshgrid(middle[0] + steps, middle[1] + steps, indexing="ij")
+    seeing = np.zeros(x.shape, dtype=np.int64)
+    for camera in cameras:
+        places = np.stack([np.stack([x, y, np.full_like(x, floor + level)], axis=-1) for level in LEVELS])
+        seeing += sees(camera, places).all(axis=0)
+    for least in range(len(cameras), min(len(cameras), 2) - 1, -1):
+        watched = seeing >= least
+        if np.count_nonzero(watched) >= FEWEST_PLACES:
+            break
+    else:
+        raise CalibrationError(
+            "No two cameras watch a common place on the floor.",
+            "Check the calibration's unit and its upward direction, or give the tracking space.",
+        )
+    lower = np.array([x[watched].min(), y[watched].min()])
+    upper = np.array([x[watched].max(), y[watched].max()])
+    half = np.maximum(0.5 * (upper - lower) + margin, 0.5 * LEAST_SIDE)
+    centre = 0.5 * (lower + upper)
+    return Box(np.array([*(centre - half), floor]), np.array([*(centre + half), floor + height]))
+
+
+def sees(camera: Camera, points: Array) -> NDArray[np.bool_]:
+    """Which world points (..., 3) mm lie in the camera's picture.
+
+    Far outside the picture the distortion polynomial folds back into it; such points are not seen.
+    """
+    pixels, depth = project(camera, points)
+    ahead = np.where(depth > 0.0, depth, 1.0)
+    seen = points @ camera.rotation.T + camera.translation
+    radius = (seen[..., 0] ** 2 + seen[..., 1] ** 2) / ahead**2
+    size = np.array([camera.width, camera.height]) - 0.5
+    inside = ((pixels >= -0.5) & (pixels < size)).all(axis=-1)
+    return (depth > 0.0) & (radius <= radius_limit(camera)) & inside
+
+
+def _surroundings(cameras: Sequence[Camera], height: float) -> tuple[Array, float]:
+    """The point (2,) that the optical axes pass nearest to, and how far around it to look, mm."""
+    axes = np.stack([camera.rotation[2] for camera in cameras])
+    centres = np.stack([camera.centre for camera in cameras])
+    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    # Parallel axes meet nowhere: a weak pull to the cameras' own middle at the space's height decides then.
+    pull = 1e-3 * np.eye(3)
+    at = np.array([*centres[:, :2].mean(axis=0), height])
+    middle = np.linalg.solve(across.sum(axis=0) + pull, np.einsum("vij,vj->i", across, centres) + pull @ at)
+    distance = np.linalg.norm(centres[:, :2] - middle[:2], axis=1)
+    return middle[:2], float(np.clip(1.2 * distance.max(), 0.5 * LEAST_SIDE, MOST_SIDE))
