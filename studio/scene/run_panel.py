@@ -10,6 +10,7 @@ from studio.errors import StudioError
 from studio.scene.playback import SPEEDS, Playback
 from studio.scene.wishes import Wishes
 from studio.worker.events import StateChanged
+from studio.worker.search_pace import in_words, offered
 
 _TRACK = ("▶ track", "pause", "cancel")
 _STEP = ("layer", "frame", "re-anneal")
@@ -61,6 +62,7 @@ class RunPanel:
         self._span = (0, 1)
         self._frame = 0
         self._playing = False
+        self._pace = 0.0
         self.status = gui.add_html(status_html(None), order=0.0)
         self.progress = gui.add_progress_bar(0.0, visible=False, order=0.1)
         with folder:
@@ -69,6 +71,11 @@ class RunPanel:
             )
             self.one = gui.add_button_group(
                 "step", _STEP, hint="One layer, one frame, or this frame once more."
+            )
+            self.pace = gui.add_dropdown(
+                "search at",
+                tuple(choice.label for choice in offered()),
+                hint="How slowly the search goes, to watch it layer by layer. Steps are not slowed; no result changes.",
             )
             self.move = gui.add_button_group("play", _MOVE, hint="First, back, play or stop, on, last.")
             self.timeline = gui.add_slider("frame", 0, 1, 1, 0, hint="The stored frame that is shown.")
@@ -81,6 +88,7 @@ class RunPanel:
             )
         self.track.on_click(self._track_clicked)
         self.one.on_click(self._step_clicked)
+        self.pace.on_update(self._pace_chosen)
         self.move.on_click(self._move_clicked)
         self.timeline.on_update(self._timeline_moved)
         self.speed.on_update(self._speed_chosen)
@@ -94,6 +102,16 @@ class RunPanel:
         self.progress.visible = bool(state and state.state in ("tracking", "paused", "compiling"))
         self.progress.animated = bool(state and state.state in ("tracking", "compiling"))
         self.progress.value = min(100.0, 100.0 * state.done / total) if state else 0.0
+
+    def show_pace(self, seconds_a_layer: float) -> None:
+        """Show how slowly the search goes, without asking for it again."""
+        self._pace = seconds_a_layer
+        options = tuple(choice.label for choice in offered(seconds_a_layer))
+        # The value goes first: options that do not hold it would put the first one in its place, as if chosen.
+        if self.pace.value != in_words(seconds_a_layer):
+            self.pace.value = in_words(seconds_a_layer)
+        if tuple(self.pace.options) != options:
+            self.pace.options = options
 
     def show_stored(self, session: str, run: str, done: int, total: int) -> None:
         """Show how a run stands that the tracking process does not have open (run "" : the session alone)."""
@@ -137,6 +155,17 @@ class RunPanel:
     async def _step_clicked(self, event: viser.GuiEvent) -> None:
         actions = {_STEP[0]: self._wishes.step_layer, _STEP[1]: self._wishes.step_frame}
         self._obey(actions.get(event.target.value, self._transport.reanneal_shown))
+
+    async def _pace_chosen(self, event: viser.GuiEvent) -> None:
+        chosen = {choice.label: choice.seconds_a_layer for choice in offered(self._pace)}
+        seconds = chosen.get(event.target.value, self._pace)
+        if seconds == self._pace:
+            return
+        try:
+            self._wishes.set_pace(seconds)
+        except StudioError as refusal:
+            self._refused(refusal)
+            self.show_pace(self._pace)
 
     async def _move_clicked(self, event: viser.GuiEvent) -> None:
         word = event.target.value

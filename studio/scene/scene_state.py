@@ -181,6 +181,7 @@ class SceneState:
 
     def _show_state(self) -> None:
         state, shown = self._control.state, self.shown
+        self._panel.run.show_pace(state.seconds_a_layer)
         if (
             self.run is None
             or (state.session, state.run) == (shown.session, shown.run)

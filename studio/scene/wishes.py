@@ -99,6 +99,10 @@ class Wishes:
         """Anneal a frame again with the settings in use; the stored answer stays."""
         self._send(commands.Reanneal(frame=frame))
 
+    def set_pace(self, seconds_a_layer: float) -> None:
+        """Let each layer that is tracked take at least so many seconds; 0: as fast as it can."""
+        self._send(commands.SetPace(seconds_a_layer=seconds_a_layer))
+
     def settled(self, event: Event) -> tuple[str, StudioError | None] | None:
         """If the event acknowledges a command sent from here: its identifier and the refusal, None if it
         was taken.

@@ -16,6 +16,7 @@ from studio.sessions.run_log import read_log
 from studio.sessions.stored_run import StoredRun
 from studio.web.doors import Doors, doors_of, let_go
 from studio.web.event_encoding import message_of, plain
+from studio.web.pace_schemas import PaceRequest, PaceView, SpeedView
 from studio.web.schemas import (
     Frame,
     LogEntry,
@@ -33,6 +34,7 @@ from studio.web.schemas import (
 from studio.web.session_routes import OpenSession, trash_entry
 from studio.web.session_views import completed, parameter_views
 from studio.worker import commands
+from studio.worker.search_pace import offered
 
 router = APIRouter(prefix="/api", tags=["runs"])
 
@@ -130,6 +132,23 @@ def restart_worker(doors: Door) -> dict[str, object]:
     """Start the tracking process again after it died, and resume what it tracked."""
     doors.control.restart()
     return plain(message_of(doors.control.state))
+
+
+@router.get("/worker/pace")
+def pace(doors: Door) -> PaceView:
+    """How slowly a search goes that is watched, and the choices that are offered."""
+    seconds = doors.control.state.seconds_a_layer
+    choices = [SpeedView.model_validate(choice) for choice in offered(seconds)]
+    return PaceView(seconds_a_layer=seconds, choices=choices)
+
+
+@router.post("/worker/pace", status_code=202)
+def set_pace(wish: PaceRequest, doors: Door) -> Posted:
+    """Let each tracked layer take at least so many seconds, until the tracking process ends; results stay the same.
+
+    Single steps and re-annealing are not slowed.
+    """
+    return _post(doors, commands.SetPace(seconds_a_layer=wish.seconds_a_layer))
 
 
 @router.post(RUN + "/open", status_code=202)

@@ -3,6 +3,7 @@
 import asyncio
 import math
 from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -16,10 +17,11 @@ from studio.scene.guarded_server import GuardedServer
 from studio.scene.knob_input import knob_value, slider_range
 from studio.scene.pose_editor import PoseEditor
 from studio.scene.presets import PRESETS, offered
-from studio.scene.run_panel import clock, status_html
+from studio.scene.run_panel import RunPanel, Transport, clock, status_html
 from studio.scene.settings_panel import SettingsPanel, SettingsTabs
 from studio.scene.show_panel import ShowPanel
 from studio.scene.view_options import ViewOptions
+from studio.scene.wishes import Wishes
 from studio.settings import all_knobs, changed_settings, default_settings, values
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.settings import AnnealedSettings
@@ -231,6 +233,51 @@ def test_the_pose_editor_speaks_degrees_and_keeps_radians(server: GuardedServer,
     settle(server)
     np.testing.assert_array_equal(editor.pose, pose)
     assert editor.sliders[4].value == pytest.approx(pose[4], abs=0.05)
+
+
+class RunWishes:
+    """What the run's panel asks of the tracking process about its pace."""
+
+    def __init__(self) -> None:
+        self.paces: list[float] = []
+        self.unable: StudioError | None = None
+
+    def set_pace(self, seconds_a_layer: float) -> None:
+        if self.unable is not None:
+            raise self.unable
+        self.paces.append(seconds_a_layer)
+
+
+def choose_pace(panel: RunPanel, label: str) -> None:
+    panel.pace._impl.value = label
+    for callback in panel.pace._impl.update_cb:
+        asyncio.run(callback(SimpleNamespace(target=panel.pace)))
+
+
+def test_the_searchs_pace_is_chosen_and_followed(server: GuardedServer) -> None:
+    wishes, refusals = RunWishes(), []
+    panel = RunPanel(
+        server.gui, server.gui.add_folder("run"), cast(Wishes, wishes), cast(Transport, None), refusals.append
+    )
+    assert panel.pace.options == ("full speed", "10 layers/s", "3 layers/s", "1 layer/s")
+    assert panel.pace.value == "full speed"
+    choose_pace(panel, "3 layers/s")
+    assert wishes.paces == [pytest.approx(1.0 / 3.0)]
+
+    # What the process says is shown and not asked for again, also a speed that is none of the choices.
+    for seconds, words in ((wishes.paces[0], "3 layers/s"), (0.05, "20 layers/s"), (0.0, "full speed")):
+        panel.show_pace(seconds)
+        settle(server)
+        assert panel.pace.value == words
+        assert words in panel.pace.options
+    assert len(panel.pace.options) == 4
+    assert len(wishes.paces) == 1
+
+    # Refused: told, and put back.
+    wishes.unable = RunError("The tracking process has died.", "Resume.")
+    choose_pace(panel, "1 layer/s")
+    assert refusals == [wishes.unable]
+    assert panel.pace.value == "full speed"
 
 
 def test_the_runs_status_in_words() -> None:

@@ -279,8 +279,16 @@ def test_the_state_of_the_process_opens_its_run(workspace: Workspace) -> None:
     control = FakeControl()
     made = SceneStage(workspace, control)
     made.start()
-    control.say(StateChanged("swaying", "run-1", "tracking", 0, 0, 0, 6, 5, 30.0, 0.1))
+    state = StateChanged("swaying", "run-1", "tracking", 0, 0, 0, 6, 5, 30.0, 0.1, seconds_a_layer=0.1)
+    control.say(state)
     until(lambda: made.shown.run == "run-1")
+    director = made._director
+    assert director is not None
+    until(lambda: director.state._panel.run.pace.value == "10 layers/s")
+    director.wishes.set_pace(1.0)
+    (asked,) = control.commands
+    assert isinstance(asked, commands.SetPace)
+    assert asked.seconds_a_layer == 1.0
     made.stop()
 
 

@@ -1,5 +1,7 @@
 """Runs and settings through the API: what reaches the tracking process, and what is refused before."""
 
+import dataclasses
+
 import pytest
 from web_doubles import Studio, state_of
 
@@ -127,6 +129,37 @@ def test_after_the_process_died_start_revives_it_and_goes_on(studio: Studio, tra
     studio.control.state = state_of("take1", "first", "lost")
     assert studio.client.post("/api/worker/restart").status_code == 202
     assert "restart resume=True" in studio.control.calls
+
+
+def test_the_pace_is_set_and_told_with_its_choices(studio: Studio) -> None:
+    told = studio.client.get("/api/worker/pace").json()
+    assert told["seconds_a_layer"] == 0.0
+    assert [choice["label"] for choice in told["choices"]] == [
+        "full speed", "10 layers/s", "3 layers/s", "1 layer/s",
+    ]  # fmt: skip
+    slow = told["choices"][2]["seconds_a_layer"]
+    answer = studio.client.post("/api/worker/pace", json={"seconds_a_layer": slow})
+    assert answer.status_code == 202
+    (sent,) = studio.control.commands
+    assert isinstance(sent, commands.SetPace)
+    assert sent.seconds_a_layer == slow
+    assert answer.json() == {"identifier": sent.identifier, "command": "SetPace"}
+    studio.control.state = dataclasses.replace(state_of("take1", "first", "tracking"), seconds_a_layer=0.05)
+    assert studio.client.get("/api/worker").json()["seconds_a_layer"] == 0.05
+    told = studio.client.get("/api/worker/pace").json()
+    assert told["choices"][1] == {"label": "20 layers/s", "seconds_a_layer": 0.05}
+
+
+@pytest.mark.parametrize(
+    "body", ["{}", *(f'{{"seconds_a_layer": {n}}}' for n in ("-0.1", "10.5", "NaN", '"slow"'))]
+)
+def test_what_is_no_pace_is_refused(studio: Studio, body: str) -> None:
+    answer = studio.client.post(
+        "/api/worker/pace", content=body, headers={"content-type": "application/json"}
+    )
+    assert answer.status_code == 422
+    assert answer.json()["message"]
+    assert studio.control.commands == []
 
 
 def test_the_log_is_the_runs_own_file(studio: Studio, tracked: StoredRun) -> None:

@@ -5,13 +5,15 @@ import { onEvent } from "./live.js";
 import { complain } from "./messages.js";
 import { paced } from "./pace.js";
 import { refreshSessions } from "./rail.js";
+import { isWatched } from "./search_speed.js";
 import { get, set, watch } from "./state.js";
 
 const SUMMARY_MILLISECONDS = 1500;
 const DETAIL_MILLISECONDS = 80;
 const SCENE_MILLISECONDS = 33;
 const SESSIONS_MILLISECONDS = 800;
-// A frame that takes longer than this is shown layer by layer while it is searched; quicker ones when they are done.
+// A frame that takes longer than this is shown layer by layer while it is searched, quicker ones when they are done;
+// a search that is slowed to be watched is shown layer by layer always.
 const PATIENCE_MILLISECONDS = 700;
 
 const searching = () => ["tracking", "compiling"].includes(get("work")?.state);
@@ -93,7 +95,7 @@ function takeLayer(event) {
   layers = [...layers.filter((layer) => layer.frame === event.frame && layer.layer < event.layer), event];
   if (!get("follow")) return;
   const slow = performance.now() - drawnAt > PATIENCE_MILLISECONDS;
-  if (!searching() || slow) showLive(event.frame, false);
+  if (!searching() || slow || isWatched()) showLive(event.frame, false);
 }
 
 /** Show the layers that came with the events; whether they could be shown. */

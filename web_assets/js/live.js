@@ -7,7 +7,12 @@ import { get, set } from "./state.js";
 const RETRY_MILLISECONDS = 1500;
 const STRANGER_MILLISECONDS = 15000;
 const handlers = {
-  state: (event) => { set({ work: event }); if (event.state === "failed") say(event.message || "The run failed.", { remedy: event.hint, kind: "error" }); },
+  state: (event) => {
+    const before = get("work");
+    set({ work: event });
+    const isSaid = before?.state === "failed" && before.run === event.run && before.message === event.message;
+    if (event.state === "failed" && !isSaid) say(event.message || "The run failed.", { remedy: event.hint, kind: "error" });
+  },
   acknowledged: (event) => { if (!event.ok) say(event.message, { remedy: event.hint, kind: "error" }); },
   log: (event) => isHere(event) && addLine(event),
 };

@@ -11,6 +11,7 @@ import { startPlayback } from "./playback.js";
 import { openSession, refreshSessions, startRail } from "./rail.js";
 import { startSceneFrame } from "./scene_frame.js";
 import { get } from "./state.js";
+import { startSearchSpeed } from "./search_speed.js";
 import { startSurvival } from "./survival.js";
 import { startTabs } from "./tabs.js";
 import { startTheme } from "./theme.js";
@@ -22,6 +23,7 @@ import { startWhatIf } from "./what_if.js";
 async function start() {
   startTheme();
   startHeader();
+  startSearchSpeed();
   startRail();
   startTimeline();
   startPlayback();
