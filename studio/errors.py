@@ -75,3 +75,9 @@ class AccessError(StudioError):
     """A request without the token's cookie, from a foreign host or origin."""
 
     status, code = 403, "access"
+
+
+class BehaviourError(StudioError):
+    """A behaviour model that cannot be learnt, read or used with this body."""
+
+    status, code = 422, "behaviour"

@@ -1,0 +1,218 @@
+"""Gaussian mixtures whose number of components is found (Figueiredo & Jain, PAMI 24(3), 2002; their CEM²).
+
+EM that updates one component at a time. A component's weight is max(0, n_m - N / 2) / Σ_j max(0, n_j - N / 2): n_m
+points support it, N is the number of its parameters; one that cannot pay for its own parameters is annihilated, so that
+no component can collapse onto a few points. When EM has settled, the weakest component is removed and EM goes on, down
+to `least`; the mixture of the shortest message
+
+    L = N / 2 Σ_m ln(n α_m / 12) + k / 2 ln(n / 12) + k (N + 1) / 2 - ln p(points)        (their Eq. 15)
+
+is the answer. Starting from many components everywhere in the data, the start is not delicate.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.behaviour.gaussian_mixture import GaussianMixture
+from studio.behaviour.mixture_kernels import replace_component, shares_of
+from studio.errors import BehaviourError
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+COVARIANCES = ("full", "diagonal")
+
+# A spherical start: this share of the data's mean variance (Figueiredo & Jain, section 6.1).
+START_VARIANCE = 0.1
+
+# Variance that every direction keeps, as a share of the data's mean variance: constant features are allowed.
+FLOOR = 1e-6
+
+# Points with a smaller share of a component do not move its moments.
+LEAST_SHARE = 1e-10
+
+MOST_SWEEPS = 500
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """One mixture that EM settled at. length : its message length in nats. sweeps : updates of all components."""
+
+    components: int
+    length: float
+    log_likelihood: float
+    sweeps: int
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """How the number of components is sought.
+
+    most : components at the start. least : fewest looked at. covariance : "full" or "diagonal". tolerance : EM has
+    settled when the message length changes by less than this share. patience : components removed in a row without a
+    shorter message before the search ends; 0 goes on to `least`.
+    """
+
+    most: int
+    least: int = 1
+    covariance: str = "full"
+    tolerance: float = 1e-5
+    patience: int = 0
+
+
+def fit_mixture(
+    points: Array, rng: np.random.Generator, search: Search, progress: Progress | None = None
+) -> tuple[GaussianMixture, tuple[Settled, ...]]:
+    """The mixture of the shortest message for points (n, p), and what EM settled at on the way.
+
+    progress(step in words, components removed, components at the start). Raises BehaviourError where there are too few
+    points for one component, values that are not finite, and for a search that makes no sense.
+    """
+    _check(points, search)
+    state = _Components(points, rng, search)
+    best, history, fruitless = None, [], 0
+    while True:
+        sweeps = state.settle(search.tolerance)
+        settled = Settled(state.size, state.message_length(), state.log_likelihood, sweeps)
+        fruitless += 1
+        if best is None or settled.length < min(entry.length for entry in history):
+            best, fruitless = state.mixture(), 0
+        history.append(settled)
+        if progress is not None:
+            progress("finding clusters", search.most - state.size, search.most)
+        if state.size <= search.least or (search.patience and fruitless >= search.patience):
+            return best, tuple(history)
+        state.remove_weakest()
+
+
+def parameters_of(dimensions: int, covariance: str) -> int:
+    """N, the number of parameters of one component."""
+    shape = dimensions * (dimensions + 1) // 2 if covariance == "full" else dimensions
+    return dimensions + shape
+
+
+def _check(points: Array, search: Search) -> None:
+    if search.covariance not in COVARIANCES:
+        raise BehaviourError(
+            f"There is no covariance '{search.covariance}'.", f"Choose {' or '.join(COVARIANCES)}."
+        )
+    if not 1 <= search.least <= search.most:
+        raise BehaviourError(
+            f"A search from {search.most} down to {search.least} clusters is none.",
+            "Give 1 <= least <= most.",
+        )
+    if points.ndim != 2 or not np.isfinite(points).all():
+        raise BehaviourError("Points to cluster hold values that are no numbers.", "Leave such frames out.")
+    needed = parameters_of(points.shape[1], search.covariance) // 2 + 1
+    if len(points) < max(2, needed):
+        raise BehaviourError(
+            f"{len(points)} frames are too few for one cluster in {points.shape[1]} dimensions.",
+            f"Give {max(2, needed)} or more, fewer reduced dimensions, or a diagonal covariance.",
+        )
+
+
+class _Components:
+    """The components that are alive, with the log densities of all points.
+
+    log_densities : (k, n) rows in the order of `weights`. totals : (n,) logs of the mixture's density.
+    """
+
+    def __init__(self, points: Array, rng: np.random.Generator, search: Search) -> None:
+        self.points = np.ascontiguousarray(points, dtype=np.float64)
+        self.count, self.dimensions = points.shape
+        self.full = search.covariance == "full"
+        self.parameters = parameters_of(self.dimensions, search.covariance)
+        size = min(search.most, self.count)
+        variance = max(float(points.var(axis=0).mean()), 1e-300)
+        self.floor = FLOOR * variance
+        self.weights = np.full(size, 1.0 / size)
+        self.means = self.points[rng.choice(self.count, size, replace=False)].copy()
+        self.covariances = np.repeat(
+            (START_VARIANCE * variance * np.eye(self.dimensions))[None], size, axis=0
+        )
+        self.log_densities = np.stack([self._densities(number) for number in range(size)])
+        self.totals = self._totals()
+
+    @property
+    def size(self) -> int:
+        return len(self.weights)
+
+    @property
+    def log_likelihood(self) -> float:
+        return float(self.totals.sum())
+
+    def mixture(self) -> GaussianMixture:
+        return GaussianMixture(self.weights.copy(), self.means.copy(), self.covariances.copy())
+
+    def message_length(self) -> float:
+        """L of their Eq. 15."""
+        shape = 0.5 * self.parameters * float(np.log(self.count * self.weights / 12.0).sum())
+        number = 0.5 * self.size * (math.log(self.count / 12.0) + self.parameters + 1.0)
+        return shape + number - self.log_likelihood
+
+    def settle(self, tolerance: float) -> int:
+        """EM until the message length stays. Returns the number of sweeps."""
+        length = math.inf
+        for sweep in range(1, MOST_SWEEPS + 1):
+            self._sweep()
+            before, length = length, self.message_length()
+            if abs(length - before) < tolerance * abs(length):
+                return sweep
+        return MOST_SWEEPS
+
+    def remove_weakest(self) -> None:
+        self._remove(int(np.argmin(self.weights)))
+
+    def _sweep(self) -> None:
+        """One update of every component, in turn (component-wise EM: each sees the others as they have become)."""
+        number = 0
+        while number < self.size:
+            shares = shares_of(self.log_densities[number], math.log(self.weights[number]), self.totals)
+            strength = max(0.0, float(shares.sum()) - 0.5 * self.parameters) / self.count
+            if strength <= 0.0 and self.size > 1:
+                self._remove(number)
+                continue
+            self._update(number, shares, max(strength, 1.0 / self.count))
+            number += 1
+        self.totals = self._totals()
+
+    def _update(self, number: int, shares: Array, strength: float) -> None:
+        """A component's new weight and moments, and what they make of the densities."""
+        active = np.flatnonzero(shares > LEAST_SHARE)
+        own, share = self.points[active], shares[active]
+        self.means[number] = share @ own / share.sum()
+        away = own - self.means[number]
+        if self.full:
+            covariance = (away * share[:, None]).T @ away / share.sum()
+        else:
+            covariance = np.diag(share @ (away * away) / share.sum())
+        self.covariances[number] = covariance + self.floor * np.eye(self.dimensions)
+        densities = self._densities(number)
+        others = 1.0 - self.weights[number] + strength
+        log_weights = np.log(self.weights)
+        replace_component(self.log_densities, log_weights, number, densities, math.log(strength), self.totals)
+        self.weights[number] = strength
+        self.weights /= others
+        self.totals -= math.log(others)
+
+    def _remove(self, number: int) -> None:
+        """Annihilates a component; the others share its weight."""
+        stay = np.arange(self.size) != number
+        self.weights = self.weights[stay] / self.weights[stay].sum()
+        self.means, self.covariances = self.means[stay], self.covariances[stay]
+        self.log_densities = self.log_densities[stay]
+        self.totals = self._totals()
+
+    def _densities(self, number: int) -> Array:
+        """(n,) log densities of one component."""
+        one = slice(number, number + 1)
+        component = GaussianMixture(np.ones(1), self.means[one], self.covariances[one])
+        return component.log_densities(self.points)[:, 0]
+
+    def _totals(self) -> Array:
+        joint = self.log_densities + np.log(self.weights)[:, None]
+        return np.logaddexp.reduce(joint, axis=0)

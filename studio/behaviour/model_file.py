@@ -1,0 +1,237 @@
+"""A behaviour model in one file: arrays in a zip archive (NumPy's), the rest as JSON inside it."""
+
+import json
+import os
+import zipfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, cast
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.behaviour.automaton import Automaton
+from studio.behaviour.feature_space import FeatureSpace
+from studio.behaviour.gaussian_mixture import GaussianMixture
+from studio.behaviour.model import BehaviourModel, Making
+from studio.behaviour.prototypes import Prototypes
+from studio.behaviour.reduction import Reduction
+from studio.behaviour.settings import LearningSettings
+from studio.errors import BehaviourError
+from studio.typed_decoding import decode_json
+
+VERSION = 1
+KIND = "studio behaviour model"
+
+
+class _Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What is no array."""
+
+    kind: str
+    version: int
+    body: str = ""
+    parameters: tuple[str, ...] = ()
+    fps: float = 0.0
+    kept: float = 1.0
+    smoothing: float = 0.0
+    settings: dict[str, bool | int | float | str] = {}
+    sources: tuple[str, ...] = ()
+    learnt_fps: float = 0.0
+    entropy_train: float | None = None
+    entropy_test: float | None = None
+
+
+def write_model(model: BehaviourModel, path: Path) -> None:
+    """Writes the model; an older file of the name is replaced only when the new one is whole.
+
+    Raises BehaviourError where the file cannot be written.
+    """
+    head, arrays = _head(model), cast("dict[str, Any]", _arrays(model))
+    partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with partial.open("wb") as file:
+            np.savez_compressed(file, head=np.frombuffer(head, dtype=np.uint8), **arrays)
+        partial.replace(path)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        raise BehaviourError(
+            f"The behaviour model '{path.name}' cannot be written: {error.strerror or error}.",
+            "Choose another place, or make room.",
+        ) from error
+
+
+def read_model(path: Path) -> BehaviourModel:
+    """The model in a file.
+
+    Raises BehaviourError for a file that is missing, damaged, no behaviour model, or of another version.
+    """
+    damaged = BehaviourError(
+        f"'{path.name}' is no behaviour model, or it is damaged.", "Learn it again with `studio learn`."
+    )
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        head = _checked_head(path, arrays.pop("head").tobytes())
+        return _model(head, arrays)
+    except FileNotFoundError:
+        raise BehaviourError(
+            f"There is no behaviour model '{path.name}'.", "`studio models` lists those there are."
+        ) from None
+    except (OSError, EOFError, ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
+        raise damaged from error
+    except (zipfile.BadZipFile, zipfile.LargeZipFile, msgspec.DecodeError, NotImplementedError) as error:
+        raise damaged from error
+
+
+def _head(model: BehaviourModel) -> bytes:
+    making = model.making
+    head = {
+        "kind": KIND,
+        "version": VERSION,
+        "body": model.space.body,
+        "parameters": model.space.parameters,
+        "fps": model.space.fps,
+        "kept": model.reduction.kept,
+        "smoothing": model.automaton.smoothing,
+        "settings": asdict(making.settings),
+        "sources": making.sources,
+        "learnt_fps": making.learnt_fps,
+        "entropy_train": _or_none(making.entropy_train),
+        "entropy_test": _or_none(making.entropy_test),
+    }
+    return json.dumps(head).encode()
+
+
+def _checked_head(path: Path, content: bytes) -> _Head:
+    """The head, if it is of a model that this program reads."""
+    known = json.loads(content)
+    version = known.get("version")
+    if known.get("kind") == KIND and version != VERSION:
+        raise BehaviourError(
+            f"'{path.name}' is a behaviour model of version {version}; this program reads version {VERSION}.",
+            "Learn it again with `studio learn`.",
+        )
+    head = decode_json(content, _Head)
+    if head.kind != KIND:
+        raise ValueError(head.kind)
+    return head
+
+
+def _arrays(model: BehaviourModel) -> dict[str, NDArray[np.generic]]:
+    automaton, prototypes = model.automaton, model.prototypes
+    lengths = [len(context) for context in automaton.contexts]
+    return {
+        "columns": model.space.columns,
+        "rest": model.space.rest,
+        "turning": model.space.turning,
+        "middle": model.space.middle,
+        "reduction_mean": model.reduction.mean,
+        "reduction_scale": model.reduction.scale,
+        "reduction_loadings": model.reduction.loadings,
+        **_mixture_arrays("mixture", model.mixture),
+        **_mixture_arrays("dynamics", model.dynamics),
+        "contexts": np.array([label for context in automaton.contexts for label in context], dtype=np.int64),
+        "context_lengths": np.array(lengths, dtype=np.int64),
+        "context_kept": automaton.kept,
+        "next_state": automaton.next_state,
+        "probabilities": automaton.probabilities,
+        "start": automaton.start,
+        "prototype_poses": prototypes.poses,
+        "prototype_derivatives": prototypes.derivatives,
+        "prototype_recordings": prototypes.recordings,
+        "prototype_frames": prototypes.frames,
+        "labels": np.concatenate(model.making.labels),
+        "label_lengths": np.array([len(labels) for labels in model.making.labels], dtype=np.int64),
+    }
+
+
+def _mixture_arrays(name: str, mixture: GaussianMixture) -> dict[str, NDArray[np.generic]]:
+    parts = {"weights": mixture.weights, "means": mixture.means, "covariances": mixture.covariances}
+    return {f"{name}_{part}": values for part, values in parts.items()}
+
+
+def _model(head: _Head, arrays: dict[str, NDArray]) -> BehaviourModel:
+    """The model of a head and arrays. Raises ValueError, KeyError, IndexError or TypeError where they do not fit."""
+    space = FeatureSpace(
+        head.body,
+        head.parameters,
+        arrays["columns"],
+        arrays["rest"],
+        arrays["turning"],
+        arrays["middle"],
+        head.fps,
+    )
+    reduction = Reduction(
+        arrays["reduction_mean"], arrays["reduction_scale"], arrays["reduction_loadings"], head.kept
+    )
+    mixture, dynamics = _mixture("mixture", arrays), _mixture("dynamics", arrays)
+    contexts = _split(arrays["contexts"], arrays["context_lengths"])
+    automaton = Automaton(
+        contexts=tuple(tuple(int(label) for label in context) for context in contexts),
+        kept=arrays["context_kept"],
+        next_state=arrays["next_state"],
+        probabilities=arrays["probabilities"],
+        start=arrays["start"],
+        smoothing=head.smoothing,
+    )
+    prototypes = Prototypes(
+        *(arrays[f"prototype_{part}"] for part in ("poses", "derivatives", "recordings", "frames"))
+    )
+    labels = _split(arrays["labels"], arrays["label_lengths"])
+    making = Making(
+        settings=LearningSettings(**head.settings),  # pyright: ignore[reportArgumentType]
+        sources=head.sources,
+        frames=len(arrays["labels"]),
+        labels=tuple(labels),
+        learnt_fps=head.learnt_fps,
+        entropy_train=_or_nan(head.entropy_train),
+        entropy_test=_or_nan(head.entropy_test),
+    )
+    model = BehaviourModel(space, reduction, mixture, dynamics, automaton, prototypes, making)
+    _check_shapes(model)
+    return model
+
+
+def _mixture(name: str, arrays: dict[str, NDArray]) -> GaussianMixture:
+    return GaussianMixture(arrays[f"{name}_weights"], arrays[f"{name}_means"], arrays[f"{name}_covariances"])
+
+
+def _check_shapes(model: BehaviourModel) -> None:
+    """Raise ValueError unless all parts have the same clusters, states and dimensions."""
+    clusters, states, half = model.clusters, model.states, model.space.dimensions
+    reduced, width = model.reduction.loadings.shape[0], 2 * half
+    whole = len(model.space.parameters)
+    found = {
+        (model.reduction.mean.shape, (width,)),
+        (model.reduction.scale.shape, (width,)),
+        (model.reduction.loadings.shape, (reduced, width)),
+        (model.mixture.means.shape, (clusters, reduced)),
+        (model.mixture.covariances.shape, (clusters, reduced, reduced)),
+        (model.dynamics.means.shape, (clusters, width)),
+        (model.dynamics.covariances.shape, (clusters, width, width)),
+        (model.automaton.next_state.shape, (states, clusters)),
+        (model.automaton.probabilities.shape, (states, clusters)),
+        (model.automaton.kept.shape, (states,)),
+        (model.automaton.start.shape, (states,)),
+        (model.prototypes.poses.shape, (clusters, whole)),
+        (model.prototypes.derivatives.shape, (clusters, half)),
+        (model.space.rest.shape, (whole,)),
+    }
+    if any(shape != wanted for shape, wanted in found):
+        raise ValueError("shapes")
+    if model.automaton.next_state.min() < 0 or model.automaton.next_state.max() >= states:
+        raise ValueError("states")
+
+
+def _split(values: NDArray, lengths: NDArray) -> list[NDArray]:
+    return np.split(values, np.cumsum(lengths)[:-1])
+
+
+def _or_none(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _or_nan(value: float | None) -> float:
+    return float("nan") if value is None else value

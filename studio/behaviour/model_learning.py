@@ -1,0 +1,88 @@
+"""From recordings of poses to a behaviour model (Caillette et al. 2007, sections 3.2 and 4)."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.behaviour.feature_space import FeatureSpace, feature_space
+from studio.behaviour.figueiredo_jain import FLOOR, Search, fit_mixture
+from studio.behaviour.gaussian_mixture import GaussianMixture
+from studio.behaviour.model import BehaviourModel, Making, automaton_of
+from studio.behaviour.prototypes import find_prototypes
+from studio.behaviour.reduction import fit_reduction, full_clusters
+from studio.behaviour.settings import LearningSettings
+from studio.body.model import BodyModel
+from studio.errors import BehaviourError
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Progress = Callable[[str, int, int], None]
+
+
+def learn_model(
+    recordings: Sequence[Array],
+    body: BodyModel,
+    fps: float,
+    settings: LearningSettings,
+    rng: np.random.Generator,
+    progress: Progress | None = None,
+    sources: Sequence[str] = (),
+) -> BehaviourModel:
+    """The behaviour in recordings of poses (F, D) on one body, all at `fps`; nothing is joined across recordings.
+
+    progress(step in words, done, total). sources : names of the recordings, kept with the model. Raises BehaviourError
+    for recordings that are empty, of another body or not finite, and for too few frames.
+    """
+    space = feature_space(body, fps)
+    features = _features(space, recordings)
+    everything = np.concatenate(features)
+    reduction = fit_reduction(everything, settings.reduced_dimensions)
+    points = reduction.reduced(everything)
+    search = Search(
+        most=settings.most_clusters, covariance=settings.covariance, patience=settings.clustering_patience
+    )
+    found, _ = fit_mixture(points, rng, search, progress)
+    # A cluster that no frame belongs to for the most part is no label.
+    mixture = found.chosen(np.unique(found.labels(points)))
+    labels = _split(mixture.labels(points), [len(part) for part in features])
+    dynamics = _dynamics(everything, mixture, points)
+    automaton = automaton_of(labels, mixture.size, settings)
+    making = Making(
+        settings=settings,
+        sources=tuple(sources),
+        frames=len(everything),
+        labels=labels,
+        learnt_fps=float(fps),
+        entropy_train=automaton.entropy(labels),
+    )
+    half = space.dimensions
+    prototypes = find_prototypes(
+        recordings, labels, dynamics.log_densities(everything), dynamics.means[:, half:]
+    )
+    return BehaviourModel(space, reduction, mixture, dynamics, automaton, prototypes, making)
+
+
+def _features(space: FeatureSpace, recordings: Sequence[Array]) -> list[Array]:
+    """The features of every recording. Raises BehaviourError naming the recording that has none."""
+    if not recordings:
+        raise BehaviourError("There is no recording to learn from.", "Give at least one.")
+    found = []
+    for number, poses in enumerate(recordings):
+        try:
+            found.append(space.features(poses))
+        except BehaviourError as error:
+            raise BehaviourError(f"Recording {number + 1}: {error.message}", error.hint) from error
+    return found
+
+
+def _split(labels: IntArray, lengths: Sequence[int]) -> tuple[IntArray, ...]:
+    return tuple(np.split(labels, np.cumsum(lengths)[:-1]))
+
+
+def _dynamics(features: Array, mixture: GaussianMixture, points: Array) -> GaussianMixture:
+    """The clusters as Gaussians of the features, every angle and every derivative with a least variance."""
+    half = features.shape[1] // 2
+    variances = features.var(axis=0)
+    floor = np.repeat([FLOOR * part.mean() for part in np.split(variances, [half])], half)
+    return full_clusters(features, mixture.responsibilities(points), np.maximum(floor, 1e-12))

@@ -1,0 +1,48 @@
+"""The knobs of learning a behaviour model (Caillette, Galata & Howard 2007, section 4)."""
+
+from dataclasses import dataclass
+
+from studio.knobs import knob
+
+
+@dataclass(frozen=True, slots=True)
+class LearningSettings:
+    """What a behaviour model is learnt with; the paper's memory is 10, 20 or 30, its ε is not given."""
+
+    title = "Behaviour learning"
+
+    memory: int = knob(
+        10, 0, 100, 1, unit="frames", takes_effect="new run",
+        help="Longest history of cluster labels that a state of the automaton may stand for; 0 forgets everything.",
+    )  # fmt: skip
+    epsilon: float = knob(
+        0.05, 0.0, 1000.0, 0.01, label="ε", takes_effect="new run",
+        help="A longer history is kept where it makes some label 1 + ε times more or less probable than the history "
+        "that is one frame shorter; larger keeps fewer.",
+    )  # fmt: skip
+    least_probability: float = knob(
+        0.0005, 0.0, 0.5, 0.0001, label="least probability", takes_effect="new run",
+        help="Histories that are rarer than this share of all training frames are not looked at.",
+    )  # fmt: skip
+    smoothing: float = knob(
+        0.01, 0.0, 0.5, 0.001, takes_effect="new run",
+        help="Share of every state's probability that is spread evenly over all labels in the entropy, so that what "
+        "was never seen has a finite code length; predictions are not smoothed.",
+    )  # fmt: skip
+    most_clusters: int = knob(
+        200, 1, 1000, 1, label="most clusters", takes_effect="new run",
+        help="Clusters that the search for elementary movements starts with; it ends with as many as pay for "
+        "themselves.",
+    )  # fmt: skip
+    covariance: str = knob(
+        "full", choices=("full", "diagonal"), takes_effect="new run",
+        help="Shape of the clusters where they are found; a full one costs more frames to live.",
+    )  # fmt: skip
+    reduced_dimensions: int = knob(
+        10, 0, 200, 1, label="reduced dimensions", takes_effect="new run",
+        help="Principal components in which clusters are found; 0 takes the whole feature space.",
+    )  # fmt: skip
+    clustering_patience: int = knob(
+        20, 0, 1000, 1, label="clustering patience", takes_effect="new run",
+        help="Clusters removed without a shorter message before the search ends; 0 goes on to a single cluster.",
+    )  # fmt: skip
