@@ -41,4 +41,4 @@ def fitted_thresholds(most_samples: int, alpha: float) -> ThresholdPolynomial:
     samples = np.arange(1, len(exact) + 1, dtype=np.float64)
     powers = np.stack([np.ones_like(samples), samples, samples**2], axis=1)
     coefficients = np.linalg.lstsq(powers / exact[:, None], np.ones(len(exact)), rcond=None)[0]
-    return ThresholdPolynomial(coefficients, float(exact[0]))
+    return ThresholdPolynomial(np.asarray(coefficients, dtype=np.float64), float(exact[0]))

@@ -59,13 +59,13 @@ class Hull:
         """Which world points (..., 3) mm lie in a voxel."""
         count = 2**self.depth
         flat = np.asarray(points, dtype=np.float64).reshape(-1, 3)
-        cells = np.floor((flat - self.box.lower) / self.smallest_edge).astype(np.int64)
+        cells = np.floor((flat - self.box.corner) / self.smallest_edge).astype(np.int64)
         inside = ((cells >= 0) & (cells < count)).all(axis=1)
         cells = np.clip(cells, 0, count - 1)
         found = np.zeros(len(flat), dtype=np.bool_)
         for edge in np.unique(self.edges):
             side = max(1, round(edge / self.smallest_edge))
-            own = self.centres[self.edges == edge] - self.box.lower
+            own = self.centres[self.edges == edge] - self.box.corner
             kept = _codes(np.floor(own / edge).astype(np.int64))
             found |= np.isin(_codes(cells // side), kept)
         return (found & inside).reshape(np.shape(points)[:-1])

@@ -1,14 +1,45 @@
-"""Hull settings and the reconstruction's door (being built)."""
+"""The visual hull by an octree over the tracking space (Caillette et al. 2007, section 6.1).
+
+A voxel is carved when one view shows only background where it projects to, kept when every view that sees it shows
+foreground, and otherwise cut into eight, down to the last depth. Where the paper is silent:
+
+- A voxel still undecided at the last depth is kept when in every view that sees it at least `hull_edge_share` of its
+  samples are foreground. Keeping all of them would lay a shell of half a voxel around the body; half is even.
+- A view carves only what it sees: what lies outside its picture (or partly outside, until the last depth, where the
+  centre decides) is left to the others. A voxel seen by fewer than `hull_least_views` views is carved.
+- With masks as evidence the share of mask pixels is counted over the whole rectangle around the voxel's projection
+  by summed areas, instead of at samples: no mask pixel at all carves, nothing but mask pixels is foreground.
+"""
 
 from dataclasses import dataclass
+from typing import Any
 
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.errors import FootageError
 from studio.evidence.frame_evidence import FrameEvidence
+from studio.evidence.yuv_background import SHADOW, YuvBackground
 from studio.geometry.camera import Camera
 from studio.knobs import knob
+from studio.parallel_launch import ONE_LAUNCH
+from studio.volume import hull_kernels as kernels
+from studio.volume import hull_octree as octree
+from studio.volume.chi_square import fitted_thresholds
 from studio.volume.hull import Hull
+from studio.volume.hull_cameras import camera_rows
 from studio.volume.tracking_space import Box
 
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Nodes = NDArray[np.int32]
+
+FIRST_DEPTH = 4
 NEXT_FRAME = "next frame"
+MOST_VIEWS = 32
+VOXELS_A_THREAD = 512
+"""Fewer are not worth waking a thread for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,17 +57,185 @@ class HullSettings:
         takes_effect=NEXT_FRAME,
         help="The tracking space is cut into 2 to this power voxels a side: 6 coarse and fast, 8 fine and slow.",
     )
+    hull_confidence: float = knob(
+        0.99,
+        0.5,
+        0.99999,
+        0.00001,
+        label="confidence",
+        takes_effect=NEXT_FRAME,
+        help="Eq. 5's α: the share of background areas that are taken for background.",
+    )
+    hull_shadow: float = knob(
+        SHADOW,
+        0.0,
+        0.9,
+        0.01,
+        label="shadow",
+        takes_effect=NEXT_FRAME,
+        help="Share of the luminance that a shadow takes away.",
+    )
+    hull_sampling: float = knob(
+        1.0,
+        0.25,
+        8.0,
+        0.25,
+        label="samples",
+        unit="√px",
+        takes_effect=NEXT_FRAME,
+        help="Samples of a voxel's projection: this many times the square root of its area; 1 as in the paper.",
+    )
+    hull_edge_share: float = knob(
+        0.5,
+        0.05,
+        1.0,
+        0.05,
+        label="edge share",
+        takes_effect=NEXT_FRAME,
+        help="A voxel of the last depth is kept when this share of its samples is foreground in every view.",
+    )
+    hull_least_views: int = knob(
+        3,
+        1,
+        32,
+        1,
+        label="least views",
+        takes_effect=NEXT_FRAME,
+        help="Voxels seen by fewer cameras are carved (of fewer cameras: by all).",
+    )
 
 
 class Reconstructor:
     """Carves hulls for some cameras, a tracking space and settings: build it once, use it for every frame."""
 
     def __init__(self, cameras: tuple[Camera, ...], box: Box, settings: HullSettings) -> None:
+        """Raises FootageError for no camera or more than 32."""
+        if not 0 < len(cameras) <= MOST_VIEWS:
+            raise FootageError(
+                f"A hull cannot be carved from {len(cameras)} cameras.", f"Use 1 to {MOST_VIEWS} cameras."
+            )
         self.cameras, self.box, self.settings = cameras, box, settings
+        self._rows = camera_rows(cameras)
+        sizes = np.array([(camera.width, camera.height) for camera in cameras], dtype=np.int64)
+        self._starts = np.stack([_starts(sizes.prod(axis=1)), _starts((sizes + 1).prod(axis=1))])
+        self._first = grid_within(box, FIRST_DEPTH)
+        most = self._most_samples()
+        self._heights = radical_inverses(most)
+        polynomial = fitted_thresholds(most, settings.hull_confidence)
+        rules = np.zeros(kernels.RULES)
+        rules[kernels.LEAST_VIEWS] = min(settings.hull_least_views, len(cameras))
+        rules[kernels.EDGE_SHARE] = settings.hull_edge_share
+        rules[kernels.SAMPLING] = settings.hull_sampling
+        rules[kernels.SHADOW], rules[kernels.SINGLE] = settings.hull_shadow, polynomial.single
+        rules[kernels.POLYNOMIAL :] = polynomial.coefficients
+        self._rules = rules
+        self._packed: tuple[tuple[YuvBackground, ...], NDArray[np.float32]] | None = None
 
     def hull(self, evidence: FrameEvidence) -> Hull:
-        """The hull of one frame."""
-        raise NotImplementedError
+        """The hull of one frame, from pixels where all views bring a background, else from masks.
+
+        Raises FootageError where the evidence does not fit the cameras.
+        """
+        self._check(evidence)
+        seen = self._seen(evidence)
+        kept: list[Nodes] = []
+        nodes = self._first
+        states = np.zeros((len(nodes), 2), dtype=np.uint32)
+        depths = range(FIRST_DEPTH, self.settings.hull_depth + 1)
+        for depth in depths:
+            verdicts = np.empty(len(nodes), dtype=np.uint8)
+            rules = self._rules_at(depth, seen)
+            corner, edge = self.box.corner, self.box.edge / 2.0**depth
+            _on_threads(
+                kernels.judge_share,
+                kernels.judge_all,
+                nodes,
+                states,
+                verdicts,
+                corner,
+                edge,
+                *seen.images,
+                rules,
+            )
+            kept.append(octree.kept_nodes(nodes, verdicts))
+            if depth < depths[-1]:
+                nodes, states = octree.children(nodes, states, verdicts, grid_limits(self.box, depth + 1))
+        return self._coloured(kept, seen)
+
+    def _coloured(self, kept: list[Nodes], seen: "_Seen") -> Hull:
+        """The kept voxels of each depth as a hull."""
+        sizes = [self.box.edge / 2.0 ** (FIRST_DEPTH + step) for step in range(len(kept))]
+        edges = np.repeat(sizes, [len(nodes) for nodes in kept])
+        centres = self.box.corner + (np.concatenate(kept) + 0.5) * edges[:, None]
+        views = np.empty((len(edges), len(self.cameras), 3), dtype=np.float32)
+        means = np.empty((len(edges), 3), dtype=np.float32)
+        rules = self._rules_at(self.settings.hull_depth, seen)
+        _on_threads(octree.colour_share, octree.colour_all, centres, edges, *seen.images, rules, views, means)
+        return Hull(centres, edges, means, views, self.settings.hull_depth, self.box)
+
+    def _rules_at(self, depth: int, seen: "_Seen") -> Array:
+        rules = self._rules.copy()
+        rules[kernels.DEPTH_IS_LAST] = depth == self.settings.hull_depth
+        rules[kernels.PIXELS] = seen.by_pixels
+        return rules
+
+    def _seen(self, evidence: FrameEvidence) -> "_Seen":
+        """The frame's pictures, and summed masks or Gaussians, one after the other for the kernels."""
+        picture = np.concatenate([view.picture.reshape(-1, 3) for view in evidence.views])
+        backgrounds = tuple(view.background for view in evidence.views if view.background is not None)
+        by_pixels = len(backgrounds) == len(evidence.views)
+        sums = np.zeros(1, dtype=np.int32)
+        gaussians = np.zeros((1, 9), dtype=np.float32)
+        if by_pixels:
+            gaussians = self._gaussians(backgrounds)
+        else:
+            sums = np.empty(int(self._starts[1, -1]), dtype=np.int32)
+            for view, first, end in zip(evidence.views, self._starts[1], self._starts[1, 1:], strict=False):
+                octree.summed_areas(view.mask, sums[first:end])
+        return _Seen(by_pixels, (self._rows, self._starts, sums, picture, gaussians, self._heights))
+
+    def _gaussians(self, backgrounds: tuple[YuvBackground, ...]) -> NDArray[np.float32]:
+        if self._packed is None or any(
+            one is not other for one, other in zip(self._packed[0], backgrounds, strict=True)
+        ):
+            self._packed = backgrounds, np.concatenate([background.packed() for background in backgrounds])
+        return self._packed[1]
+
+    def _check(self, evidence: FrameEvidence) -> None:
+        if len(evidence.views) != len(self.cameras):
+            raise FootageError(
+                f"Frame {evidence.frame} has {len(evidence.views)} views for {len(self.cameras)} cameras.",
+                "Give one view a camera, in the cameras' order.",
+            )
+        for camera, view in zip(self.cameras, evidence.views, strict=True):
+            size = (camera.height, camera.width)
+            parts = (
+                [view.picture, view.mask] if view.background is None else [view.picture, view.background.mean]
+            )
+            if any(part.shape[:2] != size for part in parts):
+                shapes = " and ".join(f"{part.shape[1]}x{part.shape[0]}" for part in parts)
+                raise FootageError(
+                    f"Evidence of camera {camera.name} is {shapes} pixels, not {camera.width}x{camera.height}.",
+                    "Use the calibration that belongs to this footage.",
+                )
+
+    def _most_samples(self) -> int:
+        """Samples of the largest projection that there is at the first depth."""
+        edge = self.box.edge / 2.0**FIRST_DEPTH
+        place, most = np.empty(kernels.PLACE), 1
+        for x, y, z in self.box.corner + (self._first + 0.5) * edge:
+            for row in self._rows:
+                if kernels.place_voxel(row, x, y, z, 0.5 * edge, place):
+                    most = max(most, kernels.sample_count(place, self.settings.hull_sampling))
+        return most
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen:
+    """What the kernels read of a frame. by_pixels : not by masks."""
+
+    by_pixels: bool
+    images: tuple[Any, ...]
 
 
 def reconstruct(
@@ -44,3 +243,42 @@ def reconstruct(
 ) -> Hull:
     """The hull of one frame; `Reconstructor` does the same for many."""
     return Reconstructor(cameras, box, settings or HullSettings()).hull(evidence)
+
+
+def grid_limits(box: Box, depth: int) -> Nodes:
+    """(2, 3) least and greatest places of the grid of a depth whose voxels reach into the box."""
+    edge = box.edge / 2.0**depth
+    first = np.floor((box.lower - box.corner) / edge + 1e-9)
+    last = np.ceil((box.upper - box.corner) / edge - 1e-9) - 1.0
+    return np.clip(np.stack([first, last]), 0, 2**depth - 1).astype(np.int32)
+
+
+def grid_within(box: Box, depth: int) -> Nodes:
+    """(N, 3) all places of the grid of a depth whose voxels reach into the box."""
+    low, high = grid_limits(box, depth)
+    ranges = [np.arange(first, last + 1) for first, last in zip(low, high, strict=True)]
+    return np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, 3).astype(np.int32)
+
+
+def radical_inverses(count: int) -> Array:
+    """(count,) the binary digits of 0, 1, 2 … mirrored behind the point: evenly spread however many are taken."""
+    numbers, found, digit = np.arange(count), np.zeros(count), 0.5
+    while numbers.any():
+        found += digit * (numbers & 1)
+        numbers, digit = numbers >> 1, 0.5 * digit
+    return found
+
+
+def _starts(lengths: IntArray) -> IntArray:
+    """(V + 1,) where each of V pieces begins, and the end of the last."""
+    return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
+
+
+def _on_threads(share: Any, everything: Any, voxels: Any, *arguments: Any) -> None:  # noqa: ANN401 - kernels
+    """Run a kernel over all voxels, on as many threads as Numba is set to and get enough of them."""
+    threads = min(int(numba.get_num_threads()), len(voxels) // VOXELS_A_THREAD)
+    if threads <= 1:
+        share(0, 1, voxels, *arguments)
+        return
+    with ONE_LAUNCH:
+        everything(threads, voxels, *arguments)
