@@ -9,6 +9,11 @@ survivors, Eq. 19).
 Symbols: S_{t,m}, the set of layer m, which the paper counts M … 1 and we count 0 … M - 1 in the order they
 run; π, normalised weights; β, α, D see `annealing`; P, B, σ0 see `diffusion`; γ, ε see `crossover`.
 
+Beyond the paper, a frame's first set may be predicted by a behaviour model instead of Eq. 9 and 10 (Caillette et al.
+2007; see `guided_start`). Particles carry their automaton's state from frame to frame. Within a frame, where layers
+draw, cross and spread them, a particle follows its first parent; at the frame's end its state is the one that follows
+from its ancestor's at the end of the last frame by the cluster of its pose and of the way that it went.
+
 Reference: J. Deutscher, I. Reid, Articulated Body Motion Capture by Stochastic Search, IJCV 61(2), 185-205.
 """
 
@@ -26,7 +31,10 @@ from studio.tracking.diffusion import (
     proportional_noise,
     shrunk_noise,
 )
+from studio.tracking.guided_particles import STATES, foreseen, is_guided
+from studio.tracking.guided_start import arrived, descended, guided_set, settled_walkers
 from studio.tracking.layer_record import layer_record
+from studio.tracking.model_free import judged, share_in
 from studio.tracking.particles import (
     estimate,
     expected,
@@ -43,6 +51,7 @@ from studio.tracking.settings import AnnealedSettings, layer_survivals
 from studio.tracking.tracker import Carried, Estimate, FrameProblem, LayerRecord, ParticleSet, SearchSpace
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +72,10 @@ class AnnealedParticleFilter:
         """Step 1, 2 and 7: the unweighted set of the first layer, the last frame's plus B_0 (Eq. 9, 10)."""
         if previous.particles is None:
             return unweighted(uniform_poses(rng, settings.particles, space))
-        survivors = _carried_poses(rng, previous.particles, settings)
-        predicted = expected(survivors, previous, settings.dynamics)
+        carried = _carried(rng, previous.particles, settings)
+        if is_guided(space, settings):
+            return guided_set(rng, previous, carried, space, settings)
+        predicted = expected(previous.particles.poses[carried], previous, settings.dynamics)
         spread = noise_about(predicted, space.sigma * settings.diffusion_scale)
         return first_draw(spread, spread.draw(rng), space, settings)
 
@@ -78,31 +89,41 @@ class AnnealedParticleFilter:
         settings: AnnealedSettings,
     ) -> tuple[ParticleSet, LayerRecord]:
         """Steps 3 to 5: weigh (Eq. 3, 6, 11, 12), draw, cross (Eq. 19) and spread (Eq. 7, 13 or 18)."""
-        if layer == 0:
+        guided = STATES in particles.extra
+        if layer == 0 and guided:
+            particles = settled_walkers(rng, particles, problem, space, settings)
+        elif layer == 0:
             sigma = space.sigma * settings.diffusion_scale
             particles = settled_first(rng, particles, problem, space, sigma, settings)
         raw, eligible = weigh(problem, particles.poses, settings)
+        free, extra = share_in(particles.extra), judged(particles.extra, eligible)
         wanted = layer_survivals(settings, layer + 1)[-1]
         annealed = anneal(eligible, wanted)
-        weighted = ParticleSet(particles.poses, annealed.log_weights, raw, particles.extra)
+        weighted = ParticleSet(particles.poses, annealed.log_weights, raw, extra)
         if layer == settings.layers - 1:
             kept = weighted_variance(weighted)
-            return weighted, layer_record(layer, weighted, annealed, wanted, resampled=kept, diffused=kept)
-        survivors = _survivors(rng, weighted, space, settings)
+            record = layer_record(layer, weighted, annealed, wanted, resampled=kept, diffused=kept, free=free)
+            if guided:
+                extra = arrived(rng, particles.poses, extra, space)
+            return ParticleSet(particles.poses, annealed.log_weights, raw, extra), record
+        survivors, parents = _survivors(rng, weighted, space, settings)
         spread = _spread(survivors, layer, space, settings)
         poses = settle(rng, spread, spread.draw(rng), survivors, problem, space, settings)
-        record = layer_record(
-            layer, weighted, annealed, wanted, resampled=survivors.var(axis=0), diffused=poses.var(axis=0)
-        )
-        return unweighted(poses, particles.extra), record
+        kept, diffused = survivors.var(axis=0), poses.var(axis=0)
+        record = layer_record(layer, weighted, annealed, wanted, resampled=kept, diffused=diffused, free=free)
+        return unweighted(poses, descended(extra, parents) if guided else extra), record
+
+    def expectations(self, particles: ParticleSet, space: SearchSpace, settings: AnnealedSettings) -> Array:
+        """(S, D) where the first layer's set expects the body: one place unless a model guides it (`foreseen`)."""
+        return foreseen(particles, space)
 
     def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: AnnealedSettings) -> Estimate:
         """Step 6: the mean (Eq. 8) or the mode of the last layer's weighted set."""
         return estimate(particles, settings.estimate)
 
 
-def _carried_poses(rng: np.random.Generator, last: ParticleSet, settings: AnnealedSettings) -> Array:
-    """(N, D) what the last frame hands on: all particles as they are (Eq. 9), survivors drawn by π, or the
+def _carried(rng: np.random.Generator, last: ParticleSet, settings: AnnealedSettings) -> Indices:
+    """(N,) what the last frame hands on: all particles as they are (Eq. 9), survivors drawn by π, or the
     mode.
     """
     weights = np.exp(last.log_weights)
@@ -111,20 +132,22 @@ def _carried_poses(rng: np.random.Generator, last: ParticleSet, settings: Anneal
         drawn = equal_draw(len(weights), settings.particles)
     elif settings.carry == "mode":
         drawn = np.full(settings.particles, np.argmax(weights))
-    return last.poses[drawn]
+    return drawn
 
 
 def _survivors(
     rng: np.random.Generator, weighted: ParticleSet, space: SearchSpace, settings: AnnealedSettings
-) -> Array:
+) -> tuple[Array, Indices]:
     """(N, D) drawn by π with replacement, some of them children of two (step 4 as section 6.2.1 amends
-    it).
+    it), and (N,) the first parent of each.
     """
     weights, count = np.exp(weighted.log_weights), len(weighted.poses)
-    first = weighted.poses[draw(rng, weights, count, settings.resampling)]
+    parents = draw(rng, weights, count, settings.resampling)
+    first = weighted.poses[parents]
     # A systematic draw is in order: shuffled, the two parents of a child are independent.
     second = weighted.poses[rng.permutation(draw(rng, weights, count, settings.resampling))]
-    return cross(rng, first, second, space, share=settings.crossover, by=settings.crossover_by)
+    crossed = cross(rng, first, second, space, share=settings.crossover, by=settings.crossover_by)
+    return crossed, parents
 
 
 def _spread(survivors: Array, layer: int, space: SearchSpace, settings: AnnealedSettings) -> Spread:

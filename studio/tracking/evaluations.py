@@ -15,26 +15,27 @@ from studio.tracking.catalogue import TRACKERS
 STAGE1_ITERATIONS, STAGE2_ITERATIONS = 20, 40
 # A particle alone has nobody to learn from.
 SMALLEST_SWARM = 2
+ONE_LAYER = ("condensation", "behaviour")
 
 
 def knobs_for_evaluations(tracker: str, evaluations: int, layers: int = 10) -> dict[str, int]:
     """Knobs by flat name with which a tracker weighs about `evaluations` poses a frame.
 
-    annealed: `layers` layers of evaluations / layers particles. condensation: all particles in its one layer.
-    swarm: Table 1 of Fleischmann et al. 2012 in proportion. The paper prints the table for 1000 evaluations
+    annealed: `layers` layers of evaluations / layers particles. condensation, behaviour: all particles in the
+    one layer. swarm: Table 1 of Fleischmann et al. 2012 in proportion. The paper prints the table for 1000 evaluations
     only; our choice is that the iterations stay and the particles of both stages scale (n2 = 2 n1 as nearly as
     the total allows), so that every total that is a multiple of 20 is met exactly. Raises SettingsError where
     the number is too small or too large, NotFoundError for an unknown tracker.
     """
     if tracker == "annealed":
         knobs = {"layers": layers, "particles": round(evaluations / max(layers, 1))}
-    elif tracker == "condensation":
+    elif tracker in ONE_LAYER:
         knobs = {"particles": evaluations}
     elif tracker == "swarm":
         knobs = _swarm_knobs(evaluations)
     else:
         raise NotFoundError(f"There is no tracker '{tracker}'.", f"Known: {', '.join(sorted(TRACKERS))}.")
-    smallest = {"annealed": 2 * layers, "condensation": 2}.get(tracker, _smallest_swarm())
+    smallest = {"annealed": 2 * layers, "swarm": _smallest_swarm()}.get(tracker, 2)
     if evaluations < smallest:
         raise SettingsError(
             f"{evaluations} evaluations a frame are too few for the tracker '{tracker}'.",
@@ -48,7 +49,7 @@ def evaluations_of(tracker: str, settings: Any) -> int:  # noqa: ANN401 - any tr
     """Poses that a tracker weighs in a frame (of the first frame: in each of its searches)."""
     if tracker == "annealed":
         return settings.layers * settings.particles
-    if tracker == "condensation":
+    if tracker in ONE_LAYER:
         return settings.particles
     if tracker == "swarm":
         return partitions.evaluations(settings)

@@ -1,5 +1,7 @@
 """The record of a layer, filled in from its weighted set."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,9 +13,18 @@ Array = NDArray[np.float64]
 
 
 def layer_record(
-    layer: int, weighted: ParticleSet, annealed: Annealed, wanted: float, *, resampled: Array, diffused: Array
+    layer: int,
+    weighted: ParticleSet,
+    annealed: Annealed,
+    wanted: float,
+    *,
+    resampled: Array,
+    diffused: Array,
+    free: float = math.nan,
 ) -> LayerRecord:
-    """What a person may want to see of a layer; the frame loop fills in frame, version and time."""
+    """What a person may want to see of a layer; the frame loop fills in frame, version and time. free : the share of
+    the particles that no behaviour model moved.
+    """
     best = int(np.argmax(weighted.log_weights))
     return LayerRecord(
         frame=-1,
@@ -31,4 +42,5 @@ def layer_record(
         poses=weighted.poses,
         log_weights=weighted.raw_log_weights,
         milliseconds=0.0,
+        model_free_share=free,
     )

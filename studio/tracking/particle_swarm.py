@@ -15,18 +15,23 @@ that a swarm is weighed at once. Poses that the body cannot take: see `hard_prio
 all the same, a possible pose is always better than an impossible one. Without a start pose the first stage is
 spread over the limits and moves everything, as there is nothing yet that could be kept.
 
+Beyond the paper, x̂ may be predicted by a behaviour model (`guided_swarm`).
+
 A layer is one iteration. Its record: variance_weighed, of the positions; variance_resampled, of the particles' bests
 (what is kept); variance_diffused, of the positions after the move, or of the next stage's sampled swarm. β and α
 have no meaning and are NaN; all particles weigh the same.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.tracking.guided_particles import foreseen, is_guided
+from studio.tracking.guided_swarm import handed_on, leader_arrived, predicted_starts
 from studio.tracking.hard_priors import Indices, Mask, Proposals, possible, settled
+from studio.tracking.model_free import FREE, judged, share_in
 from studio.tracking.particles import checked_values, expected, uniform_poses, unweighted
 from studio.tracking.partitions import Stage, layer_count, moment_of, stages_of
 from studio.tracking.swarm_settings import SwarmSettings
@@ -35,7 +40,7 @@ from studio.weighting.problem import WHOLE_BODY
 
 Array = NDArray[np.float64]
 
-# Arrays of a set: (N, D), (N, D), (N,), (N,), (D,), (1,), (1,), (D,), (D,).
+# Arrays of a set: (N, D), (N, D), (N,), (N,), (D,), (1,), (1,), (D,) or (N, D), (D,).
 VELOCITIES, BEST_POSES, BEST_VALUES, BEST_POSSIBLE = (
     "velocities",
     "best_poses",
@@ -70,8 +75,13 @@ class ParticleSwarm:
             spread = uniform_poses(rng, first.particles, space)
             drawn = Proposals(spread, _start_velocities(rng, spread.shape, sigma, settings))
             return _new_swarm(drawn, spread.mean(axis=0), freedom)
-        start = expected(_last_pose(previous, last)[None], previous, settings.dynamics)[0]
+        pose = _last_pose(previous, last)
         sigma = space.sigma * settings.diffusion_scale * first.freedom
+        if is_guided(space, settings) and previous.estimate is not None:
+            starts, arrays = predicted_starts(rng, previous, pose, first.particles, space, settings)
+            drawn = _sampled(rng, starts, sigma, first.particles, settings)
+            return _new_swarm(drawn, starts, first.freedom, arrays)
+        start = expected(pose[None], previous, settings.dynamics)[0]
         return _new_swarm(_sampled(rng, start, sigma, first.particles, settings), start, first.freedom)
 
     def step_layer(
@@ -93,16 +103,26 @@ class ParticleSwarm:
         looks_at = WHOLE_BODY if everything_moves else stage.looks_at
         values = checked_values(problem.fitness(particles.poses, looks_at), len(particles.poses))
         allowed = possible(problem, particles.poses, settings)
-        extra = _with_bests(particles, values, allowed)
+        free, extra = share_in(particles.extra), _with_bests(particles, values, allowed)
+        if FREE in extra:
+            extra = judged(extra, np.where(allowed, values, -np.inf) if allowed.any() else values)
+            del extra[FREE]
         weighed = ParticleSet(particles.poses, _equal(len(values)), values, extra)
         if now.iteration < stage.iterations:
             c = acceleration(now.iteration + 1, stage.iterations, settings.c_first, settings.c_last)
             following = _moved(rng, weighed, c, problem, space, settings)
         elif now.number + 1 < len(stages):
-            following = _next_swarm(rng, extra[LEADER], stages[now.number + 1], problem, space, settings)
+            following = _next_swarm(rng, extra, stages[now.number + 1], problem, space, settings)
         else:
             following = weighed
-        return following, _record(layer, weighed, allowed, following)
+        record = _record(layer, weighed, allowed, following, free)
+        if following is weighed and is_guided(space, settings):
+            following = replace(weighed, extra=leader_arrived(rng, extra[LEADER], extra, space))
+        return following, record
+
+    def expectations(self, particles: ParticleSet, space: SearchSpace, settings: SwarmSettings) -> Array:
+        """(S, D) where the first stage's swarm expects the body: one place unless a model guides it (`foreseen`)."""
+        return foreseen(particles, space)
 
     def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: SwarmSettings) -> Estimate:
         """p_g of the last stage, or the mean of its p_i."""
@@ -149,15 +169,16 @@ def _moved(
 
 def _next_swarm(
     rng: np.random.Generator,
-    start: Array,
+    extra: dict[str, Array],
     stage: Stage,
     problem: FrameProblem,
     space: SearchSpace,
     settings: SwarmSettings,
 ) -> ParticleSet:
     """A stage's swarm, sampled about the best pose of the stage before."""
-    sigma = space.sigma * settings.diffusion_scale * stage.freedom
-    sampled = _new_swarm(_sampled(rng, start, sigma, stage.particles, settings), start, stage.freedom)
+    start, sigma = extra[LEADER], space.sigma * settings.diffusion_scale * stage.freedom
+    drawn = _sampled(rng, start, sigma, stage.particles, settings)
+    sampled = _new_swarm(drawn, start, stage.freedom, handed_on(extra))
     return _kept_possible(rng, sampled, problem, space, settings)
 
 
@@ -169,15 +190,15 @@ def _kept_possible(
     settings: SwarmSettings,
 ) -> ParticleSet:
     """A sampled swarm as the hard priors let it stand."""
-    start, velocities = swarm.extra[START], swarm.extra[VELOCITIES]
+    starts = np.broadcast_to(swarm.extra[START], swarm.poses.shape)
+    velocities = swarm.extra[VELOCITIES]
     sigma = space.sigma * settings.diffusion_scale * swarm.extra[FREEDOM]
 
     def again(rows: Indices) -> Proposals:
-        normal = rng.standard_normal((len(rows), len(start)))
-        return Proposals(start + normal * sigma, velocities[rows])
+        normal = rng.standard_normal((len(rows), starts.shape[1]))
+        return Proposals(starts[rows] + normal * sigma, velocities[rows])
 
     drawn = Proposals(swarm.poses, velocities)
-    starts = np.broadcast_to(start, swarm.poses.shape)
     done = settled(problem, space, settings, drawn, starts, again)
     return unweighted(
         done.poses, swarm.extra | {VELOCITIES: done.velocities, BEST_POSES: np.array(done.poses)}
@@ -187,8 +208,8 @@ def _kept_possible(
 def _sampled(
     rng: np.random.Generator, start: Array, sigma: Array, count: int, settings: SwarmSettings
 ) -> Proposals:
-    """x ← N(x̂, Σ), v ← U(-σ, σ)."""
-    poses = start + rng.standard_normal((count, len(start))) * sigma
+    """x ← N(x̂, Σ), v ← U(-σ, σ). start : (D,) or (count, D), x̂."""
+    poses = start + rng.standard_normal((count, start.shape[-1])) * sigma
     return Proposals(poses, _start_velocities(rng, poses.shape, sigma, settings))
 
 
@@ -199,17 +220,20 @@ def _start_velocities(
     return uniform if settings.start_velocity == "uniform" else np.zeros(shape)
 
 
-def _new_swarm(drawn: Proposals, start: Array, freedom: Array) -> ParticleSet:
-    """A swarm that has met nothing yet."""
+def _new_swarm(
+    drawn: Proposals, start: Array, freedom: Array, more: dict[str, Array] | None = None
+) -> ParticleSet:
+    """A swarm that has met nothing yet. start : (D,) or (N, D). more : further arrays."""
     count = len(drawn.poses)
     return unweighted(
         drawn.poses,
-        {
+        (more or {})
+        | {
             VELOCITIES: drawn.velocities,
             BEST_POSES: drawn.poses,
             BEST_VALUES: np.full(count, -np.inf),
             BEST_POSSIBLE: np.zeros(count, dtype=bool),
-            LEADER: start,
+            LEADER: np.atleast_2d(start)[0],
             LEADER_VALUE: np.array([-np.inf]),
             LEADER_POSSIBLE: np.zeros(1, dtype=bool),
             START: start,
@@ -245,8 +269,10 @@ def _last_pose(previous: Carried, last: ParticleSet) -> Array:
     return last.poses[int(np.argmax(last.log_weights))]
 
 
-def _record(layer: int, weighed: ParticleSet, allowed: Mask, following: ParticleSet) -> LayerRecord:
-    """What a person may want to see of an iteration; the frame loop fills in frame, version and time."""
+def _record(
+    layer: int, weighed: ParticleSet, allowed: Mask, following: ParticleSet, free: float
+) -> LayerRecord:
+    """What a person may want to see; the frame loop fills in frame, version and time. free : `share_in`."""
     values = weighed.raw_log_weights
     best = int(np.argmax(np.where(allowed, values, -np.inf) if allowed.any() else values))
     kept = weighed.extra[BEST_POSES].var(axis=0)
@@ -266,6 +292,7 @@ def _record(layer: int, weighed: ParticleSet, allowed: Mask, following: Particle
         poses=weighed.poses,
         log_weights=values,
         milliseconds=0.0,
+        model_free_share=free,
     )
 
 

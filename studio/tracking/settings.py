@@ -65,10 +65,17 @@ class AnnealedSettings:
         help="What the next frame starts from: every particle (Eq. 9), survivors by weight, or the best one.",
     )  # fmt: skip
     dynamics: str = shared_knobs.dynamics()
+    prediction: str = shared_knobs.prediction()
+    attenuation: float = shared_knobs.attenuation()
+    entering: str = shared_knobs.entering()
+    model_free_share: float = shared_knobs.model_free_share(0.2)
+    model_free_grows: bool = shared_knobs.model_free_grows()
     estimate: str = shared_knobs.estimate()
     constraints: str = shared_knobs.constraints("clamp")
     limbs_apart: bool = shared_knobs.limbs_apart(False)
     resampling: str = shared_knobs.resampling()
+    online_learning: bool = shared_knobs.online_learning()
+    learning_interval: int = shared_knobs.learning_interval()
     start_repeats: int = shared_knobs.start_repeats()
 
     def __post_init__(self) -> None:

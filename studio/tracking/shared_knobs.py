@@ -5,6 +5,8 @@ from typing import Any
 from studio.knobs import knob
 
 CONSTRAINTS = ("redraw", "reject", "clamp", "ignore")
+NOISE, BEHAVIOUR = "noise", "behaviour"
+PREDICTIONS = (NOISE, BEHAVIOUR)
 
 
 def diffusion_scale(default: float = 1.0) -> Any:  # noqa: ANN401 - a dataclass field, as `knob` returns it
@@ -60,4 +62,60 @@ def start_repeats(default: int = 2) -> Any:  # noqa: ANN401
     return knob(
         default, 1, 20, 1, label="searches of the first frame", takes_effect="new run",
         help="How often the first frame is searched over, each search starting where the one before ended.",
+    )  # fmt: skip
+
+
+def prediction() -> Any:  # noqa: ANN401
+    """Whether a frame's first set is made by noise or by a behaviour model."""
+    return knob(
+        "noise", choices=PREDICTIONS, takes_effect="next frame",
+        help="How a frame's first set is made: noise about the last one, or what a behaviour model expects of it.",
+    )  # fmt: skip
+
+
+def attenuation() -> Any:  # noqa: ANN401
+    """λ of Caillette et al. 2007, Eq. 4."""
+    return knob(
+        0.3, 0.0, 1.0, 0.05, takes_effect="next frame",
+        help="λ: how much of a motion cluster's own spread is added to a particle that stays in it (behaviour, Eq. 4).",
+    )  # fmt: skip
+
+
+def entering() -> Any:  # noqa: ANN401
+    """What becomes of a particle that enters another cluster (`behaviour.prediction.propagate`)."""
+    return knob(
+        "resample", choices=("resample", "blend"), label="entering a cluster", takes_effect="next frame",
+        help="A particle that enters a motion cluster is drawn from it (5.1), or blended with where it was going.",
+    )  # fmt: skip
+
+
+def model_free_share(default: float) -> Any:  # noqa: ANN401
+    """Particles that no model moves."""
+    return knob(
+        default, 0.0, 1.0, 0.05, label="model-free share", takes_effect="next frame",
+        help="Share of the particles that are spread by σ0 instead of the behaviour model, for motion never learnt.",
+    )  # fmt: skip
+
+
+def model_free_grows() -> Any:  # noqa: ANN401
+    """Whether their share grows."""
+    return knob(
+        True, label="model-free share grows", takes_effect="next frame",
+        help="Whether the model-free share grows while its particles weigh more than those that the model moves.",
+    )  # fmt: skip
+
+
+def online_learning() -> Any:  # noqa: ANN401
+    """Whether a run teaches its model."""
+    return knob(
+        False, label="online learning", takes_effect="new run",
+        help="Whether the run adds to its behaviour model what it tracked well, every so many frames.",
+    )  # fmt: skip
+
+
+def learning_interval() -> Any:  # noqa: ANN401
+    """How often."""
+    return knob(
+        60, 10, 2000, 10, label="frames between lessons", takes_effect="new run",
+        help="After how many frames each the model learns from what was tracked so far (online learning).",
     )  # fmt: skip

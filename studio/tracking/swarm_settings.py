@@ -58,12 +58,19 @@ class SwarmSettings:
     )  # fmt: skip
     diffusion_scale: float = shared_knobs.diffusion_scale()
     dynamics: str = shared_knobs.dynamics()
+    prediction: str = shared_knobs.prediction()
+    attenuation: float = shared_knobs.attenuation()
+    entering: str = shared_knobs.entering()
+    model_free_share: float = shared_knobs.model_free_share(0.2)
+    model_free_grows: bool = shared_knobs.model_free_grows()
     estimate: str = knob(
         "mode", choices=("mode", "mean"), takes_effect="next layer",
         help="The pose that is reported: the best the swarm has found, or the mean of its particles' bests.",
     )  # fmt: skip
     constraints: str = shared_knobs.constraints("redraw")
     limbs_apart: bool = shared_knobs.limbs_apart(True)
+    online_learning: bool = shared_knobs.online_learning()
+    learning_interval: int = shared_knobs.learning_interval()
     start_repeats: int = shared_knobs.start_repeats()
 
     def __post_init__(self) -> None:

@@ -8,15 +8,13 @@ are all "layers", counted from 0 in the order they are run (the paper's layer m 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.behaviour.model import BehaviourModel
 from studio.weighting.problem import WHOLE_BODY
-
-if TYPE_CHECKING:
-    from studio.behaviour.model import BehaviourModel
 
 Array = NDArray[np.float64]
 
@@ -53,7 +51,7 @@ class SearchSpace:
     sigma: Array
     limb: NDArray[np.int64]
     hierarchy: Hierarchy
-    behaviour: "BehaviourModel | None" = None
+    behaviour: BehaviourModel | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -164,7 +164,7 @@ def test_settings_made_by_hand_are_checked_too(wrong: dict[str, float]) -> None:
         SwarmSettings(**wrong)  # pyright: ignore[reportArgumentType]
 
 
-@pytest.mark.parametrize("tracker", ["annealed", "condensation", "swarm"])
+@pytest.mark.parametrize("tracker", ["annealed", "behaviour", "condensation", "swarm"])
 @pytest.mark.parametrize("wanted", [200, 500, 1000, 2000, 4000])
 def test_knobs_give_the_evaluations_asked_for(tracker: str, wanted: int) -> None:
     knobs = knobs_for_evaluations(tracker, wanted)
@@ -184,7 +184,9 @@ def test_table_1_in_proportion() -> None:
     assert knobs_for_evaluations("annealed", 1000, layers=20) == {"layers": 20, "particles": 50}
 
 
-@pytest.mark.parametrize(("tracker", "wanted"), [("swarm", 119), ("annealed", 19), ("condensation", 1)])
+@pytest.mark.parametrize(
+    ("tracker", "wanted"), [("swarm", 119), ("annealed", 19), ("condensation", 1), ("behaviour", 1)]
+)
 def test_too_few_evaluations_are_refused(tracker: str, wanted: int) -> None:
     with pytest.raises(SettingsError, match=f"{wanted} evaluations"):
         knobs_for_evaluations(tracker, wanted)

@@ -17,6 +17,7 @@ COUNT = 9
 # Knobs of a search of about so many particles in each layer.
 SIZES = {
     "annealed": lambda count: {"particles": count},
+    "behaviour": lambda count: {"particles": count},
     "condensation": lambda count: {"particles": count},
     "swarm": lambda count: {"stage1_particles": count, "stage2_particles": count},
 }
@@ -137,8 +138,10 @@ def test_what_is_rejected_is_weighed_and_never_reported(name: str) -> None:
 
 
 def test_limits_may_be_ignored(name: str) -> None:
+    # The best of 400 single particles is near in most parameters only; their mean in all.
+    changes = {"estimate": "mean"} if name == "behaviour" else {}
     results, _ = run(
-        name, 8, space=LIMITED, problem=Limited(LIMITED), constraints="ignore", **SIZES[name](400)
+        name, 8, space=LIMITED, problem=Limited(LIMITED), constraints="ignore", **SIZES[name](400), **changes
     )
     assert np.all(results[-1].estimate.pose < 0.25)
 

@@ -1,0 +1,117 @@
+"""The tracker that is guided by a learnt model of behaviour (Caillette, Galata & Howard 2007, sections 3.3 and 5).
+
+Idea: a particle filter whose particles know what they are doing. Each carries the state of a probabilistic
+automaton over clusters of elementary movements. A frame draws survivors by weight (SIR); each goes to a cluster that
+the automaton, its pose and its movement make likely (Eq. 3); where that is a new one its joint angles are drawn from
+it anew, where it is the same one they move on with the cluster's own uncertainty (Eq. 4). The root's six parameters
+get Gaussian noise. Every particle is weighed once, and the best of them is the pose. What particles carry:
+`guided_particles`; those that no model moves, beyond the paper: `model_free`.
+
+Weights: the paper normalises w as it is (section 6.4). Most weightings are no likelihoods and nearly flat as they are,
+so by default w^β is used, with β such that a wanted share of the particles survives the next draw (Deutscher & Reid
+2005, Eq. 3 and 12); β stands in the record.
+
+Without a model in the search space the tracker is a particle filter with noise of σ0; runs are not made so
+(`runs.behaviour_models`).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.tracking.annealing import Annealed, anneal, normalised, survival_rate
+from studio.tracking.behaviour_settings import BehaviourSettings
+from studio.tracking.diffusion import noise_about
+from studio.tracking.guided_particles import STATES, foreseen, spread_over_clusters
+from studio.tracking.guided_start import guided_set, settled_walkers, without_past
+from studio.tracking.layer_record import layer_record
+from studio.tracking.model_free import judged, share_in
+from studio.tracking.particles import (
+    estimate,
+    first_draw,
+    settled_first,
+    uniform_poses,
+    unweighted,
+    weigh,
+    weighted_variance,
+)
+from studio.tracking.resampling import draw
+from studio.tracking.tracker import Carried, Estimate, FrameProblem, LayerRecord, ParticleSet, SearchSpace
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class BehaviourGuided:
+    """One frame in one layer; evaluations = particles."""
+
+    name: str = "behaviour"
+    label: str = "Guided by behaviour"
+    settings_type: type = BehaviourSettings
+
+    def layer_count(self, settings: BehaviourSettings) -> int:
+        """One."""
+        return 1
+
+    def begin_frame(
+        self, rng: np.random.Generator, previous: Carried, space: SearchSpace, settings: BehaviourSettings
+    ) -> ParticleSet:
+        """Survivors of the last frame, drawn by weight and moved by the model.
+
+        Without a set to start from, roots lie anywhere between the limits, and the angles in all clusters alike.
+        """
+        last, count = previous.particles, settings.particles
+        sigma = space.sigma * settings.diffusion_scale
+        if last is None:
+            anywhere = uniform_poses(rng, count, space)
+            if space.behaviour is None:
+                return unweighted(anywhere)
+            return spread_over_clusters(rng, space, count, anywhere, np.zeros_like(sigma))
+        drawn = draw(rng, np.exp(last.log_weights), count, settings.resampling)
+        if space.behaviour is not None:
+            return guided_set(rng, previous, drawn, space, settings)
+        spread = noise_about(last.poses[drawn], sigma)
+        return first_draw(spread, spread.draw(rng), space, settings)
+
+    def expectations(self, particles: ParticleSet, space: SearchSpace, settings: BehaviourSettings) -> Array:
+        """(S, D) the means of the clusters that hold enough particles, at their mean root (section 6.3)."""
+        return foreseen(particles, space, settings.expected_support, settings.expected_most)
+
+    def step_layer(
+        self,
+        rng: np.random.Generator,
+        particles: ParticleSet,
+        layer: int,
+        problem: FrameProblem,
+        space: SearchSpace,
+        settings: BehaviourSettings,
+    ) -> tuple[ParticleSet, LayerRecord]:
+        """Weigh every particle."""
+        if STATES in particles.extra:
+            particles = settled_walkers(rng, particles, problem, space, settings)
+        else:
+            sigma = space.sigma * settings.diffusion_scale
+            particles = settled_first(rng, particles, problem, space, sigma, settings)
+        raw, eligible = weigh(problem, particles.poses, settings)
+        chosen = _selected(eligible, settings)
+        extra = without_past(judged(particles.extra, eligible))
+        weighted = ParticleSet(particles.poses, chosen.log_weights, raw, extra)
+        kept = weighted_variance(weighted)
+        wanted = settings.survival if settings.selection == "survival" else float("nan")
+        record = layer_record(
+            layer, weighted, chosen, wanted, resampled=kept, diffused=kept, free=share_in(extra)
+        )
+        return weighted, record
+
+    def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: BehaviourSettings) -> Estimate:
+        """The particle with the highest weight (section 3.3), or the weighted mean."""
+        return estimate(particles, settings.estimate)
+
+
+def _selected(eligible: Array, settings: BehaviourSettings) -> Annealed:
+    """Normalised weights, as peaked as the settings want them."""
+    if settings.selection == "survival":
+        return anneal(eligible, settings.survival)
+    weights = normalised(eligible, 1.0)
+    return Annealed(1.0, survival_rate(weights), weights)

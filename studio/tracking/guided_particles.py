@@ -1,0 +1,260 @@
+"""Particles that a behaviour model moves from one frame to the next (Caillette, Galata & Howard 2007, sections 5 and
+6.3), as every tracker uses them.
+
+A guided set carries with each particle the state of the automaton that its path has reached, and its joint angles'
+movement in the last frame. The model moves the joint angles; the parameters of the root, which it does not know, get
+Gaussian noise of σ0 (5.2). A particle that is moved without the model gets that noise in every parameter; its
+movement is then the way that it went, and its state is found again: the model's label of where it is and how it
+moved, taken as the automaton's next symbol, exactly as training sequences are read (`followed`).
+
+In the first frame of a run nothing has moved yet: there is noise only, and a particle's state and movement are drawn
+from the clusters near its pose (`near`): the probability of each cluster given the angles, its movement unknown, then
+the movement given cluster and angles. What a state can remember of a particle's past is then only that cluster.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.behaviour.gaussian_mixture import GaussianMixture
+from studio.behaviour.model import BehaviourModel
+from studio.behaviour.prediction import propagate, start_states, states_at
+from studio.tracking.hard_priors import Rules
+from studio.tracking.particles import unweighted
+from studio.tracking.shared_knobs import BEHAVIOUR
+from studio.tracking.tracker import Carried, ParticleSet, SearchSpace
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+Arrays = dict[str, NDArray[Any]]
+
+STATES, VELOCITY = "automaton_state", "velocity"
+"""Arrays of a guided set: (N,) int, state of the automaton; (N, d) movement of the modelled angles, rad a frame."""
+
+# Standard deviations beyond √d: where a pose lies far outside a cluster, the regression from it is not believed.
+NOT_BELIEVED = 3.0
+# Particles whose states are sought at once: the automaton has thousands, and each particle a chance of each.
+AT_ONCE = 4096
+
+
+class GuidedRules(Rules, Protocol):
+    """The knobs of every tracker that a behaviour model may guide."""
+
+    @property
+    def attenuation(self) -> float:
+        """λ of Eq. 4."""
+        ...
+
+    @property
+    def entering(self) -> str:
+        """How a particle enters another cluster: "resample" or "blend" (`behaviour.prediction.propagate`)."""
+        ...
+
+    @property
+    def model_free_share(self) -> float:
+        """Of the particles, at least."""
+        ...
+
+    @property
+    def model_free_grows(self) -> bool:
+        """Whether it grows while the model is beaten."""
+        ...
+
+    @property
+    def diffusion_scale(self) -> float:
+        """Multiplies σ0."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Walkers:
+    """Particles with a past. poses : (N, D). states : (N,) int. velocity : (N, d). free : (N,) bool, those that are
+    moved without the model.
+    """
+
+    poses: Array
+    states: Indices
+    velocity: Array
+    free: Mask
+
+    def at(self, rows: Indices) -> "Walkers":
+        """Some of them."""
+        return Walkers(self.poses[rows], self.states[rows], self.velocity[rows], self.free[rows])
+
+
+class Guidable(Protocol):
+    """The knob of trackers that may go without a model though there is one."""
+
+    @property
+    def prediction(self) -> str:
+        """ "noise" or "behaviour"."""
+        ...
+
+
+def is_guided(space: SearchSpace, settings: Guidable) -> bool:
+    """Whether a model is there and wanted."""
+    return space.behaviour is not None and settings.prediction == BEHAVIOUR
+
+
+def model_of(space: SearchSpace) -> BehaviourModel:
+    """The space's model. To be asked only where there is one."""
+    assert space.behaviour is not None
+    return space.behaviour
+
+
+def columns_of(space: SearchSpace) -> Indices:
+    """(d,) the columns of the pose vector that the space's model knows."""
+    return model_of(space).space.columns
+
+
+def known_of(particles: ParticleSet) -> Arrays:
+    """A set's arrays by name, of whatever type each is."""
+    return {**particles.extra}
+
+
+def walkers_from(
+    rng: np.random.Generator, previous: Carried, rows: Indices, free: Mask, space: SearchSpace
+) -> Walkers:
+    """The particles `rows` of the set that a frame starts from, with what they carry.
+
+    Where they carry nothing yet (the model came in on the way), it is drawn from the clusters near their poses, as
+    the last movement of the reported pose lets them be.
+    """
+    last = previous.particles
+    assert last is not None
+    poses, carried = last.poses[rows], known_of(last)
+    if STATES in carried:
+        return Walkers(poses, carried[STATES][rows], carried[VELOCITY][rows], free)
+    if previous.estimate is None or previous.previous_estimate is None:
+        return Walkers(poses, *near(rng, poses, space), free)
+    columns = columns_of(space)
+    movement = (previous.estimate - previous.previous_estimate)[columns]
+    velocity = np.tile(movement, (len(poses), 1))
+    return Walkers(poses, states_at(rng, model_of(space), poses[:, columns], velocity), velocity, free)
+
+
+def walked(
+    rng: np.random.Generator, walkers: Walkers, space: SearchSpace, rules: GuidedRules, sigma: Array
+) -> Walkers:
+    """One frame further (Eq. 3 and 4). sigma : (D,) noise of what the model does not know, or does not move."""
+    model, columns = model_of(space), columns_of(space)
+    poses = walkers.poses + rng.standard_normal(walkers.poses.shape) * sigma
+    moved = propagate(
+        rng,
+        model,
+        walkers.states,
+        walkers.poses[:, columns],
+        walkers.velocity,
+        rules.attenuation,
+        rules.entering,
+    )
+    went = poses[:, columns] - walkers.poses[:, columns]
+    free = walkers.free
+    poses[:, columns] = np.where(free[:, None], poses[:, columns], moved.values)
+    velocity = np.where(free[:, None], went, moved.velocities)
+    alone = followed(rng, model, walkers.states, poses[:, columns], velocity)
+    return Walkers(poses, np.where(free, alone, moved.states), velocity, free)
+
+
+def followed(
+    rng: np.random.Generator, model: BehaviourModel, states: Indices, angles: Array, velocity: Array
+) -> Indices:
+    """(N,) the states that particles are in after they went to angles (N, d) by velocity (N, d): the cluster of both
+    is the next symbol, taken as often as a frame has steps of the automaton (`steps_per_frame`, in the mean).
+    """
+    labels = _labelled(model, angles, velocity)
+    whole = int(model.steps_per_frame)
+    left = model.steps_per_frame - whole
+    for _ in range(whole):
+        states = model.automaton.next_state[states, labels]
+    stepping = rng.random(len(states)) < left
+    return np.where(stepping, model.automaton.next_state[states, labels], states)
+
+
+def near(rng: np.random.Generator, poses: Array, space: SearchSpace) -> tuple[Indices, Array]:
+    """States (N,) and movements (N, d) drawn from the clusters near poses (N, D), their movement unknown."""
+    model = model_of(space)
+    angles = poses[:, model.space.columns]
+    states = np.concatenate(
+        [states_at(rng, model, angles[begin : begin + AT_ONCE]) for begin in range(0, len(angles), AT_ONCE)]
+    )
+    labels = model.automaton.last_symbols[states]
+    labels = np.where(labels < 0, model.poses_only.labels(angles), labels)
+    noise = rng.standard_normal(angles.shape)
+    velocity = np.zeros(angles.shape)
+    for label in np.unique(labels):
+        rows = np.flatnonzero(labels == label)
+        velocity[rows] = _movement_given_angles(model.dynamics, int(label), angles[rows], noise[rows])
+    return states, velocity
+
+
+def spread_over_clusters(
+    rng: np.random.Generator, space: SearchSpace, count: int, root: Array, sigma: Array
+) -> ParticleSet:
+    """A set of `count` particles over all clusters, all states reset: the recovery of section 6.3.
+
+    root : (D,) a pose, or (count, D) poses, whose parameters that the model does not know are taken; sigma : (D,)
+    noise about those. Clusters are as frequent as in training; angles and movements are drawn from them, and the
+    angles kept within the space's limits.
+    """
+    model, columns = model_of(space), columns_of(space)
+    start = start_states(rng, model, count)
+    around = rng.standard_normal((count, len(space.names))) * sigma
+    poses = np.broadcast_to(root, around.shape) + around
+    poses[:, columns] = start.values
+    poses = np.clip(poses, space.lower, space.upper)
+    carried: Arrays = {STATES: start.states, VELOCITY: start.velocities}
+    return unweighted(poses, carried)
+
+
+def foreseen(particles: ParticleSet, space: SearchSpace, support: float = 0.05, most: int = 4) -> Array:
+    """(S, D) where a set expects the body: the means of the clusters that hold at least a share `support` of its
+    particles, the fullest first, `most` at most, at the particles' mean root (section 6.3). Never empty: where no
+    cluster has so many the fullest is taken, and the set's own mean where nothing guides it.
+    """
+    mean = particles.poses.mean(axis=0)
+    if space.behaviour is None or STATES not in particles.extra:
+        return mean[None]
+    model, columns = space.behaviour, space.behaviour.space.columns
+    labels = _labels_of(model, particles)
+    held = np.bincount(labels, minlength=model.clusters) / len(labels)
+    order = np.argsort(-held, kind="stable")
+    enough = [int(label) for label in order if held[label] >= support and held[label] > 0.0]
+    chosen = (enough or [int(order[0])])[:most]
+    poses = np.tile(mean, (len(chosen), 1))
+    poses[:, columns] = model.poses_only.means[chosen]
+    return np.clip(poses, space.lower, space.upper)
+
+
+def _labels_of(model: BehaviourModel, particles: ParticleSet) -> Indices:
+    """(N,) the cluster that each particle is in: the last symbol of its state, and where a state remembers nothing
+    the label of its pose and movement.
+    """
+    labels = model.automaton.last_symbols[known_of(particles)[STATES]]
+    unknown = np.flatnonzero(labels < 0)
+    if unknown.size:
+        angles = particles.poses[np.ix_(unknown, model.space.columns)]
+        labels[unknown] = _labelled(model, angles, particles.extra[VELOCITY][unknown])
+    return labels
+
+
+def _labelled(model: BehaviourModel, angles: Array, velocity: Array) -> Indices:
+    """(N,) the clusters of features."""
+    return model.mixture.labels(model.reduction.reduced(np.concatenate([angles, velocity], axis=1)))
+
+
+def _movement_given_angles(mixture: GaussianMixture, label: int, angles: Array, noise: Array) -> Array:
+    """(N, d) movements drawn from a cluster's Gaussian given angles (N, d); noise : (N, d) independent normals."""
+    half = angles.shape[1]
+    mean, covariance = mixture.means[label], mixture.covariances[label]
+    inner, across, outer = covariance[:half, :half], covariance[half:, :half], covariance[half:, half:]
+    away = angles - mean[:half]
+    inverse = np.linalg.pinv(inner, hermitian=True)
+    distance = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", away, inverse, away), 1e-300))
+    away = away * np.minimum(1.0, (np.sqrt(half) + NOT_BELIEVED) / distance)[:, None]
+    values, vectors = np.linalg.eigh(outer - across @ inverse @ across.T)
+    root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+    return mean[half:] + away @ (across @ inverse).T + noise @ root

@@ -1,0 +1,154 @@
+"""A frame's first set, made by a behaviour model, with a share of particles that it does not move.
+
+Whether the body can take a particle is not known before the frame's problem is. So the set carries what its particles
+came from, and `settled_walkers` draws those that are impossible again from the same past once the problem is there,
+each in its own way: by the model, or by noise.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.tracking.diffusion import noise_about
+from studio.tracking.guided_particles import (
+    STATES,
+    VELOCITY,
+    Arrays,
+    GuidedRules,
+    Walkers,
+    columns_of,
+    followed,
+    known_of,
+    model_of,
+    near,
+    walked,
+    walkers_from,
+)
+from studio.tracking.hard_priors import Proposals, settled
+from studio.tracking.model_free import BEATEN, FREE, chosen_free, share_of
+from studio.tracking.particles import CAME_FROM, first_draw, settle, unweighted
+from studio.tracking.tracker import Carried, FrameProblem, ParticleSet, SearchSpace
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+CAME_FROM_STATES, CAME_FROM_VELOCITY = "came_from_state", "came_from_velocity"
+"""Arrays of a first set, beside CAME_FROM (N, D): (N,) int, (N, d), what its particles came from."""
+PAST = (CAME_FROM, CAME_FROM_STATES, CAME_FROM_VELOCITY)
+
+
+def guided_set(
+    rng: np.random.Generator, previous: Carried, rows: Indices, space: SearchSpace, rules: GuidedRules
+) -> ParticleSet:
+    """The unweighted set of a frame that starts from the particles `rows` (N,) of the last one's.
+
+    In a run's first frame (nothing was reported yet) particles are spread by noise alone, as nothing has moved.
+    """
+    assert previous.particles is not None
+    sigma = space.sigma * rules.diffusion_scale
+    if previous.estimate is None:
+        return _standing_set(rng, previous.particles.poses[rows], space, sigma, rules)
+    share = share_of(rules.model_free_share, rules.model_free_grows, previous.particles.extra)
+    free = chosen_free(rng, len(rows), share)
+    past = walkers_from(rng, previous, rows, free, space)
+    following = _walking_set(walked(rng, past, space, rules, sigma), past, space, rules)
+    if BEATEN in previous.particles.extra:
+        following.extra[BEATEN] = previous.particles.extra[BEATEN]
+    return following
+
+
+def settled_walkers(
+    rng: np.random.Generator,
+    particles: ParticleSet,
+    problem: FrameProblem,
+    space: SearchSpace,
+    rules: GuidedRules,
+) -> ParticleSet:
+    """A guided first set with what is impossible drawn again; what the particles came from stays with it.
+
+    A particle for which nothing possible is found stays where it came from, at rest.
+    """
+    if rules.constraints != "redraw":
+        return particles
+    extra, sigma = known_of(particles), space.sigma * rules.diffusion_scale
+    if CAME_FROM_STATES not in extra:
+        spread = noise_about(extra[CAME_FROM], sigma)
+        poses = settle(rng, spread, particles.poses, spread.centres, problem, space, rules)
+        return ParticleSet(poses, particles.log_weights, extra=extra | _found_near(rng, poses, space))
+    past = Walkers(extra[CAME_FROM], extra[CAME_FROM_STATES], extra[CAME_FROM_VELOCITY], extra[FREE])
+    first = Walkers(particles.poses, extra[STATES], extra[VELOCITY], extra[FREE])
+
+    def again(rows: Indices) -> Proposals:
+        return _packed(walked(rng, past.at(rows), space, rules, sigma))
+
+    done = settled(problem, space, rules, _packed(first), past.poses, again)
+    states = done.velocities[:, -1].astype(np.int64) - 1
+    found = {STATES: np.where(states < 0, past.states, states), VELOCITY: done.velocities[:, :-1].copy()}
+    return ParticleSet(done.poses, particles.log_weights, extra=extra | found)
+
+
+def without_past(extra: Arrays) -> Arrays:
+    """A set's arrays without what its particles came from."""
+    return {name: values for name, values in extra.items() if name not in PAST}
+
+
+def descended(extra: Arrays, ancestors: Indices) -> Arrays:
+    """A guided set's arrays for particles that descend from `ancestors` (N,) of it; what is known of all of them
+    together stays.
+    """
+    return {
+        name: values[ancestors] if name in (*PAST, STATES, VELOCITY) else values
+        for name, values in extra.items()
+        if name != FREE
+    }
+
+
+def arrived(rng: np.random.Generator, poses: Array, extra: Arrays, space: SearchSpace) -> Arrays:
+    """The arrays that a set of poses (N, D), moved on since it was made, ends its frame with.
+
+    A particle's movement is the way from what its first ancestor came from to where it is now; its state is the one
+    that follows from that ancestor's by the cluster of pose and movement. In a run's first frame both are drawn from
+    the clusters near the pose.
+    """
+    if CAME_FROM_STATES not in extra:
+        return without_past(extra) | _found_near(rng, poses, space)
+    columns = columns_of(space)
+    velocity = (poses - extra[CAME_FROM])[:, columns]
+    states = followed(rng, model_of(space), extra[CAME_FROM_STATES], poses[:, columns], velocity)
+    return without_past(extra) | {STATES: states, VELOCITY: velocity}
+
+
+def _standing_set(
+    rng: np.random.Generator, poses: Array, space: SearchSpace, sigma: Array, rules: GuidedRules
+) -> ParticleSet:
+    """Poses (N, D) spread by noise; states and movements from the clusters near to where they are then."""
+    spread = noise_about(poses, sigma)
+    first = first_draw(spread, spread.draw(rng), space, rules)
+    return unweighted(first.poses, first.extra | _found_near(rng, first.poses, space))
+
+
+def _found_near(rng: np.random.Generator, poses: Array, space: SearchSpace) -> Arrays:
+    states, velocity = near(rng, poses, space)
+    return {STATES: states, VELOCITY: velocity}
+
+
+def _walking_set(drawn: Walkers, past: Walkers, space: SearchSpace, rules: GuidedRules) -> ParticleSet:
+    poses, velocity = drawn.poses, drawn.velocity
+    if rules.constraints == "clamp":
+        columns = columns_of(space)
+        poses = np.clip(poses, space.lower, space.upper)
+        velocity = np.where(poses[:, columns] == drawn.poses[:, columns], velocity, 0.0)
+    carried = {
+        STATES: drawn.states,
+        VELOCITY: velocity,
+        FREE: drawn.free,
+        CAME_FROM: past.poses,
+        CAME_FROM_STATES: past.states,
+        CAME_FROM_VELOCITY: past.velocity,
+    }
+    return unweighted(poses, carried)
+
+
+def _packed(walkers: Walkers) -> Proposals:
+    """Poses, and beside each the movement and 1 + the state: rules that stop a particle set them to zero."""
+    beside = np.column_stack([walkers.velocity, 1.0 + walkers.states]).astype(np.float64)
+    return Proposals(walkers.poses, beside)
