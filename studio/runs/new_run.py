@@ -17,6 +17,7 @@ from studio.body.branches import within_limits
 from studio.body.model import BodyModel
 from studio.body.subject import Subject
 from studio.errors import BodyError, RunError
+from studio.runs.behaviour_models import chosen_model
 from studio.runs.search_space import parameter_names, session_sigma
 from studio.sessions.manifest import now
 from studio.sessions.run_record import RunRecord
@@ -36,7 +37,8 @@ class RunRequest:
     tracker, weighting, body : names, "" for the session's own. subject : measures instead of the session's.
     start_pose : (D,) radians and mm, instead of the session's; start_source : where it came from, in words.
     first, last : frames, half open; last None means all. changes : knobs by flat name. name : "" for run-1,
-    run-2, …
+    run-2, … behaviour : a behaviour model, by its name in the workspace's models or by path; "" for the only one that
+    fits where the settings need one.
     """
 
     tracker: str = ""
@@ -50,6 +52,7 @@ class RunRequest:
     seed: int = 0
     changes: Mapping[str, object] = field(default_factory=dict)
     name: str = ""
+    behaviour: str = ""
 
 
 def prepare_run(session: Session, request: RunRequest | None = None) -> StoredRun:
@@ -64,6 +67,9 @@ def prepare_run(session: Session, request: RunRequest | None = None) -> StoredRu
         raise RunError(f"The seed {asked.seed} cannot be used.", "Give a whole number of 0 or more.")
     body, notes = session.body_with_notes(asked.body or None, asked.subject)
     start, source = start_pose(session, body, asked.start_pose, asked.start_source)
+    behaviour = chosen_model(session, body, settings, asked.behaviour)
+    if behaviour is not None and behaviour.note:
+        notes = (*notes, behaviour.note)
     record = RunRecord(
         name=asked.name or free_run_name(session),
         session=session.name,
@@ -83,8 +89,10 @@ def prepare_run(session: Session, request: RunRequest | None = None) -> StoredRu
         start_source=source,
         software=software_version(),
         notes=tuple(notes),
+        behaviour=behaviour.name if behaviour else "",
     )
-    return session.new_run(record, _body_text(session, asked.body or body.name))
+    text = _body_text(session, asked.body or body.name)
+    return session.new_run(record, text, behaviour.path if behaviour else None)
 
 
 def checked_frames(session: Session, first: int, last: int | None) -> tuple[int, int]:

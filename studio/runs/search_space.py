@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.behaviour.model import BehaviourModel
 from studio.body.model import BodyModel
 from studio.runs.hierarchy import hierarchy_of
 from studio.sessions.session import Session
@@ -28,8 +29,8 @@ def session_sigma(session: Session, body: BodyModel, fps: float) -> Array:
     return default_sigma(body, fps) if own is None else own
 
 
-def search_space(body: BodyModel, sigma: Array) -> SearchSpace:
-    """The body's pose vectors as a tracker sees them. sigma : (D,) σ0, mm and rad."""
+def search_space(body: BodyModel, sigma: Array, behaviour: BehaviourModel | None = None) -> SearchSpace:
+    """The body's pose vectors as a tracker sees them. sigma : (D,) σ0, mm and rad. behaviour : at the rate of σ0."""
     limbs = [entry.limb for entry in body.parameters]
     number = {limb: index for index, limb in enumerate(dict.fromkeys(limbs))}
     return SearchSpace(
@@ -39,6 +40,7 @@ def search_space(body: BodyModel, sigma: Array) -> SearchSpace:
         sigma=sigma,
         limb=np.array([number[limb] for limb in limbs], dtype=np.int64),
         hierarchy=hierarchy_of(body),
+        behaviour=behaviour,
     )
 
 

@@ -58,7 +58,7 @@ class TrackingRun:
     def __init__(self, run: StoredRun, problems: Problems) -> None:
         self.run, self.record, self.problems = run, run.record, problems
         self.tracker = TRACKERS[self.record.tracker]
-        self.space = search_space(run.body(), np.array(self.record.sigma))
+        self.space = search_space(run.body(), np.array(self.record.sigma), run.behaviour())
         self._writer = ResultsWriter(run.folder)
         self._reader = ResultsReader(run.folder)
         self._pace = Pace()

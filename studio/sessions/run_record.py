@@ -1,8 +1,9 @@
 """`run.json`: what a run was asked to do, written once when it is made.
 
 Everything that a run's poses depend on is here or beside it in the run's folder: the body with its dimensions
-(`body/`), the cameras as they were (`cameras.toml`), the start pose, σ0, the seed and the settings that it
-began with. Settings changed on the way, and how far it got, are facts of the results store.
+(`body/`), the cameras as they were (`cameras.toml`), the behaviour model if it has one (`behaviour.model`), the start
+pose, σ0, the seed and the settings that it began with. Settings changed on the way, and how far it got, are facts of
+the results store.
 """
 
 from pathlib import Path
@@ -16,6 +17,7 @@ Value = bool | int | float | str
 SCHEMA_VERSION = 1
 FILE_NAME = "run.json"
 CAMERAS_NAME = "cameras.toml"
+BEHAVIOUR_NAME = "behaviour.model"
 
 
 class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -26,7 +28,8 @@ class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     start. body : name or file of the body; dimensions : its lengths and radii, mm, as they were fitted to the
     subject. parameters : names of the pose vector. start_pose : radians and mm, None where the search starts
     uniformly. start_source : where it came from, in words. sigma : σ0 of every parameter from frame to frame,
-    rad and mm. software : the studio's version. notes : what a reader of the results should know.
+    rad and mm. software : the studio's version. notes : what a reader of the results should know. behaviour : name of
+    the behaviour model whose copy the run keeps, "" without one.
     """
 
     schema: int = SCHEMA_VERSION
@@ -48,6 +51,7 @@ class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     start_source: str = ""
     software: str = ""
     notes: tuple[str, ...] = ()
+    behaviour: str = ""
 
     @property
     def frame_count(self) -> int:

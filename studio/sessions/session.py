@@ -22,7 +22,7 @@ from studio.sessions.manifest import SessionManifest, read_manifest, write_manif
 from studio.sessions.named_rows import Array, read_pose, read_sigma
 from studio.sessions.names import checked_name, free_name, inside
 from studio.sessions.results_store import create_store
-from studio.sessions.run_record import CAMERAS_NAME, RunRecord, write_run_record
+from studio.sessions.run_record import BEHAVIOUR_NAME, CAMERAS_NAME, RunRecord, write_run_record
 from studio.sessions.stored_run import BODY_FOLDER, StoredRun
 from studio.sessions.thumbnails import thumbnail_of
 
@@ -144,12 +144,13 @@ class Session:
             )
         return StoredRun(path)
 
-    def new_run(self, record: RunRecord, body_text: str = "") -> StoredRun:
+    def new_run(self, record: RunRecord, body_text: str = "", behaviour: Path | None = None) -> StoredRun:
         """Make the folder of a run: its record, the calibration's and the body file's snapshot, an empty
         store.
 
         It appears whole or not at all. `runs.new_run.prepare_run` fills in the record. body_text : content of
-        the body's file, "" where it is not to be kept. Raises SessionError if the name is taken.
+        the body's file, "" where it is not to be kept. behaviour : the file of its behaviour model, to be copied.
+        Raises SessionError if the name is taken.
         """
         place = self.path / RUNS_NAME / checked_name(record.name, "run")
         folder = atomic_files.new_folder_beside(place)
@@ -159,6 +160,8 @@ class Session:
                 (folder / BODY_FOLDER).mkdir()
                 name = Path(record.body).stem
                 atomic_files.write_text(folder / BODY_FOLDER / f"{name}.toml", body_text)
+            if behaviour is not None:
+                atomic_files.copy_file(behaviour, folder / BEHAVIOUR_NAME)
             create_store(folder)
             write_run_record(folder, record)
             atomic_files.move_into_place(folder, place)

@@ -4,6 +4,8 @@ import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 
+from studio.behaviour.model import BehaviourModel
+from studio.behaviour.model_file import read_model
 from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
 from studio.body.model import BodyModel
@@ -11,7 +13,7 @@ from studio.capture.calibration_files import read_calibration
 from studio.errors import BodyError
 from studio.geometry.camera import Camera
 from studio.sessions.results_store import ResultsReader, is_being_written
-from studio.sessions.run_record import CAMERAS_NAME, RunRecord, read_run_record
+from studio.sessions.run_record import BEHAVIOUR_NAME, CAMERAS_NAME, RunRecord, read_run_record
 
 BODY_FOLDER = "body"
 
@@ -81,6 +83,12 @@ class StoredRun:
     def cameras(self) -> tuple[Camera, ...]:
         """The cameras as they were when the run was made. Raises CalibrationError."""
         return tuple(read_calibration(self.folder / CAMERAS_NAME).cameras)
+
+    def behaviour(self) -> BehaviourModel | None:
+        """The run's own copy of its behaviour model, at the footage's rate; None without one. Raises BehaviourError."""
+        if not self.record.behaviour:
+            return None
+        return read_model(self.folder / BEHAVIOUR_NAME).at_rate(self.record.fps)
 
     def being_tracked(self) -> bool:
         """Whether some living process has the run open for tracking."""

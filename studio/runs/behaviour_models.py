@@ -1,0 +1,176 @@
+"""Where a run's behaviour model comes from: the models folder, what each model is of, and which one a run gets.
+
+Models lie in `models/NAME.behaviour` of the workspace; a run names one, and keeps a copy of its file in its own folder,
+so that it replays whatever becomes of the model. A model fits any body of the same parameters, whatever its dimensions.
+"""
+
+import contextlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from studio.behaviour.model import BehaviourModel
+from studio.behaviour.model_file import read_model
+from studio.body.model import BodyModel
+from studio.errors import BehaviourError, NotFoundError, SettingsError, StudioError
+from studio.sessions.names import is_name
+from studio.sessions.session import Session
+from studio.sessions.workspace import workspace_root
+from studio.settings import RunSettings
+from studio.tracking.shared_knobs import BEHAVIOUR
+
+MODELS_NAME, SUFFIX = "models", ".behaviour"
+GUIDED_TRACKER = "behaviour"
+
+
+@dataclass(frozen=True, slots=True)
+class ModelLine:
+    """A model as a line of a list. parameters : of its body's pose. fps : it was learnt at. frames : of training.
+    problem : why it cannot be read, "" if it can.
+    """
+
+    name: str
+    path: Path
+    body: str = ""
+    parameters: tuple[str, ...] = ()
+    clusters: int = 0
+    states: int = 0
+    frames: int = 0
+    fps: float = 0.0
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ChosenModel:
+    """The model of a new run. note : where it came from, where nobody asked for it; "" else."""
+
+    name: str
+    path: Path
+    note: str = ""
+
+
+def models_folder(root: Path) -> Path:
+    """The folder of a workspace's models."""
+    return root / MODELS_NAME
+
+
+def model_folders(session: Session) -> tuple[Path, ...]:
+    """Where a session's models are looked for: in the workspace around it, then in the user's own."""
+    folders = (models_folder(session.path.parent), models_folder(workspace_root().absolute()))
+    return tuple(dict.fromkeys(folder for folder in folders if folder.is_dir()))
+
+
+def models_in(folders: Sequence[Path]) -> tuple[ModelLine, ...]:
+    """The models of some folders by name; of two with the same name the first folder's."""
+    found: dict[str, ModelLine] = {}
+    for folder in folders:
+        for path in sorted(folder.glob(f"*{SUFFIX}")):
+            # One that is gone by now is none.
+            with contextlib.suppress(FileNotFoundError):
+                about = path.stat()
+                found.setdefault(path.stem, _line(path, about.st_mtime_ns, about.st_size))
+    return tuple(found[name] for name in sorted(found))
+
+
+def model_path(folders: Sequence[Path], name_or_path: str) -> Path:
+    """The file of a model: a name in one of the folders, else a path. Raises NotFoundError listing the models."""
+    for folder in folders:
+        path = folder / f"{name_or_path.removesuffix(SUFFIX)}{SUFFIX}"
+        if path.parent == folder and path.is_file():
+            return path
+    path = Path(name_or_path).expanduser()
+    if not is_name(name_or_path) and "\0" not in name_or_path and path.is_file():
+        return path.absolute()
+    raise NotFoundError(f"There is no behaviour model '{name_or_path}'.", _known(models_in(folders)))
+
+
+def fitting(model: BehaviourModel, body: BodyModel, fps: float) -> BehaviourModel:
+    """The model for footage of `fps` of that body.
+
+    Raises BehaviourError naming the first parameter that differs.
+    """
+    wanted, has = model.space.parameters, tuple(entry.name for entry in body.parameters)
+    if wanted == has:
+        return model.at_rate(fps)
+    pairs = [(one, other) for one, other in zip(wanted, has, strict=False) if one != other]
+    if len(wanted) != len(has):
+        differs = f"it has {len(wanted)} parameters, '{body.name}' {len(has)}"
+    else:
+        differs = f"it has '{pairs[0][0]}' where '{body.name}' has '{pairs[0][1]}'"
+    raise BehaviourError(
+        f"The behaviour model is of body '{model.space.body}': {differs}.",
+        f"Learn one with 'studio learn … --body {body.name}', or track with --body {model.space.body}.",
+    )
+
+
+def needs_model(tracker: str, settings: object) -> bool:
+    """Whether a tracker with these knobs of its own cannot go without a behaviour model."""
+    return tracker == GUIDED_TRACKER or getattr(settings, "prediction", "") == BEHAVIOUR
+
+
+def check_prediction(settings: RunSettings, has_model: bool) -> None:
+    """Raise SettingsError where settings ask for a model that a run does not have."""
+    if not has_model and needs_model(settings.tracker_name, settings.tracker):
+        raise SettingsError(
+            "Setting 'prediction' cannot be 'behaviour': the run has no behaviour model.",
+            "Start a new run with one (--behaviour MODEL).",
+        )
+
+
+def chosen_model(session: Session, body: BodyModel, settings: RunSettings, asked: str) -> ChosenModel | None:
+    """The model of a new run: the one asked for, else (where the settings need one) the only one of that body.
+
+    Raises NotFoundError for a model that is not there, BehaviourError for one that does not fit, and where the
+    settings need a model and none, or more than one, would fit.
+    """
+    folders = model_folders(session)
+    if asked:
+        path = model_path(folders, asked)
+        fitting(read_model(path), body, session.manifest.fps)
+        return ChosenModel(path.stem, path)
+    if not needs_model(settings.tracker_name, settings.tracker):
+        return None
+    names = tuple(entry.name for entry in body.parameters)
+    models = models_in(folders)
+    fit = [line for line in models if not line.problem and line.parameters == names]
+    if len(fit) == 1:
+        note = f"Behaviour model '{fit[0].name}': the only one of body '{body.name}'."
+        return ChosenModel(fit[0].name, fit[0].path, note)
+    wants = "Tracker 'behaviour'" if settings.tracker_name == GUIDED_TRACKER else "Prediction by behaviour"
+    if fit:
+        several = ", ".join(f"'{line.name}'" for line in fit)
+        raise BehaviourError(
+            f"{wants} needs a behaviour model, and several are of body '{body.name}': {several}.",
+            "Choose one with --behaviour MODEL.",
+        )
+    raise BehaviourError(
+        f"{wants} needs a behaviour model, and there is none of body '{body.name}'.",
+        f"Learn one with 'studio learn SOURCES… --body {body.name} --into MODEL'. {_known(models)}",
+    )
+
+
+@lru_cache(maxsize=256)
+def _line(path: Path, _written: int, _size: int) -> ModelLine:
+    """The line of a model's file as it was at a moment."""
+    try:
+        model = read_model(path)
+    except StudioError as error:
+        return ModelLine(path.stem, path, problem=error.message)
+    return ModelLine(
+        name=path.stem,
+        path=path,
+        body=model.space.body,
+        parameters=model.space.parameters,
+        clusters=model.clusters,
+        states=model.states,
+        frames=model.making.frames,
+        fps=model.making.learnt_fps,
+    )
+
+
+def _known(models: Sequence[ModelLine]) -> str:
+    if not models:
+        return "There are no models yet; 'studio learn' makes them."
+    words = (f"'{line.name}' ({line.problem or f'of {line.body}'})" for line in models)
+    return f"There are {', '.join(words)}."
