@@ -1,0 +1,46 @@
+"""C3D files: labelled points over time, as optical motion capture systems write them."""
+
+from pathlib import Path
+
+import ezc3d
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.capture.trc import MM_PER_UNIT, MarkerMotion
+from studio.errors import StudioError
+
+Array = NDArray[np.float64]
+
+REMEDY = "Export it again from the program that it comes from."
+
+
+def read_c3d(path: Path) -> MarkerMotion:
+    """The labelled points of a C3D file as they are written, mm; NaN where a point was not seen.
+
+    The file's third axis counts as up: learning leaves out how the whole body lies. Raises StudioError for what is no
+    C3D file, and for one without points, labels or a rate.
+    """
+    if not path.is_file():
+        raise StudioError(f"'{path}' does not exist.", "Check the path.")
+    try:
+        content = ezc3d.c3d(str(path))
+        settings = content["parameters"]["POINT"]
+        labels = [str(label).strip() for label in settings["LABELS"]["value"]]
+        unit = str(next(iter(settings["UNITS"]["value"]), "mm")).strip().lower() or "mm"
+        rate = float(settings["RATE"]["value"][0])
+        points = np.array(content["data"]["points"], dtype=np.float64)[:3].transpose(2, 1, 0)
+    except (OSError, RuntimeError, ValueError, KeyError, IndexError, TypeError) as problem:
+        raise StudioError(
+            f"'{path.name}' is not a C3D file that can be read ({str(problem).splitlines()[0]}).", REMEDY
+        ) from None
+    if not points.size or len(labels) < points.shape[1]:
+        raise StudioError(f"'{path.name}' has no labelled points.", REMEDY)
+    if unit not in MM_PER_UNIT or not 1.0 <= rate <= 10_000.0:
+        raise StudioError(
+            f"'{path.name}' has the unit '{unit}' and {rate:g} frames a second.",
+            "Points must be in mm, cm or m, at 1 to 10000 frames a second.",
+        )
+    unseen = ~np.isfinite(points).all(axis=2) | (points == 0.0).all(axis=2)
+    positions = np.where(unseen[..., None], np.nan, MM_PER_UNIT[unit] * points)
+    names = tuple(labels[: points.shape[1]])
+    return MarkerMotion(names, np.arange(len(positions)) / rate, positions, unit=unit, rate=rate)

@@ -1,0 +1,96 @@
+"""Poses of a body along a recorded motion: inverse kinematics on marker points, all frames together.
+
+First frame by frame, forwards and backwards, each from its neighbour; these paths are then fitted as wholes, where
+unsteady angles cost something (`smooth_path`): that settles what markers leave open (twists of straight limbs, joints
+near their singular positions). A path that is at first held very steady and let loose by and by finds the spelling of
+the joints that goes on without a jump; the best stretches of all paths are joined (`path_splicing`) and fitted again.
+Angles stay within the body's limits throughout.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.model import BodyModel
+from studio.training.marker_problem import MarkerProblem
+from studio.training.path_splicing import spliced
+from studio.training.smooth_path import SmoothPath, Steadiness
+from studio.training.targets import Targets
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+STEADY = Steadiness(acceleration=90.0, speed=8.0, rest=1.5)
+"""mm a radian a frame, at STEADY_FPS frames a second."""
+STEADY_FPS = 30.0
+STRICTER = ((1.0,), (4.0, 2.0, 1.0), (16.0, 8.0, 4.0, 2.0, 1.0))
+"""How much steadier than that the paths are held on the way to it."""
+PATH_STEPS, LAST_STEPS = 10, 25
+BAD_SHARE, BAD_MM = 2.5, 60.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fitted:
+    """poses : (F, D). rms_mm : (F,) distance of markers and points, NaN in frames that hold too few points."""
+
+    poses: Array
+    rms_mm: Array
+
+
+def fit_poses(body: BodyModel, targets: Targets, fps: float, progress: Progress | None = None) -> Fitted:
+    """The poses of `body` whose markers and pointers come closest to the targets, steady over time.
+
+    progress : called with a step in words, what is done and how much there is. Raises StudioError where no frame has
+    enough markers of the body.
+    """
+    problem, steady = MarkerProblem(body, targets), STEADY.at_rate(fps / STEADY_FPS)
+    frames, paths, told = targets.frame_count, [], 0
+    total = 2 * frames + PATH_STEPS * frames * 2 * sum(map(len, STRICTER)) + LAST_STEPS * frames
+    for backwards in (False, True):
+
+        def tell(more: int) -> None:
+            nonlocal told
+            told += more
+            if progress is not None:
+                progress("fitting the body", min(told, total), total)
+
+        start = _followed(problem, backwards, tell)
+        for grades in STRICTER:
+            path = start
+            for times in grades:
+                path = _refined(problem, path, steady.times(times), PATH_STEPS)
+                tell(PATH_STEPS * frames)
+            paths.append(path)
+    paths.sort(key=lambda path: float(problem.costs(path).sum()))
+    path = spliced(paths, problem.groups, problem.costs, steady.acceleration)
+    path = _refined(problem, path, steady, LAST_STEPS)
+    if progress is not None:
+        progress("fitting the body", total, total)
+    return Fitted(path * problem.scale, problem.rms(path))
+
+
+def bad_frames(rms_mm: Array) -> NDArray[np.int64]:
+    """Numbers of the frames that fit far worse than the others, or had nothing to fit. rms_mm : (F,)."""
+    limit = max(BAD_MM, BAD_SHARE * float(np.nanmedian(rms_mm)))
+    return np.flatnonzero(~(rms_mm <= limit))
+
+
+def _refined(problem: MarkerProblem, path: Array, steadiness: Steadiness, steps: int) -> Array:
+    smooth = SmoothPath(problem.slopes, problem.costs, problem.lower, problem.upper, problem.rest, steadiness)
+    return smooth.refined(path, steps)
+
+
+def _followed(problem: MarkerProblem, backwards: bool, tell: Callable[[int], None]) -> Array:
+    """(F, D) each frame from its neighbour, beginning with the first (or last) frame that can be fitted."""
+    frames = np.arange(len(problem.usable))[:: -1 if backwards else 1]
+    first = int(np.argmax(problem.usable[frames]))
+    pose = problem.searched(int(frames[first]), problem.rest)
+    path = np.tile(pose, (len(frames), 1))
+    for frame in frames[first + 1 :]:
+        if problem.usable[frame]:
+            pose = problem.next(pose, int(frame))
+        path[frame] = pose
+        tell(1)
+    return path

@@ -1,0 +1,249 @@
+"""Recorded motion as poses of a body, whatever it was recorded with.
+
+Motion files (.amc with its .asf, .bvh, .npz, .c3d, .trc), earlier runs (SESSION/RUN), and recipes of footage, whose
+motion is made without rendering it. A skeleton is put on the synthetic one with the body's proportions; points are
+met by the body in the size that their distances tell; a run of the same body is taken as it is.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.model import BodyModel
+from studio.body.subject import Subject, fit_subject
+from studio.capture.trc import MarkerMotion, read_trc
+from studio.errors import StudioError
+from studio.sessions.manifest import FILE_NAME as SESSION_FILE
+from studio.sessions.run_record import FILE_NAME as RUN_FILE
+from studio.sessions.stored_run import StoredRun
+from studio.sessions.workspace import Workspace
+from studio.synthesis.person import PersonMotion
+from studio.synthesis.recipe_file import find_recipe, read_recipe, recipe_names
+from studio.synthesis.recipes import recipe_motion
+from studio.synthesis.recorded_clip import read_recording, sampled
+from studio.synthesis.recorded_motion import RecordedMotion
+from studio.synthesis.retargeting import family_of, on_skeleton
+from studio.training.c3d_file import read_c3d
+from studio.training.marker_labels import person_markers
+from studio.training.pose_fitting import bad_frames, fit_poses
+from studio.training.resampling import frame_times, points_at, poses_at
+from studio.training.targets import Targets, marker_names, of_person, of_poses, skeleton_of_body
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+FPS = 30.0
+FEWEST_FRAMES = 10
+SKELETON_FILES, POINT_FILES, RECIPE = (".amc", ".bvh", ".npz"), (".c3d", ".trc"), ".toml"
+MOTION_FILES = (*SKELETON_FILES, *POINT_FILES)
+ARM = "arm"
+# Pairs of markers whose distances say how large the person is.
+MEASURED = (
+    *(("Hip", "Neck"), ("Neck", "Head")),
+    *((f"{side}{one}", f"{side}{other}") for side in "LR" for one, other in (("Hip", "Knee"), ("Knee", "Ankle"))),
+    *(
+        (f"{side}{one}", f"{side}{other}")
+        for side in "LR"
+        for one, other in (("Shoulder", "Elbow"), ("Elbow", "Wrist"))
+    ),
+    *(("Hip", f"{side}Hip") for side in "LR"),
+    *(("Neck", f"{side}Shoulder") for side in "LR"),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recording:
+    """Motion of a body.
+
+    poses : (F, D) at `fps`. rms_mm : distance of the body's markers from the recorded ones over all frames; 0 for
+    poses taken as they are. bad_frames : those that fit far worse than the rest (numbers at `fps`).
+    """
+
+    name: str
+    fps: float
+    poses: Array
+    rms_mm: float = 0.0
+    bad_frames: tuple[int, ...] = ()
+
+    @property
+    def frame_count(self) -> int:
+        """Number of frames."""
+        return len(self.poses)
+
+
+def read_source(
+    source: str | Path,
+    body: BodyModel,
+    skeleton: Path | None = None,
+    *,
+    fps: float = FPS,
+    workspace: Workspace | None = None,
+    progress: Progress | None = None,
+) -> Recording:
+    """The motion of a source on `body`, at `fps`.
+
+    source : a motion file, a recipe's file or name, a run's folder, or SESSION/RUN of the workspace. skeleton : the
+    ASF of an .amc; by default NN.asf beside NN_MM.amc. Raises StudioError for what cannot be read, bodies that a
+    person's motion cannot be put on, and motion of fewer than FEWEST_FRAMES frames.
+    """
+    path = Path(source).expanduser()
+    if path.is_file():
+        recording = _read_file(path, body, skeleton, fps, progress)
+    elif str(source) in recipe_names():
+        recording = _read_recipe(find_recipe(str(source)), body, fps, progress)
+    else:
+        recording = _read_run(_find_run(str(source), workspace or Workspace()), body, fps, progress)
+    if recording.frame_count < FEWEST_FRAMES:
+        raise StudioError(
+            f"'{recording.name}' has {recording.frame_count} frames at {fps:g} frames a second.",
+            f"Give motion of at least {FEWEST_FRAMES} frames.",
+        )
+    return recording
+
+
+def expand(source: str | Path) -> tuple[str, ...]:
+    """The sources that a name stands for: a folder's motion files in order, else the name itself.
+
+    Raises StudioError for a folder without motion, and a session's folder, naming its runs.
+    """
+    path = Path(source).expanduser()
+    if not path.is_dir() or (path / RUN_FILE).is_file():
+        return (str(source),)
+    if (path / SESSION_FILE).is_file():
+        raise _runs_of(path)
+    found = tuple(str(entry) for entry in sorted(path.iterdir()) if entry.suffix.lower() in MOTION_FILES)
+    if not found:
+        raise StudioError(
+            f"Folder '{path.name}' holds no motion.", f"Motion files end in {', '.join(MOTION_FILES)}."
+        )
+    return found
+
+
+def fitted_person(
+    motion: PersonMotion, body: BodyModel, name: str, progress: Progress | None = None
+) -> Recording:
+    """The body moving as a synthetic person does, at the motion's rate."""
+    return _fitted(of_person(motion), body, name, motion.fps, progress)
+
+
+def _fitted(targets: Targets, body: BodyModel, name: str, fps: float, progress: Progress | None) -> Recording:
+    found = fit_poses(body, targets, fps, progress)
+    rms = float(np.sqrt(np.nanmean(found.rms_mm**2)))
+    return Recording(name, fps, found.poses, rms, tuple(bad_frames(found.rms_mm).tolist()))
+
+
+def _read_file(
+    path: Path, body: BodyModel, skeleton: Path | None, fps: float, progress: Progress | None
+) -> Recording:
+    ending = path.suffix.lower()
+    if ending == RECIPE:
+        return _read_recipe(path, body, fps, progress)
+    if ending in SKELETON_FILES:
+        marker_names(body)
+        recorded = read_recording(path, skeleton if ending == ".amc" else None)
+        return _from_recorded(recorded, body, path.stem, fps, progress)
+    if ending in POINT_FILES:
+        marker_names(body)
+        motion = read_c3d(path) if ending == ".c3d" else read_trc(path)
+        return _from_points(motion, body, path, fps, progress)
+    raise StudioError(
+        f"'{path.name}' is no motion that can be read.",
+        f"Give files ending in {', '.join(MOTION_FILES)}, a recipe, or a run as SESSION/RUN.",
+    )
+
+
+def _from_recorded(
+    recorded: RecordedMotion, body: BodyModel, name: str, fps: float, progress: Progress | None
+) -> Recording:
+    """A recorded skeleton; one whose joints are named unusually by the places of its joints alone."""
+    if recorded.positions.shape[0] < 2:
+        return Recording(name, fps, np.repeat(body.neutral[None], len(recorded.positions), axis=0))
+    try:
+        family_of(recorded)
+    except StudioError:
+        times = np.arange(len(recorded.positions)) / recorded.fps
+        joints = MarkerMotion(recorded.names, times, recorded.positions, rate=recorded.fps)
+        return _from_points(joints, body, Path(recorded.source), fps, progress)
+    whole = on_skeleton(recorded, skeleton_of_body(body))
+    return fitted_person(sampled(whole, frame_times(recorded.seconds, fps), fps), body, name, progress)
+
+
+def _from_points(
+    motion: MarkerMotion, body: BodyModel, path: Path, fps: float, progress: Progress | None
+) -> Recording:
+    names, points = person_markers(motion.names, motion.positions, path.name)
+    times = motion.times - motion.times[0]
+    wanted = frame_times(float(times[-1]), fps)
+    if len(wanted) < FEWEST_FRAMES:
+        return Recording(path.stem, fps, np.repeat(body.neutral[None], len(wanted), axis=0))
+    targets = Targets(names, points_at(times, points, wanted), {})
+    return _fitted(targets, _sized(body, targets), path.stem, fps, progress)
+
+
+def _sized(body: BodyModel, targets: Targets) -> BodyModel:
+    """The body in the size that the distances of its markers tell, the median over the frames."""
+    at = {name: place for place, name in enumerate(targets.names)}
+    lengths = {}
+    for one, other in MEASURED:
+        if one in at and other in at:
+            apart = np.linalg.norm(targets.points[:, at[one]] - targets.points[:, at[other]], axis=1)
+            length = float(np.median(apart[np.isfinite(apart)])) if np.isfinite(apart).any() else 0.0
+            if length > 1.0:
+                lengths[f"{one}_{other}"] = length
+    return fit_subject(body, Subject(body=body.name, lengths_mm=lengths))[0]
+
+
+def _read_recipe(path: Path, body: BodyModel, fps: float, progress: Progress | None) -> Recording:
+    """A recipe's motion on the body's own proportions."""
+    recipe = read_recipe(path)
+    if recipe.motion == ARM:
+        raise StudioError(f"Recipe '{path.name}' moves no person.", "Choose a recipe of a person.")
+    motion = recipe_motion(recipe, path.parent, skeleton_of_body(body))
+    times = frame_times((motion.frame_count - 1) / motion.fps, fps)
+    return fitted_person(sampled(motion, times, fps), body, path.stem, progress)
+
+
+def _find_run(source: str, workspace: Workspace) -> StoredRun:
+    """A run by its folder, or as SESSION/RUN. Raises StudioError saying what a source can be."""
+    folder = Path(source).expanduser()
+    if (folder / RUN_FILE).is_file():
+        return StoredRun(folder.absolute())
+    session, slash, run = source.rpartition("/")
+    if slash and folder.suffix.lower() not in (*MOTION_FILES, RECIPE):
+        try:
+            return workspace.resolve(session).run(run)
+        except StudioError as problem:
+            raise StudioError(f"Source '{source}': {problem.message}", problem.hint) from None
+    raise StudioError(
+        f"There is no motion '{source}'.",
+        f"Give a file ending in {', '.join(MOTION_FILES)}, a recipe, or a run as SESSION/RUN.",
+    )
+
+
+def _runs_of(folder: Path) -> StudioError:
+    runs = sorted(entry.parent.name for entry in folder.glob(f"runs/*/{RUN_FILE}"))
+    return StudioError(
+        f"'{folder.name}' is a session, not a motion.",
+        f"Name one of its runs: {', '.join(f'{folder.name}/{run}' for run in runs) or 'there is none yet'}.",
+    )
+
+
+def _read_run(run: StoredRun, body: BodyModel, fps: float, progress: Progress | None) -> Recording:
+    """The stored poses; another body meets the markers of the one that was tracked."""
+    name, own = f"{run.session_name}/{run.name}", run.body()
+    with run.results() as results:
+        frames, poses = results.poses()
+    if len(frames) < 2:
+        raise StudioError(f"Run '{name}' holds {len(frames)} frames.", "Track it first.")
+    times = (np.asarray(frames, dtype=float) - frames[0]) / run.record.fps
+    wanted = frame_times(float(times[-1]), fps)
+    moved = poses_at(own, times, poses, wanted)
+    if own.name == body.name and len(own.parameters) == len(body.parameters):
+        return Recording(name, fps, moved)
+    marker_names(own)
+    marker_names(body)
+    targets = of_poses(own, moved)
+    return _fitted(targets, _sized(body, targets), name, fps, progress)
