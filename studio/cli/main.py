@@ -17,6 +17,8 @@ COMMANDS = {
     "track": ("tracking_commands", "track", "Track a session and store the run."),
     "evaluate": ("evaluation_commands", "evaluate_command", "Measure a run against the true markers."),
     "compare": ("comparison_commands", "compare", "Compare trackers fairly on a session with a truth."),
+    "learn": ("behaviour_commands", "learn_command", "Learn what a body tends to do from recorded motion."),
+    "models": ("behaviour_commands", "models_command", "List the behaviour models."),
     "synthesize": ("synthesis_commands", "synthesize_command", "Render footage with exact truth."),
     "reproduce": (
         "reproduction_commands",

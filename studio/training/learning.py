@@ -1,0 +1,124 @@
+"""From recordings to a behaviour model: training and test material, learning, and what came out in numbers."""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.behaviour.model import BehaviourModel
+from studio.behaviour.model_learning import learn_model
+from studio.behaviour.settings import LearningSettings
+from studio.body.model import BodyModel
+from studio.errors import StudioError
+from studio.sessions.workspace import Workspace
+from studio.training.oversampling import OversamplingSettings, oversampled
+from studio.training.sources import FPS, Progress, Recording, expand, read_source
+
+Array = NDArray[np.float64]
+
+TEST_SHARE = 0.2
+FEWEST_FOR_A_TEST = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Learnt:
+    """What was learnt. frames : of training, oversampled. recorded_frames, test_frames : as they were read.
+
+    entropy_train, entropy_test : Eq. 2 of Caillette et al. in nats a frame; the test's is NaN without a test.
+    """
+
+    frames: int
+    recorded_frames: int
+    test_frames: int
+    clusters: int
+    states: int
+    entropy_train: float
+    entropy_test: float
+
+
+def read_sources(
+    sources: Sequence[str | Path],
+    body: BodyModel,
+    skeleton: Path | None = None,
+    *,
+    fps: float = FPS,
+    workspace: Workspace | None = None,
+    progress: Progress | None = None,
+) -> tuple[Recording, ...]:
+    """All sources in order, folders taken apart. progress : given the source in words. Raises StudioError."""
+    names = [name for source in sources for name in expand(source)]
+    if not names:
+        raise StudioError("There is nothing to learn from.", "Name motion files or runs.")
+    found = []
+    for number, name in enumerate(names, start=1):
+        words = f"{Path(name).name} ({number} of {len(names)})"
+
+        def tell(_step: str, done: int, total: int, words: str = words) -> None:
+            if progress is not None:
+                progress(words, done, total)
+
+        found.append(read_source(name, body, skeleton, fps=fps, workspace=workspace, progress=tell))
+    return tuple(found)
+
+
+def parted(recordings: Sequence[Recording]) -> tuple[tuple[Recording, ...], tuple[Recording, ...]]:
+    """Training and test: the last fifth of each recording is the test, where it is long enough to be parted."""
+    training, test = [], []
+    for recording in recordings:
+        at = recording.frame_count - round(TEST_SHARE * recording.frame_count)
+        if recording.frame_count < FEWEST_FOR_A_TEST:
+            at = recording.frame_count
+        training.append(_stretch(recording, 0, at))
+        if at < recording.frame_count:
+            test.append(_stretch(recording, at, recording.frame_count))
+    return tuple(training), tuple(test)
+
+
+def learn(
+    recordings: Sequence[Recording],
+    body: BodyModel,
+    settings: LearningSettings | None = None,
+    material: OversamplingSettings | None = None,
+    test: Sequence[Recording] | None = None,
+    *,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> tuple[BehaviourModel, Learnt]:
+    """The behaviour of recordings on one body, all at one rate.
+
+    test : recordings that the entropy is measured on, as they are; None takes the last fifth of each recording away
+    from the training for that. The same seed gives the same model. Raises BehaviourError as `learn_model` does.
+    """
+    settings, material = settings or LearningSettings(), material or OversamplingSettings()
+    training, tested = parted(recordings) if test is None else (tuple(recordings), tuple(test))
+    rates = {recording.fps for recording in (*training, *tested)}
+    if len(rates) != 1:
+        raise StudioError("The recordings have different frame rates.", "Read all of them at one rate.")
+    rng = np.random.default_rng(seed)
+    sequences: list[Array] = []
+    names: list[str] = []
+    for recording in training:
+        made = oversampled(body, recording.poses, recording.fps, material, rng)
+        sequences += made
+        names += [recording.name] * len(made)
+    model = learn_model(sequences, body, rates.pop(), settings, rng, progress, names)
+    measured = model.entropy([recording.poses for recording in tested]) if tested else float("nan")
+    model = dataclasses.replace(model, making=dataclasses.replace(model.making, entropy_test=measured))
+    learnt = Learnt(
+        frames=model.making.frames,
+        recorded_frames=sum(recording.frame_count for recording in training),
+        test_frames=sum(recording.frame_count for recording in tested),
+        clusters=model.clusters,
+        states=model.states,
+        entropy_train=model.making.entropy_train,
+        entropy_test=measured,
+    )
+    return model, learnt
+
+
+def _stretch(recording: Recording, first: int, last: int) -> Recording:
+    bad = tuple(frame - first for frame in recording.bad_frames if first <= frame < last)
+    return dataclasses.replace(recording, poses=recording.poses[first:last], bad_frames=bad)

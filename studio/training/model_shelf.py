@@ -1,0 +1,87 @@
+"""The workspace's models: where a new one goes, and what there is."""
+
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from studio.behaviour.model import BehaviourModel
+from studio.behaviour.model_file import read_model, write_model
+from studio.errors import BehaviourError
+from studio.runs.behaviour_models import SUFFIX, models_folder, models_in
+from studio.sessions.names import checked_name
+from studio.sessions.workspace import Workspace
+
+
+@dataclass(frozen=True, slots=True)
+class ModelSummary:
+    """A model as a line of a list. fps : it was learnt at. sources : what it was learnt from, each once. problem : why
+    it cannot be read, "" if it can; then the rest is empty.
+    """
+
+    name: str
+    path: Path
+    body: str = ""
+    fps: float = 0.0
+    frames: int = 0
+    clusters: int = 0
+    states: int = 0
+    memory: int = 0
+    epsilon: float = 0.0
+    entropy_train: float = math.nan
+    entropy_test: float = math.nan
+    sources: tuple[str, ...] = ()
+    problem: str = ""
+
+
+def place_for_model(name_or_path: str, workspace: Workspace, *, replace: bool = False) -> Path:
+    """The file of a model that is to be made: a name means the workspace's models, a path itself.
+
+    Raises NameRefused, and BehaviourError where there is something already and it is not to be replaced.
+    """
+    if os.sep in name_or_path or "/" in name_or_path:
+        path = Path(name_or_path).expanduser().absolute()
+        path = path if path.suffix == SUFFIX else path.with_name(f"{path.name}{SUFFIX}")
+        if not path.parent.is_dir():
+            raise BehaviourError(f"There is no folder '{path.parent}'.", "Make it first, or give a name.")
+    else:
+        name = checked_name(name_or_path.removesuffix(SUFFIX), "model")
+        path = models_folder(workspace.root) / f"{name}{SUFFIX}"
+    if path.is_dir() or (path.exists() and not replace):
+        raise BehaviourError(
+            f"There is a model at '{path}' already.", "Choose another name, or replace it with --force."
+        )
+    return path
+
+
+def keep_model(model: BehaviourModel, path: Path) -> None:
+    """Write the model where `place_for_model` said, whole or not at all."""
+    write_model(model, path)
+
+
+def list_models(workspace: Workspace) -> tuple[ModelSummary, ...]:
+    """The workspace's models by name; those that cannot be read carry the reason."""
+    return tuple(
+        ModelSummary(line.name, line.path, problem=line.problem) if line.problem else summary_of(line.path)
+        for line in models_in((models_folder(workspace.root),))
+    )
+
+
+def summary_of(path: Path) -> ModelSummary:
+    """The line of a model's file. Raises BehaviourError for one that cannot be read."""
+    model = read_model(path)
+    making = model.making
+    return ModelSummary(
+        name=path.stem,
+        path=path,
+        body=model.space.body,
+        fps=making.learnt_fps,
+        frames=making.frames,
+        clusters=model.clusters,
+        states=model.states,
+        memory=making.settings.memory,
+        epsilon=making.settings.epsilon,
+        entropy_train=making.entropy_train,
+        entropy_test=making.entropy_test,
+        sources=tuple(dict.fromkeys(making.sources)),
+    )

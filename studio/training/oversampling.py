@@ -1,0 +1,101 @@
+"""More training material out of little: other performances of a recording, each smoothed by several amounts.
+
+Caillette et al. 2007, section 7.1: three repetitions of each exercise, oversampled with varied smoothing, made 13 000
+frames of training. A performance that nobody recorded is made of one that somebody did: its tempo and its angles
+change slowly by a little.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from studio.body.model import BodyModel
+from studio.knobs import knob
+from studio.synthesis.smooth_noise import smooth_noise, warped_times
+from studio.training.resampling import poses_at
+
+Array = NDArray[np.float64]
+
+TEMPO_PERIOD_S, ANGLE_PERIOD_S = 2.0, 1.5
+# The share of an angle's change that lasts through the whole performance, and of its spread that it grows with.
+LASTING, FULL_SPREAD = 0.5, np.radians(30.0)
+
+
+@dataclass(frozen=True, slots=True)
+class OversamplingSettings:
+    """What training material is made of a recording."""
+
+    title = "Training material"
+
+    performances: int = knob(
+        1, 1, 100, 1, takes_effect="new run",
+        help="Performances of every recording: itself, and others whose tempo and angles change slowly by a little.",
+    )  # fmt: skip
+    smoothings: int = knob(
+        5, 1, 50, 1, takes_effect="new run",
+        help="How often every performance is taken, each time smoothed more and seen a part of a frame later; "
+        "the paper varied the smoothing to have enough frames.",
+    )  # fmt: skip
+    widest_smoothing: float = knob(
+        0.08, 0.0, 1.0, 0.01, unit="s", label="widest smoothing", takes_effect="new run",
+        help="Standard deviation of the strongest smoothing (a Gaussian over time); the first is none.",
+    )  # fmt: skip
+    tempo_change: float = knob(
+        0.10, 0.0, 1.0, 0.01, label="tempo change", takes_effect="new run",
+        help="How much faster or slower other performances are, a share of the tempo (standard deviation).",
+    )  # fmt: skip
+    angle_change: float = knob(
+        4.0, 0.0, 45.0, 0.5, unit="degrees", label="angle change", takes_effect="new run",
+        help="How far the angles of other performances are off (standard deviation); joints that hardly move in the "
+        "recording change less.",
+    )  # fmt: skip
+
+
+def oversampled(
+    body: BodyModel, poses: Array, fps: float, settings: OversamplingSettings, rng: np.random.Generator
+) -> list[Array]:
+    """The training material of a recording (F, D): for every performance as many sequences as smoothings."""
+    found = []
+    for number in range(settings.performances):
+        shown = poses if number == 0 else performed(body, poses, fps, settings, rng)
+        found += smoothed_copies(body, shown, fps, settings)
+    return found
+
+
+def performed(
+    body: BodyModel, poses: Array, fps: float, settings: OversamplingSettings, rng: np.random.Generator
+) -> Array:
+    """(G, D) another performance of poses (F, D), of another length, within the body's limits."""
+    seconds = (len(poses) - 1) / fps
+    longer = float(np.exp(0.5 * settings.tempo_change * rng.standard_normal()))
+    frames = max(2, round(seconds * fps * longer) + 1)
+    times = warped_times(rng, frames, seconds, settings.tempo_change, TEMPO_PERIOD_S)
+    shown = poses_at(body, np.arange(len(poses)) / fps, poses, times)
+    spread = np.minimum(shown.std(axis=0) / FULL_SPREAD, 1.0)
+    size = np.radians(settings.angle_change) * (0.25 + 0.75 * spread)
+    slow = smooth_noise(rng, frames, poses.shape[1], fps, ANGLE_PERIOD_S)
+    change = np.sqrt(1.0 - LASTING**2) * slow + LASTING * rng.standard_normal(poses.shape[1])
+    angles = np.array([entry.kind == "angle" for entry in body.parameters])
+    return _within(body, shown, shown + np.where(angles, size * change, 0.0))
+
+
+def smoothed_copies(body: BodyModel, poses: Array, fps: float, settings: OversamplingSettings) -> list[Array]:
+    """Sequences of poses (F, D), one a smoothing: each smoothed more, and seen a part of a frame later."""
+    found, count = [], settings.smoothings
+    for number in range(count):
+        width = settings.widest_smoothing * fps * number / max(count - 1, 1)
+        smooth = gaussian_filter1d(poses, width, axis=0, mode="nearest") if width > 0.0 else poses
+        times = np.arange(len(poses)) / fps
+        if number:
+            smooth = poses_at(body, times, smooth, times[:-1] + number / (count * fps))
+        found.append(smooth)
+    return found
+
+
+def _within(body: BodyModel, allowed: Array, poses: Array) -> Array:
+    """The poses within the body's limits, or where `allowed` goes beyond them."""
+    lower = np.minimum([entry.lower for entry in body.parameters], allowed.min(axis=0))
+    upper = np.maximum([entry.upper for entry in body.parameters], allowed.max(axis=0))
+    return np.clip(poses, lower, upper)
