@@ -1,9 +1,9 @@
 // ECharts with the studio's tokens: one place that knows how a chart looks here.
 
 import * as echarts from "../vendor/echarts.esm.min.js";
+import { drawSoon } from "./drawing.js";
 import { onTheme, theme, token } from "./theme.js";
 
-const MILLISECONDS_BETWEEN_DRAWS = 100;
 const FAMILY = "Inter, system-ui, sans-serif";
 
 /** Three significant figures unless more are needed. */
@@ -15,15 +15,15 @@ export function figure(value) {
   return String(Number(value.toPrecision(3)));
 }
 
-/** A chart in an element: drawn at most ten times a second and only while it is seen, redrawn with theme and size. */
+/** A chart in an element: drawn with the others and only while it is seen (see drawing.js), redrawn with theme and size. */
 export class Chart {
   /** empty: what is said when there is nothing to draw. wire: called with the ECharts instance once it is made. */
   constructor(id, { empty, wire = () => {} }) {
     this.element = document.getElementById(id);
     this.emptyText = empty;
     this.wire = wire;
+    this.redrawn = () => this.redraw();
     this.make = null;
-    this.timer = null;
     this.stale = false;
     this.chart = null;
     new ResizeObserver(() => this.resized()).observe(this.element);
@@ -34,7 +34,7 @@ export class Chart {
   /** Draw what `make()` returns; null draws the empty state. */
   draw(make) {
     this.make = make;
-    this.timer ??= setTimeout(() => { this.timer = null; this.redraw(); }, MILLISECONDS_BETWEEN_DRAWS);
+    drawSoon(this.redrawn);
   }
 
   redraw() {

@@ -1,5 +1,6 @@
 // The timeline: what is tracked, weight and error over the frames, lost spans, settings changes, the cursor.
 
+import { drawSoon } from "./drawing.js";
 import { get, set, watch } from "./state.js";
 import { onTheme, token } from "./theme.js";
 
@@ -119,7 +120,7 @@ export function startTimeline() {
   new ResizeObserver(drawTimeline).observe(track);
   onTheme(drawTimeline);
   document.fonts.ready.then(drawTimeline);
-  watch(["summary", "frame"], () => { drawTimeline(); tellFrame(); });
+  watch(["summary", "frame"], () => { drawSoon(drawTimeline); tellFrame(); });
   const layerLabel = document.getElementById("layer-label");
   watch(["layer", "detail", "whatIf"], () => {
     const count = (get("whatIf") ?? get("detail")?.layers)?.length ?? 0;

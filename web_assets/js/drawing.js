@@ -1,0 +1,37 @@
+// When the page's canvases are drawn: together, before a frame of the screen, the newest wish only. However often they are
+// wished for, at least half of the time is left to everything else, so a machine that draws slowly still answers at once.
+
+const LEAST_PAUSE_MILLISECONDS = 100;
+
+const wished = new Set();
+let busy = false;
+
+const nextFrame = () => new Promise((resolve) => requestAnimationFrame(resolve));
+const pause = (milliseconds) => new Promise((resolve) => setTimeout(resolve, milliseconds));
+
+function drawAll() {
+  const drawings = [...wished];
+  wished.clear();
+  for (const draw of drawings) {
+    try { draw(); } catch (error) { console.error(error); }
+  }
+}
+
+async function serve() {
+  busy = true;
+  while (wished.size) {
+    await nextFrame();
+    const began = performance.now();
+    drawAll();
+    // The next frame begins when this one has been handed over: only then it is known how long the drawing took.
+    await nextFrame();
+    await pause(Math.max(LEAST_PAUSE_MILLISECONDS, performance.now() - began));
+  }
+  busy = false;
+}
+
+/** Call `draw` soon; wishes for the same function that come before it are one. */
+export function drawSoon(draw) {
+  wished.add(draw);
+  if (!busy) serve();
+}
