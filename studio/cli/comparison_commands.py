@@ -13,6 +13,7 @@ from studio.experiments.comparison_findings import document, table_text
 from studio.experiments.comparison_folders import differences, new_comparison, place_of, unfinished_like
 from studio.experiments.entrants import DEFAULT_LAYERS, LINEUPS, VARIANTS, Lineup, read_assignments
 from studio.experiments.kept_comparison import RECORD_NAME, KeptComparison
+from studio.runs.behaviour_models import needs_model
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 from studio.tracking.catalogue import TRACKERS
@@ -39,7 +40,7 @@ Names that stand for several:
 @click.option(
     "--trackers",
     metavar="A,B,C",
-    default=",".join(sorted(TRACKERS)),
+    default=",".join(name for name in sorted(TRACKERS) if not needs_model(name, None)),
     show_default=True,
     help="Who is compared.",
 )
@@ -61,6 +62,12 @@ Names that stand for several:
 )
 @click.option(
     "--body", default="", metavar="NAME", help="Kinematic tree; the session's subject still scales it."
+)
+@click.option(
+    "--behaviour",
+    default="",
+    metavar="MODEL",
+    help="Behaviour model of those that need one, by name or file.",
 )
 @click.option("--frames", metavar="A:B", default=":", help="Half open, from 0; default: all.")
 @click.option(
@@ -92,6 +99,7 @@ def compare(
     seeds: int,
     weighting: str | None,
     body: str,
+    behaviour: str,
     frames: str,
     layers: int,
     assignments: tuple[str, ...],
@@ -108,7 +116,9 @@ def compare(
     first, last = frame_range(frames)
     names = tuple(one.strip() for one in trackers.split(",") if one.strip())
     lineup = Lineup(names, weighting or "", evaluations, layers, read_assignments(assignments))
-    plan = plan_comparison(opened, lineup, range(seeds), first=first, last=last, body=body)
+    plan = plan_comparison(
+        opened, lineup, range(seeds), first=first, last=last, body=body, behaviour=behaviour
+    )
     kept = _kept(opened, plan, name, out)
     before = done_before(kept, plan)
     if before:

@@ -55,6 +55,12 @@ def _knob_options(function: Callable[..., object]) -> Callable[..., object]:
 @click.option(
     "--start-pose", type=click.Path(path_type=Path), help="A CSV row, or a TRC met by inverse kinematics."
 )
+@click.option(
+    "--behaviour",
+    default="",
+    metavar="MODEL",
+    help="Behaviour model, by name or file, for tracker behaviour or --set prediction=behaviour.",
+)
 @_knob_options
 @click.option("--frames", metavar="A:B", default=":", help="Half open, from 0; default: all.")
 @click.option("--seed", type=int, default=0, show_default=True, help="The same seed gives the same run.")
@@ -74,6 +80,7 @@ def track(
     body: str,
     subject: Path | None,
     start_pose: Path | None,
+    behaviour: str,
     frames: str,
     seed: int,
     changes: tuple[str, ...],
@@ -101,6 +108,7 @@ def track(
             seed=seed,
             changes=_changes(changes) | {key: value for key, value in knobs.items() if value is not None},
             name=name,
+            behaviour=behaviour,
         )
         run = prepare_run(opened, _with_start_pose(request, opened, start_pose))
     for line in run.record.notes:
@@ -147,6 +155,8 @@ def _told(run: StoredRun, result: BatchResult) -> dict[str, object]:
         "seconds": round(result.seconds, 3),
         "start_pose": record.start_source,
     }
+    if record.behaviour:
+        told["behaviour"] = record.behaviour
     if record.tracker == "condensation":
         told["likelihood_scale"] = result.last_beta
     return told

@@ -5,18 +5,21 @@ A comparison is a plan, its trials (one a tracker and seed, any of them in any p
 them: `trials`, `conclude`. Trials are made and measured as those of the experiments are (`tracking_trials`).
 """
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from studio.body.model import BodyModel
 from studio.errors import NotFoundError, RunError, TruthError
 from studio.experiments.entrants import Entrant, Lineup, entrants
 from studio.experiments.experiment import Outcome, Trial
 from studio.experiments.statistics import SignTest, sign_test
 from studio.experiments.tracked import Attempt
 from studio.experiments.tracking_trials import tracking_trial
+from studio.runs.behaviour_models import ChosenModel, chosen_model, needs_model
 from studio.runs.new_run import checked_frames, start_pose
 from studio.sessions.session import Session
 from studio.settings import DEFAULT_WEIGHTING
@@ -28,7 +31,8 @@ MOST_SEEDS = 1000
 @dataclass(frozen=True, slots=True)
 class Plan:
     """What is compared. footage : the session's folder. session : its name. first, last : frames, half open. fps : of
-    the footage. body : a name, "" for the session's own.
+    the footage. body : a name, "" for the session's own. behaviour : name of the model of those that need one, "" for
+    none; behaviour_digest : of its file; behaviour_path : where it lies now.
     """
 
     footage: str
@@ -40,6 +44,9 @@ class Plan:
     last: int
     fps: float
     body: str = ""
+    behaviour: str = ""
+    behaviour_digest: str = ""
+    behaviour_path: str = ""
 
     @property
     def frame_count(self) -> int:
@@ -113,8 +120,10 @@ def plan_comparison(
     first: int = 0,
     last: int | None = None,
     body: str = "",
+    behaviour: str = "",
 ) -> Plan:
-    """Everything checked that can be before anything is tracked; lineup.weighting "" means the session's own.
+    """Everything checked that can be before anything is tracked; lineup.weighting "" means the session's own,
+    behaviour "" the only model that fits where somebody needs one.
 
     Raises TruthError for a session without truth, SettingsError, RunError and BodyError for what cannot be done.
     """
@@ -137,8 +146,10 @@ def plan_comparison(
             f"The seeds {list(seeds)[:8]} cannot be used.", "Give different whole numbers of 0 or more."
         )
     begin, end = checked_frames(session, first, last)
-    start_pose(session, session.body(body or None), None)
+    model = session.body(body or None)
+    start_pose(session, model, None)
     taking_part = entrants(Lineup(lineup.names, weighting, lineup.evaluations, lineup.layers, lineup.changes))
+    chosen = _chosen_model(session, model, taking_part, behaviour)
     return Plan(
         footage=str(session.path.absolute()),
         session=session.name,
@@ -149,6 +160,9 @@ def plan_comparison(
         last=end,
         fps=session.manifest.fps,
         body=body,
+        behaviour=chosen.name if chosen else "",
+        behaviour_digest=hashlib.sha256(chosen.path.read_bytes()).hexdigest()[:16] if chosen else "",
+        behaviour_path=str(chosen.path) if chosen else "",
     )
 
 
@@ -182,6 +196,16 @@ def mean_curve(result: TrackerResult) -> tuple[float, ...]:
     return tuple(float(value) for value in rows.mean(axis=0))
 
 
+def _chosen_model(
+    session: Session, body: BodyModel, taking_part: Sequence[Entrant], asked: str
+) -> ChosenModel | None:
+    """The model of all who need one; None where nobody does. Raises BehaviourError, NotFoundError."""
+    for entrant in taking_part:
+        if needs_model(entrant.tracker, entrant.settings().tracker):
+            return chosen_model(session, body, entrant.settings(), asked)
+    return None
+
+
 def _attempt(plan: Plan, entrant: Entrant, seed: int) -> Attempt:
     return Attempt(
         plan.footage,
@@ -192,6 +216,7 @@ def _attempt(plan: Plan, entrant: Entrant, seed: int) -> Attempt:
         plan.first,
         plan.last,
         body=plan.body,
+        behaviour=plan.behaviour_path if needs_model(entrant.tracker, entrant.settings().tracker) else "",
     )
 
 

@@ -8,7 +8,12 @@ from typing import Any
 
 from studio.errors import NotFoundError, SessionError
 from studio.experiments.comparison import Plan
-from studio.experiments.kept_comparison import RECORD_NAME, ComparisonRecord, KeptComparison
+from studio.experiments.kept_comparison import (
+    BEHAVIOUR_NAME,
+    RECORD_NAME,
+    ComparisonRecord,
+    KeptComparison,
+)
 from studio.experiments.kept_trials import plain
 from studio.runs.new_run import software_version
 from studio.sessions import atomic_files
@@ -26,6 +31,8 @@ def new_comparison(folder: Path, plan: Plan) -> KeptComparison:
     record = ComparisonRecord(name=folder.name, created=now(), software=software_version(), plan=plan)
     made = atomic_files.new_folder_beside(folder)
     try:
+        if plan.behaviour_path:
+            atomic_files.copy_file(Path(plan.behaviour_path), made / BEHAVIOUR_NAME)
         write_record(made / RECORD_NAME, record)
         atomic_files.move_into_place(made, folder)
     except FileExistsError:
@@ -71,7 +78,7 @@ def unfinished_like(session: Session, plan: Plan) -> KeptComparison | None:
     """The newest comparison of a session that asked for the same and can go on, None without one."""
     for kept in kept_comparisons(session):
         try:
-            same = kept.plan(session) == plan
+            same = not differences(plan, kept.plan(session))
         except SessionError:
             continue
         if same and kept.status() in ("interrupted", "cancelled", "failed"):
@@ -110,7 +117,8 @@ def differences(asked: Plan, kept: Plan) -> tuple[str, ...]:
 
 
 def _comparable(plan: Plan) -> Mapping[str, Any]:
-    return plain({name: value for name, value in asdict(plan).items() if name not in ("footage", "session")})
+    places = ("footage", "session", "behaviour_path")
+    return plain({name: value for name, value in asdict(plan).items() if name not in places})
 
 
 def _folders(session: Session) -> list[Path]:

@@ -51,6 +51,14 @@ VARIANTS: dict[str, Variant] = {
     ),
 }
 
+VARIANTS |= {
+    f"{tracker}:guided": Variant(
+        "first sets predicted by a behaviour model (Caillette et al.), a fifth of the particles without it",
+        {"prediction": "behaviour"},
+    )
+    for tracker in ("annealed", "swarm")
+}
+
 PARTITION_WORDS = {
     "soft-three": "three soft stages: root, trunk and head, all",
     "hard-two": "two hard stages: the root stays fixed in the second (Fig. 2a)",
@@ -66,6 +74,7 @@ VARIANTS |= {
 LINEUPS: dict[str, tuple[str, ...]] = {
     "improvements": ("annealed:improved", "annealed:eq13", "condensation"),
     "papers": ("swarm", "annealed:improved", "annealed:eq13", "condensation"),
+    "guided": ("behaviour", "annealed:guided", "annealed", "condensation"),
     "partitions": ("swarm", *(f"swarm:{partition}" for partition in PARTITION_WORDS)),
 }
 

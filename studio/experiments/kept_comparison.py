@@ -1,6 +1,7 @@
 """Comparisons on disk: a folder each, in the session they belong to, so that none is lost and all can go on.
 
-`comparisons/<name>/`: `comparison.json` (what was asked), `trials/` (one file an outcome, as soon as it is there),
+`comparisons/<name>/`: `comparison.json` (what was asked), `behaviour.model` (a copy of the model of those that need
+one), `trials/` (one file an outcome, as soon as it is there),
 and once all are done `result.json` (numbers, findings, every frame) and `frames.csv`.
 """
 
@@ -26,6 +27,7 @@ from studio.sessions.session import Session
 from studio.typed_decoding import decode_json
 
 RECORD_NAME, RESULT_NAME, FRAMES_NAME = "comparison.json", "result.json", "frames.csv"
+BEHAVIOUR_NAME = "behaviour.model"
 LOCK_NAME, TRIALS_NAME = "comparison.lock", "trials"
 SCHEMA_VERSION = 1
 
@@ -75,11 +77,11 @@ class KeptComparison:
     def plan(self, session: Session | None = None) -> Plan:
         """What was asked; of the session where it lies now, if one is given."""
         asked = self.record().plan
-        return (
-            asked
-            if session is None
-            else replace(asked, footage=str(session.path.absolute()), session=session.name)
-        )
+        if asked.behaviour:
+            asked = replace(asked, behaviour_path=str((self.folder / BEHAVIOUR_NAME).absolute()))
+        if session is None:
+            return asked
+        return replace(asked, footage=str(session.path.absolute()), session=session.name)
 
     def status(self) -> str:
         """running, finished, cancelled, failed, or interrupted (its process is gone; it can go on)."""
@@ -122,8 +124,11 @@ class KeptComparison:
 
 
 def trial_key(trial: Trial) -> str:
-    """The name of a trial's outcome: made from its arguments, but not from where the session lies."""
-    arguments = {name: value for name, value in plain(trial.arguments).items() if name != "footage"}
+    """The name of a trial's outcome: made from its arguments, but not from where the session and the comparison's one
+    behaviour model lie.
+    """
+    elsewhere = ("footage", "behaviour")
+    arguments = {name: value for name, value in plain(trial.arguments).items() if name not in elsewhere}
     return hashlib.sha256(json.dumps(arguments, sort_keys=True).encode()).hexdigest()[:24]
 
 

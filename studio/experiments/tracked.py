@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.behaviour.model import BehaviourModel
+from studio.behaviour.model_file import read_model
 from studio.body.inverse_kinematics import known_markers, pose_from_markers
 from studio.body.model import BodyModel
 from studio.body.subject import read_subject
@@ -17,10 +19,11 @@ from studio.evaluation.errors import evaluate, rows_of_frames
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.experiments.footage_shelf import FootageShelf
 from studio.geometry.camera import Camera
+from studio.runs.behaviour_models import check_prediction, fitting, model_folders, model_path
 from studio.runs.search_space import search_space, session_sigma
 from studio.runs.tracking_run import start_of
 from studio.sessions.session import Session
-from studio.settings import changed_settings, default_settings
+from studio.settings import RunSettings, changed_settings, default_settings
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.frame_loop import search_frame
 from studio.tracking.tracker import LayerRecord
@@ -37,7 +40,7 @@ class Attempt:
     open; last None means all. every : only each so many frames are seen (fps is divided, σ0 multiplied). cameras :
     names, empty for all. body : a body's name or file, "" for the session's own. subject : a subject file beside the
     session's own, such as "subject_shape.toml" of the Lee-walk twin (no hands and feet), "" for its own. sigma_scale :
-    multiplies σ0.
+    multiplies σ0. behaviour : a behaviour model, by its name in the workspace's models or by path.
     """
 
     footage: str
@@ -52,10 +55,11 @@ class Attempt:
     body: str = ""
     sigma_scale: float = 1.0
     subject: str = ""
+    behaviour: str = ""
 
     def plain(self) -> dict[str, Any]:
-        """As a trial's arguments."""
-        return asdict(self)
+        """As a trial's arguments; without a model as they were before there were any, so that outcomes stay known."""
+        return {name: value for name, value in asdict(self).items() if name != "behaviour" or value}
 
     @classmethod
     def of_plain(cls, arguments: Mapping[str, Any]) -> "Attempt":
@@ -112,8 +116,10 @@ def track(
     subject = read_subject(session.path / attempt.subject) if attempt.subject else None
     body = session.body(attempt.body or None, subject)
     fps = session.manifest.fps
-    space = search_space(body, session_sigma(session, body, fps / attempt.every) * attempt.sigma_scale)
     settings = changed_settings(default_settings(attempt.tracker, attempt.weighting), attempt.changes)
+    behaviour = _behaviour(session, body, settings, attempt)
+    sigma = session_sigma(session, body, fps / attempt.every) * attempt.sigma_scale
+    space = search_space(body, sigma, behaviour)
     weighting = WEIGHTINGS[attempt.weighting]
     cameras = _cameras(session, attempt.cameras)
     weigher = weighting.prepare(body, spoilt.cameras(cameras), settings.weighting)
@@ -167,6 +173,17 @@ def measured(
         evaluations=evaluations,
         seconds=round(seconds, 4),
     )
+
+
+def _behaviour(
+    session: Session, body: BodyModel, settings: RunSettings, attempt: Attempt
+) -> BehaviourModel | None:
+    """The attempt's model at the rate of its frames. Raises SettingsError where one is needed and none given."""
+    if not attempt.behaviour:
+        check_prediction(settings, has_model=False)
+        return None
+    path = model_path(model_folders(session), attempt.behaviour)
+    return fitting(read_model(path), body, session.manifest.fps / attempt.every)
 
 
 def _cameras(session: Session, names: tuple[str, ...]) -> tuple[Camera, ...]:

@@ -102,6 +102,7 @@ def detail(session: OpenSession, kept: Kept, doors: Door) -> ComparisonDetail:
     return ComparisonDetail(
         comparison=_line(doors, session, kept),
         body=plan.body,
+        behaviour=plan.behaviour,
         fps=plan.fps,
         settings={
             entrant.name: {WEIGHTING: entrant.weighting, **entrant.changes} for entrant in plan.entrants
@@ -155,7 +156,13 @@ def _plan(session: Session, wish: ComparisonRequest) -> Plan:
     names = tuple(entrant.name for entrant in wish.trackers)
     lineup = Lineup(names, wish.weighting or "", wish.evaluations, wish.layers, changes)
     return plan_comparison(
-        session, lineup, range(wish.seeds), first=wish.first, last=wish.last, body=wish.body or ""
+        session,
+        lineup,
+        range(wish.seeds),
+        first=wish.first,
+        last=wish.last,
+        body=wish.body or "",
+        behaviour=wish.behaviour or "",
     )
 
 

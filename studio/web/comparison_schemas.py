@@ -27,6 +27,7 @@ class ComparisonRequest(Request):
     seeds: int = Field(5, ge=1, le=1000, description="How many seeds each, from 0 on.")
     weighting: RunName | None = Field(None, description="Of all; null: the session's own.")
     body: RunName | None = None
+    behaviour: RunName | None = Field(None, description="Behaviour model of those that need one.")
     first: int = Field(0, ge=0)
     last: int | None = Field(None, ge=1, description="Frame after the last one; null: all.")
     layers: int = Field(10, ge=1, le=60, description="Of annealed trackers.")
@@ -69,6 +70,7 @@ class ComparisonDetail(Answer):
 
     comparison: ComparisonLine
     body: str
+    behaviour: str = ""
     fps: float
     settings: dict[str, dict[str, Value]]
     result: dict[str, Any] | None

@@ -72,6 +72,7 @@ def make_run(session: OpenSession, wish: RunRequest, doors: Door) -> RunLine:
         seed=wish.seed,
         changes=wish.settings,
         name=wish.name or "",
+        behaviour=wish.behaviour or "",
     )
     made = prepare_run(session, request)
     doors.events.publish({"type": "sessions", "session": session.name, "run": made.name})
@@ -92,6 +93,7 @@ def run_detail(session: OpenSession, run: OpenRun) -> RunDetail:
         software=record.software,
         fps=record.fps,
         notes=list(record.notes),
+        behaviour=record.behaviour,
     )
 
 

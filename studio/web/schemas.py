@@ -239,6 +239,9 @@ class RunRequest(Request):
     seed: int = Field(0, ge=0, le=2**63 - 1)
     settings: dict[str, Value] = {}
     start_pose: list[float] | None = Field(None, description="Radians and mm, in the body's order.")
+    behaviour: RunName | None = Field(
+        None, description="A model of the workspace; null: the only one, if needed."
+    )
 
 
 class Frame(Request):
@@ -255,9 +258,7 @@ class ReannealRequest(Request):
 
 
 class Posted(Answer):
-    """A command that was handed to the tracking process; an `acknowledged` event with its identifier
-    follows.
-    """
+    """A command handed to the tracking process; an `acknowledged` event with its identifier follows."""
 
     identifier: str
     command: str
@@ -270,9 +271,7 @@ class RunList(Answer):
 
 
 class RunDetail(Answer):
-    """What a run was asked to do. settings: at its start; parameters: of its pose vector, as sigma and
-    start_pose.
-    """
+    """What a run was asked to do. settings: at its start; parameters: of its pose vector, as sigma and start_pose."""
 
     run: RunLine
     settings: dict[str, Value]
@@ -283,6 +282,7 @@ class RunDetail(Answer):
     software: str
     fps: float
     notes: list[str]
+    behaviour: str = ""
 
 
 class LogEntry(Answer):

@@ -97,9 +97,12 @@ class Choice(Answer):
 
 
 class TrackerChoice(Choice):
-    """weighting : what the tracker is weighed with where nobody asks for another."""
+    """weighting : what the tracker is weighed with where nobody asks for another. needs_behaviour : whether a run with
+    it has to have a behaviour model.
+    """
 
     weighting: str
+    needs_behaviour: bool = False
 
 
 class BodyChoice(Answer):
@@ -111,12 +114,24 @@ class BodyChoice(Answer):
     limbs: int
 
 
+class BehaviourChoice(Answer):
+    """A behaviour model of the workspace. problem : why it cannot be used, "" if it can."""
+
+    name: str
+    body: str
+    clusters: int
+    states: int
+    frames: int
+    problem: str
+
+
 class Choices(Answer):
     """What a new run can be made of. default_body and the like are the session's own."""
 
     trackers: list[TrackerChoice]
     weightings: list[Choice]
     bodies: list[BodyChoice]
+    behaviours: list[BehaviourChoice]
     presets: list[PresetView]
     default_tracker: RunName
     default_weighting: RunName

@@ -13,6 +13,7 @@ from fastapi import APIRouter, Depends, Query
 
 from studio.body.catalogue import list_bodies, load_body
 from studio.errors import SettingsError, StudioError
+from studio.runs.behaviour_models import check_prediction, models_folder, models_in, needs_model
 from studio.sessions.stored_run import StoredRun
 from studio.settings import (
     DEFAULT_TRACKER,
@@ -30,6 +31,7 @@ from studio.web.doors import Doors, doors_of
 from studio.web.presets import all_presets, drop_preset, keep_preset, preset
 from studio.web.run_routes import RUN, SEARCHING, OpenRun, ensure_open
 from studio.web.setting_schemas import (
+    BehaviourChoice,
     BodyChoice,
     Choice,
     Choices,
@@ -53,17 +55,33 @@ Value = bool | int | float | str
 
 @router.get("/choices")
 def choices(doors: Door) -> Choices:
-    """Trackers, weightings, bodies and presets that a new run can be made of."""
+    """Trackers, weightings, bodies, behaviour models and presets that a new run can be made of."""
     folder = doors.workspace.root / "bodies"
     folders = (folder,) if folder.is_dir() else ()
     stamp = tuple((path.name, path.stat().st_mtime_ns) for path in sorted(folder.glob("*.toml")))
     return Choices(
         trackers=[
-            TrackerChoice(name=name, label=_title(entry.settings_type), weighting=usual_weighting(name))
+            TrackerChoice(
+                name=name,
+                label=_title(entry.settings_type),
+                weighting=usual_weighting(name),
+                needs_behaviour=needs_model(name, None),
+            )
             for name, entry in TRACKERS.items()
         ],
         weightings=[Choice(name=name, label=entry.label) for name, entry in WEIGHTINGS.items()],
         bodies=list(_bodies(folders, stamp)),
+        behaviours=[
+            BehaviourChoice(
+                name=line.name,
+                body=line.body,
+                clusters=line.clusters,
+                states=line.states,
+                frames=line.frames,
+                problem=line.problem,
+            )
+            for line in models_in([models_folder(doors.workspace.root)])
+        ],
         presets=all_presets(doors.presets, doors.state_folder),
         default_tracker=DEFAULT_TRACKER,
         default_weighting=DEFAULT_WEIGHTING,
@@ -150,7 +168,8 @@ def _change(
 ) -> SettingsInUse:
     """Check the changes here (the run may not be open yet), then hand them to the tracking process."""
     now = settings_of(run).values
-    changed_settings(settings_from_values(run.record.tracker, run.record.weighting, now), changes)
+    before = settings_from_values(run.record.tracker, run.record.weighting, now)
+    check_prediction(changed_settings(before, changes), bool(run.record.behaviour))
     ensure_open(doors, run)
     if frame is not None and doors.control.state.state not in SEARCHING:
         doors.control.send(commands.Seek(frame=frame))

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from studio.errors import StudioError
+from studio.runs.behaviour_models import check_prediction
 from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
 from studio.runs.tracking_run import Stepped, TrackingRun
@@ -44,7 +45,10 @@ class OpenRun:
         except StudioError:
             self._close_problems()
             raise
-        self.mailbox = SettingsMailbox(*self.tracking.latest_settings())
+        guided = self.tracking.space.behaviour is not None
+        self.mailbox = SettingsMailbox(
+            *self.tracking.latest_settings(), lambda settings: check_prediction(settings, guided)
+        )
         self.tracking.settings_source = self.mailbox.latest
         self.selected = -1
         self.question: Reannealing | None = None

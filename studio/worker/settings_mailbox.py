@@ -2,17 +2,26 @@
 layer."""
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from studio.errors import SettingsError
 from studio.settings import RunSettings, all_knobs, changed_settings, values
 
 
 class SettingsMailbox:
-    """Latest wins: whoever reads gets the newest settings, however many changes came since it last looked."""
+    """Latest wins: whoever reads gets the newest settings, however many changes came since it last looked.
 
-    def __init__(self, version: int, settings: RunSettings) -> None:
+    check : raises SettingsError for settings that the run cannot have.
+    """
+
+    def __init__(
+        self,
+        version: int,
+        settings: RunSettings,
+        check: Callable[[RunSettings], None] = lambda settings: None,
+    ) -> None:
         self._lock = threading.Lock()
+        self._check = check
         self._latest = (version, settings)
 
     def latest(self) -> tuple[int, RunSettings]:
@@ -22,8 +31,8 @@ class SettingsMailbox:
     def change(self, changes: Mapping[str, object]) -> tuple[str, ...]:
         """Change knobs by name and return the names of those that moved; without any, the version stays.
 
-        All or nothing. Raises SettingsError for an unknown name, a value that is not allowed, or a knob that
-        only a new run can change.
+        All or nothing. Raises SettingsError for an unknown name, a value that is not allowed, a knob that only a
+        new run can change, or what the run cannot do.
         """
         with self._lock:
             version, settings = self._latest
@@ -38,5 +47,6 @@ class SettingsMailbox:
                         "Start a new run with the value wanted.",
                     )
             if moved:
+                self._check(following)
                 self._latest = (version + 1, following)
             return moved

@@ -5,36 +5,48 @@ import { openForm } from "./dialogs.js";
 import { refreshSessions, openSession } from "./rail.js";
 import { set } from "./state.js";
 
-let choices = null;
-
-/** What can be chosen: trackers, weightings, bodies (asked once). */
-async function known() {
-  choices ??= await fetchJson("/api/choices");
-  return choices;
-}
+const NOISE = "noise", BEHAVIOUR = "behaviour";
 
 const presetChoices = (presets) => [{ value: "", label: "defaults" }, ...presets.map((one) => ({ value: one.name, label: one.label }))];
 
-/** The presets all of whose knobs a tracker and weighting have. */
-async function offered(presets, tracker, weighting) {
-  const { values } = await fetchJson(`/api/knobs?tracker=${encodeURIComponent(tracker)}&weighting=${encodeURIComponent(weighting)}`);
-  return presets.filter((one) => Object.keys(one.values).every((name) => name in values));
+/** The knobs of a tracker and weighting, by name. */
+const knobsOf = async (tracker, weighting) => (await fetchJson(`/api/knobs?tracker=${encodeURIComponent(tracker)}&weighting=${encodeURIComponent(weighting)}`)).values;
+
+/** The presets all of whose knobs are among these. */
+const offered = (presets, knobs) => presets.filter((one) => Object.keys(one.values).every((name) => name in knobs));
+
+/** A behaviour model as a choice. */
+const modelChoice = (model) => ({ value: model.name, label: model.problem ? `${model.name} · ${model.problem}` : `${model.name} · ${model.body}, ${model.clusters} clusters, ${model.states} states` });
+
+/** Show the prediction where a tracker has one, and the model where something needs it. */
+function showBehaviour(form, knobs, trackers) {
+  const { tracker, prediction, behaviour } = form.elements;
+  const chooses = "prediction" in knobs;
+  if (!chooses) prediction.value = NOISE;
+  const needs = trackers.find((one) => one.name === tracker.value)?.needs_behaviour || prediction.value === BEHAVIOUR;
+  if (!needs) behaviour.value = "";
+  prediction.closest("label").hidden = !chooses;
+  behaviour.closest("label").hidden = !needs;
+  prediction.closest(".row").hidden = !chooses && !needs;
 }
 
 /** Open the form for a session; `like` is a run whose settings are taken over. */
 export async function newRunForm(entry, like = null) {
-  const { trackers, weightings, bodies, presets } = await known();
+  const { trackers, weightings, bodies, behaviours, presets } = await fetchJson("/api/choices");
   const usual = (tracker) => trackers.find((one) => one.name === tracker)?.weighting;
   let chosen = false;
   const first = { tracker: like?.tracker ?? entry.tracker, weighting: like?.weighting ?? entry.weighting };
+  let knobs = await knobsOf(first.tracker, first.weighting);
   const bodyChoices = [{ value: "", label: `the session's (${entry.body})` }, ...bodies.map((body) => ({ value: body.name, label: `${body.name} · ${body.parameters} parameters` }))];
   openForm({
     heading: `New run of ${entry.name}`, action: "Track",
     rows: [
       [{ name: "tracker", label: "Tracker", choices: trackers.map((one) => ({ value: one.name, label: one.label })), value: first.tracker },
         { name: "weighting", label: "Weighting", choices: weightings.map((one) => ({ value: one.name, label: one.label })), value: first.weighting }],
-      [{ name: "preset", label: "Preset", choices: presetChoices(await offered(presets, first.tracker, first.weighting)), value: "" },
+      [{ name: "preset", label: "Preset", choices: presetChoices(offered(presets, knobs)), value: "" },
         { name: "body", label: "Body", choices: bodyChoices, value: "" }],
+      [{ name: "prediction", label: "Prediction", choices: [{ value: NOISE, label: "by noise" }, { value: BEHAVIOUR, label: "by behaviour" }], value: NOISE },
+        { name: "behaviour", label: "Behaviour model", choices: [{ value: "", label: behaviours.length ? "the only one that fits" : "none learnt yet" }, ...behaviours.map(modelChoice)], value: "" }],
       [{ name: "first", label: "First frame", kind: "number", min: 0, max: entry.frame_count - 1, value: 0 },
         { name: "last", label: "Last frame", kind: "number", min: 0, max: entry.frame_count - 1, value: entry.frame_count - 1 }],
       [{ name: "seed", label: "Seed", kind: "number", min: 0, value: like ? like.seed + 1 : 0, hint: "The same seed gives the same run." },
@@ -45,16 +57,20 @@ export async function newRunForm(entry, like = null) {
       const { tracker, weighting, preset } = form.elements;
       chosen ||= name === "weighting";
       if (name === "tracker" && !chosen && usual(entry.tracker) === entry.weighting) weighting.value = usual(tracker.value);
-      if (!["tracker", "weighting"].includes(name)) return;
-      const before = preset.value;
-      const fitting = presetChoices(await offered(presets, tracker.value, weighting.value));
-      preset.replaceChildren(...fitting.map((one) => new Option(one.label, one.value, false, one.value === before)));
+      if (["tracker", "weighting"].includes(name)) {
+        knobs = await knobsOf(tracker.value, weighting.value);
+        const before = preset.value;
+        preset.replaceChildren(...presetChoices(offered(presets, knobs)).map((one) => new Option(one.label, one.value, false, one.value === before)));
+      }
+      showBehaviour(form, knobs, trackers);
     },
     send: async (values) => {
       const preset = presets.find((one) => one.name === values.preset);
+      const guided = values.prediction === BEHAVIOUR ? { prediction: BEHAVIOUR } : {};
       const made = await post(`${sessionPath(entry.name)}/runs`, {
         name: values.name || null, tracker: values.tracker, weighting: values.weighting, body: values.body || null, seed: Number(values.seed),
-        first: Number(values.first), last: Number(values.last) + 1, settings: preset?.values ?? {},
+        first: Number(values.first), last: Number(values.last) + 1, settings: { ...preset?.values, ...guided },
+        behaviour: values.behaviour || null,
       });
       await refreshSessions();
       openSession(entry.name, made.name);
@@ -62,4 +78,5 @@ export async function newRunForm(entry, like = null) {
       await post(`${runPath(entry.name, made.name)}/start`);
     },
   });
+  showBehaviour(document.querySelector("#dialog form"), knobs, trackers);
 }
