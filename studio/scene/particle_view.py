@@ -68,6 +68,7 @@ class ParticleView:
         self._server = server
         self._body = body
         self.handles: list[viser.PointCloudHandle] = []
+        self._drawn: dict[int, tuple[LayerRecord, tuple[object, ...]]] = {}
 
     def show(self, records: Sequence[LayerRecord], style: CloudStyle, tokens: ColourTokens) -> None:
         """Draw the layers' clouds; layers that are not in `records` vanish."""
@@ -78,7 +79,7 @@ class ParticleView:
             for layer, handle in enumerate(self.handles):
                 record = by_layer.get(layer)
                 visible = record is not None and style.layer in (None, layer) and bool(style.limbs)
-                if visible and record is not None:
+                if visible and record is not None and self._is_new(layer, record, style, tokens, (low, high)):
                     self._draw(handle, record, style, tokens, (low, high))
                 handle.visible = visible
 
@@ -92,6 +93,27 @@ class ParticleView:
         for handle in self.handles:
             handle.remove()
         self.handles = []
+        self._drawn.clear()
+
+    def _is_new(
+        self,
+        layer: int,
+        record: LayerRecord,
+        style: CloudStyle,
+        tokens: ColourTokens,
+        weights: tuple[float, float],
+    ) -> bool:
+        """Whether a layer's handle has something else to show than it does; notes that it shows this then.
+
+        While a frame is searched every redraw shows all of its layers, and only the newest one is new.
+        """
+        by_weight = weights if style.colour_by == "weight" else ()
+        look = (style.limbs, style.colour_by, style.layer_count, style.point_size, tokens.name, by_weight)
+        before = self._drawn.get(layer)
+        if before is not None and before[0] is record and before[1] == look:
+            return False
+        self._drawn[layer] = (record, look)
+        return True
 
     def _provide(self, count: int) -> None:
         while len(self.handles) < count:

@@ -11,11 +11,19 @@ from studio.body.forward_kinematics import limb_ends, limb_frames, marker_points
 from studio.body.model import BodyModel
 from studio.geometry.camera import Camera
 from studio.runs.colour_tokens import colour_tokens
+from studio.scene import particle_view
 from studio.scene.body_view import BodyView
 from studio.scene.camera_views import BACKDROP_DEPTH, DEPTH, CameraViews
 from studio.scene.floor_view import floor_extent
 from studio.scene.guarded_server import GuardedServer
-from studio.scene.particle_view import MOST_DRAWN, CloudStyle, ParticleView, extremities, weight_shares
+from studio.scene.particle_view import (
+    MOST_DRAWN,
+    CloudStyle,
+    ParticleView,
+    cloud_points,
+    extremities,
+    weight_shares,
+)
 from studio.scene.stick_figure import TruthView, trail_segments
 from studio.scene.trail_view import TrailView, extremity_markers
 
@@ -87,6 +95,35 @@ def test_layers_are_shown_together_or_one_at_a_time(server: GuardedServer, human
     assert [handle.visible for handle in view.handles] == [True, True, False, False]
     view.show(records, style(()), DARK)
     assert not any(handle.visible for handle in view.handles)
+    view.remove()
+
+
+def test_only_what_is_new_of_a_cloud_is_drawn_again(
+    server: GuardedServer, human: BodyModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[float] = []
+
+    def counted(body: BodyModel, poses: np.ndarray, limbs: tuple[int, ...]) -> np.ndarray:
+        drawn.append(float(poses.sum()))
+        return cloud_points(body, poses, limbs)
+
+    monkeypatch.setattr(particle_view, "cloud_points", counted)
+    view = ParticleView(server, human)
+    records = [cloud_record(human, 2, layer) for layer in range(LAYERS)]
+    for count in range(1, LAYERS + 1):
+        view.show(records[:count], style((0, 1)), DARK)
+    assert drawn == [float(record.poses.sum()) for record in records]
+    for look, tokens in ((style((0,)), DARK), (style((0,)), LIGHT)):
+        drawn.clear()
+        view.show(records, look, tokens)
+        assert len(drawn) == LAYERS
+    # Another answer of the same layer, as after a knob was moved.
+    drawn.clear()
+    view.show([*records[:3], cloud_record(human, 3, 3)], style((0,)), LIGHT)
+    assert len(drawn) == 1
+    np.testing.assert_allclose(
+        view.handles[3].points, cloud_points(human, cloud_record(human, 3, 3).poses, (0,)), atol=1e-6
+    )
     view.remove()
 
 
