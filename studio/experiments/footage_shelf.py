@@ -1,9 +1,10 @@
 """The footage of experiments and its evidence, so that trials on the same frames compute them once.
 
-A shelf belongs to one process. It holds the evidence of whole sequences without the pictures themselves (about
-2.5 MB a frame of four 640 × 480 cameras), the longest unused first to go.
+A shelf belongs to one process. It holds the evidence of whole sequences, the pictures themselves only where a
+weighting reads them (about 2.5 MB a frame of four 640 × 480 cameras without), the longest unused first to go.
 """
 
+import dataclasses
 from collections import OrderedDict
 from collections.abc import Hashable
 from pathlib import Path
@@ -13,7 +14,7 @@ import numpy as np
 from studio.capture.footage import Footage
 from studio.errors import SessionError
 from studio.evidence.backgrounds import Backgrounds
-from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
+from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
@@ -51,9 +52,10 @@ class FootageShelf:
         frame: int,
         settings: EvidenceSettings,
         edge_kind: str,
+        pictures: bool = False,
     ) -> FrameEvidence:
-        """What is seen in a frame, without pictures. Raises FootageError, NotFoundError."""
-        made_by = (session.path, tuple(camera.name for camera in cameras), settings, edge_kind)
+        """What is seen in a frame, the pictures themselves only if asked for. Raises FootageError, NotFoundError."""
+        made_by = (session.path, tuple(camera.name for camera in cameras), settings, edge_kind, pictures)
         key = (made_by, frame)
         if key in self._evidence:
             self._evidence.move_to_end(key)
@@ -62,8 +64,11 @@ class FootageShelf:
             footage, backgrounds = self._opened(session)
             self._open = (made_by, EvidenceMaker(cameras, footage, backgrounds, settings, edge_kind))
         seen = self._open[1].evidence(frame)
-        views = tuple(ViewEvidence(view.camera, NO_PICTURE, view.mask, view.edges) for view in seen.views)
-        return self._kept(key, FrameEvidence(frame, views))
+        if not pictures:
+            seen = dataclasses.replace(
+                seen, views=tuple(dataclasses.replace(view, picture=NO_PICTURE) for view in seen.views)
+            )
+        return self._kept(key, seen)
 
     def close(self) -> None:
         """Let go of files and of everything kept."""
@@ -92,4 +97,4 @@ class FootageShelf:
 
 
 def _size(evidence: FrameEvidence) -> int:
-    return sum(view.mask.nbytes + view.edges.nbytes for view in evidence.views)
+    return sum(view.mask.nbytes + view.edges.nbytes + view.picture.nbytes for view in evidence.views)

@@ -126,11 +126,21 @@ def track(
     frames = range(attempt.first, attempt.last or session.manifest.frame_count, attempt.every)
     carried = start_of(_start_pose(session, body, attempt.first, fps))
     poses, evaluations, seconds = np.zeros((len(frames), len(body.parameters))), 0, 0.0
+    log_weights = np.zeros(len(frames))
+
+    def tracked(count: int) -> tuple[Array, Array]:
+        return poses[:count], log_weights[:count]
+
     for number, frame in enumerate(frames):
         seen = spoilt.evidence(
-            shelf.evidence(session, cameras, frame, settings.evidence, weighting.edge_kind)
+            shelf.evidence(
+                session, cameras, frame, settings.evidence, weighting.edge_kind, weighting.reads_pictures
+            )
         )
         began = time.perf_counter()
+        if learner is not None:
+            space = dataclasses.replace(space, behaviour=learner.model_in(number, tracked))
+            carried = learner.carried_into(number, carried, tracked)
         result = search_frame(
             TRACKERS[attempt.tracker],
             weigher.problem(seen),

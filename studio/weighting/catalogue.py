@@ -7,6 +7,7 @@ from typing import Any, Protocol
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
+from studio.weighting.blobs import BlobSettings, BlobWeigher
 from studio.weighting.bodytrack import BodytrackSettings, BodytrackWeigher
 from studio.weighting.edge_region import EdgeRegionSettings, EdgeRegionWeigher
 from studio.weighting.edge_region_silhouette import EdgeRegionSilhouetteSettings, EdgeRegionSilhouetteWeigher
@@ -26,6 +27,7 @@ class Weigher(Protocol):
 @dataclass(frozen=True, slots=True)
 class Weighting:
     """One way of weighing poses. edge_kind : the edge map it reads: "proximity", "bodytrack" or "none".
+    reads_pictures : whether it looks at the pictures themselves, not only at masks and edges.
 
     settings_type : its knobs. prepare : (body, cameras, settings of that type) to a `Weigher`.
     """
@@ -35,6 +37,7 @@ class Weighting:
     settings_type: type
     edge_kind: str
     prepare: Callable[[BodyModel, tuple[Camera, ...], Any], Weigher]
+    reads_pictures: bool = False
 
 
 WEIGHTINGS: dict[str, Weighting] = {
@@ -57,5 +60,8 @@ WEIGHTINGS: dict[str, Weighting] = {
         ),
         Weighting("bodytrack", "Benchmark's score", BodytrackSettings, "bodytrack", BodytrackWeigher),
         Weighting("template", "Template and silhouette", TemplateSettings, "none", TemplateWeigher),
+        Weighting(
+            "blobs", "Blobs of the visual hull", BlobSettings, "none", BlobWeigher, reads_pictures=True
+        ),
     )
 }

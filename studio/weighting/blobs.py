@@ -1,0 +1,310 @@
+"""Weighting by coloured Gaussian blobs (Caillette, Galata & Howard 2007, sections 6.2 to 6.4).
+
+The masks become a visual hull, the hull a mixture of blobs fitted by K-means from where the body is expected, and a
+pose weighs 1 / D, D the relative entropy between the mixture that its own blobs make and the fitted one:
+
+    log w = -s ln max(D, FLOOR),    s = 1 in the paper.
+
+A pose costs its forward kinematics and a few products a blob, no picture is read.
+
+**Expectations and memory.** The fit depends on where it starts, so a search tells the frame its expectations before it
+weighs (`weighting.problem.Expectant`). What was learnt of the blobs passes from frame to frame as memory, with the
+particles, through the results store; a frame's problem is a function of evidence, expectations and memory. A run
+begins with the blobs of the body's cones and no colours. After each of the first `blob_learning` frames the found pose
+tells which voxels belong to which limb, and the blobs are learnt anew from all such frames (the paper's 20 frames);
+frames without a person, or lost, teach nothing. A pose that is weighed before anything was said (a warm-up, a sweep
+along one parameter) is taken for where the body is expected: the mean of the poses given.
+
+**Loss.** `quality` is the likelihood of the voxels under the fit (nats a voxel) less what the learnt blobs would give
+of a body just like themselves.
+
+Root and trunk first (swarms): only the trunk's blobs count, if the body has a trunk.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.forward_kinematics import checked_poses
+from studio.body.model import BodyModel
+from studio.errors import BodyError
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.geometry.camera import Camera
+from studio.knobs import knob
+from studio.volume.alignment import root_parameters
+from studio.volume.blob_acquisition import Profiles, blobs_of
+from studio.volume.blob_fitting import Fitted, fit_blobs
+from studio.volume.blob_model import BlobMixture, BlobModel, cone_blobs
+from studio.volume.hull import Hull
+from studio.volume.reconstruction import HullSettings, Reconstructor
+from studio.volume.relative_entropy import DivergenceOfPoses
+from studio.volume.tracking_space import box_of
+from studio.weighting.evidence_check import check_views
+from studio.weighting.hard_priors import HardPriors
+from studio.weighting.problem import TRUNK_FIRST, WHOLE_BODY
+
+Array = NDArray[np.float64]
+
+FLOOR = 1e-6
+"""Nats: no mixture is told apart from another that is nearer than this."""
+NOTHING_SEEN = 1e4
+"""Nats: the divergence of every pose from an empty hull."""
+TRUNK = "trunk"
+NEXT_FRAME = "next frame"
+
+
+@dataclass(frozen=True, slots=True)
+class BlobSettings(HullSettings):
+    """Knobs of hull and blobs. A frame's problem is made once, so all take effect with the next."""
+
+    title: ClassVar[str] = "Blobs"
+
+    blob_sharpness: float = knob(
+        1.0,
+        0.1,
+        20.0,
+        0.1,
+        label="sharpness",
+        takes_effect=NEXT_FRAME,
+        help="A pose weighs 1 / D to this power; the paper's is 1.",
+    )
+    blob_starts: int = knob(
+        4,
+        1,
+        32,
+        1,
+        label="fits a frame",
+        takes_effect=NEXT_FRAME,
+        help="Most expected poses that blobs are fitted from; the likeliest fit is kept.",
+    )
+    blob_iterations: int = knob(
+        8,
+        1,
+        50,
+        1,
+        label="K-means steps",
+        takes_effect=NEXT_FRAME,
+        help="Most rounds of giving voxels to blobs and blobs to voxels; a fit that stands still ends earlier.",
+    )
+    blob_learning: int = knob(
+        20,
+        0,
+        200,
+        1,
+        label="learning frames",
+        unit="frames",
+        takes_effect=NEXT_FRAME,
+        help="Blobs are learnt from the first so many frames; 0 = keep the cones, without colours.",
+    )
+    blob_split: float = knob(
+        12.0,
+        2.0,
+        120.0,
+        1.0,
+        label="split a blob at",
+        unit="grey levels",
+        takes_effect=NEXT_FRAME,
+        help="While blobs are learnt, one whose colour changes along the bone by more than this over a standard"
+        " deviation becomes two; below half of it two become one.",
+    )
+    blob_parts: int = knob(
+        3,
+        1,
+        8,
+        1,
+        label="most blobs a limb",
+        takes_effect=NEXT_FRAME,
+        help="A limb is never split into more blobs than this.",
+    )
+    blob_lost: float = knob(
+        4.0,
+        0.5,
+        50.0,
+        0.1,
+        label="lost below",
+        unit="nats/voxel",
+        takes_effect=NEXT_FRAME,
+        help="The tracker counts as lost where the voxels' likelihood lies this far below the learnt blobs' own.",
+    )
+
+
+class BlobWeigher:
+    """Makes the problem of any frame; what is learnt travels in the frames' memory, not here."""
+
+    def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: BlobSettings) -> None:
+        self.body, self.cameras, self.settings = body, cameras, settings
+        self.reconstructor = Reconstructor(cameras, box_of(cameras), settings)
+        self.priors = HardPriors(body)
+        self.cones = cone_blobs(body)
+        self.moves = len(root_parameters(body)) > 0
+        self._last: tuple[Array, BlobModel] | None = None
+
+    def problem(self, evidence: FrameEvidence) -> "BlobProblem":
+        """One frame as a function of poses. Raises FootageError where views do not fit the cameras."""
+        check_views(self.cameras, evidence, edges=False)
+        return BlobProblem(self, self.reconstructor.hull(evidence))
+
+    def model(self, memory: Mapping[str, Array]) -> BlobModel:
+        """The blobs that a frame's memory holds, the cones' where it holds none; the last answer is kept."""
+        if "blobs" in memory:
+            return _model_of(memory["blobs"])
+        profiles = self.profiles(memory)
+        if not profiles.frames:
+            return self.cones
+        kept = self._last
+        if kept is None or not np.array_equal(kept[0], profiles.sums):
+            made = blobs_of(self.body, profiles, self.settings.blob_split, self.settings.blob_parts)
+            kept = self._last = (profiles.sums, made)
+        return kept[1]
+
+    def profiles(self, memory: Mapping[str, Array]) -> Profiles:
+        """What the frames so far showed of the limbs."""
+        if "blob_profiles" not in memory:
+            return Profiles.none(self.body)
+        return Profiles(memory["blob_profiles"], int(memory["blob_frames"][0]))
+
+
+class BlobProblem:
+    """One frame as a function of poses, before anything is known of where the body may be."""
+
+    def __init__(self, weigher: BlobWeigher, hull: Hull) -> None:
+        self.weigher, self.hull = weigher, hull
+
+    def expecting(self, poses: Array, memory: Mapping[str, Array]) -> "ExpectedBlobs":
+        """The frame with blobs fitted from expected poses (S, D), of which the first `blob_starts` are used. Raises
+        BodyError for poses that are no finite (S, D).
+        """
+        return ExpectedBlobs(self.weigher, self.hull, _finite(self.weigher.body, poses), memory)
+
+    def remembered(self, pose: Array) -> Mapping[str, Array]:
+        """What a run's first frame tells the second."""
+        return self.expecting(pose[None], {}).remembered(pose)
+
+    def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+        """(N, D) poses to (N,) log-weights, the body being expected at the mean of these poses. Raises BodyError for
+        poses that are no finite (N, D).
+        """
+        checked = _finite(self.weigher.body, poses)
+        if not len(checked):
+            return np.zeros(0)
+        return self.expecting(checked.mean(axis=0)[None], {}).weigh(checked, stage)
+
+    def fitness(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+        """(N,) the log-weights of poses (N, D): this weighting defines no other fitness."""
+        return self.weigh(poses, stage)
+
+    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
+        """(N, D) poses to (N,) whether the body can take them."""
+        return self.weigher.priors.hold(poses, limbs_apart)
+
+
+class ExpectedBlobs(BlobProblem):
+    """One frame as a function of poses, with the blobs fitted.
+
+    model : the blobs known so far. fitted : to the hull, None where nothing is seen. starts : (S, D) fitted from.
+    """
+
+    def __init__(
+        self, weigher: BlobWeigher, hull: Hull, expected: Array, memory: Mapping[str, Array]
+    ) -> None:
+        super().__init__(weigher, hull)
+        settings = weigher.settings
+        self.memory = memory
+        self.model = weigher.model(memory)
+        self.starts = expected[: settings.blob_starts]
+        self.fitted: Fitted | None = None
+        if len(hull.centres):
+            self.fitted = fit_blobs(
+                hull, self.model, weigher.body, self.starts, settings.blob_iterations, moved=weigher.moves
+            )
+        self._divergences: dict[int, DivergenceOfPoses] = {}
+
+    def divergences(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+        """(N, D) poses to (N,) D(F||G), nats; NOTHING_SEEN for an empty hull. Raises BodyError for poses that are no
+        finite (N, D).
+        """
+        checked = _finite(self.weigher.body, poses)
+        if self.fitted is None:
+            return np.full(len(checked), NOTHING_SEEN)
+        if stage not in self._divergences:
+            self._divergences[stage] = DivergenceOfPoses.against(
+                self.weigher.body, self.model, self.fitted.mixture, self._counted(stage)
+            )
+        return self._divergences[stage](checked)
+
+    def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+        """(N, D) poses to (N,) log-weights, -s ln D. Raises BodyError for poses that are no finite (N, D)."""
+        sharpness = self.weigher.settings.blob_sharpness
+        return -sharpness * np.log(np.maximum(self.divergences(poses, stage), FLOOR))
+
+    def remembered(self, pose: Array) -> Mapping[str, Array]:
+        """The memory with this frame's hull added, if it is one to learn from; the finished blobs once enough frames
+        were seen.
+        """
+        weigher = self.weigher
+        wanted = weigher.settings.blob_learning
+        if "blobs" in self.memory or wanted == 0 or self.lost_evidence:
+            return self.memory
+        profiles = weigher.profiles(self.memory).with_frame(weigher.body, self.model, self.hull, pose)
+        memory = {"blob_profiles": profiles.sums, "blob_frames": np.array([float(profiles.frames)])}
+        return memory if profiles.frames < wanted else {"blobs": _table_of(weigher.model(memory))}
+
+    @property
+    def quality(self) -> float:
+        """Nats a voxel that the fit's likelihood lies above what the learnt blobs give of themselves; -inf where
+        nothing is seen.
+        """
+        return -np.inf if self.fitted is None else self.fitted.margin
+
+    @property
+    def lost_evidence(self) -> bool:
+        """Whether the likelihood is poor (section 6.3)."""
+        return self.quality < -self.weigher.settings.blob_lost
+
+    def _counted(self, stage: int) -> NDArray[np.int64] | None:
+        """The blobs that a stage looks at; None for all."""
+        if stage != TRUNK_FIRST:
+            return None
+        drawn = self.weigher.body.drawn
+        trunk = [index for index, limb in enumerate(self.model.limb) if drawn[int(limb)].part == TRUNK]
+        return np.array(trunk, dtype=np.int64) if trunk else None
+
+
+def blob_mixture(problem: object) -> BlobMixture | None:
+    """The blobs fitted to a frame, for pictures of them; None for another weighting's frame and for an empty hull."""
+    return problem.fitted.mixture if isinstance(problem, ExpectedBlobs) and problem.fitted else None
+
+
+def _finite(body: BodyModel, poses: Array) -> Array:
+    """Poses as contiguous (N, D); raises BodyError unless they are finite and the body's."""
+    checked = checked_poses(body, poses)
+    if not np.isfinite(checked).all():
+        row = int(np.argmin(np.isfinite(checked).all(axis=1)))
+        raise BodyError(
+            f"Pose {row} has entries that are not finite.", "Check the start pose and the calibration."
+        )
+    return checked
+
+
+def _table_of(model: BlobModel) -> Array:
+    """A model as one array (B, 12)."""
+    return np.column_stack(
+        [
+            model.limb.astype(np.float64),
+            model.offset,
+            model.eigenvalues,
+            model.colour,
+            model.colour_variance,
+            model.weight,
+        ]
+    )
+
+
+def _model_of(table: Array) -> BlobModel:
+    """The inverse of `_table_of`."""
+    return BlobModel(
+        table[:, 0].astype(np.int64), table[:, 1], table[:, 2:5], table[:, 5:8], table[:, 8:11], table[:, 11]
+    )
