@@ -23,9 +23,10 @@ from studio.volume.hull_cameras import (
     WIDTH,
 )
 
-U, V, DEPTH, AXES, SINKS, BOUND_X, BOUND_Y, AREA, FACES, PLACE = 0, 1, 2, 3, 9, 12, 13, 14, 15, 18
+U, V, DEPTH, AXES, SINKS, BOUND_X, BOUND_Y, AREA, FACES, SHARE, PLACE = 0, 1, 2, 3, 9, 12, 13, 14, 15, 18, 19
 """Of a voxel's place in a picture: centre (pixels), depth (mm), x and y of the half axes towards the camera, their
-depths, half sides of the upright rectangle around the hexagon, area, area of the three faces (pixels²)."""
+depths, half sides of the upright rectangle around the hexagon, area, area of the three faces (pixels²), and
+the share of foreground that was found there."""
 NEAR = 100.0
 """mm: a voxel that comes nearer to a camera's plane than this is not seen by it."""
 
@@ -48,22 +49,26 @@ samples at the last depth, samples / √area, the shadow's share, T_1, and T_k's
 BLOCK = 64
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def place_voxel(camera, x, y, z, half, place):
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def place_voxel(cameras, view, x, y, z, half, place):
     """Fill `place` with a voxel's projection; False where the camera cannot see it. half : of its edge, mm."""
     r, t = ROTATION, TRANSLATION
-    depth = camera[r + 6] * x + camera[r + 7] * y + camera[r + 8] * z + camera[t + 2]
-    reach = half * (abs(camera[r + 6]) + abs(camera[r + 7]) + abs(camera[r + 8]))
+    depth = (
+        cameras[view, r + 6] * x + cameras[view, r + 7] * y + cameras[view, r + 8] * z + cameras[view, t + 2]
+    )
+    reach = half * (abs(cameras[view, r + 6]) + abs(cameras[view, r + 7]) + abs(cameras[view, r + 8]))
     if depth - reach < NEAR:
         return False
     near = 1.0 / depth
-    a = (camera[r] * x + camera[r + 1] * y + camera[r + 2] * z + camera[t]) * near
-    b = (camera[r + 3] * x + camera[r + 4] * y + camera[r + 5] * z + camera[t + 1]) * near
+    a = (cameras[view, r] * x + cameras[view, r + 1] * y + cameras[view, r + 2] * z + cameras[view, t]) * near
+    b = (
+        cameras[view, r + 3] * x + cameras[view, r + 4] * y + cameras[view, r + 5] * z + cameras[view, t + 1]
+    ) * near
     square = a * a + b * b
-    if square > camera[RADIUS]:
+    if square > cameras[view, RADIUS]:
         return False
-    k1, k2, p1 = camera[DISTORTION], camera[DISTORTION + 1], camera[DISTORTION + 2]
-    p2, k3 = camera[DISTORTION + 3], camera[DISTORTION + 4]
+    k1, k2, p1 = cameras[view, DISTORTION], cameras[view, DISTORTION + 1], cameras[view, DISTORTION + 2]
+    p2, k3 = cameras[view, DISTORTION + 3], cameras[view, DISTORTION + 4]
     radial = 1.0 + square * (k1 + square * (k2 + square * k3))
     slope = 2.0 * (k1 + square * (2.0 * k2 + square * 3.0 * k3))
     xd = a * radial + 2.0 * p1 * a * b + p2 * (square + 2.0 * a * a)
@@ -71,17 +76,17 @@ def place_voxel(camera, x, y, z, half, place):
     xx = radial + a * a * slope + 2.0 * p1 * b + 6.0 * p2 * a
     xy = a * b * slope + 2.0 * p1 * a + 2.0 * p2 * b
     yy = radial + b * b * slope + 6.0 * p1 * b + 2.0 * p2 * a
-    fx, skew, fy = camera[MATRIX], camera[MATRIX + 1], camera[MATRIX + 3]
-    place[U] = fx * xd + skew * yd + camera[MATRIX + 2]
-    place[V] = fy * yd + camera[MATRIX + 4]
+    fx, skew, fy = cameras[view, MATRIX], cameras[view, MATRIX + 1], cameras[view, MATRIX + 3]
+    place[U] = fx * xd + skew * yd + cameras[view, MATRIX + 2]
+    place[V] = fy * yd + cameras[view, MATRIX + 4]
     place[DEPTH] = depth
     bound_x, bound_y = 0.0, 0.0
     for axis in range(3):
-        away = camera[CENTRE + axis] - (x if axis == 0 else y if axis == 1 else z)
+        away = cameras[view, CENTRE + axis] - (x if axis == 0 else y if axis == 1 else z)
         step = half if away >= 0.0 else -half
-        sink = step * camera[r + 6 + axis]
-        along_a = (step * camera[r + axis] - a * sink) * near
-        along_b = (step * camera[r + 3 + axis] - b * sink) * near
+        sink = step * cameras[view, r + 6 + axis]
+        along_a = (step * cameras[view, r + axis] - a * sink) * near
+        along_b = (step * cameras[view, r + 3 + axis] - b * sink) * near
         along_x, along_y = xx * along_a + xy * along_b, xy * along_a + yy * along_b
         across, down = fx * along_x + skew * along_y, fy * along_y
         place[AXES + 2 * axis], place[AXES + 2 * axis + 1], place[SINKS + axis] = across, down, sink
@@ -98,13 +103,20 @@ def place_voxel(camera, x, y, z, half, place):
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
+def shares_of(count, share, shares):
+    """How many of `count` things one of several threads gets when blocks of BLOCK are dealt out in turn."""
+    whole, rest = divmod(count, BLOCK * shares)
+    return whole * BLOCK + min(max(rest - share * BLOCK, 0), BLOCK)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def sample_count(place, sampling):
     """How many samples a voxel's area is worth: the square root of its pixels, at least one."""
     return max(1, math.ceil(sampling * math.sqrt(place[AREA]) - 1e-9))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def sample_pixel(place, number, count, heights):
     """Column and row of one of `count` samples spread evenly over a voxel's area (Hammersley's points on the faces).
 
@@ -128,28 +140,35 @@ def sample_pixel(place, number, count, heights):
     return math.floor(x + 0.5), math.floor(y + 0.5)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def squared_distance(blue, green, red, gaussian, shadow):
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def squared_distance(blue, green, red, gaussians, at, shadow):
     """Squared Mahalanobis distance of a pixel from its background's Gaussian or the shadow's (`yuv_background`)."""
     b, g, r = np.float32(blue), np.float32(green), np.float32(red)
     luminance = np.float32(0.114) * b + np.float32(0.587) * g + np.float32(0.299) * r
-    mean = gaussian[0]
+    mean = gaussians[at, 0]
     if luminance < (np.float32(1.0) - np.float32(0.5) * shadow) * mean:
         mean *= np.float32(1.0) - shadow
     y = luminance - mean
-    u = np.float32(0.492) * (b - luminance) - gaussian[1]
-    v = np.float32(0.877) * (r - luminance) - gaussian[2]
-    mixed = y * (u * gaussian[6] + v * gaussian[7]) + u * v * gaussian[8]
-    return y * y * gaussian[3] + u * u * gaussian[4] + v * v * gaussian[5] + np.float32(2.0) * mixed
+    u = np.float32(0.492) * (b - luminance) - gaussians[at, 1]
+    v = np.float32(0.877) * (r - luminance) - gaussians[at, 2]
+    mixed = y * (u * gaussians[at, 6] + v * gaussians[at, 7]) + u * v * gaussians[at, 8]
+    return (
+        y * y * gaussians[at, 3]
+        + u * u * gaussians[at, 4]
+        + v * v * gaussians[at, 5]
+        + np.float32(2.0) * mixed
+    )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def look_at_mask(place, width, height, sums, start, last, share):
-    """What a mask says of a voxel. sums : summed areas of all masks, this one's (H + 1, W + 1) from `start`.
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def look_at_mask(cameras, view, starts, sums, last, share, place):
+    """What a mask says of a voxel. sums : summed areas of all masks, this one's (H + 1, W + 1) from
+    starts[1, view].
 
     Above the last depth every pixel of the rectangle around the voxel counts, so nothing is carved that covers a
     mask pixel. At the last depth: of the rectangle of the voxel's own area.
     """
+    width, height = int(cameras[view, WIDTH]), int(cameras[view, HEIGHT])
     across, down = place[BOUND_X], place[BOUND_Y]
     if last:
         shrunk = math.sqrt(place[AREA] / (4.0 * across * down))
@@ -160,6 +179,7 @@ def look_at_mask(place, width, height, sums, start, last, share):
         return UNSEEN
     partly = left < 0 or top < 0 or right >= width or bottom >= height
     left, top, right, bottom = max(left, 0), max(top, 0), min(right, width - 1), min(bottom, height - 1)
+    start = starts[1, view]
     upper, lower = start + top * (width + 1), start + (bottom + 1) * (width + 1)
     found = sums[lower + right + 1] - sums[lower + left] - sums[upper + right + 1] + sums[upper + left]
     pixels = (right - left + 1) * (bottom - top + 1)
@@ -167,35 +187,40 @@ def look_at_mask(place, width, height, sums, start, last, share):
         if place[U] < -0.5 or place[V] < -0.5 or place[U] >= width - 0.5 or place[V] >= height - 0.5:
             return UNSEEN
         return FOREGROUND if found > 0 and found >= share * pixels else BACKGROUND
+    place[SHARE] = found / pixels
     if found == 0 and not partly:
         return BACKGROUND
     return FOREGROUND if found == pixels and not partly else EDGE
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def look_at_pixels(place, width, height, picture, gaussians, start, heights, rules):
-    """Eq. 6 for one voxel in one picture. picture, gaussians : all views' pixels, this one's from `start`."""
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def look_at_pixels(cameras, view, starts, picture, gaussians, heights, rules, place):
+    """Eq. 6 for one voxel in one picture. picture, gaussians : all views' pixels, this one's from starts[0, view]."""
+    width, height, start = int(cameras[view, WIDTH]), int(cameras[view, HEIGHT]), starts[0, view]
     last = rules[DEPTH_IS_LAST] > 0.0
-    shadow, single = np.float32(rules[SHADOW]), rules[SINGLE]
+    shadow, single = np.float32(rules[SHADOW]), np.float32(rules[SINGLE])
     count = sample_count(place, rules[SAMPLING])
     enough = rules[POLYNOMIAL] + count * (rules[POLYNOMIAL + 1] + count * rules[POLYNOMIAL + 2])
-    total, inside, far = 0.0, 0, 0
+    total, inside, far = np.float32(0.0), 0, 0
     for number in range(count):
         x, y = sample_pixel(place, number, count, heights)
         if x < 0 or y < 0 or x >= width or y >= height:
             continue
         at = start + y * width + x
-        distance = squared_distance(picture[at, 0], picture[at, 1], picture[at, 2], gaussians[at], shadow)
+        distance = squared_distance(picture[at, 0], picture[at, 1], picture[at, 2], gaussians, at, shadow)
         total += distance
         inside += 1
-        far += distance > single
-        if not last and total > enough and far < inside:
+        if distance > single:
+            far += 1
+        elif not last and total > enough:
+            place[SHARE] = far / inside
             return EDGE
     partly = inside < count
     if inside == 0:
         beyond_x = place[U] + place[BOUND_X] < 0.0 or place[U] - place[BOUND_X] > width - 1.0
         beyond_y = place[V] + place[BOUND_Y] < 0.0 or place[V] - place[BOUND_Y] > height - 1.0
         return UNSEEN if last or beyond_x or beyond_y else EDGE
+    place[SHARE] = far / inside
     if total <= rules[POLYNOMIAL] + inside * (rules[POLYNOMIAL + 1] + inside * rules[POLYNOMIAL + 2]):
         return EDGE if partly and not last else BACKGROUND
     if last:
@@ -204,64 +229,63 @@ def look_at_pixels(place, width, height, picture, gaussians, start, heights, rul
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def judge(node, state, corner, edge, cameras, starts, sums, picture, gaussians, heights, rules, place):
-    """CARVED, KEPT or SPLIT for one voxel. node : (3,) its place in the grid. state : (2,) bits of the views in which
-    it is foreground for good (masks only) and of those that do not see it; brought up to date.
+def judge_share(
+    share, shares, nodes, states, verdicts, corner, edge, cameras, starts, sums, picture, gaussians, heights, rules
+):  # fmt: skip
+    """CARVED, KEPT or SPLIT for every `shares`-th block of the voxels (N, 3), beginning with block `share`.
+
+    verdicts : (N,) filled. states : (N, 3) bits of the views in which each is foreground for good (masks only), bits of
+    those that do not see it, and the view to look at first: that in which its parent was the least foreground, the
+    likeliest to carve it. They are brought up to date; they change how much is looked at, never what comes out.
     """
-    half = 0.5 * edge
-    x, y, z = (
-        corner[0] + node[0] * edge + half,
-        corner[1] + node[1] * edge + half,
-        corner[2] + node[2] * edge + half,
-    )
-    last, by_pixels = rules[DEPTH_IS_LAST] > 0.0, rules[PIXELS] > 0.0
-    seen, edges = 0, 0
-    for view in range(cameras.shape[0]):
-        bit = np.uint32(1) << np.uint32(view)
-        if state[1] & bit:
-            continue
-        if state[0] & bit:
+    # One loop, not a function a voxel: array arguments of one with several exits are counted in and out at each call.
+    place, half, views = np.empty(PLACE), 0.5 * edge, cameras.shape[0]
+    last, by_pixels, edge_share = rules[DEPTH_IS_LAST] > 0.0, rules[PIXELS] > 0.0, rules[EDGE_SHARE]
+    for number in range(shares_of(len(nodes), share, shares)):
+        index = (number // BLOCK * shares + share) * BLOCK + number % BLOCK
+        x = corner[0] + nodes[index, 0] * edge + half
+        y = corner[1] + nodes[index, 1] * edge + half
+        z = corner[2] + nodes[index, 2] * edge + half
+        settled, unseen, view = states[index, 0], states[index, 1], int(states[index, 2]) - 1
+        seen, edges, least, answer = 0, 0, 2.0, EDGE
+        for _ in range(views):
+            view = view + 1 if view + 1 < views else 0
+            bit = np.uint32(1) << np.uint32(view)
+            if unseen & bit:
+                continue
+            if settled & bit:
+                seen += 1
+                continue
+            if not place_voxel(cameras, view, x, y, z, half, place):
+                answer = UNSEEN
+            elif by_pixels:
+                answer = look_at_pixels(cameras, view, starts, picture, gaussians, heights, rules, place)
+            else:
+                answer = look_at_mask(cameras, view, starts, sums, last, edge_share, place)
+            if answer == BACKGROUND:
+                break
+            if answer == UNSEEN:
+                unseen |= bit
+                continue
             seen += 1
-            continue
-        camera = cameras[view]
-        width, height = int(camera[WIDTH]), int(camera[HEIGHT])
-        if not place_voxel(camera, x, y, z, half, place):
-            answer = UNSEEN
-        elif by_pixels:
-            answer = look_at_pixels(place, width, height, picture, gaussians, starts[0, view], heights, rules)
+            if place[SHARE] < least:
+                least = place[SHARE]
+                states[index, 2] = view
+            if answer == EDGE:
+                edges += 1
+            elif not by_pixels:
+                settled |= bit
+        states[index, 0], states[index, 1] = settled, unseen
+        if answer == BACKGROUND or seen < rules[LEAST_VIEWS]:
+            verdicts[index] = CARVED
         else:
-            answer = look_at_mask(place, width, height, sums, starts[1, view], last, rules[EDGE_SHARE])
-        if answer == BACKGROUND:
-            return CARVED
-        if answer == UNSEEN:
-            state[1] |= bit
-            continue
-        seen += 1
-        if answer == EDGE:
-            edges += 1
-        elif not by_pixels:
-            state[0] |= bit
-    if seen < rules[LEAST_VIEWS]:
-        return CARVED
-    return SPLIT if edges else KEPT
-
-
-@njit(cache=True, nogil=True)
-def judge_share(share, shares, nodes, states, verdicts, corner, edge, cameras, starts, sums, picture, gaussians,
-                heights, rules):  # fmt: skip
-    """Every `shares`-th block of the voxels (N, 3), beginning with block `share`; verdicts : (N,) filled."""
-    place = np.empty(PLACE)
-    for first in range(share * BLOCK, len(nodes), shares * BLOCK):
-        for index in range(first, min(first + BLOCK, len(nodes))):
-            verdicts[index] = judge(
-                nodes[index], states[index], corner, edge, cameras, starts, sums, picture, gaussians, heights, rules,
-                place,
-            )  # fmt: skip
+            verdicts[index] = SPLIT if edges else KEPT
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def judge_all(threads, nodes, states, verdicts, corner, edge, cameras, starts, sums, picture, gaussians, heights,
-              rules):  # fmt: skip
+def judge_all(
+    threads, nodes, states, verdicts, corner, edge, cameras, starts, sums, picture, gaussians, heights, rules
+):
     """All voxels, their blocks dealt out to the threads in turn."""
     for thread in prange(threads):
         judge_share(

@@ -6,6 +6,8 @@ from numba import njit, prange
 from studio.volume.hull_cameras import HEIGHT, WIDTH
 from studio.volume.hull_kernels import (
     BLOCK,
+    BOUND_X,
+    BOUND_Y,
     KEPT,
     PIXELS,
     PLACE,
@@ -13,11 +15,38 @@ from studio.volume.hull_kernels import (
     SHADOW,
     SINGLE,
     SPLIT,
+    U,
+    V,
     place_voxel,
     sample_count,
     sample_pixel,
+    shares_of,
     squared_distance,
 )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def first_look(nodes, corner, edge, cameras, sampling, states, samples):
+    """What no picture is needed for: the bits of the views that cannot see each voxel (N, 3), in states[:, 1], a view
+    that sees all of it to begin with, in states[:, 2], and the most samples it takes in a view.
+    """
+    place, half = np.empty(PLACE), 0.5 * edge
+    for index in range(len(nodes)):
+        x = corner[0] + nodes[index, 0] * edge + half
+        y = corner[1] + nodes[index, 1] * edge + half
+        z = corner[2] + nodes[index, 2] * edge + half
+        for view in range(len(cameras)):
+            width, height = cameras[view, WIDTH] - 1.0, cameras[view, HEIGHT] - 1.0
+            if not place_voxel(cameras, view, x, y, z, half, place):
+                states[index, 1] |= np.uint32(1) << np.uint32(view)
+                continue
+            samples[index] = max(samples[index], sample_count(place, sampling))
+            left, right = place[U] - place[BOUND_X], place[U] + place[BOUND_X]
+            top, bottom = place[V] - place[BOUND_Y], place[V] + place[BOUND_Y]
+            if right < -0.5 or bottom < -0.5 or left > width + 0.5 or top > height + 0.5:
+                states[index, 1] |= np.uint32(1) << np.uint32(view)
+            elif left >= 0.0 and top >= 0.0 and right <= width and bottom <= height:
+                states[index, 2] = view
 
 
 @njit(cache=True, nogil=True)
@@ -34,12 +63,12 @@ def kept_nodes(nodes, verdicts):
 
 @njit(cache=True, nogil=True)
 def children(nodes, states, verdicts, limits):
-    """The octants (M, 3) of the voxels that are split, and their states (M, 2), in the order of their parents.
+    """The octants (M, 3) of the voxels that are split, and their states (M, 3), in the order of their parents.
 
     limits : (2, 3) least and greatest place in the children's grid that lies in the tracking space.
     """
     most = 8 * np.count_nonzero(verdicts == SPLIT)
-    found, inherited = np.empty((most, 3), np.int32), np.empty((most, 2), np.uint32)
+    found, inherited = np.empty((most, 3), np.int32), np.empty((most, 3), np.uint32)
     count = 0
     for index in range(len(nodes)):
         if verdicts[index] != SPLIT:
@@ -53,7 +82,7 @@ def children(nodes, states, verdicts, limits):
             if x > limits[1, 0] or y > limits[1, 1] or z > limits[1, 2]:
                 continue
             found[count, 0], found[count, 1], found[count, 2] = x, y, z
-            inherited[count, 0], inherited[count, 1] = states[index, 0], states[index, 1]
+            inherited[count] = states[index]
             count += 1
     return found[:count], inherited[:count]
 
@@ -75,63 +104,65 @@ def summed_areas(mask, sums):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def mean_colour(place, width, height, start, sums_start, sums, picture, gaussians, heights, rules, out):
-    """Mean BGR of a voxel's samples that are not background, else of all; NaN where none is in the picture."""
-    count = sample_count(place, rules[SAMPLING])
-    shadow = np.float32(rules[SHADOW])
-    far_blue = far_green = far_red = blue = green = red = np.float32(0.0)
-    inside, far = 0, 0
-    for number in range(count):
-        x, y = sample_pixel(place, number, count, heights)
-        if x < 0 or y < 0 or x >= width or y >= height:
-            continue
-        at = start + y * width + x
-        b, g, r = np.float32(picture[at, 0]), np.float32(picture[at, 1]), np.float32(picture[at, 2])
-        blue, green, red, inside = blue + b, green + g, red + r, inside + 1
-        if rules[PIXELS] > 0.0:
-            differs = squared_distance(b, g, r, gaussians[at], shadow) > rules[SINGLE]
-        else:
-            above = sums_start + y * (width + 1) + x
-            below = above + width + 1
-            differs = sums[below + 1] - sums[below] - sums[above + 1] + sums[above] > 0
-        if differs:
-            far_blue, far_green, far_red, far = far_blue + b, far_green + g, far_red + r, far + 1
-    if far > 0:
-        out[0], out[1], out[2] = far_blue / far, far_green / far, far_red / far
-    elif inside > 0:
-        out[0], out[1], out[2] = blue / inside, green / inside, red / inside
+def colour_share(
+    share, shares, centres, edges, cameras, starts, sums, picture, gaussians, heights, rules, views, means
+):
+    """Colours of every `shares`-th block of the voxels. views : (K, V, 3), means : (K, 3), both filled.
 
-
-@njit(cache=True, nogil=True)
-def colour_share(share, shares, centres, edges, cameras, starts, sums, picture, gaussians, heights, rules, views,
-                 means):  # fmt: skip
-    """Every `shares`-th block of the voxels' colours. views : (K, V, 3) NaN, means : (K, 3), both filled."""
-    place = np.empty(PLACE)
-    for first in range(share * BLOCK, len(centres), shares * BLOCK):
-        for index in range(first, min(first + BLOCK, len(centres))):
-            total = np.zeros(3, np.float32)
-            seen = np.float32(0.0)
-            for view in range(len(cameras)):
-                camera, out = cameras[view], views[index, view]
-                x, y, z = centres[index, 0], centres[index, 1], centres[index, 2]
-                out[:] = np.nan
-                if not place_voxel(camera, x, y, z, 0.5 * edges[index], place):
+    A voxel's colour in a view is the mean BGR of its samples that are not background, else of all its samples, NaN
+    where none lies in the picture.
+    """
+    place, by_pixels, shadow = np.empty(PLACE), rules[PIXELS] > 0.0, np.float32(rules[SHADOW])
+    for turn in range(shares_of(len(centres), share, shares)):
+        index = (turn // BLOCK * shares + share) * BLOCK + turn % BLOCK
+        blue = green = red = seen = np.float32(0.0)
+        x, y, z = centres[index, 0], centres[index, 1], centres[index, 2]
+        for view in range(len(cameras)):
+            width, height = int(cameras[view, WIDTH]), int(cameras[view, HEIGHT])
+            count, chosen, found = 0, 0, False
+            if place_voxel(cameras, view, x, y, z, 0.5 * edges[index], place):
+                count = sample_count(place, rules[SAMPLING])
+            b = g = r = np.float32(0.0)
+            for number in range(count):
+                column, row = sample_pixel(place, number, count, heights)
+                if column < 0 or row < 0 or column >= width or row >= height:
                     continue
-                mean_colour(
-                    place, int(camera[WIDTH]), int(camera[HEIGHT]), starts[0, view], starts[1, view], sums, picture,
-                    gaussians, heights, rules, out,
-                )  # fmt: skip
-                if out[0] == out[0]:
-                    for channel in range(3):
-                        total[channel] += out[channel]
-                    seen += np.float32(1.0)
-            for channel in range(3):
-                means[index, channel] = total[channel] / seen
+                at = starts[0, view] + row * width + column
+                if by_pixels:
+                    pixel = picture[at, 0], picture[at, 1], picture[at, 2]
+                    differs = squared_distance(*pixel, gaussians, at, shadow) > rules[SINGLE]
+                else:
+                    above = starts[1, view] + row * (width + 1) + column
+                    below = above + width + 1
+                    differs = sums[below + 1] - sums[below] - sums[above + 1] + sums[above] > 0
+                if differs and not found:
+                    b = g = r = np.float32(0.0)
+                    chosen, found = 0, True
+                if differs or not found:
+                    b += np.float32(picture[at, 0])
+                    g += np.float32(picture[at, 1])
+                    r += np.float32(picture[at, 2])
+                    chosen += 1
+            amount = np.float32(1.0) / np.float32(chosen) if chosen else np.float32(np.nan)
+            views[index, view, 0], views[index, view, 1], views[index, view, 2] = (
+                b * amount,
+                g * amount,
+                r * amount,
+            )
+            if chosen:
+                blue, green, red, seen = (
+                    blue + b * amount,
+                    green + g * amount,
+                    red + r * amount,
+                    seen + np.float32(1.0),
+                )
+        means[index, 0], means[index, 1], means[index, 2] = blue / seen, green / seen, red / seen
 
 
 @njit(cache=True, nogil=True, parallel=True)
-def colour_all(threads, centres, edges, cameras, starts, sums, picture, gaussians, heights, rules, views,
-               means):  # fmt: skip
+def colour_all(
+    threads, centres, edges, cameras, starts, sums, picture, gaussians, heights, rules, views, means
+):
     """All voxels' colours, their blocks dealt out to the threads in turn."""
     for thread in prange(threads):
         colour_share(

@@ -118,8 +118,7 @@ class Reconstructor:
         self._rows = camera_rows(cameras)
         sizes = np.array([(camera.width, camera.height) for camera in cameras], dtype=np.int64)
         self._starts = np.stack([_starts(sizes.prod(axis=1)), _starts((sizes + 1).prod(axis=1))])
-        self._first = grid_within(box, FIRST_DEPTH)
-        most = self._most_samples()
+        self._first, self._first_states, most = self._start()
         self._heights = radical_inverses(most)
         polynomial = fitted_thresholds(most, settings.hull_confidence)
         rules = np.zeros(kernels.RULES)
@@ -139,8 +138,7 @@ class Reconstructor:
         self._check(evidence)
         seen = self._seen(evidence)
         kept: list[Nodes] = []
-        nodes = self._first
-        states = np.zeros((len(nodes), 2), dtype=np.uint32)
+        nodes, states = self._first, self._first_states.copy()
         depths = range(FIRST_DEPTH, self.settings.hull_depth + 1)
         for depth in depths:
             verdicts = np.empty(len(nodes), dtype=np.uint8)
@@ -219,15 +217,18 @@ class Reconstructor:
                     "Use the calibration that belongs to this footage.",
                 )
 
-    def _most_samples(self) -> int:
-        """Samples of the largest projection that there is at the first depth."""
-        edge = self.box.edge / 2.0**FIRST_DEPTH
-        place, most = np.empty(kernels.PLACE), 1
-        for x, y, z in self.box.corner + (self._first + 0.5) * edge:
-            for row in self._rows:
-                if kernels.place_voxel(row, x, y, z, 0.5 * edge, place):
-                    most = max(most, kernels.sample_count(place, self.settings.hull_sampling))
-        return most
+    def _start(self) -> tuple[Nodes, NDArray[np.uint32], int]:
+        """The first depth's voxels that enough views see, their states (see `hull_kernels.judge`), and the samples
+        of the largest projection among them.
+        """
+        nodes, edge = grid_within(self.box, FIRST_DEPTH), self.box.edge / 2.0**FIRST_DEPTH
+        states, samples = np.zeros((len(nodes), 3), dtype=np.uint32), np.zeros(len(nodes), dtype=np.int64)
+        octree.first_look(
+            nodes, self.box.corner, edge, self._rows, self.settings.hull_sampling, states, samples
+        )
+        unseen = np.array([int(bits).bit_count() for bits in states[:, 1]])
+        seen = len(self.cameras) - unseen >= min(self.settings.hull_least_views, len(self.cameras))
+        return nodes[seen], states[seen], int(samples.max(initial=1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
