@@ -23,6 +23,7 @@ from studio.evidence.background import (
     gaussian_from_frames,
     gaussian_from_median,
 )
+from studio.evidence.yuv_background import YuvBackground, independent_background, learn_background
 
 Bytes = NDArray[np.uint8]
 FittedKind = Literal["gaussian", "median", "mog2", "knn"]
@@ -41,6 +42,7 @@ class Backgrounds:
     def __init__(self, footage: Footage) -> None:
         self._footage = footage
         self._fitted: dict[tuple[str, FittedKind], BackgroundModel] = {}
+        self._yuv: dict[tuple[str, float], YuvBackground] = {}
         self._locks = {camera: threading.Lock() for camera in footage.cameras}
 
     def model(self, camera: str, kind: FittedKind) -> BackgroundModel:
@@ -53,6 +55,25 @@ class Backgrounds:
             if found is None:
                 found = self._fit(camera, kind)
                 self._fitted[camera, kind] = found
+            return found
+
+    def yuv(self, camera: str, least_noise: float) -> YuvBackground:
+        """Full Gaussians in YUV of the plate or empty clip, else about the footage's median; least_noise : grey levels.
+
+        Raises FootageError if there is too little to fit it to.
+        """
+        with self._locks[camera]:
+            found = self._yuv.get((camera, least_noise))
+            if found is None:
+                path = self._footage.background_path(camera)
+                if path is not None:
+                    found = learn_background(self._plate(camera, path, CLIP_FRAMES), least_noise)
+                else:
+                    median = gaussian_from_median(self._spread(camera, MEDIAN_FRAMES))
+                    found = independent_background(median.mean, median.variance, least_noise)
+                for old in [key for key in self._yuv if key[0] == camera]:
+                    del self._yuv[old]
+                self._yuv[camera, least_noise] = found
             return found
 
     def _fit(self, camera: str, kind: FittedKind) -> BackgroundModel:

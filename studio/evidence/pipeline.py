@@ -5,6 +5,7 @@ models, is in `Backgrounds` and shared. Cameras are independent: with an executo
 takes half the time.
 """
 
+import functools
 from concurrent.futures import Executor
 
 import cv2
@@ -22,7 +23,8 @@ from studio.geometry.camera import Camera
 
 Bytes = NDArray[np.uint8]
 
-EDGE_KINDS = ("proximity", "bodytrack", "none")
+EDGE_KINDS = ("proximity", "bodytrack", "none", "hull")
+"""Maps that a weighting reads; "hull": no map, but what a visual hull is carved from (knob hull_evidence)."""
 
 
 class EvidenceMaker:
@@ -44,6 +46,7 @@ class EvidenceMaker:
         self.cameras = tuple(camera.name for camera in cameras)
         self.settings, self.edge_kind = settings, edge_kind
         self._footage, self._backgrounds, self._executor = footage, backgrounds, executor
+        self.hull_of_pixels = edge_kind == "hull" and self._from_pixels()
 
     def evidence(self, frame: int) -> FrameEvidence:
         """The evidence of a frame, views in the order of the cameras. Raises FootageError, NotFoundError."""
@@ -56,8 +59,21 @@ class EvidenceMaker:
     def view(self, camera: str, frame: int) -> ViewEvidence:
         """One camera's evidence."""
         picture = self._footage.picture(camera, frame)
+        if self.hull_of_pixels:
+            nothing = _nothing(picture.shape[0], picture.shape[1])
+            background = self._backgrounds.yuv(camera, self.settings.mask_noise)
+            return ViewEvidence(camera, picture, nothing, nothing, background)
         mask = self._mask(camera, frame, picture)
         return ViewEvidence(camera, picture, mask, self._edges(picture, mask))
+
+    def _from_pixels(self) -> bool:
+        """Whether a hull is carved from pixels: as the knob says, "auto" where it can be done well."""
+        if self.settings.hull_evidence != "auto":
+            return self.settings.hull_evidence == "pixels"
+        return self.settings.background_model in ("auto", "gaussian") and all(
+            self._footage.background_path(camera) is not None and not self._footage.has_masks(camera)
+            for camera in self.cameras
+        )
 
     def _mask(self, camera: str, frame: int, picture: Bytes) -> Bytes:
         """The mask that came with the data, or the cleaned difference from a background model."""
@@ -79,9 +95,17 @@ class EvidenceMaker:
         """The edge map that the weighting asks for."""
         if self.edge_kind == "bodytrack":
             return bodytrack_edges(picture)
-        if self.edge_kind == "none":
-            return np.zeros(picture.shape[:2], np.uint8)
+        if self.edge_kind in ("none", "hull"):
+            return _nothing(picture.shape[0], picture.shape[1])
         knobs = self.settings
         return proximity_edges(
             picture, knobs.edge_threshold, knobs.edge_smoothing, mask, knobs.edge_near_mask
         )
+
+
+@functools.lru_cache(maxsize=16)
+def _nothing(height: int, width: int) -> Bytes:
+    """An empty map, shared and read-only."""
+    empty = np.zeros((height, width), np.uint8)
+    empty.setflags(write=False)
+    return empty

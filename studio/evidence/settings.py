@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from studio.knobs import knob
 
 BACKGROUND_MODELS = ("auto", "mask", "gaussian", "median", "mog2", "knn")
+HULL_EVIDENCE = ("auto", "pixels", "masks")
 NEXT_FRAME = "next frame"
 
 
@@ -157,4 +158,12 @@ class EvidenceSettings:
         unit="px",
         takes_effect=NEXT_FRAME,
         help="Forget edges further than this from the foreground; 0 = keep all, as in the paper.",
+    )
+    hull_evidence: str = knob(
+        "auto",
+        label="hull from",
+        choices=HULL_EVIDENCE,
+        takes_effect=NEXT_FRAME,
+        help="What carves the visual hull: pixels tested one by one against the background's colours, as in the paper"
+        " (no mask is made), or masks; auto: pixels where every camera has a plate or an empty clip and no masks.",
     )

@@ -66,9 +66,18 @@ def learn_background(pictures: Sequence[Bytes], least_noise: float = LEAST_NOISE
         total += level
         products += level[..., :, None] * level[..., None, :]
     mean = total / len(pictures)
-    covariance = products / len(pictures) - mean[..., :, None] * mean[..., None, :]
+    return _background(mean, products / len(pictures) - mean[..., :, None] * mean[..., None, :], least_noise)
+
+
+def independent_background(mean: Floats, variance: Floats, least_noise: float = LEAST_NOISE) -> YuvBackground:
+    """Gaussians of a mean and a variance (H, W, 3) of each colour of BGR, taken as independent of each other."""
+    return _background(mean.astype(np.float64), variance[..., None] * np.eye(3), least_noise)
+
+
+def _background(mean: Array, covariance: Array, least_noise: float) -> YuvBackground:
+    """BGR mean (H, W, 3) and covariance (H, W, 3, 3), made even where it is too small, in YUV."""
     spread, axes = np.linalg.eigh(covariance)
-    # Where background and noise are linear in the colours so is YUV: the floor may be laid in BGR, where noise is even.
+    # YUV is linear in the colours, so the floor may be laid in BGR, where a sensor's noise is even in all directions.
     axes = np.linalg.inv(YUV_OF_BGR).T @ axes
     precision = (axes / np.maximum(spread, least_noise**2)[..., None, :]) @ np.swapaxes(axes, -1, -2)
     return YuvBackground((mean @ YUV_OF_BGR.T).astype(np.float32), precision.astype(np.float32))

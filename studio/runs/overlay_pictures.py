@@ -101,6 +101,8 @@ class ViewComposer:
             nothing = np.zeros((0, 0), dtype=np.uint8)
             return ViewEvidence(camera, self._footage.picture(camera, frame), nothing, nothing)
         kind = WEIGHTINGS[self._settings.weighting_name].edge_kind if "edges" in layers else "none"
+        # A hull may be carved without masks; a picture that is drawn on shows one all the same.
+        kind = "none" if kind == "hull" else kind
         lenses = tuple(self.cameras.values())
         maker = EvidenceMaker(lenses, self._footage, self._backgrounds, self._settings.evidence, kind)
         return maker.view(camera, frame)

@@ -7,7 +7,8 @@ from typing import Any, Protocol
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
-from studio.weighting.blobs import BlobSettings, BlobWeigher
+from studio.weighting.blob_settings import BlobSettings
+from studio.weighting.blobs import BlobWeigher
 from studio.weighting.bodytrack import BodytrackSettings, BodytrackWeigher
 from studio.weighting.edge_region import EdgeRegionSettings, EdgeRegionWeigher
 from studio.weighting.edge_region_silhouette import EdgeRegionSilhouetteSettings, EdgeRegionSilhouetteWeigher
@@ -26,7 +27,7 @@ class Weigher(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Weighting:
-    """One way of weighing poses. edge_kind : the edge map it reads: "proximity", "bodytrack" or "none".
+    """One way of weighing poses. edge_kind : the edge map it reads, or "hull" where it carves one (`evidence.pipeline`).
     reads_pictures : whether it looks at the pictures themselves, not only at masks and edges.
 
     settings_type : its knobs. prepare : (body, cameras, settings of that type) to a `Weigher`.
