@@ -22,8 +22,6 @@ Root and trunk first (swarms): only the trunk's blobs count, if the body has a t
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,15 +31,15 @@ from studio.body.model import BodyModel
 from studio.errors import BodyError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
-from studio.knobs import knob
 from studio.volume.alignment import root_parameters
 from studio.volume.blob_acquisition import Profiles, blobs_of
 from studio.volume.blob_fitting import Fitted, fit_blobs
 from studio.volume.blob_model import BlobMixture, BlobModel, cone_blobs
 from studio.volume.hull import Hull
-from studio.volume.reconstruction import HullSettings, Reconstructor
+from studio.volume.reconstruction import Reconstructor
 from studio.volume.relative_entropy import DivergenceOfPoses
 from studio.volume.tracking_space import box_of
+from studio.weighting.blob_settings import BlobSettings
 from studio.weighting.evidence_check import check_views
 from studio.weighting.hard_priors import HardPriors
 from studio.weighting.problem import TRUNK_FIRST, WHOLE_BODY
@@ -53,82 +51,6 @@ FLOOR = 1e-6
 NOTHING_SEEN = 1e4
 """Nats: the divergence of every pose from an empty hull."""
 TRUNK = "trunk"
-NEXT_FRAME = "next frame"
-
-
-@dataclass(frozen=True, slots=True)
-class BlobSettings(HullSettings):
-    """Knobs of hull and blobs. A frame's problem is made once, so all take effect with the next."""
-
-    title: ClassVar[str] = "Blobs"
-
-    blob_sharpness: float = knob(
-        1.0,
-        0.1,
-        20.0,
-        0.1,
-        label="sharpness",
-        takes_effect=NEXT_FRAME,
-        help="A pose weighs 1 / D to this power; the paper's is 1.",
-    )
-    blob_starts: int = knob(
-        4,
-        1,
-        32,
-        1,
-        label="fits a frame",
-        takes_effect=NEXT_FRAME,
-        help="Most expected poses that blobs are fitted from; the likeliest fit is kept.",
-    )
-    blob_iterations: int = knob(
-        8,
-        1,
-        50,
-        1,
-        label="K-means steps",
-        takes_effect=NEXT_FRAME,
-        help="Most rounds of giving voxels to blobs and blobs to voxels; a fit that stands still ends earlier.",
-    )
-    blob_learning: int = knob(
-        20,
-        0,
-        200,
-        1,
-        label="learning frames",
-        unit="frames",
-        takes_effect=NEXT_FRAME,
-        help="Blobs are learnt from the first so many frames; 0 = keep the cones, without colours.",
-    )
-    blob_split: float = knob(
-        12.0,
-        2.0,
-        120.0,
-        1.0,
-        label="split a blob at",
-        unit="grey levels",
-        takes_effect=NEXT_FRAME,
-        help="While blobs are learnt, one whose colour changes along the bone by more than this over a standard"
-        " deviation becomes two; below half of it two become one.",
-    )
-    blob_parts: int = knob(
-        3,
-        1,
-        8,
-        1,
-        label="most blobs a limb",
-        takes_effect=NEXT_FRAME,
-        help="A limb is never split into more blobs than this.",
-    )
-    blob_lost: float = knob(
-        4.0,
-        0.5,
-        50.0,
-        0.1,
-        label="lost below",
-        unit="nats/voxel",
-        takes_effect=NEXT_FRAME,
-        help="The tracker counts as lost where the voxels' likelihood lies this far below the learnt blobs' own.",
-    )
 
 
 class BlobWeigher:
