@@ -27,8 +27,8 @@ class Weigher(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Weighting:
-    """One way of weighing poses. edge_kind : the edge map it reads, or "hull" where it carves one (`evidence.pipeline`).
-    reads_pictures : whether it looks at the pictures themselves, not only at masks and edges.
+    """One way of weighing poses. edge_kind : the edge map it reads, or "hull" where it carves one
+    (`evidence.pipeline`). reads_pictures : whether it looks at the pictures themselves, not only at masks and edges.
 
     settings_type : its knobs. prepare : (body, cameras, settings of that type) to a `Weigher`.
     """
@@ -62,7 +62,7 @@ WEIGHTINGS: dict[str, Weighting] = {
         Weighting("bodytrack", "Benchmark's score", BodytrackSettings, "bodytrack", BodytrackWeigher),
         Weighting("template", "Template and silhouette", TemplateSettings, "none", TemplateWeigher),
         Weighting(
-            "blobs", "Blobs of the visual hull", BlobSettings, "none", BlobWeigher, reads_pictures=True
+            "blobs", "Blobs of the visual hull", BlobSettings, "hull", BlobWeigher, reads_pictures=True
         ),
     )
 }
