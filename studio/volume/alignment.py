@@ -107,7 +107,7 @@ def root_candidates(body: BodyModel, hull: Hull, pose: Array, *, upright: bool =
     for turn in turns:
         origin = turn @ (frame[:, 3] - own.mean) + seen.mean
         wanted = np.column_stack([turn @ frame[:, :3], origin])
-        found.append(_placed(body, root, parameters, pose, wanted))
+        found.append(with_root_at(body, root, parameters, pose, wanted))
     return np.stack(found)
 
 
@@ -130,8 +130,10 @@ def _axis_turns(seen: Axes, own: Axes) -> list[Array]:
     return [(to * sign) @ of.T for sign in signs]
 
 
-def _placed(body: BodyModel, root: int, parameters: IntArray, pose: Array, wanted: Array) -> Array:
-    """The pose with the root's parameters such that the root's frame is `wanted` (3, 4)."""
+def with_root_at(body: BodyModel, root: int, parameters: IntArray, pose: Array, wanted: Array) -> Array:
+    """The pose (D,) with the `parameters` of the root such that the frame of joint `root` comes as near as it can to
+    `wanted` (3, 4), mm.
+    """
     scale = np.array([[MM_OF_ROTATION] * 3 + [1.0]] * 3)
     angles = np.array([body.parameters[index].kind == "angle" for index in parameters])
     made = np.array(pose, dtype=np.float64)
