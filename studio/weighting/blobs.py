@@ -35,10 +35,10 @@ from studio.volume.alignment import root_parameters
 from studio.volume.blob_acquisition import Profiles, blobs_of
 from studio.volume.blob_fitting import Fitted, fit_blobs
 from studio.volume.blob_model import BlobMixture, BlobModel, cone_blobs
+from studio.volume.body_space import space_of
 from studio.volume.hull import Hull
 from studio.volume.reconstruction import Reconstructor
 from studio.volume.relative_entropy import DivergenceOfPoses
-from studio.volume.tracking_space import box_of
 from studio.weighting.blob_settings import BlobSettings
 from studio.weighting.evidence_check import check_views
 from studio.weighting.hard_priors import HardPriors
@@ -58,7 +58,7 @@ class BlobWeigher:
 
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: BlobSettings) -> None:
         self.body, self.cameras, self.settings = body, cameras, settings
-        self.reconstructor = Reconstructor(cameras, box_of(cameras), settings)
+        self.reconstructor = Reconstructor(cameras, space_of(body, cameras), settings)
         self.priors = HardPriors(body)
         self.cones = cone_blobs(body)
         self.moves = len(root_parameters(body)) > 0
