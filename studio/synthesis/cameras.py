@@ -1,6 +1,8 @@
-"""Cameras for made-up footage: a rig in the corners of the room, cameras put down by hand, rays for the
+"""Cameras for made-up footage: rigs in the corners of the room or around it, cameras put down by hand, rays for the
 renderer.
 """
+
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,9 @@ CORNERS = (
 )
 CORNER_TARGET = (0.0, 0.0, 820.0)
 CORNER_FOCAL = 0.78
+FIVE_RADIUS, FIVE_START, FIVE_FOCAL = 3950.0, np.radians(20.0), 0.84
+FIVE_HEIGHTS = (2500.0, 1900.0, 2700.0, 2100.0, 2600.0)
+FIVE_TARGET = (0.0, 0.0, 900.0)
 RIG_LENS = (-0.22, 0.08, 0.0006, -0.0004, 0.0)
 UNDISTORT_ROUNDS = 40
 
@@ -65,14 +70,41 @@ def corner_rig(size: tuple[int, int], rng: np.random.Generator) -> tuple[Camera,
     """Four cameras under the ceiling of the room's corners, slightly rolled, with barrel distortion as
     webcams have.
     """
+    return _webcams(CORNERS, CORNER_TARGET, CORNER_FOCAL, size, rng)
+
+
+def five_rig(size: tuple[int, int], rng: np.random.Generator) -> tuple[Camera, ...]:
+    """Five such cameras around the hall, evenly spaced at different heights (Caillette et al. 2007 had five)."""
+    angles = FIVE_START + 2.0 * np.pi * np.arange(5) / 5.0
+    places = tuple(
+        (FIVE_RADIUS * float(np.cos(angle)), FIVE_RADIUS * float(np.sin(angle)), height)
+        for angle, height in zip(angles, FIVE_HEIGHTS, strict=True)
+    )
+    return _webcams(places, FIVE_TARGET, FIVE_FOCAL, size, rng)
+
+
+RIGS: dict[str, Callable[[tuple[int, int], np.random.Generator], tuple[Camera, ...]]] = {
+    "corners": corner_rig,
+    "five": five_rig,
+}
+
+
+def _webcams(
+    places: tuple[tuple[float, float, float], ...],
+    target: tuple[float, float, float],
+    focal_share: float,
+    size: tuple[int, int],
+    rng: np.random.Generator,
+) -> tuple[Camera, ...]:
+    """Cameras at the places; focal_share : focal length as a share of the picture's width, about."""
     cameras = []
-    for index, place in enumerate(CORNERS):
-        focal = CORNER_FOCAL * size[0] * float(1.0 + rng.normal(0.0, 0.01))
+    for index, place in enumerate(places):
+        focal = focal_share * size[0] * float(1.0 + rng.normal(0.0, 0.01))
         middle = np.array([(size[0] - 1) / 2.0, (size[1] - 1) / 2.0]) + rng.normal(0.0, 0.008, 2) * size[0]
         camera = placed_camera(
             f"cam{index + 1}",
             place,
-            CORNER_TARGET,
+            target,
             size=size,
             focal_px=focal,
             roll=float(rng.normal(0.0, 0.02)),

@@ -6,7 +6,7 @@ shadows everywhere: masks get holes and remnants, as real ones have.
 
 import numpy as np
 
-from studio.synthesis.room import CARPET, CHECKS, GRAIN, PLAIN, TILES, Block, Room, furnished_room, obstacle
+from studio.synthesis.room import CARPET, CHECKS, GRAIN, PLAIN, TILES, Block, Room, obstacle
 
 HALF, HEIGHT = (2900.0, 2600.0), 2900.0
 LIGHTS = np.array([[900.0, 250.0, 2860.0], [240.0, 0.0, 0.0], [0.50, 0.49, 0.47], [0.44, 0.445, 0.455]])
@@ -42,6 +42,3 @@ OFFICE = (
 def office(obstacle_height: float = 0.0) -> Room:
     """The office; with a box of the given height (mm) at the origin where one is stepped over."""
     return Room(HALF, HEIGHT, OFFICE + obstacle(obstacle_height), LIGHTS.copy())
-
-
-ROOMS = {"furnished": furnished_room, "office": office}

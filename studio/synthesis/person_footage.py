@@ -8,10 +8,10 @@ import cv2
 
 from studio.geometry.camera import Camera
 from studio.synthesis.clips import ClipWriter
-from studio.synthesis.office import ROOMS
 from studio.synthesis.person import PersonMotion
 from studio.synthesis.recipe_file import Picture, Recipe
 from studio.synthesis.renderer import Renderer
+from studio.synthesis.rooms import ROOMS
 from studio.synthesis.wardrobes import WARDROBES
 
 Progress = Callable[[str, int, int], None]

@@ -2,21 +2,26 @@
 along.
 """
 
+import tomllib
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
+import tomli_w
 
 from studio.errors import StudioError
 from studio.geometry.camera import Camera
-from studio.synthesis.cameras import corner_rig, placed_camera
-from studio.synthesis.office import ROOMS
+from studio.synthesis.cameras import RIGS, placed_camera
+from studio.synthesis.joined_clips import Clip
+from studio.synthesis.rooms import ROOMS
 from studio.synthesis.wardrobes import WARDROBES
 from studio.typed_decoding import decode_toml
 
 RECIPES = Path(__file__).parent / "recipe_files"
 SUFFIX = ".toml"
-RECORDED = "recorded"
+RECORDED, JOINED = "recorded", "joined"
+LIKE, LONGEST_CHAIN = "like", 5
 
 
 class Picture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -45,8 +50,8 @@ class Placed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Cameras(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which cameras: "corners" (four made-up ones), a calibration file or folder (in the real data after
-    "data:"), or `placed` ones."""
+    """Which cameras: a made-up rig ("corners": four; "five", around a hall), a calibration file or folder (in the real
+    data after "data:"), or `placed` ones."""
 
     rig: str = ""
     calibration: str = ""
@@ -73,14 +78,16 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     motion : "walk", "run", "box", "handstand", "stand", "circuit" and others (`motions.py`); or "arm", which shows
     `body` itself, seen by one camera, as in Deutscher & Reid 6.1; or "recorded", the motion of `motion_file` (.amc,
-    .bvh, .npz; `skeleton_file` for an .amc whose ASF is not beside it). options : numbers of the motion. weighting :
-    what runs of the session use by default.
+    .bvh, .npz; `skeleton_file` for an .amc whose ASF is not beside it); or "joined", several `clips` of such motion one
+    after the other (`joined_clips.py`). options : numbers of the motion. weighting : what runs of the session use by
+    default. An entry `like` in the file names another recipe, bundled or beside it, whose entries count where this
+    one has none of its own.
 
     height_mm : of a person with published proportions. shape : instead, a file of `body`'s dimensions, whose lengths
     the person's bones have; the session's subject has these dimensions, radii included, and those of the rendered
     hands and shoes; `subject_shape.toml` beside it has the file's dimensions alone. girth : how much stouter than
-    usual the flesh is. wardrobe : "striped" or "plain" clothes, which hardly stand out in the "office". room : that or
-    "furnished".
+    usual the flesh is. wardrobe : "striped" or "plain" clothes, which hardly stand out in the "office". room : that,
+    "furnished" or "hall".
     sigma : a file whose first numbers are the session's σ0, one for each parameter of `body`, from frame to frame at
     60 Hz. Files count from the recipe's folder, or lie in the real data after "data:" (`real_data.py`).
     """
@@ -89,6 +96,7 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     motion: str
     motion_file: str = ""
     skeleton_file: str = ""
+    clips: tuple[Clip, ...] = ()
     frames: int
     fps: float = 60.0
     seed: int = 1
@@ -128,18 +136,40 @@ def recipe_names() -> tuple[str, ...]:
 def read_recipe(path: Path) -> Recipe:
     """The recipe in a file. Raises StudioError naming file, entry and remedy."""
     try:
-        recipe = decode_toml(path.read_bytes(), Recipe)
+        recipe = decode_toml(tomli_w.dumps(_entries(path, LONGEST_CHAIN)), Recipe)
     except OSError as problem:
         raise StudioError(
             f"Recipe '{path}' cannot be read ({problem.strerror}).", "Check the path."
         ) from None
-    except (msgspec.DecodeError, UnicodeDecodeError) as problem:
+    except (msgspec.DecodeError, tomllib.TOMLDecodeError, UnicodeDecodeError) as problem:
         cause = f"Recipe '{path.name}': {str(problem).replace('`', chr(39))}."
         raise StudioError(cause, "Correct the entry; the bundled recipes are examples.") from None
     problem = _problem(recipe)
     if problem:
         raise StudioError(f"Recipe '{path.name}': {problem}.", "Correct the entry.")
     return recipe
+
+
+def _entries(path: Path, chain: int) -> dict[str, Any]:
+    """The entries of a file, those of the recipe that it is like included. Raises StudioError for an endless chain."""
+    own = tomllib.loads(path.read_text(encoding="utf-8"))
+    base = own.pop(LIKE, None)
+    if base is None:
+        return own
+    if chain == 0 or not isinstance(base, str):
+        raise StudioError(
+            f"Recipe '{path.name}': 'like' does not lead to a whole recipe.", "Correct the entry."
+        )
+    beside = path.with_name(base)
+    whole = _entries(beside if beside.is_file() else find_recipe(base), chain - 1)
+    # Cameras are one choice of several: they are taken as a whole.
+    merged = {
+        name: {**whole[name], **entry}
+        if isinstance(entry, dict) and isinstance(whole.get(name), dict) and name != "cameras"
+        else entry
+        for name, entry in own.items()
+    }
+    return {**whole, **merged}
 
 
 def recipe_cameras(recipe: Recipe, rng: np.random.Generator) -> tuple[Camera, ...]:
@@ -160,7 +190,7 @@ def recipe_cameras(recipe: Recipe, rng: np.random.Generator) -> tuple[Camera, ..
             )
             for entry in recipe.cameras.placed
         )
-    return corner_rig(size, rng)
+    return RIGS[recipe.cameras.rig](size, rng)
 
 
 def _problem(recipe: Recipe) -> str:
@@ -190,8 +220,9 @@ def _problem(recipe: Recipe) -> str:
             (recipe.motion == RECORDED) != bool(recipe.motion_file),
             f"motion '{RECORDED}' and an entry motion_file belong together",
         ),
+        ((recipe.motion == JOINED) != bool(recipe.clips), f"motion '{JOINED}' and [[clips]] belong together"),
         (picture.empty_frames < 1, "picture.empty_frames must be 1 or more"),
-        (cameras.rig not in ("", "corners"), f"cameras.rig is '{cameras.rig}', not 'corners'"),
+        (cameras.rig not in ("", *RIGS), f"cameras.rig is '{cameras.rig}', not one of {', '.join(RIGS)}"),
         (
             sum(map(bool, (cameras.rig, cameras.calibration, cameras.placed))) != 1,
             "[cameras] must hold one of rig, calibration, placed",

@@ -19,6 +19,7 @@ from studio.sessions.importers.catalogue import import_source
 from studio.sessions.manifest import read_manifest, write_manifest
 from studio.sessions.named_rows import write_pose, write_sigma
 from studio.synthesis.arm_footage import render_arm
+from studio.synthesis.joined_clips import joined_person
 from studio.synthesis.motions import make_motion
 from studio.synthesis.person import (
     PersonMotion,
@@ -30,8 +31,9 @@ from studio.synthesis.person import (
 )
 from studio.synthesis.person_footage import render_person
 from studio.synthesis.real_data import located
-from studio.synthesis.recipe_file import RECORDED, Recipe, find_recipe, read_recipe, recipe_cameras
+from studio.synthesis.recipe_file import JOINED, RECORDED, Recipe, find_recipe, read_recipe, recipe_cameras
 from studio.synthesis.recorded_clip import read_recording, recorded_person
+from studio.synthesis.recorded_motion import RecordedMotion
 from studio.synthesis.shape import skeleton_of_subject, subject_of_file, with_hands_and_feet
 
 Progress = Callable[[str, int, int], None]
@@ -114,11 +116,18 @@ def render_source(
 
 def recipe_motion(recipe: Recipe, recipe_folder: Path, skeleton: Skeleton) -> PersonMotion:
     """The written or recorded motion that a recipe asks for. Raises StudioError, for files too."""
-    if recipe.motion != RECORDED:
-        return make_motion(recipe.motion, skeleton, recipe.frames, recipe.fps, recipe.options)
-    own = located(recipe.skeleton_file, recipe_folder) if recipe.skeleton_file else None
-    recorded = read_recording(located(recipe.motion_file, recipe_folder), own)
-    return recorded_person(recorded, skeleton, recipe.frames, recipe.fps, recipe.options)
+    if recipe.motion == JOINED:
+        clips = [(clip, _recording(clip.file, clip.skeleton_file, recipe_folder)) for clip in recipe.clips]
+        return joined_person(clips, skeleton, recipe.frames, recipe.fps, recipe.options)
+    if recipe.motion == RECORDED:
+        recorded = _recording(recipe.motion_file, recipe.skeleton_file, recipe_folder)
+        return recorded_person(recorded, skeleton, recipe.frames, recipe.fps, recipe.options)
+    return make_motion(recipe.motion, skeleton, recipe.frames, recipe.fps, recipe.options)
+
+
+def _recording(motion_file: str, skeleton_file: str, recipe_folder: Path) -> RecordedMotion:
+    own = located(skeleton_file, recipe_folder) if skeleton_file else None
+    return read_recording(located(motion_file, recipe_folder), own)
 
 
 def recipe_person(

@@ -64,7 +64,7 @@ def recorded_person(
         motion = sampled(whole, times, fps)
     if wanted["radius_mm"] != 0.0:
         motion = bent(motion, wanted["radius_mm"], wanted["bank"])
-    return _placed(motion, np.radians(wanted["turn_degrees"]), (wanted["at_x_mm"], wanted["at_y_mm"]))
+    return placed(motion, np.radians(wanted["turn_degrees"]), (wanted["at_x_mm"], wanted["at_y_mm"]))
 
 
 def sampled(motion: PersonMotion, times: Array, fps: float) -> PersonMotion:
@@ -92,7 +92,7 @@ def bent(motion: PersonMotion, radius: float, bank: float) -> PersonMotion:
     """
     first, last = motion.root[0, :2], motion.root[-1, :2]
     heading = float(np.arctan2(*(last - first)[::-1]))
-    straight = _placed(motion, -heading, (0.0, 0.0))
+    straight = placed(motion, -heading, (0.0, 0.0))
     along = straight.root[:, 0]
     angle = along / radius
     way = np.stack([radius * np.sin(angle), radius * (1.0 - np.cos(angle)), np.zeros_like(angle)], axis=-1)
@@ -106,7 +106,7 @@ def bent(motion: PersonMotion, radius: float, bank: float) -> PersonMotion:
     return above_floor(PersonMotion(motion.skeleton, motion.fps, root, turns))
 
 
-def _placed(motion: PersonMotion, turn: float, middle: tuple[float, float]) -> PersonMotion:
+def placed(motion: PersonMotion, turn: float, middle: tuple[float, float]) -> PersonMotion:
     """Turned about the vertical, then moved until the middle of the way's extent lies at `middle`."""
     about = axis_turn(2, turn)
     root = motion.root @ about.T
