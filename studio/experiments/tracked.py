@@ -1,5 +1,6 @@
 """A tracker on a footage, kept in memory only: the trial that most experiments are made of."""
 
+import dataclasses
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
@@ -20,6 +21,7 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.experiments.footage_shelf import FootageShelf
 from studio.geometry.camera import Camera
 from studio.runs.behaviour_models import check_prediction, fitting, model_folders, model_path
+from studio.runs.run_behaviour import learner_of
 from studio.runs.search_space import search_space, session_sigma
 from studio.runs.tracking_run import start_of
 from studio.sessions.session import Session
@@ -120,6 +122,7 @@ def track(
     behaviour = _behaviour(session, body, settings, attempt)
     sigma = session_sigma(session, body, fps / attempt.every) * attempt.sigma_scale
     space = search_space(body, sigma, behaviour)
+    learner = learner_of(behaviour, settings, attempt.seed)
     weighting = WEIGHTINGS[attempt.weighting]
     cameras = _cameras(session, attempt.cameras)
     weigher = weighting.prepare(body, spoilt.cameras(cameras), settings.weighting)
@@ -155,6 +158,7 @@ def track(
         if number:
             seconds += time.perf_counter() - began
         carried, poses[number], evaluations = result.carried, result.estimate.pose, result.evaluations
+        log_weights[number] = result.estimate.log_weight
         if on_frame is not None:
             on_frame(number + 1, len(frames))
     return measured(session, body, poses, np.array(frames), evaluations, seconds)

@@ -17,7 +17,7 @@ import numpy as np
 
 from studio.errors import NotFoundError, RunError
 from studio.runs.pace import Pace, Progress
-from studio.runs.search_space import search_space
+from studio.runs.run_behaviour import RunBehaviour
 from studio.sessions.results_codec import particle_arrays, particles_from
 from studio.sessions.results_store import ResultsReader, ResultsWriter
 from studio.sessions.stored_run import StoredRun
@@ -58,9 +58,9 @@ class TrackingRun:
     def __init__(self, run: StoredRun, problems: Problems) -> None:
         self.run, self.record, self.problems = run, run.record, problems
         self.tracker = TRACKERS[self.record.tracker]
-        self.space = search_space(run.body(), np.array(self.record.sigma), run.behaviour())
-        self._writer = ResultsWriter(run.folder)
         self._reader = ResultsReader(run.folder)
+        self._behaviour = RunBehaviour(run, self._reader)
+        self._writer = ResultsWriter(run.folder)
         self._pace = Pace()
         self._load()
 
@@ -111,6 +111,11 @@ class TrackingRun:
     # ----------------------------------------------------------------- stepping
 
     @property
+    def guided(self) -> bool:
+        """Whether the run has a behaviour model."""
+        return self._behaviour.space.behaviour is not None
+
+    @property
     def finished(self) -> bool:
         """Whether every frame has a result."""
         return self.next_frame >= self.record.last
@@ -148,6 +153,8 @@ class TrackingRun:
         self._search, self._layers, self._saved = None, [], True
         self.next_frame += 1
         self.done += 1
+        if self.finished:
+            self._behaviour.keep()
 
     def save(self) -> None:
         """Store where the search stands inside a frame, whole, so that another process can go on from
@@ -229,8 +236,8 @@ class TrackingRun:
             repeats = self._settings_at(frame, 0)[1].tracker.start_repeats
         return FrameSearch(
             self.tracker,
-            self.carried_into(frame),
-            self.space,
+            self._behaviour.carried_into(frame, self.carried_into(frame)),
+            self._behaviour.space_in(frame),
             seed=self.record.seed,
             frame=frame,
             repeats=repeats,
@@ -266,6 +273,7 @@ class TrackingRun:
         self._writer.write_settings(version, result.frame, 0, values(settings))
         self._writer.write_frame(result, layers, settings.recording.record_particles)
         source = self.settings_source
+        self._behaviour.forget()
         self._load()
         self.settings_source = source
 

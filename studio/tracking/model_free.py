@@ -4,10 +4,11 @@ Beyond the paper, which leaves open what to do with movements that are not in th
 2007, 7.5): a share of every first set is spread by σ0 about the carried poses, whatever the model expects. After the
 first weighing both kinds are compared, and where the model's own weigh less the share grows.
 
-Comparing: weights are flattened until half of the set survives (the raw ones of most weightings are nearly flat, or
-so peaked that one particle has everything), w̄ is the mean weight of a kind, and b = w̄_free / (w̄_free + w̄_guided)
-is the probability that the model is beaten, were both as likely before. b is smoothed over frames; the share is the
-knob's value while b <= 1/2 and grows with b to at most `LARGEST`, so that both kinds can always be compared.
+Comparing: weights are taken to the power with which a tenth of the set survives, so that the best of each kind count
+(the raw ones of most weightings are nearly flat, or so peaked that one particle has everything). w̄ is the mean weight
+of a kind, and b = w̄_free / (w̄_free + w̄_guided) is the probability that the model is beaten, were both as likely
+before. b is smoothed over frames; the share is the knob's value while b <= 1/2 and grows with b, to `LARGEST` where b
+reaches 3/4, so that both kinds can always be compared.
 """
 
 from typing import Any
@@ -25,7 +26,7 @@ FREE, BEATEN = "model_free", "model_beaten"
 """Arrays of a set: (N,) bool, whether a particle was moved without the model; (1,) b, smoothed."""
 
 LARGEST = 0.9
-FLATTENED = 0.5
+SURVIVING = 0.1
 # Of what a frame says, beside what all before said: half of a lasting change is seen within three frames.
 NEWEST = 0.25
 
@@ -34,7 +35,7 @@ def share_of(wanted: float, grows: bool, extra: Arrays) -> float:
     """The share of the next set. wanted : the knob's. extra : of the set that the last frame ended with."""
     if not grows or BEATEN not in extra or wanted <= 0.0:
         return wanted
-    beaten = float(np.clip(2.0 * extra[BEATEN][0] - 1.0, 0.0, 1.0))
+    beaten = float(np.clip(4.0 * extra[BEATEN][0] - 2.0, 0.0, 1.0))
     return wanted + max(LARGEST - wanted, 0.0) * beaten
 
 
@@ -58,7 +59,7 @@ def judged(extra: Arrays, log_weights: Array) -> Arrays:
     free = extra.get(FREE)
     if free is None or free.all() or not free.any():
         return extra
-    weights = np.exp(anneal(log_weights, FLATTENED).log_weights)
+    weights = np.exp(anneal(log_weights, SURVIVING).log_weights)
     of_free, of_guided = float(weights[free].mean()), float(weights[~free].mean())
     now = of_free / (of_free + of_guided)
     before = float(extra[BEATEN][0]) if BEATEN in extra else 0.0

@@ -15,11 +15,10 @@ that a swarm is weighed at once. Poses that the body cannot take: see `hard_prio
 all the same, a possible pose is always better than an impossible one. Without a start pose the first stage is
 spread over the limits and moves everything, as there is nothing yet that could be kept.
 
-Beyond the paper, x̂ may be predicted by a behaviour model (`guided_swarm`).
-
-A layer is one iteration. Its record: variance_weighed, of the positions; variance_resampled, of the particles' bests
-(what is kept); variance_diffused, of the positions after the move, or of the next stage's sampled swarm. β and α
-have no meaning and are NaN; all particles weigh the same.
+Beyond the paper, x̂ may be predicted by a behaviour model (`guided_swarm`). A layer is one iteration. Its record:
+variance_weighed, of the positions; variance_resampled, of the particles' bests (what is kept); variance_diffused, of
+the positions after the move, or of the next stage's sampled swarm. β and α have no meaning and are NaN; all particles
+weigh the same.
 """
 
 import math
@@ -29,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.tracking.guided_particles import foreseen, is_guided
-from studio.tracking.guided_swarm import handed_on, leader_arrived, predicted_starts
+from studio.tracking.guided_swarm import BEFORE, handed_on, leader_arrived, predicted_starts
 from studio.tracking.hard_priors import Indices, Mask, Proposals, possible, settled
 from studio.tracking.model_free import FREE, judged, share_in
 from studio.tracking.particles import checked_values, expected, uniform_poses, unweighted
@@ -66,7 +65,7 @@ class ParticleSwarm:
     def begin_frame(
         self, rng: np.random.Generator, previous: Carried, space: SearchSpace, settings: SwarmSettings
     ) -> ParticleSet:
-        """The first stage's swarm, sampled about the last estimate: x ← N(x̂, Σ), v ← U(-σ, σ)."""
+        """The first stage's swarm, sampled about x̂: x ← N(x̂, Σ), v ← U(-σ, σ)."""
         first = stages_of(space.hierarchy, settings)[0]
         last = previous.particles
         if last is None:
@@ -77,12 +76,11 @@ class ParticleSwarm:
             return _new_swarm(drawn, spread.mean(axis=0), freedom)
         pose = _last_pose(previous, last)
         sigma = space.sigma * settings.diffusion_scale * first.freedom
+        starts, arrays = expected(pose[None], previous, settings.dynamics)[0], {}
         if is_guided(space, settings) and previous.estimate is not None:
             starts, arrays = predicted_starts(rng, previous, pose, first.particles, space, settings)
-            drawn = _sampled(rng, starts, sigma, first.particles, settings)
-            return _new_swarm(drawn, starts, first.freedom, arrays)
-        start = expected(pose[None], previous, settings.dynamics)[0]
-        return _new_swarm(_sampled(rng, start, sigma, first.particles, settings), start, first.freedom)
+        drawn = _sampled(rng, starts, sigma, first.particles, settings)
+        return _new_swarm(drawn, starts, first.freedom, arrays)
 
     def step_layer(
         self,
@@ -199,7 +197,9 @@ def _kept_possible(
         return Proposals(starts[rows] + normal * sigma, velocities[rows])
 
     drawn = Proposals(swarm.poses, velocities)
-    done = settled(problem, space, settings, drawn, starts, again)
+    # A prediction that the body cannot take is given up for where the swarm was before.
+    before = np.broadcast_to(swarm.extra[BEFORE], starts.shape) if FREE in swarm.extra else starts
+    done = settled(problem, space, settings, drawn, before, again)
     return unweighted(
         done.poses, swarm.extra | {VELOCITIES: done.velocities, BEST_POSES: np.array(done.poses)}
     )

@@ -45,9 +45,9 @@ class OpenRun:
         except StudioError:
             self._close_problems()
             raise
-        guided = self.tracking.space.behaviour is not None
         self.mailbox = SettingsMailbox(
-            *self.tracking.latest_settings(), lambda settings: check_prediction(settings, guided)
+            *self.tracking.latest_settings(),
+            lambda settings: check_prediction(settings, self.tracking.guided),
         )
         self.tracking.settings_source = self.mailbox.latest
         self.selected = -1

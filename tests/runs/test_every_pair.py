@@ -3,6 +3,7 @@ pictures, whose trunk the first stage of a search looks at alone."""
 
 import numpy as np
 import pytest
+from arm_behaviour import keep_arm_model
 from toy_session import true_poses
 
 from studio.body.catalogue import load_body
@@ -28,6 +29,7 @@ EVALUATIONS = 240
 @pytest.mark.parametrize(("tracker", "weighting"), PAIRS)
 def test_a_pair_follows_the_arm(session_on_disk: Session, tracker: str, weighting: str) -> None:
     start = true_poses()[0]
+    keep_arm_model(session_on_disk.path.parent)
     changes = {**knobs_for_evaluations(tracker, EVALUATIONS), "start_repeats": 1}
     run = prepare_run(
         session_on_disk,

@@ -1,0 +1,67 @@
+"""The behaviour model that each frame of a run is searched with: the run's own, or what it has taught itself since."""
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.behaviour.model import BehaviourModel
+from studio.behaviour.model_file import write_model
+from studio.runs.search_space import search_space
+from studio.sessions.results_store import ResultsReader
+from studio.sessions.stored_run import StoredRun
+from studio.settings import RunSettings, settings_from_values
+from studio.tracking.online_learning import OnlineLearner
+from studio.tracking.tracker import Carried, SearchSpace
+
+Array = NDArray[np.float64]
+
+LEARNT_NAME = "learnt.behaviour"
+"""In the run's folder: what it knew at its end, for other runs."""
+
+
+def learner_of(model: BehaviourModel | None, settings: RunSettings, seed: int) -> OnlineLearner | None:
+    """Who teaches a run's model, None where nobody does or there is none."""
+    if model is None or not getattr(settings.tracker, "online_learning", False):
+        return None
+    return OnlineLearner(model, settings.tracker.learning_interval, seed)
+
+
+class RunBehaviour:
+    """A run's search spaces, frame by frame. results : of the run, read when a lesson is held."""
+
+    def __init__(self, run: StoredRun, results: ResultsReader) -> None:
+        self._run, self._results = run, results
+        record = run.record
+        self.space = search_space(run.body(), np.array(record.sigma), run.behaviour())
+        self._settings = settings_from_values(record.tracker, record.weighting, record.settings)
+        self.forget()
+
+    def forget(self) -> None:
+        """Unlearn everything: frames that were learnt from have changed."""
+        self._learner = learner_of(self.space.behaviour, self._settings, self._run.record.seed)
+
+    def space_in(self, frame: int) -> SearchSpace:
+        """The search space of a frame; all frames before it have results."""
+        if self._learner is None:
+            return self.space
+        model = self._learner.model_in(frame - self._run.record.first, self._tracked)
+        return dataclasses.replace(self.space, behaviour=model)
+
+    def carried_into(self, frame: int, carried: Carried) -> Carried:
+        """What the frame before handed on, in terms of the frame's own model."""
+        if self._learner is None:
+            return carried
+        return self._learner.carried_into(frame - self._run.record.first, carried, self._tracked)
+
+    def keep(self) -> None:
+        """Write what the run has learnt beside its results, once all its frames have some."""
+        record = self._run.record
+        model = self.space_in(record.last).behaviour
+        if self._learner is not None and model is not None:
+            write_model(model, self._run.folder / LEARNT_NAME)
+
+    def _tracked(self, count: int) -> tuple[Array, Array]:
+        """Poses (K, D) and log-weights (K,) of the run's first frames."""
+        _, poses = self._results.poses()
+        return poses[:count], self._results.timeline().log_weights[:count]

@@ -1,0 +1,237 @@
+"""A run that teaches its behaviour model: what was tracked well is added to it (the second future work of Caillette et
+al. 2007, section 8, which the paper leaves open).
+
+A lesson is held every `interval` frames, with all that the run has tracked so far:
+
+1. Frames are well tracked whose log-weight is not far below the run's median (`well_tracked`). Stretches of them are
+   smoothed over `SMOOTHING_S`, as training material is, since a tracker's jitter would pass for movement.
+2. Frames that no cluster explains (`novel`) are clustered by Figueiredo & Jain's EM in the model's own reduced space.
+   What is found is added behind the clusters there are: those keep their number, place and shape.
+3. All stretches are labelled with the clusters now known, and the automaton is learnt again from these labels and those
+   of the training; so a run also teaches in which order movements that were known already follow each other.
+
+A lesson is a function of the model before it, the run's poses so far and its seed, so a run that is taken up again has
+the same model. As clusters keep their numbers, a particle's state is the same history in the next automaton
+(`translated`).
+"""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from studio.behaviour.automaton import Automaton
+from studio.behaviour.figueiredo_jain import FLOOR, Search, fit_mixture, parameters_of
+from studio.behaviour.gaussian_mixture import GaussianMixture
+from studio.behaviour.model import BehaviourModel, automaton_of
+from studio.behaviour.prototypes import Prototypes
+from studio.behaviour.reduction import full_clusters
+from studio.tracking.guided_particles import STATES, known_of
+from studio.tracking.guided_start import CAME_FROM_STATES
+from studio.tracking.guided_swarm import BEFORE_STATE, LEADER_STATE
+from studio.tracking.tracker import Carried
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+# Poses (K, D) and log-weights (K,) of the first K frames of a run.
+Tracked = Callable[[int], tuple[Array, Array]]
+
+SOURCE = "tracked"
+SMOOTHING_S = 0.06
+SHORTEST_S = 0.3
+# Robust standard deviations below the median at which a frame is not well tracked.
+TOO_LOW = 3.0
+# Mean squared deviation, in a cluster's variances, above which it does not explain a frame.
+NOT_EXPLAINED = 4.0
+MOST_NEW_CLUSTERS, PATIENCE = 20, 5
+MAD_TO_DEVIATION = 1.4826
+
+
+def well_tracked(log_weights: Array) -> Mask:
+    """(K,) frames whose log-weight (K,) is not far below the median, by the median absolute deviation."""
+    median = float(np.median(log_weights))
+    spread = MAD_TO_DEVIATION * float(np.median(np.abs(log_weights - median)))
+    return log_weights >= median - TOO_LOW * spread
+
+
+def stretches(poses: Array, log_weights: Array, model: BehaviourModel) -> list[Array]:
+    """The well-tracked stretches of a run as recordings (F, D) at the rate that the model was learnt at, smoothed.
+
+    poses : (K, D) at the model's rate. Stretches under `SHORTEST_S` are left out.
+    """
+    good = np.concatenate([[False], well_tracked(log_weights), [False]])
+    edges = np.flatnonzero(good[1:] != good[:-1])
+    found = []
+    for begin, end in edges.reshape(-1, 2):
+        if end - begin < max(2.0, SHORTEST_S * model.fps):
+            continue
+        smooth = np.array(poses[begin:end])
+        values = model.space.continuous(smooth)
+        smooth[:, model.space.columns] = gaussian_filter1d(
+            values, SMOOTHING_S * model.fps, axis=0, mode="nearest"
+        )
+        found.append(_at_learnt_rate(smooth, model))
+    return found
+
+
+def novel(model: BehaviourModel, features: Array) -> Mask:
+    """(n,) features (n, 2 d), at the model's rate, that none of its clusters explains."""
+    least = np.full(len(features), np.inf)
+    for mean, whitener in zip(model.dynamics.means, model.dynamics.whiteners, strict=True):
+        away = (features - mean) @ whitener.T
+        least = np.minimum(least, (away * away).mean(axis=1))
+    return least > NOT_EXPLAINED
+
+
+def taught(
+    base: BehaviourModel,
+    known: BehaviourModel,
+    poses: Array,
+    log_weights: Array,
+    rng: np.random.Generator,
+) -> BehaviourModel:
+    """What is known after another lesson.
+
+    base : the model that the run began with. known : after the lesson before (`base` at the first). poses (K, D),
+    log_weights (K,) : of the run so far, in order, at the models' rate. Returns `known` where nothing was tracked well.
+    """
+    recordings = stretches(poses, log_weights, known)
+    if not recordings:
+        return known
+    now = known.at_rate(known.making.learnt_fps)
+    features = [now.space.features(recording) for recording in recordings]
+    now = _with_new_clusters(now, np.concatenate(recordings), np.concatenate(features), rng)
+    labels = tuple(now.mixture.labels(now.reduction.reduced(part)) for part in features)
+    everything = (*base.making.labels, *labels)
+    automaton = automaton_of(everything, now.clusters, now.making.settings)
+    making = dataclasses.replace(
+        now.making,
+        sources=(*_sources_of(base), *(SOURCE for _ in labels)),
+        frames=base.making.frames + sum(len(part) for part in labels),
+        labels=everything,
+        entropy_train=automaton.entropy(everything),
+        entropy_test=float("nan"),
+    )
+    return dataclasses.replace(now, automaton=automaton, making=making).at_rate(known.fps)
+
+
+def translated(carried: Carried, before: Automaton, after: Automaton) -> Carried:
+    """What a frame hands on, its automaton's states said as states of the next automaton: the same histories."""
+    particles = carried.particles
+    if particles is None or before is after:
+        return carried
+    extra = known_of(particles)
+    for name in (STATES, CAME_FROM_STATES, LEADER_STATE, BEFORE_STATE):
+        if name in extra:
+            extra[name] = _same_histories(before, after, extra[name])
+    return dataclasses.replace(carried, particles=dataclasses.replace(particles, extra=extra))
+
+
+@dataclass(eq=False)
+class OnlineLearner:
+    """The model in use in each frame of a run that teaches it.
+
+    base : the run's model. interval : frames between lessons. seed : the run's. Lessons are kept; they are held when a
+    frame is asked for that comes after them.
+    """
+
+    base: BehaviourModel
+    interval: int
+    seed: int
+
+    def __post_init__(self) -> None:
+        """Nothing is learnt yet."""
+        self._models = [self.base]
+
+    def model_in(self, number: int, tracked: Tracked) -> BehaviourModel:
+        """The model of a run's frame, counted from 0; tracked : of at least the frames before it."""
+        lesson = number // self.interval
+        while len(self._models) <= lesson:
+            held = len(self._models)
+            rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((self.seed, held, LESSON_KEY))))
+            self._models.append(taught(self.base, self._models[-1], *tracked(held * self.interval), rng))
+        return self._models[lesson]
+
+    def carried_into(self, number: int, carried: Carried, tracked: Tracked) -> Carried:
+        """What the frame before handed on, as the frame's own model understands it."""
+        if number == 0 or number % self.interval:
+            return carried
+        before, after = (self.model_in(which, tracked) for which in (number - 1, number))
+        return translated(carried, before.automaton, after.automaton)
+
+
+LESSON_KEY = 0x1E550
+
+
+def _with_new_clusters(
+    model: BehaviourModel, poses: Array, features: Array, rng: np.random.Generator
+) -> BehaviourModel:
+    """The model, at its learnt rate, with clusters of what it does not explain among frames (n, D) with features
+    (n, 2 d).
+    """
+    strange = np.flatnonzero(novel(model, features))
+    points = model.reduction.reduced(features)
+    parameters = parameters_of(points.shape[1], "full")
+    if len(strange) < max(2, parameters // 2 + 1):
+        return model
+    most = min(MOST_NEW_CLUSTERS, max(1, 2 * len(strange) // parameters))
+    found, _ = fit_mixture(points[strange], rng, Search(most=most, patience=PATIENCE))
+    # A cluster that no frame belongs to for the most part is no label.
+    found = found.chosen(np.unique(found.labels(points[strange])))
+    shares = found.responsibilities(points[strange])
+    floor = FLOOR * np.maximum(features.var(axis=0).mean(), 1e-6) * np.ones(features.shape[1])
+    movements = full_clusters(features[strange], shares, floor)
+    share = len(strange) / (model.making.frames + len(strange))
+    densities = movements.log_densities(features[strange])
+    best = strange[np.argmax(densities, axis=0)]
+    half = model.space.dimensions
+    prototypes = Prototypes(
+        poses=np.concatenate([model.prototypes.poses, poses[best]]),
+        derivatives=np.concatenate([model.prototypes.derivatives, movements.means[:, half:]]),
+        recordings=np.concatenate(
+            [model.prototypes.recordings, np.full(len(best), len(model.making.labels))]
+        ),
+        frames=np.concatenate([model.prototypes.frames, best]),
+    )
+    return dataclasses.replace(
+        model,
+        mixture=_joined(model.mixture, found, share),
+        dynamics=_joined(model.dynamics, movements, share),
+        prototypes=prototypes,
+    )
+
+
+def _joined(first: GaussianMixture, second: GaussianMixture, share: float) -> GaussianMixture:
+    """Both mixtures' components; share : weight of the second's."""
+    return GaussianMixture(
+        np.concatenate([(1.0 - share) * first.weights, share * second.weights]),
+        np.concatenate([first.means, second.means]),
+        np.concatenate([first.covariances, second.covariances]),
+    )
+
+
+def _at_learnt_rate(poses: Array, model: BehaviourModel) -> Array:
+    """Poses (F, D) at the model's rate, at the rate that it was learnt at."""
+    rate = model.making.learnt_fps
+    if rate == model.fps:
+        return poses
+    times = np.arange(len(poses)) / model.fps
+    wanted = np.arange(0.0, times[-1] + 1e-9, 1.0 / rate)
+    return np.column_stack([np.interp(wanted, times, column) for column in poses.T])
+
+
+def _sources_of(model: BehaviourModel) -> Sequence[str]:
+    """A name for every recording of a model, where it has names."""
+    return model.making.sources or tuple("" for _ in model.making.labels)
+
+
+def _same_histories(before: Automaton, after: Automaton, states: Array) -> Indices:
+    """The states (N,) in which the later automaton is after the histories that the earlier one's stand for."""
+    numbers = np.asarray(states, dtype=np.int64)
+    known = {int(state): after.state_after(before.contexts[state]) for state in np.unique(numbers)}
+    return np.array([known[int(state)] for state in numbers], dtype=np.int64).reshape(numbers.shape)
