@@ -62,3 +62,22 @@ def replace_component(
         joint = log_weight + densities[point]
         largest = max(rest, joint)
         totals[point] = largest + math.log(math.exp(rest - largest) + math.exp(joint - largest))
+
+
+@numba.njit(cache=True, nogil=True)
+def losses_without(log_densities: Array, log_weights: Array, totals: Array) -> Array:
+    """(k,) by how much the points' log-likelihood falls without each component, the others sharing its weight."""
+    size, count = log_densities.shape
+    losses = np.empty(size)
+    for number in range(size):
+        losses[number] = count * math.log1p(-math.exp(log_weights[number]))
+    for point in range(count):
+        for number in range(size):
+            log_share = log_weights[number] + log_densities[number, point] - totals[point]
+            if log_share > NOTHING:
+                share = math.exp(min(log_share, 0.0))
+                if share < 0.999:
+                    losses[number] -= math.log1p(-share)
+                else:
+                    losses[number] += totals[point] - sum_of_others(log_densities, log_weights, number, point)
+    return losses
