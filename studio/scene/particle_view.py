@@ -38,17 +38,6 @@ class CloudStyle:
     point_size: float
 
 
-def extremities(body: BodyModel) -> tuple[int, ...]:
-    """Indices of the drawn limbs on which no other drawn limb's joint hangs: hands, feet, head, tips."""
-    carried: set[int] = set()
-    for limb in body.drawn:
-        above = body.joints[limb.joint].parent
-        while above >= 0:
-            carried.add(above)
-            above = body.joints[above].parent
-    return tuple(index for index, limb in enumerate(body.drawn) if limb.joint not in carried)
-
-
 def cloud_points(body: BodyModel, poses: Array, limbs: Sequence[int]) -> Array:
     """(N, D) poses to (N * len(limbs), 3) metres: the far end of each chosen limb, particle by particle."""
     ends = limb_ends(body, np.ascontiguousarray(poses, dtype=np.float64))[:, list(limbs), FAR_END]

@@ -6,6 +6,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
+from studio.body.extremities import extremities
 from studio.body.forward_kinematics import limb_ends
 from studio.runs.colour_tokens import colour_tokens
 from studio.scene.body_view import BodyView
@@ -14,7 +15,7 @@ from studio.scene.floor_view import FloorView
 from studio.scene.limb_meshes import METRES_PER_MM
 from studio.scene.moment import Moment
 from studio.scene.opened_run import OpenedRun
-from studio.scene.particle_view import CloudStyle, ParticleView, extremities
+from studio.scene.particle_view import CloudStyle, ParticleView
 from studio.scene.stick_figure import TruthView
 from studio.scene.trail_view import TrailView
 from studio.scene.view_options import ViewOptions

@@ -7,10 +7,10 @@ from typing import Any
 
 import viser
 
+from studio.body.extremities import extremities
 from studio.body.model import BodyModel
 from studio.runs.colour_tokens import ColourTokens
 from studio.runs.overlay_drawing import OVERLAYS
-from studio.scene.particle_view import extremities
 from studio.scene.trail_view import extremity_markers
 from studio.scene.view_options import ViewOptions
 

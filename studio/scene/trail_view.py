@@ -6,11 +6,11 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
+from studio.body.extremities import extremities
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
 from studio.runs.colour_tokens import ColourTokens
 from studio.runs.marker_lines import marker_sides
-from studio.scene.particle_view import extremities
 from studio.scene.stick_figure import trail_segments
 
 Array = NDArray[np.float64]
