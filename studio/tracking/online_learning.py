@@ -47,7 +47,7 @@ SHORTEST_S = 0.3
 # Robust standard deviations below the median at which a frame is not well tracked.
 TOO_LOW = 3.0
 # Mean squared deviation, in a cluster's variances, above which it does not explain a frame.
-NOT_EXPLAINED = 4.0
+NOT_EXPLAINED = 6.0
 MOST_NEW_CLUSTERS, PATIENCE = 20, 5
 MAD_TO_DEVIATION = 1.4826
 
