@@ -74,6 +74,11 @@ class StudioServer:
             time.sleep(0.1)
         return state
 
+    def pace(self, seconds_a_layer: float) -> None:
+        """Let each layer that is tracked take at least so many seconds from now on; 0: as fast as it can."""
+        self.post("/api/worker/pace", {"seconds_a_layer": seconds_a_layer})
+        self.until(lambda state: state["seconds_a_layer"] == seconds_a_layer)
+
     def worker(self) -> psutil.Process:
         """The tracking process: the child that was spawned for it (multiprocessing's own helper is another)."""
         children = psutil.Process(self.process.pid).children()

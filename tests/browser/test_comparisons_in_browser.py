@@ -38,6 +38,23 @@ def window(browser: Browser, studio: StudioServer) -> Iterator[StudioPage]:
     opened.close()
 
 
+@pytest.fixture
+def idle(window: StudioPage) -> StudioPage:
+    """The window with no comparison running, however the test before ended."""
+    for line in window.studio.get("/api/comparisons?session=walk")["comparisons"]:
+        if line["status"] == "running":
+            window.studio.post(f"/api/comparisons/walk/{line['name']}/cancel")
+    busy = ("running", "cancelling")
+    until(
+        window.page,
+        lambda: all(
+            line["status"] not in busy
+            for line in window.studio.get("/api/comparisons?session=walk")["comparisons"]
+        ),
+    )
+    return window
+
+
 def fill(window: StudioPage, **values: str) -> Locator:
     """Fill the form of a new comparison."""
     form = window.page.locator(".compare-form")
@@ -76,14 +93,14 @@ def test_the_studio_leads_to_comparing(window: StudioPage, artefacts: Path) -> N
 def test_what_cannot_be_compared_is_told_in_the_form(window: StudioPage) -> None:
     window.watch.allow(422, "/api/comparisons")
     form = fill(window, evaluations="30")
-    form.get_by_role("button", name="Compare").click()
+    form.get_by_role("button", name="Compare", exact=True).click()
     form.locator(".wrong", has_text="too few").wait_for()
     form.locator("[aria-label=Knobs]").first.fill("survival")
-    form.get_by_role("button", name="Compare").click()
+    form.get_by_role("button", name="Compare", exact=True).click()
     form.locator(".wrong", has_text="“survival” changes nothing").wait_for()
     form.locator("[aria-label=Knobs]").first.fill("survival=7")
     fill(window, evaluations="200")
-    form.get_by_role("button", name="Compare").click()
+    form.get_by_role("button", name="Compare", exact=True).click()
     form.locator(".wrong", has_text="'survival' cannot be '7'").wait_for()
 
 
@@ -92,30 +109,30 @@ def test_it_is_watched_cancelled_and_goes_on(window: StudioPage, artefacts: Path
     form = fill(window, evaluations="200", seeds="300", last="9", name="long")
     form.locator("[aria-label=Knobs]").first.fill("")
     form.get_by_text("900 trials of 10 frames").wait_for()
-    form.get_by_role("button", name="Compare").click()
+    form.get_by_role("button", name="Compare", exact=True).click()
     page.get_by_role("heading", name="annealed, swarm, condensation on walk").wait_for()
     page.locator(".progress-words", has_text="left · last:").wait_for()
     shoot(window, artefacts, "comparison-running")
-    page.get_by_role("button", name="Cancel").click()
+    page.get_by_role("button", name="Cancel", exact=True).click()
     page.locator(".card-box .badge", has_text="cancelled").wait_for()
     told = window.studio.get("/api/comparisons/walk/long")["comparison"]
     assert told["status"] == "cancelled"
     assert 0 < told["done"] < told["total"] == 900
-    page.get_by_role("button", name="Go on").click()
+    page.get_by_role("button", name="Go on", exact=True).click()
     page.locator(".card-box .badge", has_text="running").wait_for()
-    page.get_by_role("button", name="Cancel").click()
+    page.get_by_role("button", name="Cancel", exact=True).click()
     page.locator(".card-box .badge", has_text="cancelled").wait_for()
     assert window.studio.get("/api/comparisons/walk/long")["comparison"]["done"] >= told["done"]
 
 
-def test_a_small_one_is_shown_when_it_is_done(window: StudioPage) -> None:
-    page = window.page
-    page.get_by_role("button", name="+ New").click()
+def test_a_small_one_is_shown_when_it_is_done(idle: StudioPage) -> None:
+    window, page = idle, idle.page
+    page.get_by_role("button", name="+ New", exact=True).click()
     form = fill(window, evaluations="200", seeds="2", last="9", name="small")
     form.locator("[aria-label=Knobs]").first.fill("survival=0.4, crossover=0.2")
     form.locator("[aria-label=Label]").first.fill("mine")
     form.get_by_text("6 trials of 10 frames").wait_for()
-    form.get_by_role("button", name="Compare").click()
+    form.get_by_role("button", name="Compare", exact=True).click()
     page.get_by_role("heading", name="annealed:mine, swarm, condensation on walk").wait_for()
     page.get_by_role("heading", name="Who is nearer").wait_for(timeout=120_000)
     told = window.studio.get(FIRST)
@@ -144,16 +161,16 @@ def test_the_result_is_read_and_downloaded(window: StudioPage, artefacts: Path) 
     page.wait_for_function("document.querySelectorAll('.findings-canvas[data-drawn]').length === 2")
     shoot(window, artefacts, "comparison-below")
     with page.expect_download() as coming:
-        page.get_by_role("link", name="JSON").click()
+        page.get_by_role("link", name="JSON", exact=True).click()
     assert json.loads(Path(coming.value.path()).read_text())["trackers"] == result["trackers"]
     with page.expect_download() as coming:
-        page.get_by_role("link", name="CSV").click()
+        page.get_by_role("link", name="CSV", exact=True).click()
     assert len(Path(coming.value.path()).read_text().splitlines()) == 1 + 3 * 2 * 10
 
 
 def test_again_asks_for_the_same(window: StudioPage) -> None:
     page = window.page
-    page.get_by_role("button", name="Again…").click()
+    page.get_by_role("button", name="Again…", exact=True).click()
     form = page.locator(".compare-form")
     form.wait_for()
     assert form.locator("[name=evaluations]").input_value() == "200"
@@ -171,13 +188,13 @@ def test_it_is_listed_with_its_session_thrown_away_and_restored(window: StudioPa
     window.until("get('session') === 'walk'")
     page.get_by_role("link", name="2 comparisons").click()
     page.get_by_role("heading", name="Who is nearer").wait_for()
-    page.get_by_role("button", name="Delete…").click()
-    page.locator("dialog form").get_by_role("button", name="Delete").click()
+    page.get_by_role("button", name="Delete…", exact=True).click()
+    page.locator("dialog form").get_by_role("button", name="Delete", exact=True).click()
     page.get_by_role("heading", name="annealed, swarm, condensation on walk").wait_for()
     assert page.locator(".entry").count() == 1
     page.get_by_role("link", name="Studio", exact=True).click()
     line = page.locator("#trash-line")
-    window.choose(line.get_by_role("button", name="Restore…"), "walk / small (comparison)")
+    window.choose(line.get_by_role("button", name="Restore…", exact=True), "walk / small (comparison)")
     page.get_by_role("heading", name="Who is nearer").wait_for()
 
 
@@ -185,7 +202,7 @@ def test_reports_are_empty_until_something_was_reproduced(
     window: StudioPage, studio: StudioServer, artefacts: Path
 ) -> None:
     page = window.page
-    page.get_by_role("link", name="Reports").click()
+    page.get_by_role("link", name="Reports", exact=True).click()
     page.get_by_role("heading", name="Nothing reproduced yet").wait_for()
     page.get_by_text("studio reproduce all --quick").wait_for()
     shoot(window, artefacts, "reports-empty")
@@ -199,7 +216,7 @@ def test_reports_are_empty_until_something_was_reproduced(
     page.locator(".findings-badge", has_text="reproduced").first.wait_for()
     shoot(window, artefacts, "reports")
     with page.expect_download() as coming:
-        page.get_by_role("link", name="JSON").click()
+        page.get_by_role("link", name="JSON", exact=True).click()
     assert json.loads(Path(coming.value.path()).read_text()) == results
 
 

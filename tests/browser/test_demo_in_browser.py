@@ -13,18 +13,17 @@ from scene_wire import until
 from studio_page import StudioPage
 from studio_server import StudioServer
 
+from studio.body.extremities import extremities
 from studio.body.forward_kinematics import limb_ends
-from studio.scene.particle_view import extremities
 from studio.sessions.workspace import Workspace
 from studio.settings import knob_table
 
-# Slow for now: the tracker is done with the bundled walk before a page that is drawn in software can pause it, so the
-# first test races on small machines (`make test-slow` runs it).
-pytestmark = [pytest.mark.browser, pytest.mark.slow]
+pytestmark = pytest.mark.browser
 
 RUN = "/api/sessions/walk/runs/run-1"
 FRAMES_BEFORE = 6
-SLOW = {"occlusion_aware": True, "edge_samples": 128, "region_samples": 192}
+# Seconds a layer while the search goes on: a frame a second, so that a page drawn in software can follow it.
+PACE = 0.1
 PANELS = ("variance", "survival", "cameras", "weights", "log")
 SIZES = ((1280, 800), (1920, 1080))
 
@@ -33,13 +32,11 @@ SIZES = ((1280, 800), (1920, 1080))
 def window(browser: Browser, demo: StudioServer) -> Iterator[StudioPage]:
     """One window for all tests of this file.
 
-    The demo is tracking when its address is printed. It is held up and made slower here, so that it is not done before
-    a browser that draws in software has opened.
+    The demo is tracking when its address is printed; it is slowed and held up here, and tracked on in the window.
     """
+    demo.pace(PACE)
     demo.until(lambda state: state["done"] >= FRAMES_BEFORE)
     demo.post(f"{RUN}/pause")
-    demo.until(lambda state: state["state"] == "paused")
-    demo.post(f"{RUN}/settings", SLOW, "PATCH")
     demo.until(lambda state: state["state"] == "paused")
     opened = StudioPage(browser, demo)
     opened.see_scene()
@@ -96,7 +93,7 @@ def drawn(window: StudioPage, clouds: dict[int, np.ndarray]) -> bool:
 def test_the_scene_is_seen_while_the_tracking_goes_on(window: StudioPage) -> None:
     window.until("get('work')?.state === 'paused' && get('summary')?.frames.length > 0")
     count = len(window.get("summary")["frames"])  # pyright: ignore[reportIndexIssue]
-    window.page.get_by_role("button", name="Track on").click()
+    window.page.get_by_role("button", name="Track on", exact=True).click()
     window.until("get('work').state === 'tracking'")
     window.until(f"get('summary').frames.length > {count + 2} && get('frame') > {count}")
     window.until("get('detail')?.layers.length > 0 && get('follow')")
@@ -110,6 +107,31 @@ def test_the_scene_is_seen_while_the_tracking_goes_on(window: StudioPage) -> Non
     window.until("get('frame') === 0 && get('detail')?.frame === 0")
     clouds = stored_clouds(window, 0)
     until(window.page, lambda: drawn(window, clouds))
+
+
+def test_the_search_is_watched_layer_by_layer(paused: StudioPage, artefacts: Path) -> None:
+    page = paused.page
+    speed = page.get_by_label("Search speed")
+    until(page, lambda: speed.locator("option:checked").inner_text() == "10 layers/s")
+    speed.select_option(label="3 layers/s")
+    paused.until("get('work').seconds_a_layer === 1 / 3")
+    page.click("#track-toggle")
+    # The page shows the frame in progress as it grows, and so does the scene.
+    for layers in (2, 4):
+        paused.until(f"get('detail')?.finished === false && get('detail').layers.length >= {layers}")
+    until(page, lambda: len(paused.wire.layers()) >= 4)
+    paused.shoot(artefacts / "page-watched-dark-1280x800.png")
+    page.click("#track-toggle")
+    paused.until("get('work').state === 'paused'")
+
+    # By the keyboard; and a speed that a script sets is shown too.
+    speed.focus()
+    page.keyboard.press("Home")
+    paused.until("get('work').seconds_a_layer === 0")
+    paused.studio.pace(0.05)
+    until(page, lambda: speed.locator("option:checked").inner_text() == "20 layers/s")
+    paused.studio.pace(PACE)
+    until(page, lambda: speed.locator("option:checked").inner_text() == "10 layers/s")
 
 
 def test_the_survival_rate_is_moved_and_new_layers_are_drawn(paused: StudioPage) -> None:
@@ -275,7 +297,7 @@ def test_variances_and_poses_come_as_csv(paused: StudioPage) -> None:
     page, frame = paused.page, paused.get("frame")
     page.click("[data-panel=variance]")
     with page.expect_download() as coming:
-        page.get_by_role("button", name="CSV").click()
+        page.get_by_role("button", name="CSV", exact=True).click()
     rows = list(csv.reader(io.StringIO(Path(coming.value.path()).read_text())))
     stored = list(
         csv.reader(io.StringIO(paused.studio.text(f"{run_path(paused)}/frames/{frame}/variance.csv")))
@@ -295,7 +317,7 @@ def test_variances_and_poses_come_as_csv(paused: StudioPage) -> None:
 
 def test_the_guide_lists_every_knob(paused: StudioPage, artefacts: Path) -> None:
     with paused.context.expect_page() as coming:
-        paused.page.get_by_role("link", name="Guide").click()
+        paused.page.get_by_role("link", name="Guide", exact=True).click()
     guide = coming.value
     guide.wait_for_load_state()
     faults: list[str] = []
@@ -319,8 +341,8 @@ def test_a_new_answer_can_be_kept(paused: StudioPage) -> None:
     before = paused.studio.get(f"{run_path(paused)}/frames/{last - 2}")
     paused.key("r")
     paused.until("get('whatIf')?.length === get('layerCount') && get('work').state === 'paused'")
-    paused.page.locator("#what-if").get_by_role("button", name="Keep…").click()
-    paused.page.locator("dialog form").get_by_role("button", name="Keep it").click()
+    paused.page.locator("#what-if").get_by_role("button", name="Keep…", exact=True).click()
+    paused.page.locator("dialog form").get_by_role("button", name="Keep it", exact=True).click()
     paused.until(f"get('summary').frames.at(-1).frame === {last - 2} && get('whatIf') === null")
     after = paused.studio.get(f"{run_path(paused)}/frames/{last - 2}")
     assert after["pose"] != before["pose"]

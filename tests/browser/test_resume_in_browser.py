@@ -12,8 +12,10 @@ from studio_server import StudioServer
 pytestmark = pytest.mark.browser
 
 RUNS = "/api/sessions/walk/runs"
-FRAMES, SEED = 100, 5
-KNOBS = {"occlusion_aware": True, "edge_samples": 128, "start_repeats": 2}
+FRAMES, SEED = 30, 5
+KNOBS = {"start_repeats": 2}
+# Seconds a layer until the process is killed: a frame a second, so that it dies in mid-run.
+PACE = 0.1
 
 
 @pytest.fixture
@@ -32,6 +34,7 @@ def test_a_killed_process_is_said_and_the_run_resumes_bit_for_bit(
 ) -> None:
     window = StudioPage(browser, studio, open_at=f"{studio.address}&session=walk&run=broken")
     window.until("get('run') === 'broken' && get('connected') === true && get('summary') !== null")
+    studio.pace(PACE)
     window.page.click("#track-toggle")
     studio.until(lambda state: state["run"] == "broken" and 2 <= state["done"] < FRAMES - 2)
     studio.worker().send_signal(signal.SIGKILL)
@@ -44,7 +47,10 @@ def test_a_killed_process_is_said_and_the_run_resumes_bit_for_bit(
     assert 2 <= done < FRAMES
     window.shoot(artefacts / "page-worker-lost-dark-1280x800.png")
 
-    card.get_by_role("button", name="Resume").click()
+    card.get_by_role("button", name="Resume", exact=True).click()
+    # The pace came back with the process.
+    window.until(f"get('work').state === 'tracking' && get('work').seconds_a_layer === {PACE}")
+    studio.pace(0.0)
     window.until("get('work').state === 'finished'")
     window.page.locator("#curtain").wait_for(state="hidden")
     window.until(f"get('summary').frames.length === {FRAMES}")

@@ -65,7 +65,7 @@ def session_menu(window: StudioPage, name: str, entry: str) -> None:
 def imported(window: StudioPage, footage: Path) -> StudioPage:
     """The window with the session "arm" open."""
     if not session_head(window, "arm").count():
-        window.page.get_by_role("button", name="+ Import").click()
+        window.page.get_by_role("button", name="+ Import", exact=True).click()
         fill(window, "Import", source=str(footage / "arm"), name="arm", fps=str(FRAMES_PER_SECOND))
     session_head(window, "arm").wait_for()
     window.page.locator("dialog[open]").wait_for(state="detached")
@@ -77,11 +77,11 @@ def imported(window: StudioPage, footage: Path) -> StudioPage:
 def test_an_empty_workspace_offers_the_sample(window: StudioPage, artefacts: Path) -> None:
     card = window.page.locator("#curtain .card")
     card.get_by_role("heading", name="Nothing here yet").wait_for()
-    card.get_by_role("button", name="Import footage").wait_for()
+    card.get_by_role("button", name="Import footage", exact=True).wait_for()
     window.shoot(artefacts / "page-empty-dark-1280x800.png")
-    card.get_by_role("button", name="Open the sample").click()
+    card.get_by_role("button", name="Open the sample", exact=True).click()
     window.until("get('session') === 'walk' && get('run') === null")
-    window.page.locator("#invitation").get_by_role("button", name="New run").wait_for()
+    window.page.locator("#invitation").get_by_role("button", name="New run", exact=True).wait_for()
     loaded = (
         "() => [...document.querySelectorAll('.session > .head img')].some((image) => image.naturalWidth > 0)"
     )
@@ -90,7 +90,7 @@ def test_an_empty_workspace_offers_the_sample(window: StudioPage, artefacts: Pat
 
 def test_a_wrong_folder_is_told_in_the_form(window: StudioPage, footage: Path, artefacts: Path) -> None:
     window.watch.allow(404, "/api/imports")
-    window.page.get_by_role("button", name="+ Import").click()
+    window.page.get_by_role("button", name="+ Import", exact=True).click()
     form = fill(window, "Import", source=str(footage / "nowhere"), name="gone")
     form.locator(".wrong", has_text=f"There is no folder '{footage / 'nowhere'}'.").wait_for()
     form.get_by_text("Check the path.").wait_for()
@@ -102,7 +102,7 @@ def test_a_wrong_folder_is_told_in_the_form(window: StudioPage, footage: Path, a
         window.page,
         lambda: "nowhere" not in form.locator(".wrong").inner_text() and form.locator(".wrong").inner_text(),
     )
-    form.get_by_role("button", name="Cancel").click()
+    form.get_by_role("button", name="Cancel", exact=True).click()
     assert [entry["name"] for entry in window.studio.get("/api/sessions")["sessions"]] == ["walk"]
 
 
@@ -144,7 +144,7 @@ def test_names_copies_and_the_trash(imported: StudioPage, artefacts: Path) -> No
     session_head(imported, copy).wait_for(state="detached")
     line = page.locator("#trash-line")
     line.get_by_text("1 in the trash").wait_for()
-    imported.choose(line.get_by_role("button", name="Restore…"), f"{copy} (session)")
+    imported.choose(line.get_by_role("button", name="Restore…", exact=True), f"{copy} (session)")
     session_head(imported, copy).wait_for()
     imported.until(f"get('session') === '{copy}'")
     line.wait_for(state="hidden")
