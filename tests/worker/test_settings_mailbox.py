@@ -3,6 +3,7 @@
 import pytest
 
 from studio.errors import SettingsError
+from studio.runs.behaviour_models import check_prediction
 from studio.settings import default_settings
 from studio.worker.settings_mailbox import SettingsMailbox
 
@@ -39,3 +40,14 @@ def test_what_is_refused_changes_nothing(changes: dict[str, object]) -> None:
         mailbox.change(changes)
     assert caught.value.hint
     assert mailbox.latest() is before
+
+
+def test_what_the_run_cannot_do_is_refused_and_changes_nothing() -> None:
+    mailbox = SettingsMailbox(
+        1, default_settings(), lambda settings: check_prediction(settings, has_model=False)
+    )
+    before = mailbox.latest()
+    with pytest.raises(SettingsError, match="no behaviour model"):
+        mailbox.change({"survival": 0.4, "prediction": "behaviour"})
+    assert mailbox.latest() is before
+    assert mailbox.change({"survival": 0.4}) == ("survival",)

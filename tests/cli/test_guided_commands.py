@@ -1,0 +1,88 @@
+"""`studio track --behaviour`, `studio compare --behaviour`."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from arm_behaviour import FPS, keep_arm_model
+from click.testing import CliRunner, Result
+from toy_session import FRAMES, true_poses
+
+from studio.body.forward_kinematics import marker_points
+from studio.capture.trc import MarkerMotion, write_trc
+from studio.cli.main import main
+from studio.experiments.kept_comparison import BEHAVIOUR_NAME
+from studio.sessions.named_rows import write_pose
+from studio.sessions.session import Session
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(main, list(arguments), catch_exceptions=False)
+
+
+@pytest.fixture
+def started(session_on_disk: Session) -> Session:
+    """The toy session with a start pose and a truth."""
+    body = session_on_disk.body()
+    write_pose(
+        session_on_disk.path / "start_pose.csv",
+        tuple(entry.name for entry in body.parameters),
+        true_poses()[0],
+    )
+    names = tuple(marker.name for marker in body.markers)
+    (session_on_disk.path / "truth").mkdir()
+    motion = MarkerMotion(names, np.arange(FRAMES) / FPS, marker_points(body, true_poses(FRAMES)), "mm", FPS)
+    write_trc(session_on_disk.path / "truth" / "true.trc", motion)
+    return session_on_disk
+
+
+def test_track_with_a_model(started: Session, tmp_path: Path) -> None:
+    path = keep_arm_model(started.path.parent)
+    common = ("track", "toy", "--frames", "0:2", "--particles", "40", "--json")
+    only = run(*common, "--tracker", "behaviour")
+    assert only.exit_code == 0, only.stderr
+    assert json.loads(only.stdout)["behaviour"] == "swings"
+    assert "the only one" in only.stderr
+    named = run(*common, "--tracker", "behaviour", "--behaviour", "swings", "--set", "attenuation=0.2")
+    assert json.loads(named.stdout)["behaviour"] == "swings"
+    predicted = run(*common, "--behaviour", str(path), "--set", "prediction=behaviour", "--layers", "2")
+    assert json.loads(predicted.stdout)["behaviour"] == "swings"
+    assert "behaviour" not in json.loads(run(*common, "--layers", "2").stdout)
+
+
+def test_track_without_a_model_says_how_to_get_one(started: Session) -> None:
+    for wish in (("--tracker", "behaviour"), ("--set", "prediction=behaviour")):
+        result = run("track", "toy", *wish)
+        assert result.exit_code == 2
+        assert "none of body 'planar_arm4'" in result.stderr
+        assert "studio learn" in result.stderr
+    result = run("track", "toy", "--tracker", "behaviour", "--behaviour", "nobody")
+    assert result.exit_code == 2
+    assert "no behaviour model 'nobody'" in result.stderr
+
+
+def test_compare_with_a_model(started: Session) -> None:
+    path = keep_arm_model(started.path.parent)
+    common = (
+        "compare", "toy", "--trackers", "behaviour,annealed:guided,condensation", "--evaluations", "40",
+        "--layers", "2", "--seeds", "1", "--frames", "0:3", "--processes", "1", "--json",
+    )  # fmt: skip
+    result = run(*common)
+    assert result.exit_code == 0, result.stderr
+    told = json.loads(result.stdout)
+    assert [entry["tracker"] for entry in told["trackers"]] == [
+        "behaviour",
+        "annealed:guided",
+        "condensation",
+    ]
+    assert (Path(told["folder"]) / BEHAVIOUR_NAME).read_bytes() == path.read_bytes()
+    path.unlink()
+    refused = run(*common)
+    assert refused.exit_code == 2
+    assert "needs a behaviour model" in refused.stderr
+    # Nobody who takes part by default needs one.
+    assert (
+        "behaviour"
+        not in run("compare", "--help").output.partition("--evaluations")[0].partition("default:")[2]
+    )
