@@ -13,7 +13,7 @@ import zstandard
 from numpy.typing import NDArray
 
 from studio.errors import SessionError
-from studio.tracking.tracker import Carried, Estimate, FrameResult, LayerRecord, ParticleSet
+from studio.tracking.tracker import TRACKING_STATES, Carried, Estimate, FrameResult, LayerRecord, ParticleSet
 
 Array = NDArray[np.float64]
 
@@ -122,6 +122,7 @@ def pack_result(result: FrameResult) -> bytes:
             result.settings_version,
             result.milliseconds,
             estimate.log_weight,
+            TRACKING_STATES.index(result.tracking),
         ],
         dtype=np.float64,
     )
@@ -141,6 +142,8 @@ def unpack_result(blob: bytes) -> FrameResult:
         settings_version=int(numbers[3]),
         milliseconds=float(numbers[4]),
         carried=carried_from(arrays),
+        # Frames stored before a loss could be noticed end here.
+        tracking=TRACKING_STATES[int(numbers[6]) if len(numbers) > 6 else 0],
     )
 
 

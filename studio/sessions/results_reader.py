@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from studio.errors import NotFoundError, SessionError
 from studio.sessions.results_codec import unpack, unpack_layer, unpack_result
 from studio.settings import SettingsEntry
-from studio.tracking.tracker import FrameResult, LayerRecord
+from studio.tracking.tracker import TRACKED, FrameResult, LayerRecord
 
 Array = NDArray[np.float64]
 FILE_NAME = "results.sqlite"
@@ -29,7 +29,9 @@ class PartialFrame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Timeline:
-    """What a timeline shows of K finished frames: all (K,). layers, evaluations, settings_version : int."""
+    """What a timeline shows of K finished frames: all (K,). layers, evaluations, settings_version : int. tracking : how
+    each frame went, of `tracking.tracker.TRACKING_STATES`.
+    """
 
     frames: NDArray[np.int64]
     log_weights: Array
@@ -37,6 +39,7 @@ class Timeline:
     evaluations: NDArray[np.int64]
     layers: NDArray[np.int64]
     settings_versions: NDArray[np.int64]
+    tracking: tuple[str, ...]
 
 
 class ResultsReader:
@@ -113,7 +116,15 @@ class ResultsReader:
         columns = list(zip(*rows, strict=True)) if rows else [[]] * 6
         whole = [np.array(columns[index], dtype=np.int64) for index in (0, 3, 4, 5)]
         real = [np.array(columns[index], dtype=np.float64) for index in (1, 2)]
-        return Timeline(whole[0], real[0], real[1], whole[1], whole[2], whole[3])
+        states = self._tracking()
+        named = tuple(states.get(int(frame), TRACKED) for frame in whole[0])
+        return Timeline(whole[0], real[0], real[1], whole[1], whole[2], whole[3], named)
+
+    def _tracking(self) -> dict[int, str]:
+        """The frames that were not simply tracked, and how they went; none in stores older than that table."""
+        if not self._query("SELECT name FROM sqlite_master WHERE type = 'table' AND name = 'tracking'"):
+            return {}
+        return dict(self._query("SELECT frame, state FROM tracking"))
 
     def settings_history(self) -> list[SettingsEntry]:
         """Every version of the settings that was in use, oldest first."""

@@ -18,7 +18,7 @@ from studio.errors import RunError, SessionError
 from studio.sessions.process_lock import ProcessLock
 from studio.sessions.results_codec import pack, pack_layer, pack_result
 from studio.sessions.results_reader import FILE_NAME, ResultsReader
-from studio.tracking.tracker import FrameResult, LayerRecord
+from studio.tracking.tracker import TRACKED, FrameResult, LayerRecord
 
 Array = NDArray[np.float64]
 Value = bool | int | float | str
@@ -39,6 +39,7 @@ CREATE TABLE IF NOT EXISTS layers (
 CREATE TABLE IF NOT EXISTS partial (
     id INTEGER PRIMARY KEY CHECK (id = 1), frame INTEGER NOT NULL, next_layer INTEGER NOT NULL, blob BLOB NOT
     NULL);
+CREATE TABLE IF NOT EXISTS tracking (frame INTEGER PRIMARY KEY, state TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS partial_layers (layer INTEGER PRIMARY KEY, blob BLOB NOT NULL);
 """
 
@@ -111,8 +112,11 @@ class ResultsWriter:
         in `result.carried` and always whole.
         """
         statements: list[tuple[str, tuple[object, ...]]] = [
-            ("DELETE FROM layers WHERE frame = ?", (result.frame,))
+            ("DELETE FROM layers WHERE frame = ?", (result.frame,)),
+            ("DELETE FROM tracking WHERE frame = ?", (result.frame,)),
         ]
+        if result.tracking != TRACKED:
+            statements.append(("INSERT INTO tracking VALUES (?, ?)", (result.frame, result.tracking)))
         for record in layers:
             statements.append(
                 (
@@ -159,6 +163,7 @@ class ResultsWriter:
             [
                 ("DELETE FROM frames WHERE frame >= ?", (frame,)),
                 ("DELETE FROM layers WHERE frame >= ?", (frame,)),
+                ("DELETE FROM tracking WHERE frame >= ?", (frame,)),
                 (
                     "DELETE FROM settings WHERE frame >= ? AND version > (SELECT MIN(version) FROM settings)",
                     (frame,),

@@ -18,6 +18,11 @@ from studio.weighting.problem import WHOLE_BODY
 
 Array = NDArray[np.float64]
 
+TRACKED, LOST, NO_EVIDENCE, RECOVERED = "tracked", "lost", "no evidence", "recovered"
+TRACKING_STATES = (TRACKED, LOST, NO_EVIDENCE, RECOVERED)
+"""How a frame went. Lost: its pose does not explain the pictures. No evidence: nothing is to be seen, the pose is held.
+Recovered: tracked again by a search for the body, having been lost."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hierarchy:
@@ -129,7 +134,9 @@ class LayerRecord:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameResult:
-    """The result of one frame. evaluations : poses weighed. carried : what the next frame starts from."""
+    """The result of one frame. evaluations : poses weighed. carried : what the next frame starts from. tracking : one
+    of TRACKING_STATES.
+    """
 
     frame: int
     estimate: Estimate
@@ -138,6 +145,7 @@ class FrameResult:
     settings_version: int
     milliseconds: float
     carried: Carried
+    tracking: str = TRACKED
 
 
 class FrameProblem(Protocol):

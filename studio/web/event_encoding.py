@@ -92,6 +92,7 @@ def frame_summary(result: FrameResult) -> dict[str, object]:
         "evaluations": result.evaluations,
         "settings_version": result.settings_version,
         "milliseconds": result.milliseconds,
+        "tracking": result.tracking,
     }
 
 

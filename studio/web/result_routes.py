@@ -54,6 +54,7 @@ def frames(session: OpenSession, run: OpenRun) -> FramesSummary:
             evaluations=int(timeline.evaluations[at]),
             layers=int(timeline.layers[at]),
             settings_version=int(timeline.settings_versions[at]),
+            tracking=timeline.tracking[at],
         )
         for at in range(len(timeline.frames))
     ]
@@ -92,6 +93,7 @@ def frame_detail(run: OpenRun, frame: int) -> FrameDetail:
         evaluations=result.evaluations if result else sum(len(layer.poses) for layer in layers),
         milliseconds=result.milliseconds if result else sum(layer.milliseconds for layer in layers),
         settings_version=layers[-1].settings_version,
+        tracking=result.tracking if result else None,
         settings=dict(entry.values if entry else run.record.settings),
     )
 

@@ -7,7 +7,9 @@ from studio.web.setting_schemas import SettingsChange
 
 
 class FrameLine(Answer):
-    """A finished frame in the timeline. lost: whether a limb is off by more than 150 mm (with truth only)."""
+    """A finished frame in the timeline. lost: whether a limb is off by more than 150 mm (with truth only). tracking:
+    whether the tracker thinks that it is on the body.
+    """
 
     frame: int
     log_weight: Number
@@ -17,6 +19,7 @@ class FrameLine(Answer):
     settings_version: int
     error_mm: Number = None
     lost: bool = False
+    tracking: str = Field("tracked", description="tracked, lost, no evidence or recovered.")
 
 
 class FramesSummary(Answer):
@@ -77,6 +80,7 @@ class FrameDetail(Answer):
     evaluations: int
     milliseconds: Number
     settings_version: int
+    tracking: str | None = Field(None, description="As in the timeline; null in an unfinished frame.")
     settings: dict[str, Value]
 
 

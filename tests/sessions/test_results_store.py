@@ -1,5 +1,6 @@
 """The store gives back every bit, while it is written, and stays readable when the writer dies."""
 
+import dataclasses
 import os
 import sqlite3
 import subprocess
@@ -76,6 +77,26 @@ def test_reader_sees_each_frame_as_soon_as_it_is_written(tmp_path: Path) -> None
     assert np.array_equal(line.log_weights, [-0.5, -1.5, -2.5, -3.5, -4.5])
     assert line.evaluations.tolist() == [36] * 5
     reader.close()
+
+
+def test_how_a_frame_went_is_kept_and_stores_without_it_read_as_tracked(tmp_path: Path) -> None:
+    folder = tmp_path
+    with ResultsWriter(folder) as writer, ResultsReader(folder) as reader:
+        for frame, state in enumerate(("tracked", "lost", "no evidence", "recovered", "lost")):
+            result = dataclasses.replace(result_of(frame), tracking=state)
+            writer.write_frame(result, [layer_of(frame, 0)])
+        assert reader.timeline().tracking == ("tracked", "lost", "no evidence", "recovered", "lost")
+        assert [reader.result(frame).tracking for frame in range(3)] == ["tracked", "lost", "no evidence"]
+        writer.write_frame(result_of(1), [layer_of(1, 0)])
+        writer.forget_from(4)
+        writer.write_frame(result_of(4), [layer_of(4, 0)])
+        assert reader.timeline().tracking == ("tracked", "tracked", "no evidence", "recovered", "tracked")
+    older = sqlite3.connect(folder / "results.sqlite")
+    older.execute("DROP TABLE tracking")
+    older.commit()
+    older.close()
+    with ResultsReader(folder) as reader:
+        assert reader.timeline().tracking == ("tracked",) * 5
 
 
 def test_what_is_not_there_is_named(tmp_path: Path) -> None:

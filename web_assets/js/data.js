@@ -110,7 +110,7 @@ function showLive(frame, finished) {
 function takeFrame(event) {
   const summary = get("summary");
   if (!summary) return;
-  const line = { frame: event.frame, log_weight: event.log_weight, milliseconds: event.milliseconds, error_mm: null, lost: false };
+  const line = { frame: event.frame, log_weight: event.log_weight, milliseconds: event.milliseconds, error_mm: null, lost: false, tracking: event.tracking };
   arrived.push(line);
   set({ summary: { ...summary, frames: [...summary.frames.filter((one) => one.frame < event.frame), line] } });
   const whole = layers.length === event.layers && layers[0].frame === event.frame;

@@ -8,6 +8,13 @@ const track = document.getElementById("track");
 const canvas = document.getElementById("track-canvas");
 const label = document.getElementById("frame-label");
 const PADDING = 6;
+// How a frame went, its colour, and what is said of it; frames that were simply tracked carry no mark.
+const STATES = {
+  lost: ["bad", "the tracker lost the body here and searches for it"],
+  "no evidence": ["text-quiet", "nothing to be seen: the pose is held"],
+  recovered: ["good", "found again"],
+};
+const BAND = 5;
 
 /** First and last frame (half open) of the run that is open. */
 export function range() {
@@ -59,6 +66,7 @@ function drawTimeline() {
   }
   pen.fillStyle = token("bad");
   for (const entry of frames) if (entry.lost) pen.fillRect(position(entry.frame, width) - 1, height - 4, 3, 4);
+  markStates(pen, frames, width);
   curve(pen, frames, "log_weight", token("text-quiet"), width, height, false);
   curve(pen, frames, "error_mm", token("layer-7"), width, height, true);
   pen.fillStyle = token("warn");
@@ -74,17 +82,35 @@ function drawTimeline() {
   }
 }
 
-/** What the two curves are, at the free end of the line. */
+/** A band along the top: where the tracker was lost, blind, or found the body again. */
+function markStates(pen, frames, width) {
+  const [first, last] = range();
+  const step = Math.max(3, (width - 2 * PADDING) / Math.max(1, last - first - 1) + 0.5);
+  for (const entry of frames) {
+    const state = STATES[entry.tracking];
+    if (!state) continue;
+    pen.fillStyle = token(state[0]);
+    pen.fillRect(position(entry.frame, width) - step / 2, 0, step, BAND);
+  }
+}
+
+/** The words of the legend and their colours: only what the run has. */
+function legend(frames) {
+  const measured = frames.some((entry) => entry.error_mm !== null && entry.error_mm !== undefined);
+  const states = Object.keys(STATES).filter((name) => frames.some((entry) => entry.tracking === name));
+  return [["weight", "text-quiet"], ...(measured ? [["error", "layer-7"]] : []), ...states.map((name) => [name, STATES[name][0]])];
+}
+
+/** What curves and bands are, at the free end of the line. */
 function explain(pen, frames) {
   if (frames.length < 2) return;
-  const measured = frames.some((entry) => entry.error_mm !== null && entry.error_mm !== undefined);
   pen.font = "500 10px Inter, system-ui, sans-serif";
   pen.textBaseline = "top";
   pen.lineWidth = 4;
   pen.lineJoin = "round";
   pen.strokeStyle = token("accent-soft");
   let left = PADDING + 4;
-  for (const [word, colour] of [["weight", "text-quiet"], ...(measured ? [["error", "layer-7"]] : [])]) {
+  for (const [word, colour] of legend(frames)) {
     pen.strokeText(word, left, 4);
     pen.fillStyle = token(colour);
     pen.fillText(word, left, 4);
@@ -100,11 +126,14 @@ function tellFrame() {
   label.innerHTML = "";
   label.append(`${frame} `);
   const rest = document.createElement("small");
-  rest.textContent = entry?.error_mm != null ? `/ ${summary.last - 1} · ${entry.error_mm.toPrecision(3)} mm` : `/ ${summary.last - 1}`;
+  const state = STATES[entry?.tracking] ? entry.tracking : "";
+  const measured = entry?.error_mm != null ? `${entry.error_mm.toPrecision(3)} mm` : "";
+  rest.textContent = [`/ ${summary.last - 1}`, measured, state].filter(Boolean).join(" · ");
   label.append(rest);
   track.setAttribute("aria-valuemin", summary.first);
   track.setAttribute("aria-valuemax", summary.last - 1);
   track.setAttribute("aria-valuenow", frame);
+  track.setAttribute("aria-valuetext", state ? `frame ${frame}, ${state}` : `frame ${frame}`);
 }
 
 function frameAt(event) {
@@ -113,10 +142,20 @@ function frameAt(event) {
   return first + ((event.clientX - box.left - PADDING) / (box.width - 2 * PADDING)) * (last - first - 1);
 }
 
+/** What the pointer stands on, where the tracker has something to say of it. */
+function toldOf(frame) {
+  const entry = get("summary")?.frames.find((one) => one.frame === frame);
+  const state = STATES[entry?.tracking];
+  return state ? `frame ${frame}: ${entry.tracking} – ${state[1]}` : "";
+}
+
 /** Wire the timeline. */
 export function startTimeline() {
   track.addEventListener("pointerdown", (event) => { track.setPointerCapture(event.pointerId); goTo(frameAt(event)); });
-  track.addEventListener("pointermove", (event) => event.buttons && goTo(frameAt(event)));
+  track.addEventListener("pointermove", (event) => {
+    if (event.buttons) goTo(frameAt(event));
+    track.title = toldOf(Math.round(frameAt(event)));
+  });
   new ResizeObserver(drawTimeline).observe(track);
   onTheme(drawTimeline);
   document.fonts.ready.then(drawTimeline);

@@ -1,0 +1,129 @@
+"""Poses that the search for a start pose begins with: every heading, many attitudes of the limbs, laid on the hull.
+
+An attitude's own middle is laid on the hull's mean (Caillette, Galata & Howard 2007, section 6.2, Fig. 7). Headings are
+taken all around, evenly: the hull of a person who stands is about as deep as wide, and limbs turn its axes. Lying and
+upside down are among the candidates where the hull's longest axis asks for it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.forward_kinematics import joint_frames
+from studio.body.model import BodyModel
+from studio.geometry.rotations import axis_turn
+from studio.volume.alignment import root_candidates, root_parameters, with_root_at
+from studio.volume.blob_model import cone_blobs
+from studio.volume.hull import Hull
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+HEADINGS = 16
+NARROW, WIDE = 0.12, 0.25
+"""Standard deviations of the attitudes drawn about the rest pose, as shares of the joints' ranges; half of each."""
+UPRIGHT = 0.6
+"""A hull whose longest axis is at least so vertical (cosine) is of somebody who stands, on feet or hands."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StartCandidates:
+    """poses : (N, D). family : (N,) int, equal for candidates of one attitude of the root. fixed : whether the body
+    cannot move or turn as a whole.
+    """
+
+    poses: Array
+    family: IntArray
+    fixed: bool
+
+
+def start_candidates(
+    rng: np.random.Generator,
+    body: BodyModel,
+    hull: Hull | None,
+    middle: Array,
+    per_family: int,
+    prototypes: Array | None = None,
+) -> StartCandidates:
+    """Candidates of `per_family` poses for each of HEADINGS headings, and more where the hull lies.
+
+    hull : where the body is; None or empty: about `middle` (3,) mm, a place to look. prototypes : (K, D) poses that the
+    body is known to take: half of each family's attitudes are drawn from them.
+    """
+    attitudes = _attitudes(rng, body, per_family * HEADINGS, prototypes)
+    root = root_parameters(body)
+    if not len(root):
+        return StartCandidates(attitudes, np.arange(len(attitudes)) // per_family, fixed=True)
+    seen = None if hull is None or hull.empty else hull
+    turned = _roots(body, seen, root, middle)
+    family = np.arange(len(turned) * per_family) // per_family
+    poses = attitudes[np.arange(len(family)) % len(attitudes)].copy()
+    poses[:, root] = turned[family][:, root]
+    target = middle if seen is None else seen.weights() @ seen.centres
+    return StartCandidates(_moved(body, poses, root, target), family, fixed=False)
+
+
+def facing(body: BodyModel, poses: Array) -> Array:
+    """(N, 3) where the root of poses (N, D) faces: its own x axis, unit vectors in the world."""
+    root = next(index for index, joint in enumerate(body.joints) if joint.parent < 0)
+    return joint_frames(body, poses)[:, root, :, 0]
+
+
+def _attitudes(rng: np.random.Generator, body: BodyModel, count: int, prototypes: Array | None) -> Array:
+    """(count, D) attitudes of all joints; what has no limits stays at rest."""
+    lower, upper = (
+        np.array([getattr(entry, end) for entry in body.parameters]) for end in ("lower", "upper")
+    )
+    bounded = np.isfinite(lower) & np.isfinite(upper)
+    ranges = np.where(bounded, upper - lower, 0.0)
+    spread = np.where(rng.random((count, 1)) < 0.5, NARROW, WIDE)
+    drawn = body.neutral + spread * ranges * rng.standard_normal((count, len(ranges)))
+    if prototypes is not None and len(prototypes):
+        known = rng.random(count) < 0.5
+        drawn[known] = prototypes[rng.integers(len(prototypes), size=int(known.sum()))]
+    return np.clip(drawn, np.where(bounded, lower, -np.inf), np.where(bounded, upper, np.inf))
+
+
+def _roots(body: BodyModel, hull: Hull | None, root: IntArray, middle: Array) -> Array:
+    """(R, D) the rest pose turned about the vertical to every heading; then, where the hull lies or may be of somebody
+    upside down, laid on its principal axes.
+    """
+    number = next(index for index, joint in enumerate(body.joints) if joint.parent < 0)
+    frame = joint_frames(body, body.neutral)[0, number]
+    found = []
+    for heading in range(HEADINGS):
+        turn = axis_turn(2, np.array(2.0 * np.pi * heading / HEADINGS))
+        wanted = np.column_stack([turn @ frame[:, :3], middle])
+        found.append(with_root_at(body, number, root, body.neutral, wanted))
+    if hull is not None:
+        found += _laid(body, hull, number)
+    return np.stack(found)
+
+
+def _laid(body: BodyModel, hull: Hull, number: int) -> list[Array]:
+    """The rest pose on the hull's principal axes, where those candidates are not upright anyway."""
+    rest = joint_frames(body, body.neutral)[0, number, :, :3]
+    laid = root_candidates(body, hull, body.neutral, upright=False)
+    turns = joint_frames(body, laid)[:, number, :, :3] @ rest.T
+    return [pose for pose, turn in zip(laid, turns, strict=True) if turn[2, 2] < UPRIGHT]
+
+
+def _moved(body: BodyModel, poses: Array, root: IntArray, target: Array) -> Array:
+    """Poses moved as a whole so that the middle of each one's volume is the target (3,)."""
+    lengths = np.array([index for index in root if body.parameters[index].kind == "length"], dtype=np.int64)
+    blobs = cone_blobs(body)
+
+    def middles(some: Array) -> Array:
+        mixture = blobs.mixture(body, some)
+        return np.einsum("b,nbi->ni", mixture.weights, mixture.means)
+
+    here, moved = middles(poses), poses.copy()
+    slopes = []
+    for index in lengths:
+        pushed = poses.copy()
+        pushed[:, index] += 1.0
+        slopes.append(middles(pushed) - here)
+    steps = np.einsum("nki,ni->nk", np.linalg.pinv(np.stack(slopes, axis=2)), target - here)
+    moved[:, lengths] += steps
+    return moved
