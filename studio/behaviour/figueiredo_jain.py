@@ -59,8 +59,8 @@ class Search:
     """How the number of components is sought.
 
     most : components at the start. least : fewest looked at. covariance : "full" or "diagonal". tolerance : EM has
-    settled when a sweep changes the message length by less than this, nats a point. patience : components removed in a row without a
-    shorter message before the search ends; 0 goes on to `least`.
+    settled when a sweep changes the message length by less than this, nats a point. patience : components removed in a
+    row without a shorter message before the search ends; 0 goes on to `least`.
     """
 
     most: int
@@ -201,9 +201,7 @@ class _Components:
         self.covariances[number] = covariance + self.floor * np.eye(self.dimensions)
         densities = self._densities(number)
         log_weights = np.log(self.weights)
-        replace_component(
-            self.log_densities, log_weights, number, densities, math.log(strength), self.totals
-        )
+        replace_component(self.log_densities, log_weights, number, densities, math.log(strength), self.totals)
         self.weights[number] = strength
         # Summed, not 1 - old + new: that error would grow with every component.
         whole = float(self.weights.sum())

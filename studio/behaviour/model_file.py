@@ -1,5 +1,6 @@
 """A behaviour model in one file: arrays in a zip archive (NumPy's), the rest as JSON inside it."""
 
+import contextlib
 import json
 import os
 import zipfile
@@ -55,7 +56,8 @@ def write_model(model: BehaviourModel, path: Path) -> None:
             np.savez_compressed(file, head=np.frombuffer(head, dtype=np.uint8), **arrays)
         partial.replace(path)
     except OSError as error:
-        partial.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            partial.unlink()
         raise BehaviourError(
             f"The behaviour model '{path.name}' cannot be written: {error.strerror or error}.",
             "Choose another place, or make room.",
@@ -71,7 +73,7 @@ def read_model(path: Path) -> BehaviourModel:
         f"'{path.name}' is no behaviour model, or it is damaged.", "Learn it again with `studio learn`."
     )
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         head = _checked_head(path, arrays.pop("head").tobytes())
         return _model(head, arrays)

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+# Offered here too: motion without pictures stands beside motion with them.
+from studio.behaviour.generation import generate as generate
 from studio.behaviour.model import BehaviourModel
 from studio.behaviour.prediction_kernels import choose_arcs, rooted_noise
 from studio.errors import BehaviourError
@@ -93,23 +95,6 @@ def states_at(
         log_start = np.log(model.automaton.start)
     joint = log_start + np.where(clusters >= 0, densities[:, clusters], 0.0)
     return _drawn(rng, np.exp(joint - joint.max(axis=1, keepdims=True)))
-
-
-def generate(
-    rng: np.random.Generator,
-    model: BehaviourModel,
-    frames: int,
-    attenuation: float = 0.1,
-    entering: str = "blend",
-) -> tuple[Array, IntArray]:
-    """Poses (F, D) of a walk through the automaton from a start state, and its states (F,); the root rests."""
-    now = start_states(rng, model, 1)
-    values = np.empty((frames, model.space.dimensions))
-    states = np.empty(frames, dtype=np.int64)
-    for frame in range(frames):
-        values[frame], states[frame] = now.values[0], now.states[0]
-        now = propagate(rng, model, now.states, now.values, now.velocities, attenuation, entering)
-    return model.space.poses(values), states
 
 
 def _next_labels(

@@ -16,12 +16,12 @@ class LearningSettings:
         help="Longest history of cluster labels that a state of the automaton may stand for; 0 forgets everything.",
     )  # fmt: skip
     epsilon: float = knob(
-        0.05, 0.0, 1000.0, 0.01, label="ε", takes_effect="new run",
+        0.5, 0.0, 1000.0, 0.01, label="ε", takes_effect="new run",
         help="A longer history is kept where it makes some label 1 + ε times more or less probable than the history "
         "that is one frame shorter; larger keeps fewer.",
     )  # fmt: skip
     least_probability: float = knob(
-        0.0005, 0.0, 0.5, 0.0001, label="least probability", takes_effect="new run",
+        0.001, 0.0, 0.5, 0.0001, label="least probability", takes_effect="new run",
         help="Histories that are rarer than this share of all training frames are not looked at.",
     )  # fmt: skip
     smoothing: float = knob(
