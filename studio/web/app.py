@@ -15,7 +15,9 @@ from starlette.staticfiles import StaticFiles
 from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.workspace import Workspace
 from studio.web import (
+    behaviour_routes,
     comparison_routes,
+    document_pages,
     event_stream,
     guide_routes,
     import_routes,
@@ -56,6 +58,8 @@ ROUTERS = (
     result_routes.router,
     picture_routes.router,
     comparison_routes.router,
+    behaviour_routes.router,
+    document_pages.router,
     report_routes.router,
     scene_routes.router,
     scene_relay.router,

@@ -1,4 +1,4 @@
-"""The studio's further pages: comparisons, and what `studio reproduce` found."""
+"""What `studio reproduce` found, for the page of reports and as downloads."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,7 +12,6 @@ from studio.errors import NotFoundError, SessionError
 from studio.experiments.findings_files import REPORT, RESULTS, SUMMARY
 from studio.typed_decoding import decode_json
 from studio.web.doors import Doors, doors_of
-from studio.web.page_routes import assets_folder
 from studio.web.schemas import Answer
 
 router = APIRouter(tags=["reports"])
@@ -29,18 +28,6 @@ class Reports(Answer):
     software: str = ""
     date: str = ""
     experiments: list[dict[str, Any]] = Field(default_factory=list)
-
-
-@router.get("/comparisons", include_in_schema=False)
-def comparisons_page() -> Response:
-    """The page of comparisons."""
-    return _page("comparisons.html")
-
-
-@router.get("/reports", include_in_schema=False)
-def reports_page() -> Response:
-    """The page of reproduced figures."""
-    return _page("reports.html")
 
 
 @router.get("/api/reports")
@@ -77,7 +64,3 @@ class _Results(msgspec.Struct, frozen=True):
 
 def _folder(doors: Doors) -> Path:
     return doors.workspace.root / REPRODUCTION_FOLDER
-
-
-def _page(name: str) -> Response:
-    return FileResponse(assets_folder() / name, media_type="text/html", headers={"cache-control": "no-cache"})

@@ -1,82 +1,133 @@
-"""Behaviour models through the API: listed, chosen for a run, asked for by a knob that needs one."""
+"""Behaviour models through the API and as a page: clusters as poses, who follows whom, entropies, walks."""
 
-from arm_behaviour import arm_model, keep_arm_model
-from toy_session import make_session, true_poses
+import itertools
+import re
+
+import numpy as np
+import pytest
+from toy_behaviour import FPS, recordings, toy_model
 from web_doubles import Studio
 
-RUNS = "/api/sessions/toy/runs"
-WISH = {"weighting": "edge-region", "start_pose": true_poses()[0].tolist()}
+from studio.behaviour.model import BehaviourModel
+from studio.behaviour.model_file import write_model
+from studio.body.catalogue import load_body
+from studio.body.forward_kinematics import limb_ends
+from studio.runs.behaviour_models import SUFFIX, models_folder
+from studio.web.document_pages import PAGES
 
 
-def with_arm(studio: Studio) -> Studio:
-    """The studio's workspace with the arm's session and its model."""
-    make_session(studio.workspace.root / "toy")
-    keep_arm_model(studio.workspace.root)
+@pytest.fixture(scope="module")
+def model() -> BehaviourModel:
+    return toy_model()
+
+
+@pytest.fixture
+def learnt(studio: Studio, model: BehaviourModel) -> Studio:
+    """A workspace with one model."""
+    folder = models_folder(studio.workspace.root)
+    folder.mkdir(parents=True)
+    write_model(model, folder / f"wave{SUFFIX}")
     return studio
 
 
-def test_models_are_among_the_choices(studio: Studio) -> None:
-    assert studio.client.get("/api/choices").json()["behaviours"] == []
-    path = keep_arm_model(studio.workspace.root)
-    path.with_name("broken.behaviour").write_bytes(b"nonsense")
-    told = studio.client.get("/api/choices").json()
-    broken, swings = told["behaviours"]
-    assert "damaged" in broken["problem"]
-    model = arm_model()
-    assert swings == {
-        "name": "swings",
-        "body": "planar_arm4",
-        "clusters": model.clusters,
-        "states": model.states,
-        "frames": model.making.frames,
-        "problem": "",
-    }
-    needs = {entry["name"]: entry["needs_behaviour"] for entry in told["trackers"]}
-    assert needs == {"annealed": False, "behaviour": True, "condensation": False, "swarm": False}
+def test_models_are_listed_and_a_damaged_one_says_why(learnt: Studio, model: BehaviourModel) -> None:
+    (models_folder(learnt.workspace.root) / f"broken{SUFFIX}").write_bytes(b"nothing")
+    broken, wave = learnt.client.get("/api/behaviours").json()["models"]
+    assert (broken["name"], wave["name"]) == ("broken", "wave")
+    assert broken["problem"]
+    assert wave["entropy_test"] is None
+    assert (wave["clusters"], wave["states"], wave["fps"]) == (model.clusters, model.states, FPS)
 
 
-def test_a_run_gets_the_model_asked_for_or_the_only_one(studio: Studio) -> None:
-    client = with_arm(studio).client
-    for number, wish in enumerate(
-        ({"tracker": "behaviour"}, {"tracker": "behaviour", "behaviour": "swings"}, {"behaviour": "swings"})
-    ):
-        answer = client.post(RUNS, json={**WISH, **wish, "name": f"run{number}"})
-        assert answer.status_code == 201, answer.text
-        assert client.get(f"{RUNS}/run{number}").json()["behaviour"] == "swings"
-    client.post(RUNS, json={**WISH, "name": "plain"})
-    assert client.get(f"{RUNS}/plain").json()["behaviour"] == ""
+def test_clusters_are_poses_with_their_share_and_their_movement(
+    learnt: Studio, model: BehaviourModel
+) -> None:
+    told = learnt.client.get("/api/behaviours/wave").json()
+    assert [limb["side"] for limb in told["limbs"]] == ["middle"] * 4
+    assert {cluster["cluster"] for cluster in told["clusters"]} == set(range(model.clusters))
+    shares = [cluster["share"] for cluster in told["clusters"]]
+    assert shares == sorted(shares, reverse=True)
+    assert sum(shares) == pytest.approx(1.0)
+    body = load_body("planar_arm4")
+    for cluster in told["clusters"]:
+        number = cluster["cluster"]
+        pose = model.prototypes.poses[number]
+        ends = limb_ends(body, pose[None])[0]
+        np.testing.assert_allclose(cluster["limbs"], ends, atol=0.06)
+        # The arm's tip moves along the arrow: seen again a frame later, on a straight line.
+        later = limb_ends(body, (pose + 1e-4 * model.prototypes.derivatives[number])[None])[0]
+        speed = (later[-1, 1] - ends[-1, 1]) * 1e4 * FPS
+        ((begin, end),) = cluster["arrows"]
+        np.testing.assert_allclose(
+            np.subtract(end, begin), speed * told["arrow_seconds"], atol=0.2 + 0.01 * np.abs(speed).max()
+        )
 
 
-def test_what_does_not_fit_is_refused_with_the_reason(studio: Studio) -> None:
-    client = with_arm(studio).client
-    for wish, status, words in (
-        ({"tracker": "behaviour", "behaviour": "none"}, 404, "swings"),
-        ({"behaviour": "../swings"}, 422, ""),
-    ):
-        answer = client.post(RUNS, json={**WISH, **wish})
-        assert answer.status_code == status, answer.text
-        assert words in answer.text
-    answer = client.post("/api/sessions/take1/runs", json={"behaviour": "swings"})
-    assert answer.status_code == 422
-    assert "4 parameters" in answer.json()["message"]
-    answer = client.post("/api/sessions/take1/runs", json={"tracker": "behaviour"})
-    assert answer.status_code == 422
-    assert "planar_arm4" in answer.json()["hint"]
+def test_stays_and_transitions_are_counted_in_the_recordings(learnt: Studio, model: BehaviourModel) -> None:
+    told = learnt.client.get("/api/behaviours/wave").json()
+    runs: dict[int, list[int]] = {}
+    follows: dict[tuple[int, int], int] = {}
+    for poses in recordings():
+        labels = model.labels(poses).tolist()
+        for before, after in itertools.pairwise(labels):
+            if before != after:
+                follows[before, after] = follows.get((before, after), 0) + 1
+        for label, row in itertools.groupby(labels):
+            runs.setdefault(label, []).append(len(list(row)))
+    for cluster in told["clusters"]:
+        assert cluster["stays"] == pytest.approx(np.mean(runs[cluster["cluster"]]))
+    for transition in told["transitions"]:
+        source = transition["source"]
+        left = sum(count for (before, _), count in follows.items() if before == source)
+        assert transition["probability"] == pytest.approx(follows[source, transition["target"]] / left)
+    assert sum(told["context_lengths"]) == model.states
+    assert sum(told["kept_lengths"]) == int(model.automaton.kept.sum())
 
 
-def test_a_live_change_to_prediction_needs_a_model(studio: Studio) -> None:
-    client = with_arm(studio).client
-    client.post(RUNS, json={**WISH, "name": "plain"})
-    client.post(RUNS, json={**WISH, "name": "guided", "behaviour": "swings"})
-    refused = client.patch(f"{RUNS}/plain/settings", json={"prediction": "behaviour"})
-    assert refused.status_code == 422
-    assert "no behaviour model" in refused.json()["message"]
-    assert studio.control.changes == []
-    assert client.patch(f"{RUNS}/guided/settings", json={"prediction": "behaviour"}).status_code == 200
-    assert studio.control.changes == [{"prediction": "behaviour"}]
+def test_a_longer_memory_says_what_it_was_learnt_from_better(learnt: Studio) -> None:
+    lines = learnt.client.get("/api/behaviours/wave/entropies").json()["lines"]
+    assert len(lines) == 2
+    for line in lines:
+        assert line["memory"][0] == 0
+        assert line["states"][0] == 1
+        assert line["train"][5] < line["train"][0]
+        assert len(line["test"]) == len(line["memory"])
+    assert sum(lines[1]["states"]) <= sum(lines[0]["states"])
 
 
-def test_the_form_offers_models(studio: Studio) -> None:
-    page = studio.client.get("/assets/js/new_run.js").text
-    assert "Behaviour model" in page
-    assert "needs_behaviour" in page
+def test_a_walk_goes_along_the_automaton_and_is_the_same_again(learnt: Studio, model: BehaviourModel) -> None:
+    path = "/api/behaviours/wave/walk?frames=60&seed=4"
+    walk = learnt.client.get(path).json()
+    assert walk == learnt.client.get(path).json()
+    assert walk != learnt.client.get("/api/behaviours/wave/walk?frames=60&seed=5").json() | {"seed": 4}
+    assert np.shape(walk["frames"]) == (60, 4, 2, 3)
+    assert [history[-1] for history in walk["histories"]] == walk["clusters"]
+    contexts = list(model.automaton.contexts)
+    for before, after in itertools.pairwise(walk["histories"]):
+        state = contexts.index(tuple(before))
+        assert model.automaton.probabilities[state, after[-1]] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("path", "status"),
+    [
+        ("none", 404),
+        ("none/walk", 404),
+        ("..%2Fx", 404),
+        ("wave/walk?frames=0", 422),
+        ("wave/walk?seed=-1", 422),
+    ],
+)
+def test_what_is_not_there_is_told(learnt: Studio, path: str, status: int) -> None:
+    answer = learnt.client.get(f"/api/behaviours/{path}")
+    assert answer.status_code == status
+    assert answer.json()["message"]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_page_marks_its_own_place(studio: Studio, page) -> None:
+    text = studio.client.get(f"/{page.name}").text
+    assert "{{" not in text
+    assert re.findall(r'<a href="([^"]+)" aria-current="page">', text) == [f"/{page.name}"]
+    assert f"/assets/js/{page.name}.js" in text
+    assert ('id="entries"' in text) == page.rail

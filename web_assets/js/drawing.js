@@ -1,7 +1,8 @@
 // When the page's canvases are drawn: together, before a frame of the screen, the newest wish only. However often they are
-// wished for, at least half of the time is left to everything else, so a machine that draws slowly still answers at once.
+// wished for, every other frame and a pause are left to everything else, so a machine that draws slowly still answers.
 
 const LEAST_PAUSE_MILLISECONDS = 100;
+const LONGEST_PAUSE_MILLISECONDS = 500;
 
 const wished = new Set();
 let busy = false;
@@ -25,7 +26,8 @@ async function serve() {
     drawAll();
     // The next frame begins when this one has been handed over: only then it is known how long the drawing took.
     await nextFrame();
-    await pause(Math.max(LEAST_PAUSE_MILLISECONDS, performance.now() - began));
+    const took = performance.now() - began;
+    await pause(Math.min(LONGEST_PAUSE_MILLISECONDS, Math.max(LEAST_PAUSE_MILLISECONDS, took)));
   }
   busy = false;
 }

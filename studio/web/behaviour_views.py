@@ -1,0 +1,161 @@
+"""What a page shows of a behaviour model: clusters as poses, which follow which, entropies, generated movement."""
+
+import math
+from dataclasses import asdict, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.behaviour.model import BehaviourModel, automaton_of
+from studio.behaviour.prediction import generate
+from studio.body.extremities import extremities
+from studio.body.forward_kinematics import limb_ends
+from studio.body.model import BodyModel
+from studio.training.model_shelf import ModelSummary
+from studio.web.behaviour_schemas import (
+    BehaviourDetail,
+    BehaviourLine,
+    ClusterPicture,
+    Entropies,
+    EntropyLine,
+    GeneratedWalk,
+    LimbShape,
+    Transition,
+)
+
+Array = NDArray[np.float64]
+
+ARROW_SECONDS = 0.2
+LEAST_TRANSITION = 0.02
+"""Transitions that are rarer than this, of the times a cluster is left, would only blacken the picture."""
+MEMORIES = (0, 1, 2, 3, 5, 8, 10, 15, 20, 30)
+EPSILON_FACTORS = (1.0, 10.0)
+TRAINING_SHARE = 0.8
+FAR_END = 1
+
+
+def line_of(summary: ModelSummary) -> BehaviourLine:
+    """A model in a list."""
+    told = {name: value for name, value in asdict(summary).items() if name != "path"}
+    for name in ("entropy_train", "entropy_test"):
+        told[name] = None if math.isnan(told[name]) else told[name]
+    return BehaviourLine(**told)
+
+
+def detail_of(summary: ModelSummary, model: BehaviourModel, body: BodyModel) -> BehaviourDetail:
+    """Everything about a model but its entropies and walks. body : of the model's parameters."""
+    counts = _transition_counts(model)
+    lengths = np.array([len(context) for context in model.automaton.contexts])
+    most = int(lengths.max()) + 1
+    return BehaviourDetail(
+        model=line_of(summary),
+        limbs=[
+            LimbShape(
+                name=limb.name, side=limb.side, radius_start=limb.radius_start, radius_end=limb.radius_end
+            )
+            for limb in body.drawn
+        ],
+        arrow_seconds=ARROW_SECONDS,
+        clusters=_clusters(model, body),
+        transitions=_transitions(counts),
+        context_lengths=np.bincount(lengths, minlength=most).tolist(),
+        kept_lengths=np.bincount(lengths[model.automaton.kept], minlength=most).tolist(),
+    )
+
+
+def entropies_of(model: BehaviourModel) -> Entropies:
+    """Eq. 2 over memory, at the model's own ε and at a larger one."""
+    cut = [max(1, round(TRAINING_SHARE * len(labels))) for labels in model.making.labels]
+    train = [labels[:end] for labels, end in zip(model.making.labels, cut, strict=True)]
+    test = [labels[end:] for labels, end in zip(model.making.labels, cut, strict=True) if len(labels) > end]
+    settings = model.making.settings
+    lines = []
+    for epsilon in dict.fromkeys(max(settings.epsilon, 0.01) * factor for factor in EPSILON_FACTORS):
+        made = [
+            automaton_of(train, model.clusters, replace(settings, memory=memory, epsilon=epsilon))
+            for memory in MEMORIES
+        ]
+        lines.append(
+            EntropyLine(
+                epsilon=epsilon,
+                memory=list(MEMORIES),
+                states=[automaton.size for automaton in made],
+                train=[automaton.entropy(train) for automaton in made],
+                test=[automaton.entropy(test) for automaton in made] if test else [],
+            )
+        )
+    return Entropies(lines=lines)
+
+
+def walk_of(model: BehaviourModel, body: BodyModel, frames: int, seed: int) -> GeneratedWalk:
+    """A walk through the automaton and the movement it makes; the same for the same seed."""
+    poses, states = generate(np.random.default_rng(seed), model, frames)
+    contexts = model.automaton.contexts
+    return GeneratedWalk(
+        seed=seed,
+        fps=model.fps,
+        frames=_rounded(limb_ends(body, poses)),
+        clusters=model.automaton.last_symbols[states].tolist(),
+        histories=[list(contexts[state]) for state in states],
+    )
+
+
+def _clusters(model: BehaviourModel, body: BodyModel) -> list[ClusterPicture]:
+    """Prototypes with the root at rest and arrows at the extremities, most frequent first."""
+    prototypes, space = model.prototypes, model.space
+    labels = np.concatenate(model.making.labels)
+    shares = np.bincount(labels, minlength=model.clusters) / len(labels)
+    stays = np.bincount(labels, minlength=model.clusters) / np.maximum(_entries(model), 1.0)
+    still = space.poses(space.angles(prototypes.poses))
+    moved = still.copy()
+    # A thousandth of the way, so that the arrow is the tangent and not the chord.
+    moved[:, space.columns] += 0.001 * prototypes.derivatives
+    ends, later = limb_ends(body, still), limb_ends(body, moved)
+    tips = list(extremities(body))
+    begins = ends[:, tips, FAR_END]
+    ways = (later[:, tips, FAR_END] - begins) * 1000.0 * space.fps * ARROW_SECONDS
+    arrows = np.stack([begins, begins + ways], axis=2)
+    sources = model.making.sources
+    return [
+        ClusterPicture(
+            cluster=int(cluster),
+            share=float(shares[cluster]),
+            stays=float(stays[cluster]),
+            limbs=_rounded(ends[cluster]),
+            arrows=_rounded(arrows[cluster]),
+            source=sources[prototypes.recordings[cluster]] if sources else "",
+            frame=int(prototypes.frames[cluster]),
+        )
+        for cluster in np.argsort(-shares, kind="stable")
+    ]
+
+
+def _entries(model: BehaviourModel) -> Array:
+    """(K,) how often each cluster is entered in the training recordings, their first frames included."""
+    entries = np.zeros(model.clusters)
+    for labels in model.making.labels:
+        first = np.concatenate([[True], labels[1:] != labels[:-1]])
+        entries += np.bincount(labels[first], minlength=model.clusters)
+    return entries
+
+
+def _transition_counts(model: BehaviourModel) -> Array:
+    """(K, K) how often each cluster follows each in the training recordings."""
+    counts = np.zeros((model.clusters, model.clusters))
+    for labels in model.making.labels:
+        np.add.at(counts, (labels[:-1], labels[1:]), 1.0)
+    return counts
+
+
+def _transitions(counts: Array) -> list[Transition]:
+    leaving = counts - np.diag(np.diag(counts))
+    shares = leaving / np.maximum(leaving.sum(axis=1, keepdims=True), 1.0)
+    return [
+        Transition(source=int(source), target=int(target), probability=float(shares[source, target]))
+        for source, target in np.argwhere(shares >= LEAST_TRANSITION)
+    ]
+
+
+def _rounded(points: Array) -> list:
+    """Millimetres; a tenth is finer than any screen."""
+    return np.round(points, 1).tolist()

@@ -1,0 +1,85 @@
+"""The studio's further pages: one frame with a bar of places, what is in it is drawn by each page's own module."""
+
+from dataclasses import dataclass
+from functools import cache
+
+from fastapi import APIRouter
+from starlette.responses import HTMLResponse
+
+from studio.web.page_routes import assets_folder
+
+router = APIRouter(tags=["page"], include_in_schema=False)
+
+TEMPLATE = "document.html"
+RAIL = (
+    '<nav class="rail" aria-label="{title}">\n    <div class="rail-head">\n      <h2>{title}</h2>\n      {button}'
+    '\n    </div>\n    <div class="entries" id="entries"></div>\n  </nav>'
+)
+NEW = '<button class="quiet small" id="new">+ New</button>'
+
+
+@dataclass(frozen=True, slots=True)
+class DocumentPage:
+    """A page. name : its address and its module. rail : whether it has a list at the left; new : and a button that
+    makes something.
+    """
+
+    name: str
+    title: str
+    rail: bool = False
+    new: bool = False
+
+
+PAGES = (
+    DocumentPage("comparisons", "Comparisons", rail=True, new=True),
+    DocumentPage("behaviours", "Behaviours", rail=True),
+    DocumentPage("reports", "Reports"),
+)
+PLACES = (("/", "Studio"), *((f"/{page.name}", page.title) for page in PAGES), ("/guide", "Guide"))
+
+
+@router.get("/comparisons")
+def comparisons_page() -> HTMLResponse:
+    """The page of comparisons."""
+    return _answer("comparisons")
+
+
+@router.get("/behaviours")
+def behaviours_page() -> HTMLResponse:
+    """The page of behaviour models."""
+    return _answer("behaviours")
+
+
+@router.get("/reports")
+def reports_page() -> HTMLResponse:
+    """The page of reproduced figures."""
+    return _answer("reports")
+
+
+def _answer(name: str) -> HTMLResponse:
+    return HTMLResponse(_rendered(name), headers={"cache-control": "no-cache"})
+
+
+@cache
+def _rendered(name: str) -> str:
+    """A page's text; what is put in is our own."""
+    page = next(page for page in PAGES if page.name == name)
+    places = "".join(_link(address, title, page) for address, title in PLACES)
+    rail = RAIL.format(title=page.title, button=NEW if page.new else "") if page.rail else ""
+    text = (assets_folder() / TEMPLATE).read_text(encoding="utf-8")
+    filled = {
+        "title": page.title,
+        "module": page.name,
+        "columns": "" if page.rail else "wide",
+        "places": places,
+        "rail": rail,
+    }
+    for entry, value in filled.items():
+        text = text.replace(f"{{{{{entry}}}}}", value)
+    return text
+
+
+def _link(address: str, title: str, page: DocumentPage) -> str:
+    """A place in the bar, marked where it is the page itself."""
+    mark = ' aria-current="page"' if address == f"/{page.name}" else ""
+    return f'<a href="{address}"{mark}>{title}</a>'
