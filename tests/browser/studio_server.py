@@ -32,8 +32,12 @@ class StudioServer:
             )
         found = self._printed()
         self.address, self.origin = found[0].removeprefix("Open "), found[1]
+        # A connection each: one that is kept may be closed by the server just when it is used again.
         self._client = httpx.Client(
-            base_url=self.origin, headers={"authorization": f"Bearer {found[2]}"}, timeout=PATIENCE
+            base_url=self.origin,
+            headers={"authorization": f"Bearer {found[2]}"},
+            timeout=PATIENCE,
+            limits=httpx.Limits(max_keepalive_connections=0),
         )
 
     def _printed(self) -> re.Match[str]:
