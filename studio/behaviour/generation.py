@@ -3,7 +3,12 @@
 The labels are drawn from γ alone (Caillette et al. 2007, 4.2). The motion is the most probable one for these labels:
 the x_1 … x_F that maximise Σ ln N((x_t, x_t - x_{t-1}) | cluster of t), one banded system of linear equations. Eq. 3
 and 4 would not do here: without pictures to weigh particles by, what Eq. 4 adds in every frame leads away for good.
+
+Where every recording of a movement ends, the automaton knows no way on but to stay. A walk that gets there begins anew
+from a start state, and so does the motion: a cut, as between two takes of a film.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +37,19 @@ def generate(
         raise BehaviourError(
             f"There is no state {start}.", f"The automaton's states go from 0 to {model.states - 1}."
         )
-    states, labels = walk(rng, model.automaton, frames, model.steps_per_frame, start)
-    return model.space.poses(likeliest_motion(model.dynamics, labels)), states
+    taken = walk(rng, model.automaton, frames, model.steps_per_frame, start)
+    pieces = np.split(taken.labels, np.flatnonzero(taken.begins)[1:])
+    values = np.concatenate([likeliest_motion(model.dynamics, labels) for labels in pieces])
+    return model.space.poses(values), taken.states
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Walk:
+    """states, labels : (F,). begins : (F,) bool, frames that are entered from no other: the first, and after cuts."""
+
+    states: IntArray
+    labels: IntArray
+    begins: NDArray[np.bool_]
 
 
 def walk(
@@ -42,21 +58,40 @@ def walk(
     frames: int,
     steps_per_frame: float = 1.0,
     start: int | None = None,
-) -> tuple[IntArray, IntArray]:
-    """States (F,) and labels (F,) of a walk by τ and γ. A frame takes so many steps on average, 0 among them."""
-    state = int(rng.choice(automaton.size, p=automaton.start)) if start is None else start
-    label = int(automaton.last_symbols[state])
-    if label < 0:
-        # The empty context has no cluster yet.
-        state, label = _step(rng, automaton, state)
+) -> Walk:
+    """A walk by τ and γ. A frame takes so many steps on average, 0 among them."""
     states, labels = np.empty(frames, dtype=np.int64), np.empty(frames, dtype=np.int64)
+    begins = np.zeros(frames, dtype=np.bool_)
+    state, label = _begun(rng, automaton, start)
+    begins[0] = True
     taken = 0
     for frame in range(frames):
         while taken < int(frame * steps_per_frame + 1e-9):
-            state, label = _step(rng, automaton, state)
             taken += 1
+            if _ends(automaton, state):
+                state, label = _begun(rng, automaton, None)
+                begins[frame] = True
+            else:
+                state, label = _step(rng, automaton, state)
         states[frame], labels[frame] = state, label
-    return states, labels
+    return Walk(states, labels, begins)
+
+
+def _begun(rng: np.random.Generator, automaton: Automaton, start: int | None) -> tuple[int, int]:
+    """A first state and its label; one that has none takes a step."""
+    state = int(rng.choice(automaton.size, p=automaton.start)) if start is None else start
+    label = int(automaton.last_symbols[state])
+    return (state, label) if label >= 0 else _step(rng, automaton, state)
+
+
+def _ends(automaton: Automaton, state: int) -> bool:
+    """Whether a state leads to itself only, by its own label."""
+    label = automaton.last_symbols[state]
+    return bool(
+        label >= 0
+        and automaton.probabilities[state, label] == 1.0
+        and automaton.next_state[state, label] == state
+    )
 
 
 def _step(rng: np.random.Generator, automaton: Automaton, state: int) -> tuple[int, int]:
@@ -65,11 +100,14 @@ def _step(rng: np.random.Generator, automaton: Automaton, state: int) -> tuple[i
 
 
 def likeliest_motion(dynamics: GaussianMixture, labels: IntArray) -> Array:
-    """(F, d) the most probable x_1 … x_F for the clusters (F,) that the frames belong to, F >= 2.
+    """(F, d) the most probable x_1 … x_F for the clusters (F,) that the frames belong to.
 
-    dynamics : Gaussians of (x, ẋ), 2 d features each. The first frame has the second's derivative.
+    dynamics : Gaussians of (x, ẋ), 2 d features each. The first frame has the second's derivative; a single frame has
+    none, and is its cluster's mean.
     """
     half = dynamics.means.shape[1] // 2
+    if len(labels) < 2:
+        return dynamics.means[labels, :half]
     precisions = dynamics.whiteners.transpose(0, 2, 1) @ dynamics.whiteners
     wanted = np.einsum("kij,kj->ki", precisions, dynamics.means)
     own = np.zeros((len(labels), half, half))

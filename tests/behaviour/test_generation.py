@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import minimize
 from toy_behaviour import recordings, toy_model
 
+from studio.behaviour.automaton_learning import ContextTest, learn_automaton
 from studio.behaviour.gaussian_mixture import GaussianMixture
 from studio.behaviour.generation import generate, likeliest_motion, walk
 from studio.behaviour.model import BehaviourModel
@@ -32,7 +33,9 @@ def test_walks_visit_clusters_as_often_as_the_training(model: BehaviourModel) ->
     slow = np.concatenate(model.making.labels[::2])
     own = np.unique(slow)
     start = int(np.flatnonzero(np.isin(model.automaton.last_symbols, own) & (model.automaton.start > 0.0))[0])
-    states, labels = walk(np.random.default_rng(0), model.automaton, 20_000, start=start)
+    taken = walk(np.random.default_rng(0), model.automaton, 20_000, start=start)
+    states, labels = taken.states, taken.labels
+    assert taken.begins.sum() == 1
     visits = np.bincount(labels, minlength=model.clusters) / 20_000
     usual = np.bincount(slow, minlength=model.clusters) / len(slow)
     assert np.abs(visits - usual).max() < 0.03
@@ -82,15 +85,37 @@ def test_a_chosen_start_and_seeds(model: BehaviourModel) -> None:
 @pytest.mark.parametrize("rate", [0.4, 2.0])
 def test_at_another_rate_the_motion_takes_as_long(model: BehaviourModel, rate: float) -> None:
     other = model.at_rate(model.fps / rate)
-    states, labels = walk(np.random.default_rng(3), other.automaton, 1000, other.steps_per_frame, start=2)
-    changes = np.count_nonzero(np.diff(states))
+    taken = walk(np.random.default_rng(3), other.automaton, 1000, other.steps_per_frame, start=2)
+    changes = np.count_nonzero(np.diff(taken.states))
     if rate < 1.0:
         assert changes <= 400
-    assert len(labels) == 1000
+    assert len(taken.labels) == 1000
     poses, _ = generate(np.random.default_rng(3), other, 300)
     per_second = np.linalg.norm(np.diff(poses, axis=0), axis=1).mean() * other.fps
     usual = np.mean([np.linalg.norm(np.diff(poses, axis=0), axis=1).mean() for poses in recordings()])
     assert 0.4 < per_second / (usual * model.fps) < 1.6
+
+
+def test_a_walk_that_comes_to_an_end_begins_anew() -> None:
+    labels = np.array([0] * 5 + [1] * 5 + [2] * 20)
+    automaton = learn_automaton([labels] * 4, 3, ContextTest(3, 0.1, 0.0))
+    taken = walk(np.random.default_rng(2), automaton, 500)
+    np.testing.assert_array_equal(automaton.last_symbols[taken.states], taken.labels)
+    cuts = np.flatnonzero(taken.begins)
+    assert len(cuts) > 10
+    for frame in cuts[1:]:
+        before = taken.states[frame - 1]
+        assert automaton.contexts[before][-1] == 2
+        assert automaton.probabilities[before, 2] == 1.0
+    assert (0, 1) in set(itertools.pairwise(taken.labels.tolist()))
+    within = np.flatnonzero(~taken.begins)
+    assert {(int(taken.labels[at - 1]), int(taken.labels[at])) for at in within} <= {
+        (0, 0),
+        (0, 1),
+        (1, 1),
+        (1, 2),
+        (2, 2),
+    }
 
 
 def test_refusals(model: BehaviourModel) -> None:
