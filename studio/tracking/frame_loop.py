@@ -162,14 +162,14 @@ class FrameSearch:
 
     def _expected(self, particles: ParticleSet, settings: Any) -> Array:  # noqa: ANN401
         """(S, D) where a search that begins with these particles expects the body: what the tracker says, else their
-        mean, and beside either the pose that was reported last, if there is one.
+        mean; second of them the pose that was reported last, if there is one.
         """
         if isinstance(self.tracker, Foreseeing):
             poses = self.tracker.expectations(particles, self.space, settings)
         else:
             poses = particles.poses.mean(axis=0)[None]
         last = self.previous.estimate
-        return poses if last is None else np.concatenate([poses, last[None]])
+        return poses if last is None else np.concatenate([poses[:1], last[None], poses[1:]])
 
     def _told(self, problem: FrameProblem, repeat: int, expected: Array) -> FrameProblem:
         """The problem, told once a search what is expected, if it wants to know."""

@@ -12,7 +12,7 @@ from studio.knobs import knobs_of
 from studio.weighting.catalogue import WEIGHTINGS
 from studio.weighting.problem import TRUNK_FIRST
 
-STAGED = ("edge-silhouette", "edge-region-silhouette")
+STAGED = ("edge-silhouette", "edge-region-silhouette", "blobs")
 
 
 def test_the_names():
@@ -22,6 +22,7 @@ def test_the_names():
         "edge-region-silhouette",
         "bodytrack",
         "template",
+        "blobs",
     ]
     assert all(name == entry.name for name, entry in WEIGHTINGS.items())
 
