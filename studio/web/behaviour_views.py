@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.behaviour.model import BehaviourModel, automaton_of
-from studio.behaviour.prediction import generate
+from studio.behaviour.generation import generate
 from studio.body.extremities import extremities
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
