@@ -58,7 +58,7 @@ def behaviour_entropies(path: Named) -> Entropies:
 @router.get("/{behaviour}/walk")
 def behaviour_walk(
     path: Named,
-    frames: Annotated[int, Query(ge=1, le=MOST_FRAMES)] = 300,
+    frames: Annotated[int, Query(ge=2, le=MOST_FRAMES)] = 300,
     seed: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
 ) -> GeneratedWalk:
     """A walk through the automaton, as movement."""

@@ -13,7 +13,7 @@ export function walkCard(path, told) {
   const again = element("button", { type: "button", className: "primary", textContent: "Generate" });
   const play = element("button", { type: "button", textContent: "Pause", disabled: true });
   const slider = element("input", { type: "range", min: 0, max: FRAMES - 1, value: 0, disabled: true, ariaLabel: "Frame" });
-  const words = element("p", { className: "lead", textContent: "A walk from state to state by the automaton's probabilities, the pose moved within each cluster as Eq. 4 says; global position and orientation rest." });
+  const words = element("p", { className: "lead", textContent: "A walk from state to state by the automaton's probabilities, and the smooth movement that suits its clusters best; global position and orientation rest." });
   const box = element("section", { className: "card-box" }, element("h2", { textContent: "Generated movement" }),
     element("div", { className: "walk" }, canvas, element("div", { className: "walk-side" }, words,
       element("div", { className: "form-foot" }, again, play), slider)));
