@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solveh_banded
+
+from studio.training.banded_kernels import solve_banded
 
 Array = NDArray[np.float64]
 
@@ -118,16 +119,14 @@ def _transposed_difference(values: Array, order: int) -> Array:
 def _solved(normal: Array, bands: Array, right: Array, held: NDArray[np.bool_], damping: float) -> Array:
     """(F, D) solving (normal on the diagonal + steadiness + damping) move = right; held entries do not move."""
     count, width = right.shape
-    reach = min(2, count - 1) * width if count > 1 else 0
-    reach = max(reach, width - 1)
-    upper = np.zeros((reach + 1, count * width))
+    reach = max(min(2, count - 1) * width, width - 1)
+    lower = np.zeros((count * width, reach + 1))
     for row in range(width):
-        for column in range(row, width):
-            upper[reach + row - column, column::width] = normal[:, row, column]
-    upper[reach] *= 1.0 + damping
-    for steps in range(3):
-        if steps * width <= reach and count > steps:
-            coupling = np.repeat(bands[steps, : count - steps], width)
-            upper[reach - steps * width, steps * width :] += coupling
-    upper[reach] += np.where(held.ravel(), HELD, 0.0)
-    return solveh_banded(upper, right.ravel()).reshape(count, width)
+        for column in range(row + 1):
+            lower[row::width, reach + column - row] = normal[:, row, column]
+    lower[:, reach] *= 1.0 + damping
+    for steps in range(min(3, count)):
+        coupling = np.repeat(bands[steps, : count - steps], width)
+        lower[steps * width :, reach - steps * width] += coupling
+    lower[:, reach] += np.where(held.ravel(), HELD, 0.0)
+    return solve_banded(lower, right.ravel().copy()).reshape(count, width)

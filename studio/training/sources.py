@@ -5,10 +5,11 @@ motion is made without rendering it. A skeleton is put on the synthetic one with
 met by the body in the size that their distances tell; a run of the same body is taken as it is.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +21,7 @@ from studio.sessions.manifest import FILE_NAME as SESSION_FILE
 from studio.sessions.run_record import FILE_NAME as RUN_FILE
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
+from studio.synthesis.mending import mended
 from studio.synthesis.person import PersonMotion
 from studio.synthesis.recipe_file import find_recipe, read_recipe, recipe_names
 from studio.synthesis.recipes import recipe_motion
@@ -93,7 +95,7 @@ def read_source(
     if path.is_file():
         recording = _read_file(path, body, skeleton, fps, progress)
     elif str(source) in recipe_names():
-        recording = _read_recipe(find_recipe(str(source)), body, fps, progress)
+        recording = recipe_recording(str(source), body, fps=fps, progress=progress)
     else:
         recording = _read_run(_find_run(str(source), workspace or Workspace()), body, fps, progress)
     if recording.frame_count < FEWEST_FRAMES:
@@ -129,6 +131,32 @@ def fitted_person(
     return _fitted(of_person(motion), body, name, motion.fps, progress)
 
 
+def recipe_recording(
+    recipe: str | Path,
+    body: BodyModel,
+    *,
+    fps: float = FPS,
+    options: Mapping[str, float] | None = None,
+    frames: int | None = None,
+    progress: Progress | None = None,
+) -> Recording:
+    """The motion of a footage's recipe (a file or a bundled name) on the body's own proportions; nothing is rendered.
+
+    options : of the motion, in place of the recipe's ({"performance": 2} is the second performance of joined clips).
+    frames : instead of the recipe's, at its rate. Raises StudioError, for a recipe without a person too.
+    """
+    path = find_recipe(recipe)
+    wanted = read_recipe(path)
+    if wanted.motion == ARM:
+        raise StudioError(f"Recipe '{path.name}' moves no person.", "Choose a recipe of a person.")
+    changed = msgspec.structs.replace(
+        wanted, options={**wanted.options, **(options or {})}, frames=frames or wanted.frames
+    )
+    motion = recipe_motion(changed, path.parent, skeleton_of_body(body))
+    times = frame_times((motion.frame_count - 1) / motion.fps, fps)
+    return fitted_person(sampled(motion, times, fps), body, path.stem, progress)
+
+
 def _fitted(targets: Targets, body: BodyModel, name: str, fps: float, progress: Progress | None) -> Recording:
     found = fit_poses(body, targets, fps, progress)
     rms = float(np.sqrt(np.nanmean(found.rms_mm**2)))
@@ -140,7 +168,7 @@ def _read_file(
 ) -> Recording:
     ending = path.suffix.lower()
     if ending == RECIPE:
-        return _read_recipe(path, body, fps, progress)
+        return recipe_recording(path, body, fps=fps, progress=progress)
     if ending in SKELETON_FILES:
         marker_names(body)
         recorded = read_recording(path, skeleton if ending == ".amc" else None)
@@ -167,7 +195,7 @@ def _from_recorded(
         times = np.arange(len(recorded.positions)) / recorded.fps
         joints = MarkerMotion(recorded.names, times, recorded.positions, rate=recorded.fps)
         return _from_points(joints, body, Path(recorded.source), fps, progress)
-    whole = on_skeleton(recorded, skeleton_of_body(body))
+    whole = mended(on_skeleton(recorded, skeleton_of_body(body)))
     return fitted_person(sampled(whole, frame_times(recorded.seconds, fps), fps), body, name, progress)
 
 
@@ -194,16 +222,6 @@ def _sized(body: BodyModel, targets: Targets) -> BodyModel:
             if length > 1.0:
                 lengths[f"{one}_{other}"] = length
     return fit_subject(body, Subject(body=body.name, lengths_mm=lengths))[0]
-
-
-def _read_recipe(path: Path, body: BodyModel, fps: float, progress: Progress | None) -> Recording:
-    """A recipe's motion on the body's own proportions."""
-    recipe = read_recipe(path)
-    if recipe.motion == ARM:
-        raise StudioError(f"Recipe '{path.name}' moves no person.", "Choose a recipe of a person.")
-    motion = recipe_motion(recipe, path.parent, skeleton_of_body(body))
-    times = frame_times((motion.frame_count - 1) / motion.fps, fps)
-    return fitted_person(sampled(motion, times, fps), body, path.stem, progress)
 
 
 def _find_run(source: str, workspace: Workspace) -> StoredRun:

@@ -13,10 +13,10 @@ from studio.synthesis.recipe_file import find_recipe, read_recipe, recipe_camera
 @pytest.mark.parametrize("name", recipe_names())
 def test_bundled_recipes_are_sound(name: str) -> None:
     recipe = read_recipe(find_recipe(name))
-    assert recipe.motion in {*MOTIONS, "arm", "recorded"}
+    assert recipe.motion in {*MOTIONS, "arm", "recorded", "joined"}
     if not recipe.cameras.calibration:
         cameras = recipe_cameras(recipe, np.random.default_rng(recipe.seed))
-        assert len(cameras) == (len(recipe.cameras.placed) or 4)
+        assert len(cameras) == (len(recipe.cameras.placed) or {"corners": 4, "five": 5}[recipe.cameras.rig])
     assert recipe.weighting == ("template" if recipe.motion == "arm" else "")
 
 
@@ -57,3 +57,23 @@ def test_a_wrong_entry_is_named(tmp_path: Path, change: tuple[str, str], words: 
         read_recipe(path)
     assert "mine.toml" in told.value.message
     assert told.value.hint
+
+
+def test_a_recipe_like_another_differs_in_its_own_entries_alone(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text('like = "walk"\nframes = 7\n[options]\nradius_mm = 500\n[picture]\nwidth = 64\n')
+    mine, walk = read_recipe(path), read_recipe(find_recipe("walk"))
+    assert (mine.frames, mine.picture.width, mine.options["radius_mm"]) == (7, 64, 500.0)
+    assert (mine.title, mine.cameras, mine.picture.height) == (walk.title, walk.cameras, walk.picture.height)
+    assert set(walk.options) <= set(mine.options)
+    (tmp_path / "second.toml").write_text('like = "mine.toml"\nseed = 9\n')
+    second = read_recipe(tmp_path / "second.toml")
+    assert (second.frames, second.seed) == (7, 9)
+
+
+@pytest.mark.parametrize("other", ['"mine.toml"', "5"])
+def test_a_recipe_that_is_like_itself_or_like_no_recipe_is_refused(tmp_path: Path, other: str) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(f"like = {other}\n")
+    with pytest.raises(StudioError, match=r"mine.toml.*like"):
+        read_recipe(path)
