@@ -6,8 +6,9 @@ weighting reads them (about 2.5 MB a frame of four 640 × 480 cameras without), 
 
 import dataclasses
 from collections import OrderedDict
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from pathlib import Path
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -22,6 +23,10 @@ from studio.sessions.session import Session
 
 MOST_BYTES = 3_000_000_000
 NO_PICTURE = np.zeros((0, 0, 3), np.uint8)
+MOST_PREPARED = 3
+"""A sequence of visual hulls, ready to be weighed, takes some 100 MB."""
+
+T = TypeVar("T")
 
 
 class FootageShelf:
@@ -31,6 +36,7 @@ class FootageShelf:
         self.folder = folder
         self._most, self._bytes = most_bytes, 0
         self._evidence: OrderedDict[Hashable, FrameEvidence] = OrderedDict()
+        self._prepared: OrderedDict[Hashable, Any] = OrderedDict()
         self._open: tuple[Hashable, EvidenceMaker] | None = None
         self._footage: tuple[Path, Footage, Backgrounds] | None = None
 
@@ -70,9 +76,19 @@ class FootageShelf:
             )
         return self._kept(key, seen)
 
+    def prepared(self, key: Hashable, make: Callable[[], T]) -> T:
+        """What `make` makes, once for all trials that ask for the same key; few such things are kept."""
+        if key not in self._prepared:
+            self._prepared[key] = make()
+            while len(self._prepared) > MOST_PREPARED:
+                self._prepared.popitem(last=False)
+        self._prepared.move_to_end(key)
+        return cast("T", self._prepared[key])
+
     def close(self) -> None:
         """Let go of files and of everything kept."""
         self._evidence.clear()
+        self._prepared.clear()
         self._bytes = 0
         self._open = None
         if self._footage is not None:

@@ -19,7 +19,10 @@ from studio.runs.new_run import software_version
 from studio.sessions.atomic_files import write_text
 
 # What decides on an outcome; pages, commands and reports do not.
-SCIENCE = ("geometry", "body", "capture", "evidence", "weighting", "tracking", "runs", "evaluation")
+SCIENCE = (
+    *("geometry", "body", "capture", "evidence", "volume", "weighting", "behaviour", "tracking", "runs"),
+    *("evaluation", "training"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,16 +80,21 @@ def footage_of(experiment: Experiment, trial: Trial) -> tuple[str, ...]:
     return named or experiment.footage
 
 
-@cache
 def measured_by() -> str:
     """The studio's version and a digest of the code that decides on outcomes: "0.1.0+1a2b3c4d"."""
+    return f"{software_version()}+{code_digest(SCIENCE)}"
+
+
+@cache
+def code_digest(rooms: tuple[str, ...]) -> str:
+    """A digest of the code of some rooms, read once in a process."""
     package = Path(studio.__file__).parent
     digest = hashlib.sha256()
-    for room in SCIENCE:
+    for room in rooms:
         for path in sorted((package / room).rglob("*")):
             if path.suffix in (".py", ".toml"):
                 digest.update(path.read_bytes())
-    return f"{software_version()}+{digest.hexdigest()[:8]}"
+    return digest.hexdigest()[:8]
 
 
 def plain(value: Plain) -> Any:  # noqa: ANN401
