@@ -61,7 +61,7 @@ class EvidenceMaker:
         picture = self._footage.picture(camera, frame)
         if self.hull_of_pixels:
             nothing = _nothing(picture.shape[0], picture.shape[1])
-            background = self._backgrounds.yuv(camera, self.settings.mask_noise)
+            background = self._backgrounds.yuv(camera, self.settings.hull_noise)
             return ViewEvidence(camera, picture, nothing, nothing, background)
         mask = self._mask(camera, frame, picture)
         return ViewEvidence(camera, picture, mask, self._edges(picture, mask))

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from studio.evidence.yuv_background import LEAST_NOISE
 from studio.knobs import knob
 
 BACKGROUND_MODELS = ("auto", "mask", "gaussian", "median", "mog2", "knn")
@@ -166,4 +167,15 @@ class EvidenceSettings:
         takes_effect=NEXT_FRAME,
         help="What carves the visual hull: pixels tested one by one against the background's colours, as in the paper"
         " (no mask is made), or masks; auto: pixels where every camera has a plate or an empty clip and no masks.",
+    )
+    hull_noise: float = knob(
+        LEAST_NOISE,
+        0.5,
+        40.0,
+        0.5,
+        label="hull's camera noise",
+        unit="grey levels",
+        takes_effect=NEXT_FRAME,
+        help="Smallest standard deviation of a background pixel where pixels carve the hull; raise it where the light"
+        " flickers.",
     )

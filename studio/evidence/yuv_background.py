@@ -19,7 +19,7 @@ Floats = NDArray[np.float32]
 
 SHADOW = 0.1
 """Share of the luminance that a shadow takes away."""
-LEAST_NOISE = 4.0
+LEAST_NOISE = 2.5
 """Grey levels: the smallest standard deviation of a pixel in any direction of BGR."""
 LUMINANCE = np.array([0.114, 0.587, 0.299])
 """Of B, G and R."""
@@ -42,13 +42,25 @@ class YuvBackground:
         rows = np.concatenate([self.mean, np.stack(parts, axis=-1)], axis=-1)
         return np.ascontiguousarray(rows.reshape(-1, 9), dtype=np.float32)
 
-    def squared_distances(self, picture: Bytes, shadow: float = SHADOW) -> Array:
-        """(H, W) squared Mahalanobis distance of each pixel of a BGR picture from background or shadow."""
+    def squared_distances(self, picture: Bytes, shadow: float = SHADOW, deepest: float = 0.0) -> Array:
+        """(H, W) squared Mahalanobis distance of each pixel of a BGR picture from background or shadow.
+
+        deepest : beyond the paper, of pixels in shadow the smaller of that and the distance from the background
+        darkened, all of YUV, to the pixel's own luminance, but by no larger a share than this.
+        """
         seen = picture @ YUV_OF_BGR.T
         mean = self.mean.astype(np.float64)
         in_shadow = seen[..., 0] < (1.0 - 0.5 * shadow) * mean[..., 0]
-        mean[..., 0] *= np.where(in_shadow, 1.0 - shadow, 1.0)
-        away = seen - mean
+        shift = np.where(in_shadow, shadow * mean[..., 0], 0.0)
+        found = self._squared(seen - mean + shift[..., None] * np.array([1.0, 0.0, 0.0]))
+        if deepest > 0.0:
+            left = np.maximum(seen[..., 0] / np.maximum(mean[..., 0], 1.0), 1.0 - deepest)
+            found = np.where(
+                in_shadow, np.minimum(found, self._squared(seen - left[..., None] * mean)), found
+            )
+        return found
+
+    def _squared(self, away: Array) -> Array:
         return np.einsum("hwi,hwij,hwj->hw", away, self.precision, away)
 
 

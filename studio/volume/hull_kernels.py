@@ -33,19 +33,11 @@ NEAR = 100.0
 BACKGROUND, EDGE, FOREGROUND, UNSEEN = 0, 1, 2, 3
 CARVED, KEPT, SPLIT = 0, 1, 2
 
-DEPTH_IS_LAST, PIXELS, LEAST_VIEWS, EDGE_SHARE, SAMPLING, SHADOW, SINGLE, POLYNOMIAL, RULES = (
-    0,
-    1,
-    2,
-    3,
-    4,
-    5,
-    6,
-    7,
-    10,
-)
+DEPTH_IS_LAST, PIXELS, LEAST_VIEWS, EDGE_SHARE, SAMPLING = 0, 1, 2, 3, 4
+SHADOW, DEEPEST, SINGLE, POLYNOMIAL, RULES = 5, 6, 7, 8, 11
 """Of a row of rules: is this the last depth, are pixels the evidence, fewest views that see a voxel, share of the
-samples at the last depth, samples / √area, the shadow's share, T_1, and T_k's three coefficients."""
+samples at the last depth, samples / √area, the shadow's share, the deepest
+shadow's, T_1, and T_k's three coefficients."""
 BLOCK = 64
 
 
@@ -141,23 +133,29 @@ def sample_pixel(place, number, count, heights):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def squared_distance(blue, green, red, gaussians, at, shadow):
-    """Squared Mahalanobis distance of a pixel from its background's Gaussian or the shadow's (`yuv_background`)."""
+def weighed(y, u, v, p00, p11, p22, p01, p02, p12):
+    """A difference's square under a precision."""
+    return y * y * p00 + u * u * p11 + v * v * p22 + np.float32(2.0) * (y * (u * p01 + v * p02) + u * v * p12)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def squared_distance(blue, green, red, gaussians, at, shadow, deepest):
+    """Squared Mahalanobis distance of a pixel from its background, lit or in shadow (`evidence.yuv_background`)."""
     b, g, r = np.float32(blue), np.float32(green), np.float32(red)
-    luminance = np.float32(0.114) * b + np.float32(0.587) * g + np.float32(0.299) * r
-    mean = gaussians[at, 0]
-    if luminance < (np.float32(1.0) - np.float32(0.5) * shadow) * mean:
-        mean *= np.float32(1.0) - shadow
-    y = luminance - mean
-    u = np.float32(0.492) * (b - luminance) - gaussians[at, 1]
-    v = np.float32(0.877) * (r - luminance) - gaussians[at, 2]
-    mixed = y * (u * gaussians[at, 6] + v * gaussians[at, 7]) + u * v * gaussians[at, 8]
-    return (
-        y * y * gaussians[at, 3]
-        + u * u * gaussians[at, 4]
-        + v * v * gaussians[at, 5]
-        + np.float32(2.0) * mixed
-    )
+    one = np.float32(1.0)
+    y = np.float32(0.114) * b + np.float32(0.587) * g + np.float32(0.299) * r
+    u, v = np.float32(0.492) * (b - y), np.float32(0.877) * (r - y)
+    my, mu, mv = gaussians[at, 0], gaussians[at, 1], gaussians[at, 2]
+    p00, p11, p22 = gaussians[at, 3], gaussians[at, 4], gaussians[at, 5]
+    p01, p02, p12 = gaussians[at, 6], gaussians[at, 7], gaussians[at, 8]
+    in_shadow = y < (one - np.float32(0.5) * shadow) * my
+    mean = (one - shadow) * my if in_shadow else my
+    found = weighed(y - mean, u - mu, v - mv, p00, p11, p22, p01, p02, p12)
+    if in_shadow and deepest > np.float32(0.0):
+        left = max(y / max(my, one), one - deepest)
+        darker = weighed(y - left * my, u - left * mu, v - left * mv, p00, p11, p22, p01, p02, p12)
+        found = min(found, darker)
+    return found
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
@@ -198,7 +196,7 @@ def look_at_pixels(cameras, view, starts, picture, gaussians, heights, rules, pl
     """Eq. 6 for one voxel in one picture. picture, gaussians : all views' pixels, this one's from starts[0, view]."""
     width, height, start = int(cameras[view, WIDTH]), int(cameras[view, HEIGHT]), starts[0, view]
     last = rules[DEPTH_IS_LAST] > 0.0
-    shadow, single = np.float32(rules[SHADOW]), np.float32(rules[SINGLE])
+    shadow, deepest, single = np.float32(rules[SHADOW]), np.float32(rules[DEEPEST]), np.float32(rules[SINGLE])
     count = sample_count(place, rules[SAMPLING])
     enough = rules[POLYNOMIAL] + count * (rules[POLYNOMIAL + 1] + count * rules[POLYNOMIAL + 2])
     total, inside, far = np.float32(0.0), 0, 0
@@ -207,7 +205,9 @@ def look_at_pixels(cameras, view, starts, picture, gaussians, heights, rules, pl
         if x < 0 or y < 0 or x >= width or y >= height:
             continue
         at = start + y * width + x
-        distance = squared_distance(picture[at, 0], picture[at, 1], picture[at, 2], gaussians, at, shadow)
+        distance = squared_distance(
+            picture[at, 0], picture[at, 1], picture[at, 2], gaussians, at, shadow, deepest
+        )
         total += distance
         inside += 1
         if distance > single:

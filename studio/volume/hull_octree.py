@@ -8,6 +8,7 @@ from studio.volume.hull_kernels import (
     BLOCK,
     BOUND_X,
     BOUND_Y,
+    DEEPEST,
     KEPT,
     PIXELS,
     PLACE,
@@ -112,7 +113,8 @@ def colour_share(
     A voxel's colour in a view is the mean BGR of its samples that are not background, else of all its samples, NaN
     where none lies in the picture.
     """
-    place, by_pixels, shadow = np.empty(PLACE), rules[PIXELS] > 0.0, np.float32(rules[SHADOW])
+    place, by_pixels = np.empty(PLACE), rules[PIXELS] > 0.0
+    shadow, deepest = np.float32(rules[SHADOW]), np.float32(rules[DEEPEST])
     for turn in range(shares_of(len(centres), share, shares)):
         index = (turn // BLOCK * shares + share) * BLOCK + turn % BLOCK
         blue = green = red = seen = np.float32(0.0)
@@ -130,7 +132,7 @@ def colour_share(
                 at = starts[0, view] + row * width + column
                 if by_pixels:
                     pixel = picture[at, 0], picture[at, 1], picture[at, 2]
-                    differs = squared_distance(*pixel, gaussians, at, shadow) > rules[SINGLE]
+                    differs = squared_distance(*pixel, gaussians, at, shadow, deepest) > rules[SINGLE]
                 else:
                     above = starts[1, view] + row * (width + 1) + column
                     below = above + width + 1

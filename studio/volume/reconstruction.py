@@ -73,7 +73,17 @@ class HullSettings:
         0.01,
         label="shadow",
         takes_effect=NEXT_FRAME,
-        help="Share of the luminance that a shadow takes away.",
+        help="Share of the luminance that a shadow takes away; 0.1 in the paper.",
+    )
+    hull_deepest_shadow: float = knob(
+        0.4,
+        0.0,
+        0.9,
+        0.01,
+        label="deepest shadow",
+        takes_effect=NEXT_FRAME,
+        help="Beyond the paper: every darker shade of the background's own colour down to this share taken away is"
+        " shadow too; 0 = off, the paper's two Gaussians only.",
     )
     hull_sampling: float = knob(
         1.0,
@@ -86,7 +96,7 @@ class HullSettings:
         help="Samples of a voxel's projection: this many times the square root of its area; 1 as in the paper.",
     )
     hull_edge_share: float = knob(
-        0.5,
+        0.25,
         0.05,
         1.0,
         0.05,
@@ -125,7 +135,8 @@ class Reconstructor:
         rules[kernels.LEAST_VIEWS] = min(settings.hull_least_views, len(cameras))
         rules[kernels.EDGE_SHARE] = settings.hull_edge_share
         rules[kernels.SAMPLING] = settings.hull_sampling
-        rules[kernels.SHADOW], rules[kernels.SINGLE] = settings.hull_shadow, polynomial.single
+        rules[kernels.SHADOW], rules[kernels.DEEPEST] = settings.hull_shadow, settings.hull_deepest_shadow
+        rules[kernels.SINGLE] = polynomial.single
         rules[kernels.POLYNOMIAL :] = polynomial.coefficients
         self._rules = rules
         self._packed: tuple[tuple[YuvBackground, ...], NDArray[np.float32]] | None = None
