@@ -178,7 +178,8 @@ def test_pictures_of_page_scene_and_charts_are_kept(paused: StudioPage, artefact
         for width, height in SIZES:
             paused.page.set_viewport_size({"width": width, "height": height})
             name = f"{theme}-{width}x{height}"
-            for panel in PANELS:
+            # A wide window takes long to draw in software: the panels are kept in the narrow one.
+            for panel in PANELS if width == SIZES[0][0] else PANELS[:1]:
                 paused.page.click(f"[data-panel={panel}]")
                 if panel == "cameras":
                     until(paused.page, lambda: loaded_views(paused) == 4)
