@@ -78,12 +78,17 @@ def _steps(turns: Array) -> Array:
 def smoothed(motion: PersonMotion, seconds: float) -> PersonMotion:
     """Places and turns smoothed over time by a Gaussian of that standard deviation."""
     width = seconds * motion.fps
-    turns = {
-        name: _rotations(gaussian_filter1d(turn, width, axis=0, mode="nearest"))
-        for name, turn in motion.turns.items()
-    }
-    root = gaussian_filter1d(motion.root, width, axis=0, mode="nearest")
-    return PersonMotion(motion.skeleton, motion.fps, root, turns)
+    turns = {name: _rotations(_smooth(turn, width)) for name, turn in motion.turns.items()}
+    return PersonMotion(motion.skeleton, motion.fps, _smooth(motion.root, width), turns)
+
+
+def _smooth(values: Array, width: float) -> Array:
+    """Values (F, ...) smoothed along frames; at their ends they go on as they came, so that nobody slows down there."""
+    margin = min(int(np.ceil(4.0 * width)), len(values) - 1)
+    before = 2.0 * values[:1] - values[margin:0:-1]
+    after = 2.0 * values[-1:] - values[-2 : -margin - 2 : -1]
+    extended = np.concatenate([before, values, after])
+    return gaussian_filter1d(extended, width, axis=0, mode="nearest")[margin : margin + len(values)]
 
 
 def with_feet_on_floor(motion: PersonMotion) -> PersonMotion:

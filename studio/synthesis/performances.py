@@ -30,7 +30,7 @@ CARRIERS = {
 """Which segment carries which, carriers first."""
 HINGES = tuple(f"{side}_{part}" for side in SIDES for part in ("forearm", "shin"))
 LESS = {"pelvis": 0.4, "head": 0.5, **{f"{side}_{part}": 0.5 for side in SIDES for part in ("hand", "foot")}}
-TEMPO_PERIOD_S, TURN_PERIOD_S = 2.0, 1.5
+TEMPO_PERIOD_S, TURN_PERIOD_S = 4.0, 3.0
 LASTING, STILL_SHARE, FULL_SPREAD = 0.5, 0.25, np.radians(30.0)
 STRAIGHT = 0.03  # a knee or elbow is not bent backwards: it keeps this angle, radians, or what it had
 STANDING_MM = 20.0  # a foot this much higher than the other counts less by e

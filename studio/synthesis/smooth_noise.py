@@ -8,7 +8,7 @@ Array = NDArray[np.float64]
 
 REACH = 4.0  # standard deviations of the smoothing that count
 # Noise smoothed with a standard deviation of s swings about once in PERIODS * s.
-PERIODS = 2.0 * np.pi / np.sqrt(2.0)
+PERIODS = 2.0 * np.pi * np.sqrt(2.0)
 
 
 def smooth_noise(rng: np.random.Generator, frames: int, width: int, fps: float, period_s: float) -> Array:

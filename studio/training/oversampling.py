@@ -18,7 +18,7 @@ from studio.training.resampling import poses_at
 
 Array = NDArray[np.float64]
 
-TEMPO_PERIOD_S, ANGLE_PERIOD_S = 2.0, 1.5
+TEMPO_PERIOD_S, ANGLE_PERIOD_S = 4.0, 3.0
 # The share of an angle's change that lasts through the whole performance, and of its spread that it grows with.
 LASTING, FULL_SPREAD = 0.5, np.radians(30.0)
 

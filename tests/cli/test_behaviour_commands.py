@@ -1,0 +1,113 @@
+"""`studio learn` and `studio models` as a stranger calls them."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from moving_bodies import c3d_of, swinging
+
+from studio.body.catalogue import load_body
+from studio.cli import behaviour_commands
+from studio.cli.main import main
+from studio.sessions.workspace import workspace_root
+
+BODY = load_body("human25")
+QUICK = (
+    "--most-clusters",
+    "12",
+    "--reduced-dimensions",
+    "4",
+    "--clustering-patience",
+    "4",
+    "--smoothings",
+    "2",
+)
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(main, list(arguments), catch_exceptions=False)
+
+
+@pytest.fixture
+def motions(tmp_path: Path) -> Path:
+    """A folder with two motions and something else."""
+    folder = tmp_path / "motions"
+    folder.mkdir()
+    for seed, name in ((3, "one"), (4, "two")):
+        c3d_of(folder / f"{name}.c3d", BODY, swinging(BODY, 60, 30.0, seed), 30.0)
+    (folder / "notes.txt").write_text("nothing")
+    return folder
+
+
+def test_learn_tells_numbers_and_models_lists(motions: Path, tmp_path: Path) -> None:
+    result = run("learn", str(motions), "--into", "mine", *QUICK, "--memory", "3", "--json")
+    assert result.exit_code == 0, result.stderr
+    told = json.loads(result.stdout)
+    assert {"frames", "clusters", "states", "entropy_train", "entropy_test"} <= set(told)
+    assert told["frames"] == 2 * (48 + 47)
+    assert (told["recorded_frames"], told["test_frames"], told["body"]) == (96, 24, "human25")
+    assert [entry["name"] for entry in told["sources"]] == ["one", "two"]
+    assert all(entry["rms_mm"] < 8.0 for entry in told["sources"])
+    assert Path(told["path"]) == workspace_root() / "models" / "mine.behaviour"
+    listed = json.loads(run("models", "--json").stdout)["models"]
+    assert [(entry["name"], entry["memory"], entry["clusters"]) for entry in listed] == [
+        ("mine", 3, told["clusters"])
+    ]
+    assert "mine" in run("models").stdout
+    before = Path(told["path"]).read_bytes()
+    again = run("learn", str(motions), "--into", "mine", *QUICK)
+    assert again.exit_code == 2
+    assert "--force" in again.stderr
+    assert Path(told["path"]).read_bytes() == before
+    replaced = run(
+        *("learn", str(motions / "one.c3d"), "--test", str(motions / "two.c3d"), str(motions / "one.c3d")),
+        *("--into", "mine", "--force", *QUICK, "--json"),
+    )
+    assert replaced.exit_code == 0, replaced.stderr
+    told = json.loads(replaced.stdout)
+    assert (told["recorded_frames"], told["test_frames"]) == (60, 120)
+
+
+def test_wrong_calls_are_refused_and_leave_nothing(motions: Path, tmp_path: Path) -> None:
+    (tmp_path / "01_01.amc").write_text("1\n")
+    cases = {
+        ("learn", str(tmp_path / "gone.bvh"), "--into", "m"): "gone.bvh",
+        ("learn", str(motions / "notes.txt"), "--into", "m"): "notes.txt",
+        ("learn", str(tmp_path / "01_01.amc"), "--into", "m"): "01.asf",
+        ("learn", str(motions), "--into", "a b"): "a b",
+        ("learn", str(motions), "--into", "m", "--memory", "many"): "memory",
+        ("learn", str(motions), "--into", "m", "--smoothings", "0"): "smoothings",
+        ("learn", str(motions), "--into", "m", "--body", "nobody"): "nobody",
+        ("learn", str(motions), "--into", "m", "--body", "dog"): "dog",
+        ("learn", "--into", "m"): "SOURCES",
+        ("learn", str(motions), "--into", "m", "--test"): "--test",
+    }
+    for arguments, words in cases.items():
+        result = run(*arguments)
+        assert result.exit_code == 2, arguments
+        assert words in result.stderr
+        assert "Traceback" not in result.stderr
+    assert not (workspace_root() / "models").exists()
+
+
+def test_a_cancelled_learning_leaves_nothing(motions: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_arguments: object, **_options: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(behaviour_commands, "learn", interrupted)
+    result = run("learn", str(motions / "one.c3d"), "--into", "mine", *QUICK)
+    assert result.exit_code == 130
+    assert not (workspace_root() / "models").exists()
+
+
+def test_frames_that_the_body_cannot_follow_are_named(tmp_path: Path) -> None:
+    poses = swinging(BODY, 60, 30.0)
+    names = [entry.name for entry in BODY.parameters]
+    poses[20:26, names.index("left_hip_spread")] = np.radians(178.0)
+    path = c3d_of(tmp_path / "split.c3d", BODY, poses, 30.0)
+    result = run("learn", str(path), "--into", "mine", *QUICK)
+    assert result.exit_code == 0, result.stderr
+    assert "split: " in result.stderr
+    assert "fit badly" in result.stderr
