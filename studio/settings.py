@@ -1,7 +1,7 @@
 """All knobs of a run in one frozen, versioned value.
 
-A run's settings are four groups: the tracker's, the weighting's, the evidence's and the recording's. Each
-knob has a flat name that is unique over the four, so that a slider, `--set name=value` and `PATCH /settings`
+A run's settings are five groups: the tracker's, the weighting's, the evidence's, the recovery's and the recording's.
+Each knob has a flat name that is unique over the five, so that a slider, `--set name=value` and `PATCH /settings`
 need no group.
 """
 
@@ -15,9 +15,10 @@ from studio.errors import SettingsError
 from studio.evidence.settings import EvidenceSettings
 from studio.knobs import Knob, Value, changed, knob, knobs_of
 from studio.tracking.catalogue import TRACKERS
+from studio.tracking.recovery_settings import RecoverySettings
 from studio.weighting.catalogue import WEIGHTINGS
 
-GROUPS = ("tracker", "weighting", "evidence", "recording")
+GROUPS = ("tracker", "weighting", "evidence", "recovery", "recording")
 DEFAULT_TRACKER, DEFAULT_WEIGHTING = "annealed", "edge-region"
 # What a tracker is weighed with where neither run nor session say otherwise: the swarm with its paper's fitness.
 USUAL_WEIGHTINGS = {"swarm": "edge-silhouette"}
@@ -47,6 +48,7 @@ class RunSettings:
     tracker: Any
     weighting: Any
     evidence: EvidenceSettings
+    recovery: RecoverySettings
     recording: RecordingSettings
 
 
@@ -104,7 +106,13 @@ def default_settings(
     tracker = TRACKERS[tracker_name].settings_type()
     weighting = WEIGHTINGS[weighting_name].settings_type()
     return RunSettings(
-        tracker_name, weighting_name, tracker, weighting, EvidenceSettings(), RecordingSettings()
+        tracker_name,
+        weighting_name,
+        tracker,
+        weighting,
+        EvidenceSettings(),
+        RecoverySettings(),
+        RecordingSettings(),
     )
 
 
@@ -156,7 +164,7 @@ def knob_table() -> tuple[Knob, ...]:
     """Every knob that there is, of all trackers and weightings, for the guide; `group` says whose it is."""
     types = [tracker.settings_type for tracker in TRACKERS.values()]
     types += [weighting.settings_type for weighting in WEIGHTINGS.values()]
-    types += [EvidenceSettings, RecordingSettings]
+    types += [EvidenceSettings, RecoverySettings, RecordingSettings]
     return tuple(entry for settings_type in dict.fromkeys(types) for entry in knobs_of(settings_type))
 
 

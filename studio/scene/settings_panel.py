@@ -92,8 +92,12 @@ class SettingsPanel:
             tracker = knobs_of(type(settings.tracker))
             self._add(tracker[:_FOREMOST], now)
             self._add_folded("More of the search", tracker[_FOREMOST:], now)
-            self._add_folded("Recording", knobs_of(type(settings.recording)), now)
-            self._add_reset((*tracker, *knobs_of(type(settings.recording))))
+            others = ()
+            for title, group in (("When lost", settings.recovery), ("Recording", settings.recording)):
+                declared = knobs_of(type(group))
+                self._add_folded(title, declared, now)
+                others += declared
+            self._add_reset((*tracker, *others))
         for tab, group in ((self._tabs.weighting, settings.weighting), (self._tabs.masks, settings.evidence)):
             with tab, self._folder():
                 declared = knobs_of(type(group))

@@ -123,6 +123,8 @@ def pack_result(result: FrameResult) -> bytes:
             result.milliseconds,
             estimate.log_weight,
             TRACKING_STATES.index(result.tracking),
+            result.overlap,
+            result.doubts,
         ],
         dtype=np.float64,
     )
@@ -142,8 +144,10 @@ def unpack_result(blob: bytes) -> FrameResult:
         settings_version=int(numbers[3]),
         milliseconds=float(numbers[4]),
         carried=carried_from(arrays),
-        # Frames stored before a loss could be noticed end here.
+        # Numbers of frames stored before a loss could be noticed end here.
         tracking=TRACKING_STATES[int(numbers[6]) if len(numbers) > 6 else 0],
+        overlap=float(numbers[7]) if len(numbers) > 7 else math.nan,
+        doubts=int(numbers[8]) if len(numbers) > 8 else 0,
     )
 
 

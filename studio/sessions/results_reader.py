@@ -1,6 +1,7 @@
 """Reading a run's results while they are written, from any thread of any process (see `results_store`)."""
 
 import json
+import math
 import sqlite3
 import threading
 from dataclasses import dataclass
@@ -16,6 +17,8 @@ from studio.tracking.tracker import TRACKED, FrameResult, LayerRecord
 
 Array = NDArray[np.float64]
 FILE_NAME = "results.sqlite"
+UNWATCHED = (TRACKED, None, 0)
+"""State, overlap and doubts of a frame that was stored before a loss could be noticed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,7 +33,7 @@ class PartialFrame:
 @dataclass(frozen=True, slots=True, eq=False)
 class Timeline:
     """What a timeline shows of K finished frames: all (K,). layers, evaluations, settings_version : int. tracking : how
-    each frame went, of `tracking.tracker.TRACKING_STATES`.
+    each frame went, of `tracking.tracker.TRACKING_STATES`. overlaps : NaN where unknown. doubts : int.
     """
 
     frames: NDArray[np.int64]
@@ -40,6 +43,8 @@ class Timeline:
     layers: NDArray[np.int64]
     settings_versions: NDArray[np.int64]
     tracking: tuple[str, ...]
+    overlaps: Array
+    doubts: NDArray[np.int64]
 
 
 class ResultsReader:
@@ -116,15 +121,20 @@ class ResultsReader:
         columns = list(zip(*rows, strict=True)) if rows else [[]] * 6
         whole = [np.array(columns[index], dtype=np.int64) for index in (0, 3, 4, 5)]
         real = [np.array(columns[index], dtype=np.float64) for index in (1, 2)]
-        states = self._tracking()
-        named = tuple(states.get(int(frame), TRACKED) for frame in whole[0])
-        return Timeline(whole[0], real[0], real[1], whole[1], whole[2], whole[3], named)
+        known = self._tracking()
+        told = [known.get(int(frame), UNWATCHED) for frame in whole[0]]
+        return Timeline(
+            *(whole[0], real[0], real[1], whole[1], whole[2], whole[3]),
+            tracking=tuple(entry[0] for entry in told),
+            overlaps=np.array([math.nan if entry[1] is None else entry[1] for entry in told]),
+            doubts=np.array([entry[2] for entry in told], dtype=np.int64),
+        )
 
-    def _tracking(self) -> dict[int, str]:
-        """The frames that were not simply tracked, and how they went; none in stores older than that table."""
+    def _tracking(self) -> dict[int, tuple[str, float | None, int]]:
+        """How each frame went; nothing in stores older than that table."""
         if not self._query("SELECT name FROM sqlite_master WHERE type = 'table' AND name = 'tracking'"):
             return {}
-        return dict(self._query("SELECT frame, state FROM tracking"))
+        return {row[0]: row[1:] for row in self._query("SELECT frame, state, overlap, doubts FROM tracking")}
 
     def settings_history(self) -> list[SettingsEntry]:
         """Every version of the settings that was in use, oldest first."""

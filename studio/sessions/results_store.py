@@ -7,6 +7,7 @@ columns. Neither side holds more than the frame at hand.
 """
 
 import json
+import math
 import sqlite3
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -18,7 +19,7 @@ from studio.errors import RunError, SessionError
 from studio.sessions.process_lock import ProcessLock
 from studio.sessions.results_codec import pack, pack_layer, pack_result
 from studio.sessions.results_reader import FILE_NAME, ResultsReader
-from studio.tracking.tracker import TRACKED, FrameResult, LayerRecord
+from studio.tracking.tracker import FrameResult, LayerRecord
 
 Array = NDArray[np.float64]
 Value = bool | int | float | str
@@ -39,7 +40,8 @@ CREATE TABLE IF NOT EXISTS layers (
 CREATE TABLE IF NOT EXISTS partial (
     id INTEGER PRIMARY KEY CHECK (id = 1), frame INTEGER NOT NULL, next_layer INTEGER NOT NULL, blob BLOB NOT
     NULL);
-CREATE TABLE IF NOT EXISTS tracking (frame INTEGER PRIMARY KEY, state TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS tracking (
+    frame INTEGER PRIMARY KEY, state TEXT NOT NULL, overlap REAL, doubts INTEGER NOT NULL);
 CREATE TABLE IF NOT EXISTS partial_layers (layer INTEGER PRIMARY KEY, blob BLOB NOT NULL);
 """
 
@@ -115,8 +117,9 @@ class ResultsWriter:
             ("DELETE FROM layers WHERE frame = ?", (result.frame,)),
             ("DELETE FROM tracking WHERE frame = ?", (result.frame,)),
         ]
-        if result.tracking != TRACKED:
-            statements.append(("INSERT INTO tracking VALUES (?, ?)", (result.frame, result.tracking)))
+        overlap = result.overlap if math.isfinite(result.overlap) else None
+        told = (result.frame, result.tracking, overlap, result.doubts)
+        statements.append(("INSERT INTO tracking VALUES (?, ?, ?, ?)", told))
         for record in layers:
             statements.append(
                 (

@@ -135,7 +135,8 @@ class LayerRecord:
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameResult:
     """The result of one frame. evaluations : poses weighed. carried : what the next frame starts from. tracking : one
-    of TRACKING_STATES.
+    of TRACKING_STATES. overlap : how well the silhouettes of pose and masks agree (f_s, 0 to 1), NaN where unknown.
+    doubts : frames in a row, this one included, that looked lost.
     """
 
     frame: int
@@ -146,6 +147,8 @@ class FrameResult:
     milliseconds: float
     carried: Carried
     tracking: str = TRACKED
+    overlap: float = math.nan
+    doubts: int = 0
 
 
 class FrameProblem(Protocol):

@@ -83,10 +83,13 @@ def test_how_a_frame_went_is_kept_and_stores_without_it_read_as_tracked(tmp_path
     folder = tmp_path
     with ResultsWriter(folder) as writer, ResultsReader(folder) as reader:
         for frame, state in enumerate(("tracked", "lost", "no evidence", "recovered", "lost")):
-            result = dataclasses.replace(result_of(frame), tracking=state)
+            result = dataclasses.replace(result_of(frame), tracking=state, overlap=0.5 + frame, doubts=frame)
             writer.write_frame(result, [layer_of(frame, 0)])
         assert reader.timeline().tracking == ("tracked", "lost", "no evidence", "recovered", "lost")
         assert [reader.result(frame).tracking for frame in range(3)] == ["tracked", "lost", "no evidence"]
+        assert reader.timeline().overlaps.tolist() == [0.5, 1.5, 2.5, 3.5, 4.5]
+        assert reader.timeline().doubts.tolist() == [0, 1, 2, 3, 4]
+        assert (reader.result(3).overlap, reader.result(3).doubts) == (3.5, 3)
         writer.write_frame(result_of(1), [layer_of(1, 0)])
         writer.forget_from(4)
         writer.write_frame(result_of(4), [layer_of(4, 0)])
@@ -97,6 +100,7 @@ def test_how_a_frame_went_is_kept_and_stores_without_it_read_as_tracked(tmp_path
     older.close()
     with ResultsReader(folder) as reader:
         assert reader.timeline().tracking == ("tracked",) * 5
+        assert np.isnan(reader.timeline().overlaps).all()
 
 
 def test_what_is_not_there_is_named(tmp_path: Path) -> None:

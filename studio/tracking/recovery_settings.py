@@ -1,0 +1,32 @@
+"""The knobs of noticing that a tracker is lost and of finding the body again, the same for every tracker."""
+
+from dataclasses import dataclass
+
+from studio.knobs import knob
+
+OFF, SPREAD, INITIALISE = "off", "spread", "initialise"
+
+
+@dataclass(frozen=True, slots=True)
+class RecoverySettings:
+    """What a run does when it is lost (Caillette, Galata & Howard 2007, section 6.3, and a search of our own)."""
+
+    title = "Recovery"
+
+    # On footage with a second of black pictures, and with a person who leaves and comes back elsewhere, the search
+    # found the body in every run; particles spread over joints and clusters only where many of them are weighed.
+    recovery: str = knob(
+        INITIALISE,
+        choices=(INITIALISE, SPREAD, OFF),
+        takes_effect="next frame",
+        help="When lost: search as for a start pose, or spread the particles over the motion clusters (without a "
+        "behaviour model over the joints' ranges) at the hull. Off: losses are not looked for.",
+    )
+    lost_after: int = knob(
+        3, 1, 60, 1, label="lost after", unit="frames", takes_effect="next frame",
+        help="So many frames in a row must look lost before it is believed.",
+    )  # fmt: skip
+    recovery_interval: int = knob(
+        10, 1, 600, 1, label="search again after", unit="frames", takes_effect="next frame",
+        help="Frames between two searches while the body is not found.",
+    )  # fmt: skip
