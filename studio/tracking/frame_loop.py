@@ -162,14 +162,18 @@ class FrameSearch:
 
     def _expected(self, particles: ParticleSet, settings: Any) -> Array:  # noqa: ANN401
         """(S, D) where a search that begins with these particles expects the body: what the tracker says, else their
-        mean; second of them the pose that was reported last, if there is one.
+        mean; behind the first of these the last movement going on, and the pose that was reported last, as far as
+        they are known.
         """
         if isinstance(self.tracker, Foreseeing):
             poses = self.tracker.expectations(particles, self.space, settings)
         else:
             poses = particles.poses.mean(axis=0)[None]
-        last = self.previous.estimate
-        return poses if last is None else np.concatenate([poses[:1], last[None], poses[1:]])
+        last, before = self.previous.estimate, self.previous.previous_estimate
+        if last is None:
+            return poses
+        known = last[None] if before is None else np.stack([2.0 * last - before, last])
+        return np.concatenate([poses[:1], known, poses[1:]])
 
     def _told(self, problem: FrameProblem, repeat: int, expected: Array) -> FrameProblem:
         """The problem, told once a search what is expected, if it wants to know."""

@@ -25,7 +25,7 @@ class BlobSettings(HullSettings):
         help="A pose weighs 1 / D to this power; the paper's is 1.",
     )
     blob_starts: int = knob(
-        4,
+        6,
         1,
         32,
         1,
