@@ -8,10 +8,13 @@ from fastapi import APIRouter
 from markdown_it import MarkdownIt
 from starlette.responses import HTMLResponse
 
+from studio.behaviour.settings import LearningSettings
 from studio.evidence.settings import EvidenceSettings
 from studio.knobs import Knob, allowed, knobs_of
 from studio.settings import RecordingSettings
 from studio.tracking.catalogue import TRACKERS
+from studio.tracking.recovery_settings import RecoverySettings
+from studio.training.oversampling import OversamplingSettings
 from studio.web.page_routes import assets_folder
 from studio.weighting.catalogue import WEIGHTINGS
 
@@ -69,11 +72,12 @@ def settings_groups() -> dict[str, type]:
     """Every settings class there is, by the words that head its table."""
     groups: dict[str, type] = {f"Tracker: {name}": entry.settings_type for name, entry in TRACKERS.items()}
     groups |= {f"Weighting: {name}": entry.settings_type for name, entry in WEIGHTINGS.items()}
-    return groups | {"Evidence": EvidenceSettings, "Recording": RecordingSettings}
+    groups |= {"Evidence": EvidenceSettings, "Recovery": RecoverySettings, "Recording": RecordingSettings}
+    return groups | {entry.title: entry for entry in (LearningSettings, OversamplingSettings)}
 
 
 def all_knob_tables() -> str:
-    """A table for each tracker, each weighting, the evidence and the recording."""
+    """A table for each tracker, each weighting, the evidence, the recording and the learning of behaviour."""
     return "\n".join(knob_table(title, knobs_of(settings)) for title, settings in settings_groups().items())
 
 

@@ -177,3 +177,44 @@ def test_a_dance_clip_on_several_bodies(real_data: Path) -> None:
         assert found.rms_mm < most
         angles = np.array([entry.kind == "angle" for entry in body.parameters])
         assert np.degrees(np.abs(np.diff(found.poses[:, angles], axis=0)).max()) < 75.0
+
+
+def test_a_skeleton_with_unusual_names_is_taken_by_its_joints(tmp_path: Path) -> None:
+    """A BVH as exported from a game character: no finger or toe joints, its own unit."""
+    tree = """HIERARCHY
+ROOT mixamorig:Hips
+{
+OFFSET 0 0 0
+CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+"""
+    for side, sign in (("Left", 1), ("Right", -1)):
+        tree += f"JOINT mixamorig:{side}UpLeg\n{{\nOFFSET {9 * sign} 0 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n"
+        tree += f"JOINT mixamorig:{side}Leg\n{{\nOFFSET 0 -43 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n"
+        tree += f"JOINT mixamorig:{side}Foot\n{{\nOFFSET 0 -43 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n"
+        tree += "End Site\n{\nOFFSET 0 0 10\n}\n}\n}\n}\n"
+    for side, sign in (("Left", 1), ("Right", -1)):
+        tree += f"JOINT mixamorig:{side}Arm\n{{\nOFFSET {20 * sign} 50 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n"
+        tree += (
+            f"JOINT mixamorig:{side}ForeArm\n{{\nOFFSET 0 -32 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n"
+        )
+        tree += f"JOINT mixamorig:{side}Hand\n{{\nOFFSET 0 -25 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n"
+        tree += "End Site\n{\nOFFSET 0 -10 0\n}\n}\n}\n}\n"
+    count = 40
+    lines = []
+    for frame in range(count):
+        bend = 40.0 + 30.0 * np.sin(0.2 * frame)
+        row = np.zeros(6 + 12 * 3)
+        row[1] = 90.0
+        row[6 + 1], row[9 + 1] = -0.5 * bend, bend
+        lines.append(" ".join(f"{value:.4f}" for value in row))
+    text = f"{tree}}}\nMOTION\nFrames: {count}\nFrame Time: 0.0333333\n" + "\n".join(lines) + "\n"
+    path = tmp_path / "character.bvh"
+    path.write_text(text)
+    found = read_source(path, BODY)
+    assert found.frame_count == count
+    assert found.rms_mm < 15.0
+    names = [entry.name for entry in BODY.parameters]
+    wanted = 40.0 + 30.0 * np.sin(0.2 * np.arange(count))
+    knees = np.degrees(found.poses[:, [names.index("left_knee"), names.index("right_knee")]])
+    np.testing.assert_allclose(knees[:, 0], wanted, atol=6.0)
+    assert np.abs(knees[:, 1]).max() < 8.0
