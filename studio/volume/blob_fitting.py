@@ -20,14 +20,13 @@ Where the paper leaves things open or pure K-means breaks down:
 - Before colours are learnt every blob has the hull's own mean colour, and colour decides nothing.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.model import BodyModel
-from studio.volume.blob_kernels import FACTORS, SUMS, assign, count_changes, gather
+from studio.volume.blob_kernels import FACTORS, LOG_TWO_PI, assign, fill_factors, fit
 from studio.volume.blob_model import SMALLEST_VARIANCE, BlobMixture, BlobModel
 from studio.volume.hull import Hull
 
@@ -40,7 +39,8 @@ LEAST_COLOUR_VARIANCE = 36.0
 """levels²: no blob is surer of its colour than 6 levels; light and camera are not."""
 STILL = 0.002
 """Share of voxels that may still change hands when the fit stops."""
-LOG_TWO_PI = math.log(2.0 * math.pi)
+NEAR_ENOUGH = 20.0
+"""mm: a prediction whose mean is this near the hull's is not tried moved."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,12 +71,16 @@ class Voxels:
         extents = np.asarray(hull.edges, dtype=np.float64) ** 2 / 12.0
         return cls(rows, shares, extents, centre, mean, np.maximum(variance, LEAST_COLOUR_VARIANCE))
 
+    def no_labels(self) -> Labels:
+        """Room for a label of each voxel."""
+        return np.empty(self.rows.shape[1], dtype=np.int32)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fitted:
     """The best fit. mixture : blob b is the model's blob b. labels : (K,) each voxel's nearest. log_likelihood : nats a
     voxel, of the best fit; log_likelihoods : of every fit, the S from the poses as they are, then the S from the poses
-    moved to the hull. start : the pose (0...S - 1) of the best. margin : nats a voxel
+    moved to the hull that were tried. start : the pose (0...S - 1) of the best. margin : nats a voxel
     that the likelihood lies above (positive) or below (negative) what the model gives of a body just like itself.
     """
 
@@ -98,7 +102,7 @@ def fit_blobs(
     moved: bool = True,
 ) -> Fitted:
     """The model's blobs fitted to a hull that is not empty, from poses (S, D); iterations : at most, of each fit.
-    moved : also from each pose moved so that its mean is the hull's.
+    moved : also from each pose moved so that its mean is the hull's, where that is further than NEAR_ENOUGH.
 
     Raises BodyError for poses that are not the body's, ValueError for an empty hull.
     """
@@ -107,26 +111,36 @@ def fit_blobs(
     voxels = Voxels.of(hull)
     coloured = model.in_colour(voxels.colour, voxels.colour_variance)
     predicted = coloured.mixture(body, starts)
-    begun = [_Blobs.of(predicted.at(start), voxels.centre) for start in range(len(predicted.means))]
+    begun = [_state_of(predicted.at(start), voxels.centre) for start in range(len(predicted.means))]
+    origins = list(range(len(begun)))
     if moved:
-        begun += [blobs.centred() for blobs in begun]
-    fits = [_fit_one(voxels, coloured, blobs, iterations) for blobs in begun]
-    likelihoods = np.array([fit[2] for fit in fits])
-    best = int(np.argmax(likelihoods))
-    blobs, labels, _ = fits[best]
-    mixture = BlobMixture(
-        blobs.means + voxels.centre, blobs.covariances, blobs.colours, blobs.variances, blobs.weights
+        for start, state in enumerate(begun[:]):
+            shift = state[:, 15] @ state[:, :3]
+            if np.linalg.norm(shift) > NEAR_ENOUGH:
+                begun.append(np.column_stack([state[:, :3] - shift, state[:, 3:]]))
+                origins.append(start)
+    colours = np.column_stack([coloured.colour, coloured.colour_variance])
+    rules = np.array([iterations, STILL, PRIOR_SHARE, LEAST_COLOUR_VARIANCE, SMALLEST_VARIANCE])
+    found, labels = [np.empty_like(state) for state in begun], [voxels.no_labels() for _ in begun]
+    likelihoods = np.array(
+        [
+            fit(voxels.rows, voxels.shares, voxels.extents, state, colours, rules, best, own)
+            for state, best, own in zip(begun, found, labels, strict=True)
+        ]
     )
-    found = float(likelihoods[best])
-    start = best % len(predicted.means)
-    return Fitted(mixture, labels, found, likelihoods, start, found - self_likelihood(coloured))
+    best = int(np.argmax(likelihoods))
+    likelihood = float(likelihoods[best])
+    margin = likelihood - self_likelihood(coloured)
+    mixture = _mixture_of(found[best], voxels.centre)
+    return Fitted(mixture, labels[best], likelihood, likelihoods, origins[best], margin)
 
 
 def nearest_blobs(voxels: Voxels, mixture: BlobMixture) -> Labels:
     """(K,) the blob of a mixture, means (B, 3), that each voxel is nearest to; all colours known."""
-    blobs = _Blobs.of(mixture, voxels.centre)
-    labels, distances = _room(voxels)
-    assign(voxels.rows, blobs.factors(), labels, distances)
+    labels, distances = voxels.no_labels(), np.empty(voxels.rows.shape[1], dtype=np.float32)
+    factors = np.empty((len(mixture.means), FACTORS), dtype=np.float32)
+    fill_factors(_state_of(mixture, voxels.centre), factors)
+    assign(voxels.rows, factors, labels, distances)
     return labels
 
 
@@ -138,114 +152,15 @@ def self_likelihood(model: BlobModel) -> float:
     return float(model.weight @ (np.log(model.weight) - 0.5 * (6.0 * (LOG_TWO_PI + 1.0) + logs)))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Blobs:
-    """A mixture in the voxels' coordinates: means (B, 3), covariances (B, 3, 3), colours, variances (B, 3)."""
-
-    means: Array
-    covariances: Array
-    colours: Array
-    variances: Array
-    weights: Array
-
-    @classmethod
-    def of(cls, mixture: BlobMixture, centre: Array) -> "_Blobs":
-        return cls(
-            mixture.means - centre,
-            mixture.covariances,
-            mixture.colours,
-            mixture.colour_variances,
-            mixture.weights,
-        )
-
-    def centred(self) -> "_Blobs":
-        """Moved so that the mixture's mean is the voxels'."""
-        means = self.means - self.weights @ self.means
-        return _Blobs(means, self.covariances, self.colours, self.variances, self.weights)
-
-    def factors(self) -> Floats:
-        """(B, FACTORS) as the kernel reads them: the root of Σ⁻¹ is the upper triangle Lᵀ of Σ⁻¹ = L Lᵀ."""
-        root = np.linalg.cholesky(np.linalg.inv(self.covariances))
-        table = np.empty((len(self.means), FACTORS), dtype=np.float32)
-        table[:, 0:3] = self.means
-        for column, (i, j) in enumerate(((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))):
-            table[:, 3 + column] = root[:, j, i]
-        table[:, 9:12] = self.colours
-        table[:, 12:15] = 1.0 / np.sqrt(self.variances)
-        return table
+def _state_of(mixture: BlobMixture, centre: Array) -> Array:
+    """A mixture of means (B, 3) as the kernels have it, (B, STATE), about `centre` (3,)."""
+    upper = mixture.covariances[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
+    return np.column_stack(
+        [mixture.means - centre, upper, mixture.colours, mixture.colour_variances, mixture.weights]
+    )
 
 
-def _room(voxels: Voxels) -> tuple[Labels, Floats]:
-    count = voxels.rows.shape[1]
-    return np.empty(count, dtype=np.int32), np.empty(count, dtype=np.float32)
-
-
-def _fit_one(
-    voxels: Voxels, model: BlobModel, predicted: _Blobs, iterations: int
-) -> tuple[_Blobs, Labels, float]:
-    """K-means from one predicted mixture: the likeliest blobs on the way, the labels (K,) of the voxels nearest to
-    each, and their likelihood, nats a voxel.
-    """
-    labels, distances = _room(voxels)
-    before = np.full_like(labels, -1)
-    sums = np.empty((len(predicted.means), SUMS))
-    blobs, best, best_labels, likelihood = predicted, predicted, before, -np.inf
-    for _ in range(iterations + 1):
-        assign(voxels.rows, blobs.factors(), labels, distances)
-        changed = count_changes(labels, before)
-        gather(voxels.rows, voxels.shares, labels, sums)
-        found = _likelihood(model, blobs, sums)
-        if blobs is not predicted and found <= likelihood:
-            break
-        best, likelihood, best_labels = blobs, found, labels.copy()
-        if changed <= STILL * len(labels):
-            break
-        held = np.bincount(labels, voxels.shares * voxels.extents, minlength=len(sums))
-        blobs = _updated(predicted, sums, np.asarray(held, dtype=np.float64))
-    return best, best_labels, likelihood
-
-
-def _updated(predicted: _Blobs, sums: Array, extents: Array) -> _Blobs:
-    """The M-step: what each blob holds (`gather`'s sums; Σ share edge² / 12), the prediction counting a little."""
-    prior = PRIOR_SHARE * predicted.weights
-    held = sums[:, 0]
-    total = (held + prior)[:, None]
-    means = (sums[:, 1:4] + prior[:, None] * predicted.means) / total
-    second = sums[:, [4, 5, 6, 5, 7, 8, 6, 8, 9]].reshape(-1, 3, 3)
-    own = predicted.covariances + _outer(predicted.means)
-    covariances = (second + prior[:, None, None] * own) / total[..., None] - _outer(means)
-    covariances += (extents / total[:, 0])[:, None, None] * np.eye(3)
-    colours = (sums[:, 10:13] + prior[:, None] * predicted.colours) / total
-    squares = sums[:, 13:16] + prior[:, None] * (predicted.variances + predicted.colours**2)
-    variances = np.maximum(squares / total - colours**2, LEAST_COLOUR_VARIANCE)
-    return _Blobs(means, _thick(covariances), colours, variances, total[:, 0] / total.sum())
-
-
-def _outer(vectors: Array) -> Array:
-    return vectors[:, :, None] * vectors[:, None, :]
-
-
-def _thick(covariances: Array) -> Array:
-    """Covariances (B, 3, 3) with no eigenvalue below SMALLEST_VARIANCE."""
-    values, axes = np.linalg.eigh(covariances)
-    if values.min() >= SMALLEST_VARIANCE:
-        return covariances
-    return np.einsum("bik,bk,bjk->bij", axes, np.maximum(values, SMALLEST_VARIANCE), axes)
-
-
-def _likelihood(model: BlobModel, blobs: _Blobs, sums: Array) -> float:
-    """Nats a voxel: mean over the volume of ln β + ln N(x; fitted) + ln N(colour; learnt) of each voxel's own blob,
-    from what each blob holds (`gather`'s sums), so that it costs no pass over the voxels.
-    """
-    held = sums[:, 0]
-    safe = np.maximum(held, np.finfo(np.float64).tiny)[:, None]
-    mean = sums[:, 1:4] / safe
-    second = sums[:, [4, 5, 6, 5, 7, 8, 6, 8, 9]].reshape(-1, 3, 3) / safe[..., None]
-    about = second - _outer(mean) + _outer(mean - blobs.means)
-    spatial = np.einsum("bij,bji->b", np.linalg.inv(blobs.covariances), about)
-    spatial += np.linalg.slogdet(blobs.covariances)[1]
-    colour = sums[:, 10:13] / safe
-    about_colour = sums[:, 13:16] / safe - 2.0 * colour * model.colour + model.colour**2
-    coloured = (about_colour / model.colour_variance + np.log(model.colour_variance)).sum(axis=1)
-    logs = np.log(blobs.weights) - 0.5 * (6.0 * LOG_TWO_PI + spatial + coloured)
-    return float(held @ logs)
+def _mixture_of(state: Array, centre: Array) -> BlobMixture:
+    """The inverse of `_state_of`."""
+    covariances = state[:, [3, 4, 5, 4, 6, 7, 5, 7, 8]].reshape(-1, 3, 3)
+    return BlobMixture(state[:, :3] + centre, covariances, state[:, 9:12], state[:, 12:15], state[:, 15])

@@ -1,9 +1,11 @@
-"""The inner loops of blob fitting: which blob a voxel is nearest to, and what each blob then holds.
+"""The inner loops of blob fitting: which blob a voxel is nearest to, what each blob then holds, and what it becomes.
 
 Voxels come as six rows (x, y, z from the hull's mean, then the three colours), so that a loop over voxels with the
 blob held fixed runs on whole vector registers. Sums are made in the order of the voxels, in double precision: the same
 voxels give the same bits every time.
 """
+
+import math
 
 import numba
 import numpy as np
@@ -11,8 +13,12 @@ import numpy as np
 # Columns of a blob's row in `factors`: mean, upper triangle of the root of its inverse covariance, colour, inverse
 # standard deviation of each colour.
 FACTORS = 15
-# Columns of `gather`: volume, its products with x y z, with xx xy xz yy yz zz, with the colours and their squares.
-SUMS = 16
+# Columns of `gather`: volume, its products with x y z, with xx xy xz yy yz zz, with the colours and their squares, and
+# with the voxels' own extents.
+SUMS = 17
+# Columns of a blob in `state`: mean, covariance xx xy xz yy yz zz, colour, variance of each colour, weight.
+STATE = 16
+LOG_TWO_PI = math.log(2.0 * math.pi)
 # Voxels at a time, so that their nearest distances stay in the first cache.
 CHUNK = 512
 
@@ -51,10 +57,10 @@ def assign(voxels, factors, labels, distances):
 
 
 @numba.njit(cache=True, nogil=True)
-def gather(voxels, volumes, labels, sums):
+def gather(voxels, volumes, extents, labels, sums):
     """What each blob holds of the voxels assigned to it: sums (B, SUMS) float64, made new.
 
-    voxels : (6, K) float32. volumes : (K,) float64, each voxel's share of all. labels : (K,) int32.
+    voxels : (6, K) float32. volumes : (K,) each voxel's share of all. extents : (K,) mm². labels : (K,) int32.
     """
     sums[:] = 0.0
     for k in range(voxels.shape[1]):
@@ -75,6 +81,7 @@ def gather(voxels, volumes, labels, sums):
             colour = np.float64(voxels[3 + channel, k])
             row[10 + channel] += share * colour
             row[13 + channel] += share * colour * colour
+        row[16] += share * extents[k]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -86,3 +93,148 @@ def count_changes(labels, before):
             changed += 1
             before[k] = labels[k]
     return changed
+
+
+@numba.njit(cache=True, nogil=True)
+def precision_of(blob, inverse):
+    """The inverse of a blob's covariance, inverse (6,) xx xy xz yy yz zz, and its determinant. blob : (STATE,)."""
+    xx, xy, xz, yy, yz, zz = blob[3], blob[4], blob[5], blob[6], blob[7], blob[8]
+    first, second, third = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+    determinant = xx * first + xy * second + xz * third
+    inverse[0], inverse[1], inverse[2] = first / determinant, second / determinant, third / determinant
+    inverse[3] = (xx * zz - xz * xz) / determinant
+    inverse[4] = (xy * xz - xx * yz) / determinant
+    inverse[5] = (xx * yy - xy * xy) / determinant
+    return determinant
+
+
+@numba.njit(cache=True, nogil=True)
+def fill_factors(state, factors):
+    """The rows of `assign`, factors (B, FACTORS), of blobs (B, STATE): the root is Lᵀ of Σ⁻¹ = L Lᵀ (Cholesky)."""
+    inverse = np.empty(6)
+    for b in range(state.shape[0]):
+        blob, row = state[b], factors[b]
+        precision_of(blob, inverse)
+        a = math.sqrt(inverse[0])
+        d, e = inverse[1] / a, inverse[2] / a
+        f = math.sqrt(inverse[3] - d * d)
+        g = (inverse[4] - d * e) / f
+        h = math.sqrt(inverse[5] - e * e - g * g)
+        row[0], row[1], row[2] = blob[0], blob[1], blob[2]
+        row[3], row[4], row[5], row[6], row[7], row[8] = a, d, e, f, g, h
+        for channel in range(3):
+            row[9 + channel] = blob[9 + channel]
+            row[12 + channel] = 1.0 / math.sqrt(blob[12 + channel])
+
+
+@numba.njit(cache=True, nogil=True)
+def likelihood_of(state, sums, colours):
+    """Nats a voxel: the mean over the volume of ln β + ln N(x; fitted) + ln N(colour; learnt) of each voxel's own blob,
+    from what the blobs hold. state : (B, STATE). colours : (B, 6) the learnt colours and their variances.
+    """
+    inverse, total = np.empty(6), 0.0
+    for b in range(state.shape[0]):
+        held, row, blob = sums[b, 0], sums[b], state[b]
+        if held <= 0.0:
+            continue
+        logs = math.log(precision_of(blob, inverse))
+        about = 0
+        for i in range(3):
+            for j in range(i, 3):
+                first, second = row[1 + i] / held, row[1 + j] / held
+                spread = row[4 + about] / held - first * second + (first - blob[i]) * (second - blob[j])
+                logs += (1.0 if i == j else 2.0) * inverse[about] * spread
+                about += 1
+        for channel in range(3):
+            mean, variance = colours[b, channel], colours[b, 3 + channel]
+            off = row[13 + channel] - 2.0 * mean * row[10 + channel] + mean * mean * held
+            logs += off / (held * variance) + math.log(variance)
+        total += held * (math.log(blob[15]) - 0.5 * (6.0 * LOG_TWO_PI + logs))
+    return total
+
+
+@numba.njit(cache=True, nogil=True)
+def update(predicted, sums, prior_share, least_colour, state):
+    """The M-step: state (B, STATE) from what each blob holds, the prediction counting as `prior_share` of its volume.
+
+    least_colour : levels², the least variance of a colour. The six entries of a covariance may make it too thin.
+    """
+    whole = 0.0
+    for b in range(state.shape[0]):
+        row, before, blob = sums[b], predicted[b], state[b]
+        prior = prior_share * before[15]
+        total = row[0] + prior
+        whole += total
+        for i in range(3):
+            blob[i] = (row[1 + i] + prior * before[i]) / total
+        about = 0
+        for i in range(3):
+            for j in range(i, 3):
+                own = before[3 + about] + before[i] * before[j]
+                blob[3 + about] = (row[4 + about] + prior * own) / total - blob[i] * blob[j]
+                if i == j:
+                    blob[3 + about] += row[16] / total
+                about += 1
+        for channel in range(9, 12):
+            mean = (row[channel + 1] + prior * before[channel]) / total
+            square = row[channel + 4] + prior * (before[channel + 3] + before[channel] ** 2)
+            blob[channel] = mean
+            blob[channel + 3] = max(square / total - mean * mean, least_colour)
+        blob[15] = total
+    state[:, 15] /= whole
+
+
+@numba.njit(cache=True, nogil=True)
+def thicken(state, least):
+    """Make no covariance's eigenvalue less than `least` mm², in place."""
+    for b in range(state.shape[0]):
+        blob = state[b]
+        x, y, z = blob[3] - least, blob[6] - least, blob[8] - least
+        plane = x * y - blob[4] * blob[4]
+        first, second = y * z - blob[7] * blob[7], blob[5] * blob[7] - blob[4] * z
+        third = blob[4] * blob[7] - blob[5] * y
+        if x >= 0.0 and plane >= 0.0 and x * first + blob[4] * second + blob[5] * third >= 0.0:
+            continue
+        matrix = np.array(
+            [[blob[3], blob[4], blob[5]], [blob[4], blob[6], blob[7]], [blob[5], blob[7], blob[8]]]
+        )
+        values, axes = np.linalg.eigh(matrix)
+        about = 3
+        for i in range(3):
+            for j in range(i, 3):
+                blob[about] = 0.0
+                for k in range(3):
+                    blob[about] += max(values[k], least) * axes[i, k] * axes[j, k]
+                about += 1
+
+
+@numba.njit(cache=True, nogil=True)
+def fit(voxels, volumes, extents, predicted, colours, rules, best, best_labels):
+    """K-means from the predicted blobs (B, STATE): the likeliest on the way into best (B, STATE), the voxels' nearest
+    blobs into best_labels (K,); returns their likelihood.
+
+    colours : (B, 6) learnt colours and variances. rules : most rounds, share of voxels that may still change hands,
+    share that the prediction counts, least colour variance, least variance.
+    """
+    count = voxels.shape[1]
+    labels, before = np.empty(count, np.int32), np.full(count, -1, np.int32)
+    distances = np.empty(count, np.float32)
+    factors = np.empty((predicted.shape[0], FACTORS), np.float32)
+    sums = np.empty((predicted.shape[0], SUMS))
+    state, likelihood = predicted.copy(), -np.inf
+    for step in range(int(rules[0]) + 1):
+        fill_factors(state, factors)
+        assign(voxels, factors, labels, distances)
+        changed = count_changes(labels, before)
+        gather(voxels, volumes, extents, labels, sums)
+        found = likelihood_of(state, sums, colours)
+        if step > 0 and found <= likelihood:
+            break
+        best[:] = state
+        best_labels[:] = labels
+        likelihood = found
+        if changed <= rules[1] * count:
+            break
+        update(predicted, sums, rules[2], rules[3], state)
+        thicken(state, rules[4])
+    return likelihood

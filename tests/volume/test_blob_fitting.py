@@ -55,12 +55,12 @@ def test_the_kernel_finds_the_nearest_blob_and_sums_what_it_holds() -> None:
     squared = (space**2).sum(axis=2) + (colour**2).sum(axis=2)
     np.testing.assert_array_equal(labels, squared.argmin(axis=1))
     np.testing.assert_allclose(distances, squared.min(axis=1), rtol=1e-4)
-    shares, sums = rng.random(1500), np.empty((7, SUMS))
-    gather(voxels, shares, labels, sums)
+    shares, extents, sums = rng.random(1500), rng.random(1500), np.empty((7, SUMS))
+    gather(voxels, shares, extents, labels, sums)
     for blob in range(7):
         own, w = voxels[:, labels == blob].astype(float), shares[labels == blob]
         products = [own[i] * own[j] for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))]
-        rows = [np.ones_like(w), *own[:3], *products, *own[3:], *own[3:] ** 2]
+        rows = [np.ones_like(w), *own[:3], *products, *own[3:], *own[3:] ** 2, extents[labels == blob]]
         np.testing.assert_allclose(sums[blob], [row @ w for row in rows], rtol=1e-9, atol=1e-12)
     before = labels.copy()
     before[::3] += 1
@@ -118,6 +118,7 @@ def test_the_likeliest_start_is_kept(body: BodyModel, pose: Array, hull: Hull, l
     starts = np.stack([near(body, pose, seed, frames=6) for seed in (31, 32)] + [near(body, pose, 2)])
     fitted = fit_blobs(hull, learnt, body, starts)
     assert fitted.start == 2
+    # Each as it is, and moved to the hull.
     assert len(fitted.log_likelihoods) == 6
     assert fitted.log_likelihood == fitted.log_likelihoods.max()
     alone = fit_blobs(hull, learnt, body, starts[2:])

@@ -176,7 +176,7 @@ def test_only_so_many_expectations_are_fitted(
     assert isinstance(told, ExpectedBlobs)
     assert len(told.starts) == SETTINGS.blob_starts
     assert told.fitted is not None
-    assert len(told.fitted.log_likelihoods) == 2 * SETTINGS.blob_starts
+    assert SETTINGS.blob_starts <= len(told.fitted.log_likelihoods) <= 2 * SETTINGS.blob_starts
 
 
 @pytest.mark.parametrize("name", ["dog", "human34"])
