@@ -36,11 +36,11 @@ class YuvBackground:
     precision: Floats
 
     def packed(self) -> Floats:
-        """(H W, 9) float32 for the kernels: the mean, then precision 00, 11, 22, 01, 02, 12."""
+        """(9, H W) float32 for the kernels: the mean, then precision 00, 11, 22, 01, 02, 12."""
         p = self.precision
         parts = (p[..., 0, 0], p[..., 1, 1], p[..., 2, 2], p[..., 0, 1], p[..., 0, 2], p[..., 1, 2])
-        rows = np.concatenate([self.mean, np.stack(parts, axis=-1)], axis=-1)
-        return np.ascontiguousarray(rows.reshape(-1, 9), dtype=np.float32)
+        rows = [*np.moveaxis(self.mean, -1, 0), *parts]
+        return np.stack([row.ravel() for row in rows]).astype(np.float32)
 
     def squared_distances(self, picture: Bytes, shadow: float = SHADOW, deepest: float = 0.0) -> Array:
         """(H, W) squared Mahalanobis distance of each pixel of a BGR picture from background or shadow.

@@ -1,98 +1,38 @@
-"""Kernels of the visual hull: a voxel in a picture, and what the picture says of it.
-
-A voxel's projection is computed at its centre: with the derivative of the lens's projection there (distortion
-included) its three half axes become three vectors in the picture, its silhouette a hexagon that the projections of
-the three faces turned to the camera tile exactly. Seen by a pinhole a point at d from the centre lies at the
-derivative times d, scaled by depth / (depth + d's depth): samples use that factor, bounds its largest value, so
-both are exact for a pinhole; what distortion adds within one voxel is hundredths of a pixel.
-"""
+"""Kernels of the visual hull: what pictures say of voxels (Caillette et al. 2007, Eq. 6), and what becomes of these."""
 
 import math
 
 import numpy as np
 from numba import njit, prange
 
-from studio.volume.hull_cameras import (
-    CENTRE,
-    DISTORTION,
-    HEIGHT,
-    MATRIX,
-    RADIUS,
-    ROTATION,
-    TRANSLATION,
-    WIDTH,
+from studio.volume.distance_kernels import look_at_tile
+from studio.volume.hull_cameras import HEIGHT, WIDTH
+from studio.volume.hull_projection import (
+    AREA,
+    BOUND_X,
+    BOUND_Y,
+    PLACE,
+    SHARE,
+    U,
+    V,
+    place_voxel,
+    sample_count,
+    sample_pixel,
 )
-
-U, V, DEPTH, AXES, SINKS, BOUND_X, BOUND_Y, AREA, FACES, SHARE, PLACE = 0, 1, 2, 3, 9, 12, 13, 14, 15, 18, 19
-"""Of a voxel's place in a picture: centre (pixels), depth (mm), x and y of the half axes towards the camera, their
-depths, half sides of the upright rectangle around the hexagon, area, area of the three faces (pixels²), and
-the share of foreground that was found there."""
-NEAR = 100.0
-"""mm: a voxel that comes nearer to a camera's plane than this is not seen by it."""
+from studio.volume.hull_rules import (
+    DEPTH_IS_LAST,
+    EDGE_SHARE,
+    LEAST_VIEWS,
+    PIXELS,
+    POLYNOMIAL,
+    SAMPLING,
+    SINGLE,
+)
 
 BACKGROUND, EDGE, FOREGROUND, UNSEEN = 0, 1, 2, 3
 CARVED, KEPT, SPLIT = 0, 1, 2
-
-DEPTH_IS_LAST, PIXELS, LEAST_VIEWS, EDGE_SHARE, SAMPLING = 0, 1, 2, 3, 4
-SHADOW, DEEPEST, SINGLE, POLYNOMIAL, RULES = 5, 6, 7, 8, 11
-"""Of a row of rules: is this the last depth, are pixels the evidence, fewest views that see a voxel, share of the
-samples at the last depth, samples / √area, the shadow's share, the deepest
-shadow's, T_1, and T_k's three coefficients."""
 BLOCK = 64
-
-
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def place_voxel(cameras, view, x, y, z, half, place):
-    """Fill `place` with a voxel's projection; False where the camera cannot see it. half : of its edge, mm."""
-    r, t = ROTATION, TRANSLATION
-    depth = (
-        cameras[view, r + 6] * x + cameras[view, r + 7] * y + cameras[view, r + 8] * z + cameras[view, t + 2]
-    )
-    reach = half * (abs(cameras[view, r + 6]) + abs(cameras[view, r + 7]) + abs(cameras[view, r + 8]))
-    if depth - reach < NEAR:
-        return False
-    near = 1.0 / depth
-    a = (cameras[view, r] * x + cameras[view, r + 1] * y + cameras[view, r + 2] * z + cameras[view, t]) * near
-    b = (
-        cameras[view, r + 3] * x + cameras[view, r + 4] * y + cameras[view, r + 5] * z + cameras[view, t + 1]
-    ) * near
-    square = a * a + b * b
-    if square > cameras[view, RADIUS]:
-        return False
-    k1, k2, p1 = cameras[view, DISTORTION], cameras[view, DISTORTION + 1], cameras[view, DISTORTION + 2]
-    p2, k3 = cameras[view, DISTORTION + 3], cameras[view, DISTORTION + 4]
-    radial = 1.0 + square * (k1 + square * (k2 + square * k3))
-    slope = 2.0 * (k1 + square * (2.0 * k2 + square * 3.0 * k3))
-    xd = a * radial + 2.0 * p1 * a * b + p2 * (square + 2.0 * a * a)
-    yd = b * radial + p1 * (square + 2.0 * b * b) + 2.0 * p2 * a * b
-    xx = radial + a * a * slope + 2.0 * p1 * b + 6.0 * p2 * a
-    xy = a * b * slope + 2.0 * p1 * a + 2.0 * p2 * b
-    yy = radial + b * b * slope + 6.0 * p1 * b + 2.0 * p2 * a
-    fx, skew, fy = cameras[view, MATRIX], cameras[view, MATRIX + 1], cameras[view, MATRIX + 3]
-    place[U] = fx * xd + skew * yd + cameras[view, MATRIX + 2]
-    place[V] = fy * yd + cameras[view, MATRIX + 4]
-    place[DEPTH] = depth
-    bound_x, bound_y = 0.0, 0.0
-    for axis in range(3):
-        away = cameras[view, CENTRE + axis] - (x if axis == 0 else y if axis == 1 else z)
-        step = half if away >= 0.0 else -half
-        sink = step * cameras[view, r + 6 + axis]
-        along_a = (step * cameras[view, r + axis] - a * sink) * near
-        along_b = (step * cameras[view, r + 3 + axis] - b * sink) * near
-        along_x, along_y = xx * along_a + xy * along_b, xy * along_a + yy * along_b
-        across, down = fx * along_x + skew * along_y, fy * along_y
-        place[AXES + 2 * axis], place[AXES + 2 * axis + 1], place[SINKS + axis] = across, down, sink
-        bound_x += abs(across)
-        bound_y += abs(down)
-    scale = depth / (depth - reach)
-    place[BOUND_X], place[BOUND_Y] = bound_x * scale, bound_y * scale
-    place[AREA] = 0.0
-    for axis in range(3):
-        one, two = AXES + 2 * ((axis + 1) % 3), AXES + 2 * ((axis + 2) % 3)
-        face = 4.0 * abs(place[one] * place[two + 1] - place[one + 1] * place[two])
-        place[FACES + axis] = face
-        place[AREA] += face
-    return True
+"""Voxels dealt out to a thread at a time."""
 
 
 @njit(cache=True, nogil=True)
@@ -100,62 +40,6 @@ def shares_of(count, share, shares):
     """How many of `count` things one of several threads gets when blocks of BLOCK are dealt out in turn."""
     whole, rest = divmod(count, BLOCK * shares)
     return whole * BLOCK + min(max(rest - share * BLOCK, 0), BLOCK)
-
-
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def sample_count(place, sampling):
-    """How many samples a voxel's area is worth: the square root of its pixels, at least one."""
-    return max(1, math.ceil(sampling * math.sqrt(place[AREA]) - 1e-9))
-
-
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def sample_pixel(place, number, count, heights):
-    """Column and row of one of `count` samples spread evenly over a voxel's area (Hammersley's points on the faces).
-
-    heights : the radical inverse of each sample's number in base 2.
-    """
-    if count == 1:
-        return math.floor(place[U] + 0.5), math.floor(place[V] + 0.5)
-    at = (number + 0.5) / count * place[AREA]
-    face = 0
-    while face < 2 and at >= place[FACES + face]:
-        at -= place[FACES + face]
-        face += 1
-    p = 2.0 * at / place[FACES + face] - 1.0
-    q = 2.0 * heights[number] - 1.0
-    one, two = (face + 1) % 3, (face + 2) % 3
-    sink = place[SINKS + face] + p * place[SINKS + one] + q * place[SINKS + two]
-    scale = place[DEPTH] / (place[DEPTH] + sink)
-    f, g, h = AXES + 2 * face, AXES + 2 * one, AXES + 2 * two
-    x = place[U] + scale * (place[f] + p * place[g] + q * place[h])
-    y = place[V] + scale * (place[f + 1] + p * place[g + 1] + q * place[h + 1])
-    return math.floor(x + 0.5), math.floor(y + 0.5)
-
-
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def weighed(y, u, v, p00, p11, p22, p01, p02, p12):
-    """A difference's square under a precision."""
-    return y * y * p00 + u * u * p11 + v * v * p22 + np.float32(2.0) * (y * (u * p01 + v * p02) + u * v * p12)
-
-
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def squared_distance(blue, green, red, gaussians, at, shadow, deepest):
-    """Squared Mahalanobis distance of a pixel from its background, lit or in shadow (`evidence.yuv_background`)."""
-    b, g, r = np.float32(blue), np.float32(green), np.float32(red)
-    one = np.float32(1.0)
-    y = np.float32(0.114) * b + np.float32(0.587) * g + np.float32(0.299) * r
-    u, v = np.float32(0.492) * (b - y), np.float32(0.877) * (r - y)
-    my, mu, mv = gaussians[at, 0], gaussians[at, 1], gaussians[at, 2]
-    p00, p11, p22 = gaussians[at, 3], gaussians[at, 4], gaussians[at, 5]
-    p01, p02, p12 = gaussians[at, 6], gaussians[at, 7], gaussians[at, 8]
-    in_shadow = y < (one - np.float32(0.5) * shadow) * my
-    mean = (one - shadow) * my if in_shadow else my
-    found = weighed(y - mean, u - mu, v - mv, p00, p11, p22, p01, p02, p12)
-    if in_shadow and deepest > np.float32(0.0):
-        left = max(y / max(my, one), one - deepest)
-        darker = weighed(y - left * my, u - left * mu, v - left * mv, p00, p11, p22, p01, p02, p12)
-        found = min(found, darker)
-    return found
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
@@ -192,45 +76,52 @@ def look_at_mask(cameras, view, starts, sums, last, share, place):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def look_at_pixels(cameras, view, starts, picture, gaussians, heights, rules, place):
-    """Eq. 6 for one voxel in one picture. picture, gaussians : all views' pixels, this one's from starts[0, view]."""
+def look_at_pixels(cameras, view, starts, picture, gaussians, distances, heights, rules, place):
+    """Eq. 6 for one voxel in one picture. distances : of all views' pixels, this one's from starts[0, view]; NaN
+    where nobody has looked yet.
+    """
+    # One way out, as functions with several count their array arguments in and out at each call.
     width, height, start = int(cameras[view, WIDTH]), int(cameras[view, HEIGHT]), starts[0, view]
-    last = rules[DEPTH_IS_LAST] > 0.0
-    shadow, deepest, single = np.float32(rules[SHADOW]), np.float32(rules[DEEPEST]), np.float32(rules[SINGLE])
+    last, single = rules[DEPTH_IS_LAST] > 0.0, np.float32(rules[SINGLE])
     count = sample_count(place, rules[SAMPLING])
     enough = rules[POLYNOMIAL] + count * (rules[POLYNOMIAL + 1] + count * rules[POLYNOMIAL + 2])
-    total, inside, far = np.float32(0.0), 0, 0
+    total, inside, far, decided = np.float32(0.0), 0, 0, False
     for number in range(count):
         x, y = sample_pixel(place, number, count, heights)
-        if x < 0 or y < 0 or x >= width or y >= height:
-            continue
-        at = start + y * width + x
-        distance = squared_distance(
-            picture[at, 0], picture[at, 1], picture[at, 2], gaussians, at, shadow, deepest
-        )
-        total += distance
-        inside += 1
-        if distance > single:
-            far += 1
-        elif not last and total > enough:
-            place[SHARE] = far / inside
-            return EDGE
-    partly = inside < count
+        if x >= 0 and y >= 0 and x < width and y < height:
+            at = start + y * width + x
+            distance = distances[at]
+            if distance != distance:
+                look_at_tile(cameras, view, starts, x, y, picture, gaussians, rules, distances)
+                distance = distances[at]
+            total += distance
+            inside += 1
+            far += int(distance > single)
+            decided = not last and total > enough and far < inside
+            if decided:
+                break
+    answer = EDGE
     if inside == 0:
         beyond_x = place[U] + place[BOUND_X] < 0.0 or place[U] - place[BOUND_X] > width - 1.0
         beyond_y = place[V] + place[BOUND_Y] < 0.0 or place[V] - place[BOUND_Y] > height - 1.0
-        return UNSEEN if last or beyond_x or beyond_y else EDGE
-    place[SHARE] = far / inside
-    if total <= rules[POLYNOMIAL] + inside * (rules[POLYNOMIAL + 1] + inside * rules[POLYNOMIAL + 2]):
-        return EDGE if partly and not last else BACKGROUND
-    if last:
-        return FOREGROUND if far >= rules[EDGE_SHARE] * inside else BACKGROUND
-    return FOREGROUND if far == inside and not partly else EDGE
+        answer = UNSEEN if last or beyond_x or beyond_y else EDGE
+    elif not decided:
+        partly = inside < count
+        usual = rules[POLYNOMIAL] + inside * (rules[POLYNOMIAL + 1] + inside * rules[POLYNOMIAL + 2])
+        if total <= usual:
+            answer = EDGE if partly and not last else BACKGROUND
+        elif last:
+            answer = FOREGROUND if far >= rules[EDGE_SHARE] * inside else BACKGROUND
+        elif far == inside and not partly:
+            answer = FOREGROUND
+    place[SHARE] = far / max(inside, 1)
+    return answer
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def judge_share(
-    share, shares, nodes, states, verdicts, corner, edge, cameras, starts, sums, picture, gaussians, heights, rules
+    share, shares, nodes, states, verdicts, corner, edge, cameras, starts, sums, picture, gaussians, distances, heights,
+    rules
 ):  # fmt: skip
     """CARVED, KEPT or SPLIT for every `shares`-th block of the voxels (N, 3), beginning with block `share`.
 
@@ -259,7 +150,9 @@ def judge_share(
             if not place_voxel(cameras, view, x, y, z, half, place):
                 answer = UNSEEN
             elif by_pixels:
-                answer = look_at_pixels(cameras, view, starts, picture, gaussians, heights, rules, place)
+                answer = look_at_pixels(
+                    cameras, view, starts, picture, gaussians, distances, heights, rules, place
+                )
             else:
                 answer = look_at_mask(cameras, view, starts, sums, last, edge_share, place)
             if answer == BACKGROUND:
@@ -284,11 +177,24 @@ def judge_share(
 
 @njit(cache=True, nogil=True, parallel=True)
 def judge_all(
-    threads, nodes, states, verdicts, corner, edge, cameras, starts, sums, picture, gaussians, heights, rules
+    threads,
+    nodes,
+    states,
+    verdicts,
+    corner,
+    edge,
+    cameras,
+    starts,
+    sums,
+    picture,
+    gaussians,
+    distances,
+    heights,
+    rules,
 ):
     """All voxels, their blocks dealt out to the threads in turn."""
     for thread in prange(threads):
         judge_share(
-            thread, threads, nodes, states, verdicts, corner, edge, cameras, starts, sums, picture, gaussians, heights,
-            rules,
+            thread, threads, nodes, states, verdicts, corner, edge, cameras, starts, sums, picture, gaussians,
+            distances, heights, rules,
         )  # fmt: skip

@@ -3,27 +3,20 @@
 import numpy as np
 from numba import njit, prange
 
+from studio.volume.distance_kernels import look_at_tile
 from studio.volume.hull_cameras import HEIGHT, WIDTH
-from studio.volume.hull_kernels import (
-    BLOCK,
+from studio.volume.hull_kernels import BLOCK, KEPT, SPLIT, shares_of
+from studio.volume.hull_projection import (
     BOUND_X,
     BOUND_Y,
-    DEEPEST,
-    KEPT,
-    PIXELS,
     PLACE,
-    SAMPLING,
-    SHADOW,
-    SINGLE,
-    SPLIT,
     U,
     V,
     place_voxel,
     sample_count,
     sample_pixel,
-    shares_of,
-    squared_distance,
 )
+from studio.volume.hull_rules import PIXELS, SAMPLING, SINGLE
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -106,7 +99,20 @@ def summed_areas(mask, sums):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def colour_share(
-    share, shares, centres, edges, cameras, starts, sums, picture, gaussians, heights, rules, views, means
+    share,
+    shares,
+    centres,
+    edges,
+    cameras,
+    starts,
+    sums,
+    picture,
+    gaussians,
+    distances,
+    heights,
+    rules,
+    views,
+    means,
 ):
     """Colours of every `shares`-th block of the voxels. views : (K, V, 3), means : (K, 3), both filled.
 
@@ -114,7 +120,6 @@ def colour_share(
     where none lies in the picture.
     """
     place, by_pixels = np.empty(PLACE), rules[PIXELS] > 0.0
-    shadow, deepest = np.float32(rules[SHADOW]), np.float32(rules[DEEPEST])
     for turn in range(shares_of(len(centres), share, shares)):
         index = (turn // BLOCK * shares + share) * BLOCK + turn % BLOCK
         blue = green = red = seen = np.float32(0.0)
@@ -131,8 +136,9 @@ def colour_share(
                     continue
                 at = starts[0, view] + row * width + column
                 if by_pixels:
-                    pixel = picture[at, 0], picture[at, 1], picture[at, 2]
-                    differs = squared_distance(*pixel, gaussians, at, shadow, deepest) > rules[SINGLE]
+                    if distances[at] != distances[at]:
+                        look_at_tile(cameras, view, starts, column, row, picture, gaussians, rules, distances)
+                    differs = distances[at] > rules[SINGLE]
                 else:
                     above = starts[1, view] + row * (width + 1) + column
                     below = above + width + 1
@@ -163,7 +169,19 @@ def colour_share(
 
 @njit(cache=True, nogil=True, parallel=True)
 def colour_all(
-    threads, centres, edges, cameras, starts, sums, picture, gaussians, heights, rules, views, means
+    threads,
+    centres,
+    edges,
+    cameras,
+    starts,
+    sums,
+    picture,
+    gaussians,
+    distances,
+    heights,
+    rules,
+    views,
+    means,
 ):
     """All voxels' colours, their blocks dealt out to the threads in turn."""
     for thread in prange(threads):
@@ -177,6 +195,7 @@ def colour_all(
             sums,
             picture,
             gaussians,
+            distances,
             heights,
             rules,
             views,

@@ -20,15 +20,16 @@ from numpy.typing import NDArray
 
 from studio.errors import FootageError
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.evidence.yuv_background import SHADOW, YuvBackground
+from studio.evidence.yuv_background import YuvBackground
 from studio.geometry.camera import Camera
-from studio.knobs import knob
 from studio.parallel_launch import ONE_LAUNCH
 from studio.volume import hull_kernels as kernels
 from studio.volume import hull_octree as octree
+from studio.volume import hull_rules as rule
 from studio.volume.chi_square import fitted_thresholds
 from studio.volume.hull import Hull
 from studio.volume.hull_cameras import camera_rows
+from studio.volume.hull_settings import HullSettings
 from studio.volume.tracking_space import Box
 
 Array = NDArray[np.float64]
@@ -36,83 +37,9 @@ IntArray = NDArray[np.int64]
 Nodes = NDArray[np.int32]
 
 FIRST_DEPTH = 4
-NEXT_FRAME = "next frame"
 MOST_VIEWS = 32
 VOXELS_A_THREAD = 512
 """Fewer are not worth waking a thread for."""
-
-
-@dataclass(frozen=True, slots=True)
-class HullSettings:
-    """How the hull is carved (section 6.1)."""
-
-    title = "Visual hull"
-
-    hull_depth: int = knob(
-        7,
-        5,
-        8,
-        1,
-        label="octree depth",
-        takes_effect=NEXT_FRAME,
-        help="The tracking space is cut into 2 to this power voxels a side: 6 coarse and fast, 8 fine and slow.",
-    )
-    hull_confidence: float = knob(
-        0.99,
-        0.5,
-        0.99999,
-        0.00001,
-        label="confidence",
-        takes_effect=NEXT_FRAME,
-        help="Eq. 5's α: the share of background areas that are taken for background.",
-    )
-    hull_shadow: float = knob(
-        SHADOW,
-        0.0,
-        0.9,
-        0.01,
-        label="shadow",
-        takes_effect=NEXT_FRAME,
-        help="Share of the luminance that a shadow takes away; 0.1 in the paper.",
-    )
-    hull_deepest_shadow: float = knob(
-        0.4,
-        0.0,
-        0.9,
-        0.01,
-        label="deepest shadow",
-        takes_effect=NEXT_FRAME,
-        help="Beyond the paper: every darker shade of the background's own colour down to this share taken away is"
-        " shadow too; 0 = off, the paper's two Gaussians only.",
-    )
-    hull_sampling: float = knob(
-        1.0,
-        0.25,
-        8.0,
-        0.25,
-        label="samples",
-        unit="√px",
-        takes_effect=NEXT_FRAME,
-        help="Samples of a voxel's projection: this many times the square root of its area; 1 as in the paper.",
-    )
-    hull_edge_share: float = knob(
-        0.25,
-        0.05,
-        1.0,
-        0.05,
-        label="edge share",
-        takes_effect=NEXT_FRAME,
-        help="A voxel of the last depth is kept when this share of its samples is foreground in every view.",
-    )
-    hull_least_views: int = knob(
-        3,
-        1,
-        32,
-        1,
-        label="least views",
-        takes_effect=NEXT_FRAME,
-        help="Voxels seen by fewer cameras are carved (of fewer cameras: by all).",
-    )
 
 
 class Reconstructor:
@@ -131,13 +58,13 @@ class Reconstructor:
         self._first, self._first_states, most = self._start()
         self._heights = radical_inverses(most)
         polynomial = fitted_thresholds(most, settings.hull_confidence)
-        rules = np.zeros(kernels.RULES)
-        rules[kernels.LEAST_VIEWS] = min(settings.hull_least_views, len(cameras))
-        rules[kernels.EDGE_SHARE] = settings.hull_edge_share
-        rules[kernels.SAMPLING] = settings.hull_sampling
-        rules[kernels.SHADOW], rules[kernels.DEEPEST] = settings.hull_shadow, settings.hull_deepest_shadow
-        rules[kernels.SINGLE] = polynomial.single
-        rules[kernels.POLYNOMIAL :] = polynomial.coefficients
+        rules = np.zeros(rule.RULES)
+        rules[rule.LEAST_VIEWS] = min(settings.hull_least_views, len(cameras))
+        rules[rule.EDGE_SHARE] = settings.hull_edge_share
+        rules[rule.SAMPLING] = settings.hull_sampling
+        rules[rule.SHADOW], rules[rule.DEEPEST] = settings.hull_shadow, settings.hull_deepest_shadow
+        rules[rule.SINGLE] = polynomial.single
+        rules[rule.POLYNOMIAL :] = polynomial.coefficients
         self._rules = rules
         self._packed: tuple[tuple[YuvBackground, ...], NDArray[np.float32]] | None = None
 
@@ -184,8 +111,8 @@ class Reconstructor:
 
     def _rules_at(self, depth: int, seen: "_Seen") -> Array:
         rules = self._rules.copy()
-        rules[kernels.DEPTH_IS_LAST] = depth == self.settings.hull_depth
-        rules[kernels.PIXELS] = seen.by_pixels
+        rules[rule.DEPTH_IS_LAST] = depth == self.settings.hull_depth
+        rules[rule.PIXELS] = seen.by_pixels
         return rules
 
     def _seen(self, evidence: FrameEvidence) -> "_Seen":
@@ -194,20 +121,27 @@ class Reconstructor:
         backgrounds = tuple(view.background for view in evidence.views if view.background is not None)
         by_pixels = len(backgrounds) == len(evidence.views)
         sums = np.zeros(1, dtype=np.int32)
-        gaussians = np.zeros((1, 9), dtype=np.float32)
+        gaussians = np.zeros((9, 1), dtype=np.float32)
+        distances = np.zeros(1, dtype=np.float32)
         if by_pixels:
+            distances = np.full(len(picture), np.nan, dtype=np.float32)
             gaussians = self._gaussians(backgrounds)
         else:
             sums = np.empty(int(self._starts[1, -1]), dtype=np.int32)
             for view, first, end in zip(evidence.views, self._starts[1], self._starts[1, 1:], strict=False):
                 octree.summed_areas(view.mask, sums[first:end])
-        return _Seen(by_pixels, (self._rows, self._starts, sums, picture, gaussians, self._heights))
+        return _Seen(
+            by_pixels, (self._rows, self._starts, sums, picture, gaussians, distances, self._heights)
+        )
 
     def _gaussians(self, backgrounds: tuple[YuvBackground, ...]) -> NDArray[np.float32]:
         if self._packed is None or any(
             one is not other for one, other in zip(self._packed[0], backgrounds, strict=True)
         ):
-            self._packed = backgrounds, np.concatenate([background.packed() for background in backgrounds])
+            self._packed = (
+                backgrounds,
+                np.concatenate([background.packed() for background in backgrounds], axis=1),
+            )
         return self._packed[1]
 
     def _check(self, evidence: FrameEvidence) -> None:
