@@ -73,8 +73,8 @@ class BlobSettings(HullSettings):
         help="A limb is never split into more blobs than this.",
     )
     blob_lost: float = knob(
-        4.0,
-        0.5,
+        1.5,
+        0.1,
         50.0,
         0.1,
         label="lost below",

@@ -183,7 +183,11 @@ class ExpectedBlobs(BlobProblem):
 
     @property
     def lost_evidence(self) -> bool:
-        """Whether the likelihood is poor (section 6.3)."""
+        """Whether the likelihood is poor (section 6.3). Before anything is learnt a poor one says as much of the cones
+        as of the pose; then only an empty hull is lost.
+        """
+        if self.fitted is None or not self.memory:
+            return self.fitted is None
         return self.quality < -self.weigher.settings.blob_lost
 
     def _counted(self, stage: int) -> NDArray[np.int64] | None:
