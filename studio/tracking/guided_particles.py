@@ -3,9 +3,10 @@
 
 A guided set carries with each particle the state of the automaton that its path has reached, and its joint angles'
 movement in the last frame. The model moves the joint angles; the parameters of the root, which it does not know, get
-Gaussian noise of σ0 (5.2). A particle that is moved without the model gets that noise in every parameter; its
-movement is then the way that it went, and its state is found again: the model's label of where it is and how it
-moved, taken as the automaton's next symbol, exactly as training sequences are read (`followed`).
+Gaussian noise of σ0 (5.2). A particle that is moved without the model gets that noise in every parameter. It keeps the
+movement that it had, as noise is none (taken for one it would be added again in the next frame, and no such particle
+would survive that). Its state is found again: the model's label of where it is and how it moves, taken as the
+automaton's next symbol, exactly as training sequences are read (`followed`).
 
 In the first frame of a run nothing has moved yet: there is noise only, and a particle's state and movement are drawn
 from the clusters near its pose (`near`): the probability of each cluster given the angles, its movement unknown, then
@@ -66,6 +67,11 @@ class GuidedRules(Rules, Protocol):
     @property
     def diffusion_scale(self) -> float:
         """Multiplies σ0."""
+        ...
+
+    @property
+    def global_scale(self) -> float:
+        """Multiplies σ0 once more, of what the model does not know of particles that it moves."""
         ...
 
 
@@ -141,7 +147,9 @@ def walked(
 ) -> Walkers:
     """One frame further (Eq. 3 and 4). sigma : (D,) noise of what the model does not know, or does not move."""
     model, columns = model_of(space), columns_of(space)
-    poses = walkers.poses + rng.standard_normal(walkers.poses.shape) * sigma
+    free = walkers.free
+    noise = rng.standard_normal(walkers.poses.shape) * sigma
+    poses = walkers.poses + np.where(free[:, None], noise, rules.global_scale * noise)
     moved = propagate(
         rng,
         model,
@@ -151,10 +159,8 @@ def walked(
         rules.attenuation,
         rules.entering,
     )
-    went = poses[:, columns] - walkers.poses[:, columns]
-    free = walkers.free
     poses[:, columns] = np.where(free[:, None], poses[:, columns], moved.values)
-    velocity = np.where(free[:, None], went, moved.velocities)
+    velocity = np.where(free[:, None], walkers.velocity, moved.velocities)
     alone = followed(rng, model, walkers.states, poses[:, columns], velocity)
     return Walkers(poses, np.where(free, alone, moved.states), velocity, free)
 

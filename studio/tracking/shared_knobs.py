@@ -73,10 +73,10 @@ def prediction() -> Any:  # noqa: ANN401
     )  # fmt: skip
 
 
-def attenuation() -> Any:  # noqa: ANN401
+def attenuation(default: float) -> Any:  # noqa: ANN401
     """λ of Caillette et al. 2007, Eq. 4."""
     return knob(
-        0.3, 0.0, 1.0, 0.05, takes_effect="next frame",
+        default, 0.0, 1.0, 0.05, takes_effect="next frame",
         help="λ: how much of a motion cluster's own spread is added to a particle that stays in it (behaviour, Eq. 4).",
     )  # fmt: skip
 
@@ -86,6 +86,14 @@ def entering() -> Any:  # noqa: ANN401
     return knob(
         "resample", choices=("resample", "blend"), label="entering a cluster", takes_effect="next frame",
         help="A particle that enters a motion cluster is drawn from it (5.1), or blended with where it was going.",
+    )  # fmt: skip
+
+
+def global_scale(default: float) -> Any:  # noqa: ANN401
+    """The root's noise beside a model."""
+    return knob(
+        default, 0.02, 2.0, 0.02, label="root's noise", takes_effect="next frame",
+        help="Multiplies σ0 of position and orientation, which no model knows, of particles that a model moves (5.2).",
     )  # fmt: skip
 
 

@@ -59,8 +59,9 @@ class SwarmSettings:
     diffusion_scale: float = shared_knobs.diffusion_scale()
     dynamics: str = shared_knobs.dynamics()
     prediction: str = shared_knobs.prediction()
-    attenuation: float = shared_knobs.attenuation()
+    attenuation: float = shared_knobs.attenuation(0.3)
     entering: str = shared_knobs.entering()
+    global_scale: float = shared_knobs.global_scale(1.0)
     model_free_share: float = shared_knobs.model_free_share(0.2)
     model_free_grows: bool = shared_knobs.model_free_grows()
     estimate: str = knob(
