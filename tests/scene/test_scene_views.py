@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
+from studio.body.extremities import extremities
 from studio.body.forward_kinematics import limb_ends, limb_frames, marker_points
 from studio.body.model import BodyModel
 from studio.geometry.camera import Camera
@@ -21,7 +22,6 @@ from studio.scene.particle_view import (
     CloudStyle,
     ParticleView,
     cloud_points,
-    extremities,
     weight_shares,
 )
 from studio.scene.stick_figure import TruthView, trail_segments
