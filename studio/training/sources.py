@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
 from studio.body.subject import Subject, fit_subject
 from studio.capture.trc import MarkerMotion, read_trc
@@ -194,21 +195,43 @@ def _from_recorded(
     except StudioError:
         times = np.arange(len(recorded.positions)) / recorded.fps
         joints = MarkerMotion(recorded.names, times, recorded.positions, rate=recorded.fps)
-        return _from_points(joints, body, Path(recorded.source), fps, progress)
+        return _from_points(joints, body, Path(recorded.source), fps, progress, unit_known=False)
     whole = mended(on_skeleton(recorded, skeleton_of_body(body)))
     return fitted_person(sampled(whole, frame_times(recorded.seconds, fps), fps), body, name, progress)
 
 
 def _from_points(
-    motion: MarkerMotion, body: BodyModel, path: Path, fps: float, progress: Progress | None
+    motion: MarkerMotion,
+    body: BodyModel,
+    path: Path,
+    fps: float,
+    progress: Progress | None,
+    *,
+    unit_known: bool = True,
 ) -> Recording:
+    """Points; where their unit is not known (BVH has none), the legs are taken to be as long as the body's."""
     names, points = person_markers(motion.names, motion.positions, path.name)
+    if not unit_known:
+        theirs = _leg(names, points)
+        mine = _leg(marker_names(body), marker_points(body, body.neutral))
+        points = points * (mine / theirs if theirs > 0.0 else 1.0)
     times = motion.times - motion.times[0]
     wanted = frame_times(float(times[-1]), fps)
     if len(wanted) < FEWEST_FRAMES:
         return Recording(path.stem, fps, np.repeat(body.neutral[None], len(wanted), axis=0))
     targets = Targets(names, points_at(times, points, wanted), {})
     return _fitted(targets, _sized(body, targets), path.stem, fps, progress)
+
+
+def _leg(names: tuple[str, ...], points: Array) -> float:
+    """The usual length of both legs together, mm. points : (F, M, 3)."""
+    at = {name: points[:, place] for place, name in enumerate(names)}
+    pairs = [
+        (f"{side}{one}", f"{side}{other}")
+        for side in "LR"
+        for one, other in (("Hip", "Knee"), ("Knee", "Ankle"))
+    ]
+    return float(sum(np.nanmedian(np.linalg.norm(at[one] - at[other], axis=1)) for one, other in pairs))
 
 
 def _sized(body: BodyModel, targets: Targets) -> BodyModel:
