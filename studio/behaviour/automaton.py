@@ -21,7 +21,7 @@ ROOT = 0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arcs:
-    """The transitions that have a probability above 0, state after state.
+    """The transitions that particles may take, state after state.
 
     first : (Q + 1,) state q owns first[q]:first[q + 1]. symbols : (T,) labels. log_probabilities : (T,) ln γ.
     """
@@ -39,6 +39,7 @@ class Automaton:
     there so that the automaton is deterministic, and predict as their longest kept suffix does. next_state : (Q, K) τ.
     probabilities : (Q, K) γ, rows sum to 1. start : (Q,) s, the share of the training frames that each state was
     entered in. smoothing : share of probability spread evenly over all labels in code lengths, and only there.
+    back_off : share that `predictions` take from shorter contexts.
     """
 
     contexts: tuple[Context, ...]
@@ -47,6 +48,7 @@ class Automaton:
     probabilities: Array
     start: Array
     smoothing: float
+    back_off: float = 0.0
 
     @property
     def size(self) -> int:
@@ -69,11 +71,27 @@ class Automaton:
         return np.array([context[-1] if context else -1 for context in self.contexts], dtype=np.int64)
 
     @cached_property
+    def predictions(self) -> Array:
+        """(Q, K) γ for particles: the share `back_off` of each is the longest suffix's, down to single labels.
+
+        A long context that was seen a few times forbids nearly everything; what its suffixes have seen stays possible.
+        Where all recordings end, a label leads to itself alone; there the share is that of all labels.
+        """
+        found = self.probabilities.copy()
+        place = {context: number for number, context in enumerate(self.contexts)}
+        for context, number in sorted(place.items(), key=lambda entry: len(entry[0])):
+            shorter = next((context[at:] for at in range(1, len(context)) if context[at:] in place), ())
+            ends = len(context) == 1 and found[number, context[0]] == 1.0
+            if shorter or ends:
+                found[number] += self.back_off * (found[place[shorter]] - found[number])
+        return found
+
+    @cached_property
     def arcs(self) -> Arcs:
-        """The possible transitions, for kernels."""
-        states, symbols = np.nonzero(self.probabilities)
+        """The transitions that `predictions` allow, for kernels."""
+        states, symbols = np.nonzero(self.predictions)
         first = np.searchsorted(states, np.arange(self.size + 1)).astype(np.int64)
-        return Arcs(first, symbols.astype(np.int64), np.log(self.probabilities[states, symbols]))
+        return Arcs(first, symbols.astype(np.int64), np.log(self.predictions[states, symbols]))
 
     def state_after(self, labels: Sequence[int] | IntArray, start: int = ROOT) -> int:
         """The state after a history of labels, oldest first, from `start`."""

@@ -37,7 +37,11 @@ class ContextTest:
 
 
 def learn_automaton(
-    recordings: Sequence[IntArray], symbols: int, test: ContextTest, smoothing: float = 0.0
+    recordings: Sequence[IntArray],
+    symbols: int,
+    test: ContextTest,
+    smoothing: float = 0.0,
+    back_off: float = 0.0,
 ) -> Automaton:
     """The automaton of recordings of labels 0 … symbols - 1; histories do not reach across recordings.
 
@@ -65,6 +69,7 @@ def learn_automaton(
         probabilities=probabilities,
         start=np.zeros(len(contexts)),
         smoothing=smoothing,
+        back_off=back_off,
     )
     automaton.start[:] = _visits(automaton, recordings)
     return automaton

@@ -135,4 +135,4 @@ class BehaviourModel:
 def automaton_of(labels: Sequence[IntArray], clusters: int, settings: LearningSettings) -> Automaton:
     """The automaton of recordings of labels by the learning settings."""
     test = ContextTest(settings.memory, settings.epsilon, settings.least_probability)
-    return learn_automaton(labels, clusters, test, settings.smoothing)
+    return learn_automaton(labels, clusters, test, settings.smoothing, settings.back_off)

@@ -36,6 +36,7 @@ class _Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     fps: float = 0.0
     kept: float = 1.0
     smoothing: float = 0.0
+    back_off: float = 0.0
     settings: dict[str, bool | int | float | str] = {}
     sources: tuple[str, ...] = ()
     learnt_fps: float = 0.0
@@ -97,6 +98,7 @@ def _head(model: BehaviourModel) -> bytes:
         "fps": model.space.fps,
         "kept": model.reduction.kept,
         "smoothing": model.automaton.smoothing,
+        "back_off": model.automaton.back_off,
         "settings": asdict(making.settings),
         "sources": making.sources,
         "learnt_fps": making.learnt_fps,
@@ -177,6 +179,7 @@ def _model(head: _Head, arrays: dict[str, NDArray]) -> BehaviourModel:
         probabilities=arrays["probabilities"],
         start=arrays["start"],
         smoothing=head.smoothing,
+        back_off=head.back_off,
     )
     prototypes = Prototypes(
         *(arrays[f"prototype_{part}"] for part in ("poses", "derivatives", "recordings", "frames"))

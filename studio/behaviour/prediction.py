@@ -6,6 +6,11 @@ its cluster moves on with noise from that cluster's covariance (Eq. 4); one that
 
 Eq. 3 in a reduced space: N(X | k) is the cluster's density of the reduced features, which is what gave the training
 frames their labels; the density of what the reduction leaves out is taken to be the same for all clusters and cancels.
+
+Eq. 3 by itself loses people. A density in so many dimensions tells clusters apart so sharply that a particle a few
+degrees off is held by whichever cluster is the widest, whatever γ says, and Eq. 4 then carries it away. Hence a share
+of the particles takes its transition from γ alone. Measured on five dance clips (angles seen with noise, 200 particles,
+113 clusters): 38 degrees RMS with Eq. 3 alone, all sequences lost; 8 with a tenth of the particles by γ, none lost.
 """
 
 from dataclasses import dataclass
@@ -23,6 +28,8 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 ENTERING = ("resample", "blend")
+AUTOMATON_SHARE = 0.1
+"""Particles that follow the automaton whatever Eq. 3's density says of them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,17 +52,20 @@ def propagate(
     velocities: Array,
     attenuation: float,
     entering: str = "resample",
+    automaton_share: float = AUTOMATON_SHARE,
 ) -> Moved:
     """The particles one frame later, by Eq. 3 and 4.
 
     states : (N,) of the automaton. values, velocities : (N, d) modelled parameters and their change per frame at the
     model's rate (`model.at_rate`). attenuation : λ >= 0. entering : a particle that enters a cluster is sampled from it
     ("resample", as the paper has it), or from its product with Eq. 4's prediction ("blend"), which keeps to where the
-    particle came from. Raises BehaviourError for shapes that do not fit and an unknown `entering`.
+    particle came from. automaton_share : of the particles, those that take their transition from γ alone, chosen anew
+    in every frame; 0 as the paper has it. Raises BehaviourError for shapes that do not fit and an unknown `entering`.
     """
     _check(model, states, values, velocities, entering)
     before = _clusters(model, states, values, velocities)
-    states, labels = _next_labels(rng, model, states, before, values, velocities)
+    free = rng.random(len(states)) < automaton_share
+    states, labels = _next_labels(rng, model, states, before, values, velocities, free)
     jumped = labels != before
     half = model.space.dimensions
     noise = rooted_noise(model.dynamics.roots, labels, rng.standard_normal((len(states), 2 * half)))
@@ -104,8 +114,9 @@ def _next_labels(
     labels: IntArray,
     values: Array,
     velocities: Array,
+    free: NDArray[np.bool_],
 ) -> tuple[IntArray, IntArray]:
-    """(N,) states and labels after the automaton's steps of one frame (Eq. 3).
+    """(N,) states and labels after the automaton's steps of one frame: Eq. 3, or γ alone for those that are `free`.
 
     At another rate than the model was learnt at a frame takes `steps_per_frame` steps in the mean: as many whole ones,
     and one more with the probability of what is left.
@@ -118,7 +129,7 @@ def _next_labels(
         stepping = rng.random(len(states)) < (1.0 if step < whole else left)
         luck = rng.random(len(states))
         chosen = choose_arcs(
-            reduced, states, luck,
+            reduced, states, luck, free,
             arcs.first, arcs.symbols, arcs.log_probabilities,
             mixture.means, mixture.whiteners, mixture.log_scales,
         )  # fmt: skip

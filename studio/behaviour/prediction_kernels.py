@@ -24,14 +24,14 @@ def squared_distance(point: Array, mean: Array, whitener: Array) -> float:
 
 @numba.njit(cache=True, nogil=True)
 def choose_arcs(
-    points: Array, states: IntArray, luck: Array,
+    points: Array, states: IntArray, luck: Array, free: NDArray[np.bool_],
     first: IntArray, symbols: IntArray, log_probabilities: Array,
     means: Array, whiteners: Array, log_scales: Array,
 ) -> IntArray:  # fmt: skip
     """(N,) labels drawn with probability ∝ N(point | label) γ(state, label), over the arcs of each particle's state.
 
-    points : (N, p). luck : (N,) uniform in [0, 1). first, symbols, log_probabilities : the automaton's arcs. means,
-    whiteners, log_scales : the clusters'.
+    points : (N, p). luck : (N,) uniform in [0, 1). free : (N,) particles whose likelihood does not count. first,
+    symbols, log_probabilities : the automaton's arcs. means, whiteners, log_scales : the clusters'.
     """
     chosen = np.empty(len(states), dtype=np.int64)
     most = 0
@@ -43,8 +43,10 @@ def choose_arcs(
         largest = -np.inf
         for arc in range(begin, end):
             label = symbols[arc]
-            distance = squared_distance(points[particle], means[label], whiteners[label])
-            weights[arc - begin] = log_scales[label] - 0.5 * distance + log_probabilities[arc]
+            weights[arc - begin] = log_probabilities[arc]
+            if not free[particle]:
+                distance = squared_distance(points[particle], means[label], whiteners[label])
+                weights[arc - begin] += log_scales[label] - 0.5 * distance
             largest = max(largest, weights[arc - begin])
         total = 0.0
         for arc in range(end - begin):

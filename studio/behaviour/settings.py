@@ -29,6 +29,11 @@ class LearningSettings:
         help="Share of every state's probability that is spread evenly over all labels in the entropy, so that what "
         "was never seen has a finite code length; predictions are not smoothed.",
     )  # fmt: skip
+    back_off: float = knob(
+        0.05, 0.0, 1.0, 0.01, label="back-off", takes_effect="new run",
+        help="Share of a state's predictions that is taken from shorter histories, down to one label: what a long "
+        "history has not seen stays possible. 0 allows only what the state itself has seen, as in the paper.",
+    )  # fmt: skip
     most_clusters: int = knob(
         200, 1, 1000, 1, label="most clusters", takes_effect="new run",
         help="Clusters that the search for elementary movements starts with; it ends with as many as pay for "

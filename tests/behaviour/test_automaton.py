@@ -1,6 +1,7 @@
 """The automaton's entropy (Eq. 2) by hand, and its walk."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -63,6 +64,23 @@ def test_walk(automaton: Automaton) -> None:
     assert automaton.state_after([1], start=1) == 3
     np.testing.assert_array_equal(automaton.last_symbols, [-1, 0, 1, 1])
     assert (automaton.size, automaton.symbols, automaton.memory) == (4, 3, 2)
+
+
+def test_predictions_back_off_to_shorter_contexts(automaton: Automaton) -> None:
+    np.testing.assert_array_equal(automaton.predictions, automaton.probabilities)
+    soft = replace(automaton, back_off=0.1)
+    wanted = automaton.probabilities.copy()
+    # 01 has 1 as its suffix; 0 and 1 are single labels and keep theirs.
+    wanted[3] = 0.9 * wanted[3] + 0.1 * wanted[2]
+    np.testing.assert_allclose(soft.predictions, wanted)
+    np.testing.assert_array_equal(soft.probabilities, automaton.probabilities)
+    # Where a label leads to itself alone, anything may follow.
+    ending = replace(
+        soft, probabilities=np.array([[0.5, 0.5, 0], [0, 1, 0], [0, 1, 0], [0, 1, 0]], dtype=float)
+    )
+    np.testing.assert_allclose(ending.predictions[2], [0.05, 0.95, 0.0])
+    np.testing.assert_allclose(ending.predictions[3], 0.9 * np.array([0, 1, 0]) + 0.1 * ending.predictions[2])
+    np.testing.assert_array_equal(ending.predictions[1], [0.0, 1.0, 0.0])
 
 
 def test_arcs_are_the_transitions_above_zero(automaton: Automaton) -> None:

@@ -22,10 +22,10 @@ def model() -> BehaviourModel:
 
 def crossroads(model: BehaviourModel) -> tuple[int, np.ndarray]:
     """A state with several ways on, and features between the clusters they lead to."""
-    ways = (model.automaton.probabilities > 0.0).sum(axis=1)
+    ways = (model.automaton.predictions > 0.0).sum(axis=1)
     ways[model.automaton.last_symbols < 0] = 0
     state = int(np.argmax(ways))
-    labels = np.flatnonzero(model.automaton.probabilities[state])
+    labels = np.flatnonzero(model.automaton.predictions[state])
     return state, model.dynamics.means[labels].mean(axis=0)
 
 
@@ -39,7 +39,7 @@ def equation_3(model: BehaviourModel, state: int, features: np.ndarray) -> np.nd
     point = model.reduction.reduced(features[None])[0]
     parts = zip(model.mixture.means, model.mixture.covariances, strict=True)
     density = np.array([multivariate_normal(mean, covariance).pdf(point) for mean, covariance in parts])
-    weights = density * model.automaton.probabilities[state]
+    weights = density * model.automaton.predictions[state]
     return weights / weights.sum()
 
 
@@ -47,7 +47,9 @@ def test_transitions_are_chosen_by_equation_3(model: BehaviourModel) -> None:
     state, features = crossroads(model)
     wanted = equation_3(model, state, features)
     assert np.sort(wanted)[-2] > 0.02, "the choice is open"
-    moved = propagate(np.random.default_rng(0), model, *repeated(state, features, MANY), LAMBDA)
+    moved = propagate(
+        np.random.default_rng(0), model, *repeated(state, features, MANY), LAMBDA, automaton_share=0.0
+    )
     chosen = np.bincount(model.automaton.last_symbols[moved.states], minlength=model.clusters) / MANY
     np.testing.assert_allclose(chosen, wanted, atol=4.0 * np.sqrt(0.25 / MANY))
     label = model.automaton.last_symbols[state]
@@ -56,11 +58,22 @@ def test_transitions_are_chosen_by_equation_3(model: BehaviourModel) -> None:
     assert set(moved.states) <= {int(nexts[cluster]) for cluster in np.flatnonzero(wanted)}
 
 
+@pytest.mark.parametrize("share", [0.25, 1.0])
+def test_a_share_follows_the_automaton_alone(model: BehaviourModel, share: float) -> None:
+    state, features = crossroads(model)
+    start = repeated(state, features, MANY)
+    moved = propagate(np.random.default_rng(0), model, *start, LAMBDA, automaton_share=share)
+    chosen = np.bincount(model.automaton.last_symbols[moved.states], minlength=model.clusters) / MANY
+    gamma = model.automaton.predictions[state]
+    wanted = share * gamma + (1.0 - share) * equation_3(model, state, features)
+    np.testing.assert_allclose(chosen, wanted, atol=4.0 * np.sqrt(0.25 / MANY))
+
+
 def test_far_from_every_cluster_the_choice_is_still_made(model: BehaviourModel) -> None:
     state, features = crossroads(model)
     moved = propagate(np.random.default_rng(0), model, *repeated(state, features + 300.0, 10), LAMBDA)
     assert np.isfinite(moved.values).all()
-    assert (model.automaton.probabilities[state, model.automaton.last_symbols[moved.states]] > 0.0).all()
+    assert (model.automaton.predictions[state, model.automaton.last_symbols[moved.states]] > 0.0).all()
 
 
 def test_staying_moves_by_equation_4(model: BehaviourModel) -> None:
@@ -163,7 +176,9 @@ def test_at_another_rate_the_automaton_steps_as_often_a_second(model: BehaviourM
     fast = model.at_rate(4.0 * FPS)
     scaled = np.concatenate([features[:4], features[4:] / 4.0])
     wanted = 1.0 - equation_3(model, state, features)[model.automaton.last_symbols[state]]
-    moved = propagate(np.random.default_rng(8), fast, *repeated(state, scaled, MANY), 0.0)
+    moved = propagate(
+        np.random.default_rng(8), fast, *repeated(state, scaled, MANY), 0.0, automaton_share=0.0
+    )
     assert moved.jumped.mean() == pytest.approx(wanted / 4.0, abs=0.01)
     slow = model.at_rate(0.5 * FPS)
     scaled = np.concatenate([features[:4], features[4:] * 2.0])
@@ -181,7 +196,13 @@ def test_without_memory_clusters_come_from_the_likelihood(model: BehaviourModel)
     assert not start.states.any()
     features = np.repeat(model.dynamics.means[1][None], 2000, axis=0)
     moved = propagate(
-        np.random.default_rng(0), forgetful, np.zeros(2000, int), features[:, :4], features[:, 4:], 0.1
+        np.random.default_rng(0),
+        forgetful,
+        np.zeros(2000, int),
+        features[:, :4],
+        features[:, 4:],
+        0.1,
+        automaton_share=0.0,
     )
     wanted = equation_3(forgetful, 0, features[0])
     assert 1.0 - moved.jumped.mean() == pytest.approx(wanted[1], abs=0.05)
