@@ -111,11 +111,6 @@ class TrackingRun:
     # ----------------------------------------------------------------- stepping
 
     @property
-    def guided(self) -> bool:
-        """Whether the run has a behaviour model."""
-        return self._behaviour.space.behaviour is not None
-
-    @property
     def finished(self) -> bool:
         """Whether every frame has a result."""
         return self.next_frame >= self.record.last

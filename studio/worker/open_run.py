@@ -47,7 +47,7 @@ class OpenRun:
             raise
         self.mailbox = SettingsMailbox(
             *self.tracking.latest_settings(),
-            lambda settings: check_prediction(settings, self.tracking.guided),
+            lambda settings: check_prediction(settings, bool(self.stored.record.behaviour)),
         )
         self.tracking.settings_source = self.mailbox.latest
         self.selected = -1
