@@ -4,6 +4,16 @@ import difflib
 from types import MappingProxyType, ModuleType
 
 from studio.errors import NotFoundError
+from studio.experiments.caillette import (
+    best_tracker,
+    clusters_and_states,
+    fig_11,
+    fig_12,
+    fig_13,
+    online_learning,
+    scalability,
+    table_1,
+)
 from studio.experiments.deutscher_reid import (
     adaptive_diffusion,
     crossover,
@@ -55,6 +65,14 @@ MODULES: tuple[ModuleType, ...] = (
     constraints,
     best_figure,
     computation_time,
+    clusters_and_states,
+    table_1,
+    fig_11,
+    fig_12,
+    fig_13,
+    scalability,
+    online_learning,
+    best_tracker,
     robustness,
 )
 

@@ -1,0 +1,1 @@
+"""The figures and tables of Caillette, Galata & Howard 2007, run again."""

@@ -1,0 +1,114 @@
+"""What runs on the dance say beside each other: ratios, losses, curves over frames, tables."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.experiments.caillette.following import Followed
+from studio.experiments.caillette.setting import FPS
+from studio.experiments.charts import Chart, Series
+from studio.experiments.experiment import Number, Outcome, Table
+from studio.experiments.statistics import number, ratio_interval
+from studio.experiments.tracking_trials import claimed_verdict, grouped
+
+Array = NDArray[np.float64]
+Runs = Sequence[Followed]
+Groups = Mapping[str, Runs]
+
+OFF_MM = 150.0
+"""RMS over the markers: the body is no longer on the person."""
+
+
+def by_contender(outcomes: Sequence[Outcome]) -> dict[str, list[Followed]]:
+    """What was measured, by contender in the order of the trials, seeds in order."""
+    return grouped(outcomes, Followed)
+
+
+def angle(run: Followed) -> float:
+    """A run's RMS joint angle error, degrees."""
+    return run.angle_rms
+
+
+def position(run: Followed) -> float:
+    """A run's RMS joint position error, mm."""
+    return run.position_rms
+
+
+def longest_loss(run: Followed) -> float:
+    """Seconds that a run was off by more than OFF_MM at a stretch, the longest such stretch."""
+    longest = now = 0
+    for error in run.position_mm:
+        now = now + 1 if error > OFF_MM else 0
+        longest = max(longest, now)
+    return longest / FPS
+
+
+def loses_track(run: Followed) -> bool:
+    """Whether a run is off for a second or more at a stretch."""
+    return longest_loss(run) >= 1.0
+
+
+def ratio(name: str, ours: Runs, theirs: Runs, claim: str, of: Callable[[Followed], float] = angle) -> Number:
+    """The ratio of two contenders' errors, paired by seed. claim : "equal" or "lower" (`claimed_verdict`), "" where
+    there is none.
+    """
+    first, second = [of(run) for run in ours], [of(run) for run in theirs]
+    low, high = ratio_interval(first, second)
+    verdict = claimed_verdict(low, high, claim) if claim else "answered"
+    value = float(np.mean(first) / np.mean(second))
+    return Number(
+        name, value, low, high, "×", 1.0 if claim == "equal" else None, "lower", len(first), verdict
+    )
+
+
+def error_number(name: str, runs: Runs, of: Callable[[Followed], float] = angle, unit: str = "°") -> Number:
+    """The mean over seeds of a run's error; the paper prints curves and no figures."""
+    return number(name, [of(run) for run in runs], unit)
+
+
+def mean_of(runs: Runs, of: Callable[[Followed], float] = angle) -> float:
+    """The mean over seeds."""
+    return float(np.mean([of(run) for run in runs]))
+
+
+def curves(title: str, groups: Groups, positions: bool = False) -> Chart:
+    """Error over frames: every seed thin, the RMS over seeds thick."""
+    series: list[Series] = []
+    for group, runs in groups.items():
+        rows = np.array([run.position_mm if positions else run.angle_deg for run in runs])
+        frames = tuple(float(frame) for frame in range(rows.shape[1]))
+        series += [
+            Series(f"{group}, seed {index}", frames, tuple(row.tolist()), group=group, thin=True)
+            for index, row in enumerate(rows)
+        ]
+        whole = np.sqrt((rows**2).mean(axis=0))
+        series.append(Series(group, frames, tuple(whole.tolist()), group=group))
+    axis = "RMS joint position error (mm)" if positions else "RMS joint angle error (°)"
+    return Chart(title, "lines", f"frame (at {FPS} Hz)", axis, tuple(series))
+
+
+def summary_table(title: str, groups: Groups) -> Table:
+    """A line a contender: errors, losses, time."""
+    columns = (
+        "contender", "seeds", "evaluations a frame", "joint angle, RMS (°)", "joint position, RMS (mm)",
+        "mean (mm)", "frames with a limb lost (%)", "longest loss (s)", "model-free share (%)", "search (ms a frame)",
+    )  # fmt: skip
+    rows = []
+    for group, runs in groups.items():
+        free = [value for run in runs for value in run.free]
+        rows.append(
+            (
+                group,
+                len(runs),
+                runs[0].evaluations,
+                round(mean_of(runs), 1),
+                round(mean_of(runs, position), 1),
+                round(float(np.mean([run.mean_mm for run in runs])), 1),
+                round(100.0 * float(np.mean([run.lost_share for run in runs])), 1),
+                round(max(longest_loss(run) for run in runs), 1),
+                round(100.0 * float(np.mean(free)), 0) if free else "",
+                round(float(np.mean([run.milliseconds for run in runs])), 1),
+            )
+        )
+    return Table(title, columns, tuple(rows))

@@ -1,0 +1,159 @@
+"""What behaviour models are learnt from, and the models, learnt once and kept beside the footage.
+
+Three performances of each exercise as the paper has them: the recording itself and two made from it, whose tempo and
+angles change slowly by a little; each is smoothed by several amounts (section 7.1), which makes about 13 000 frames of
+two exercises. Everything is on the body in its own proportions: a model fits the body in any size.
+"""
+
+import dataclasses
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.behaviour.model import BehaviourModel
+from studio.behaviour.model_file import read_model, write_model
+from studio.behaviour.settings import LearningSettings
+from studio.body.catalogue import load_body
+from studio.body.model import BodyModel
+from studio.experiments.caillette.learnt_files import made_once
+from studio.experiments.caillette.pointing import POINTING, pointing_poses
+from studio.experiments.footage_shelf import FootageShelf
+from studio.experiments.reproduction_plan import recipe_digest
+from studio.synthesis.person import first_frames
+from studio.synthesis.recipe_file import find_recipe, read_recipe
+from studio.synthesis.recipes import recipe_motion
+from studio.synthesis.recorded_clip import sampled
+from studio.training.learning import learn
+from studio.training.oversampling import OversamplingSettings
+from studio.training.resampling import frame_times
+from studio.training.sources import FPS, Recording, fitted_person
+from studio.training.targets import skeleton_of_body
+
+Array = NDArray[np.float64]
+
+USUAL_MEMORY, USUAL_EPSILON = 10, 0.05
+MODEL, NUMBERS, POSES = "model.behaviour", "learnt.json", "poses.npy"
+
+
+@dataclass(frozen=True, slots=True)
+class Training:
+    """What a model is learnt from and how; plain values.
+
+    sources : recipes of people's motion, or "pointing". frames : of each at 30 Hz, 0 for all. performances : of each.
+    smoothings : of each performance. memory, epsilon : of the automaton. clusters : further learning knobs. seed : of
+    performances and clustering. tested : recipes on whose motion the entropy is measured.
+    """
+
+    sources: tuple[str, ...]
+    frames: int = 0
+    performances: int = 3
+    smoothings: int = 5
+    memory: int = USUAL_MEMORY
+    epsilon: float = USUAL_EPSILON
+    seed: int = 0
+    body: str = "human25"
+    tested: tuple[str, ...] = ()
+    clusters: Mapping[str, Any] = field(default_factory=dict)
+
+    def plain(self) -> dict[str, Any]:
+        """As a trial's arguments."""
+        return asdict(self)
+
+    @classmethod
+    def of_plain(cls, arguments: Mapping[str, Any]) -> "Training":
+        """From a trial's arguments, as they come back from JSON."""
+        words = {name: tuple(arguments[name]) for name in ("sources", "tested")}
+        return cls(**{**arguments, **words})
+
+    def settings(self) -> LearningSettings:
+        """The knobs of learning."""
+        return LearningSettings(memory=self.memory, epsilon=self.epsilon, **self.clusters)
+
+    def material(self) -> OversamplingSettings:
+        """The knobs of what is made of a recording."""
+        return OversamplingSettings(performances=self.performances, smoothings=self.smoothings)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lesson:
+    """A model with what learning it told. seconds : of clusters and automaton, without reading the sources."""
+
+    model: BehaviourModel
+    frames: int
+    seconds: float
+
+
+def recorded(shelf: FootageShelf, source: str, body: BodyModel, frames: int = 0) -> Recording:
+    """A source's motion on the body, fitted once. frames : at 30 Hz from the first, 0 for all.
+
+    Raises StudioError for an unknown recipe and for recorded motion that is not there.
+    """
+    if source == POINTING:
+        return Recording(source, FPS, pointing_poses(body, FPS))
+    recipe = recipe_digest(source)
+
+    def make(folder: Path) -> None:
+        path = find_recipe(source)
+        motion = recipe_motion(read_recipe(path), path.parent, skeleton_of_body(body))
+        times = frame_times((motion.frame_count - 1) / motion.fps, FPS)
+        shown = first_frames(sampled(motion, times, FPS), frames or None)
+        np.save(folder / POSES, fitted_person(shown, body, source).poses)
+
+    making = {"source": source, "recipe": recipe, "body": body.name, "frames": frames, "fps": FPS}
+    return Recording(source, FPS, np.load(made_once(shelf, "motion", making, make) / POSES))
+
+
+def learnt(shelf: FootageShelf, training: Training) -> Lesson:
+    """The model of a training set, learnt once for all who ask. Models that differ in memory or ε alone have the same
+    clusters.
+    """
+    clusters = dataclasses.replace(training, memory=USUAL_MEMORY, epsilon=USUAL_EPSILON)
+    first = made_once(shelf, "model", _making(clusters), lambda folder: _learn(shelf, clusters, folder))
+    if clusters == training:
+        return _read(first)
+
+    def make(folder: Path) -> None:
+        began = time.perf_counter()
+        base = _read(first)
+        model = base.model.with_automaton(training.settings())
+        _write(folder, Lesson(model, base.frames, time.perf_counter() - began))
+
+    return _read(made_once(shelf, "model", _making(training), make))
+
+
+def lesson_of(shelf: FootageShelf, training: Training) -> Lesson:
+    """The model of a training set, learnt now: to measure how long it takes."""
+    body = load_body(training.body)
+    recordings = [recorded(shelf, source, body, training.frames) for source in training.sources]
+    tested = [recorded(shelf, source, body, training.frames) for source in training.tested]
+    began = time.perf_counter()
+    model, told = learn(
+        recordings, body, training.settings(), training.material(), tested, seed=training.seed
+    )
+    return Lesson(model, told.frames, time.perf_counter() - began)
+
+
+def _learn(shelf: FootageShelf, training: Training, folder: Path) -> None:
+    _write(folder, lesson_of(shelf, training))
+
+
+def _making(training: Training) -> dict[str, Any]:
+    named = [name for name in (*training.sources, *training.tested) if name != POINTING]
+    return {**training.plain(), "recipes": [recipe_digest(name) for name in named]}
+
+
+def _write(folder: Path, lesson: Lesson) -> None:
+    write_model(lesson.model, folder / MODEL)
+    numbers = {"frames": lesson.frames, "seconds": round(lesson.seconds, 3)}
+    (folder / NUMBERS).write_text(json.dumps(numbers), encoding="utf-8")
+
+
+def _read(folder: Path) -> Lesson:
+    numbers = json.loads((folder / NUMBERS).read_text(encoding="utf-8"))
+    return Lesson(read_model(folder / MODEL), int(numbers["frames"]), float(numbers["seconds"]))

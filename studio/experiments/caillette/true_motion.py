@@ -1,0 +1,95 @@
+"""The true pose of every frame of rendered footage: the tracked body laid on the very motion that was rendered.
+
+The paper annotated twelve body parts by hand, smoothed their ways and took inverse kinematics (7.1). Here the motion is
+known, also how the head is turned and the feet stand, which markers at the joints do not tell; the whole path is fitted
+at once, so that what straight limbs leave open (twists) is steady.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.forward_kinematics import marker_points
+from studio.body.model import BodyModel
+from studio.errors import TruthError
+from studio.experiments.caillette.learnt_files import made_once
+from studio.experiments.footage_shelf import FootageShelf
+from studio.sessions.session import Session
+from studio.synthesis.person import first_frames, marker_motion
+from studio.synthesis.recipe_file import read_recipe
+from studio.synthesis.recipes import RECIPE_COPY, recipe_motion, recipe_person
+from studio.training.sources import fitted_person
+
+Array = NDArray[np.float64]
+
+FILE = "truth.npz"
+LOST_MM = 150.0
+"""A limb is lost when one of its markers is off by more, as in `evaluation.errors`."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrueMotion:
+    """poses : (F, D) of the tracked body. points : (F, M, 3) mm, true markers. markers : (M,) which of the body's they
+    are.
+    """
+
+    poses: Array
+    points: Array
+    markers: NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointErrors:
+    """Of each frame (F,). angle_deg : RMS over the joint angles (all but the root's), wrapped. position_mm : RMS over
+    the markers. mean_mm : their mean. lost : whether any marker is off by more than LOST_MM.
+    """
+
+    angle_deg: Array
+    position_mm: Array
+    mean_mm: Array
+    lost: NDArray[np.bool_]
+
+
+def true_motion(shelf: FootageShelf, session: Session, last: int) -> TrueMotion:
+    """Of the first `last` frames of a recipe's session, for the body that its runs track.
+
+    Raises TruthError for a session that is no recipe's.
+    """
+    recipe_path = session.path / RECIPE_COPY
+    if not recipe_path.is_file():
+        raise TruthError(f"Session '{session.name}' is not made by a recipe.", "Take one that is.")
+    body = session.body()
+
+    def make(folder: Path) -> None:
+        recipe = read_recipe(recipe_path)
+        skeleton, _ = recipe_person(recipe, recipe_path.parent, np.random.default_rng(recipe.seed))
+        motion = first_frames(recipe_motion(recipe, recipe_path.parent, skeleton), last)
+        truth = marker_motion(motion)
+        places = {marker.name: place for place, marker in enumerate(body.markers)}
+        common = [index for index, name in enumerate(truth.names) if name in places]
+        np.savez(
+            folder / FILE,
+            poses=fitted_person(motion, body, session.name).poses,
+            points=truth.positions[:, common],
+            markers=np.array([places[truth.names[index]] for index in common], dtype=np.int64),
+        )
+
+    making = {"recipe": recipe_path.read_text(encoding="utf-8"), "body": body.name, "last": last}
+    with np.load(made_once(shelf, "truth", making, make) / FILE) as kept:
+        return TrueMotion(kept["poses"], kept["points"], kept["markers"])
+
+
+def joint_errors(body: BodyModel, columns: NDArray[np.int64], poses: Array, truth: TrueMotion) -> JointErrors:
+    """Errors of poses (F, D), the first F frames of the truth. columns : (d,) the joint angles in the pose vector."""
+    true = truth.poses[: len(poses)]
+    away = np.degrees((poses - true + np.pi) % (2.0 * np.pi) - np.pi)[:, columns]
+    found = marker_points(body, poses)[:, truth.markers]
+    apart = np.linalg.norm(found - truth.points[: len(poses)], axis=2)
+    return JointErrors(
+        np.sqrt((away**2).mean(axis=1)),
+        np.sqrt((apart**2).mean(axis=1)),
+        apart.mean(axis=1),
+        (apart > LOST_MM).any(axis=1),
+    )
