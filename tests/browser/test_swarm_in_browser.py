@@ -139,8 +139,12 @@ def test_the_page_shows_sixty_layers(swarm: StudioPage, artefacts: Path) -> None
     page.click("#theme")
 
 
-def test_a_new_swarm_brings_its_weighting_and_presets(swarm: StudioPage, artefacts: Path) -> None:
-    page = swarm.page
+def test_a_new_swarm_brings_its_weighting_and_presets(
+    browser: Browser, studio: StudioServer, artefacts: Path
+) -> None:
+    window = StudioPage(browser, studio, with_scene=False)
+    window.until("get('session') === 'walk'")
+    page = window.page
     page.locator(".session.open .new-run").click()
     form = page.locator("dialog form")
     tracker, weighting, preset = (
@@ -152,11 +156,12 @@ def test_a_new_swarm_brings_its_weighting_and_presets(swarm: StudioPage, artefac
     until(page, lambda: "paper, swarm" in values_of(preset.locator("option")))
     assert weighting.input_value() == "edge-silhouette"
     assert "paper, Eq. 13" not in values_of(preset.locator("option"))
-    swarm.shoot(artefacts / "page-new-swarm-dark-1280x800.png")
+    window.shoot(artefacts / "page-new-swarm-dark-1280x800.png")
     tracker.select_option("annealed")
     until(page, lambda: "paper, Eq. 13" in values_of(preset.locator("option")))
     assert weighting.input_value() == "edge-region"
     form.get_by_role("button", name="Cancel", exact=True).click()
+    window.close()
 
 
 def values_of(options: Locator) -> list[str]:
