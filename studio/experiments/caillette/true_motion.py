@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
+from studio.capture.trc import MarkerMotion, read_trc
 from studio.errors import TruthError
 from studio.experiments.caillette.learnt_files import made_once
 from studio.experiments.footage_shelf import FootageShelf
@@ -25,6 +26,7 @@ from studio.training.sources import fitted_person
 Array = NDArray[np.float64]
 
 FILE = "truth.npz"
+SAME_MM = 0.1
 LOST_MM = 150.0
 """A limb is lost when one of its markers is off by more, as in `evaluation.errors`."""
 
@@ -55,7 +57,7 @@ class JointErrors:
 def true_motion(shelf: FootageShelf, session: Session, last: int) -> TrueMotion:
     """Of the first `last` frames of a recipe's session, for the body that its runs track.
 
-    Raises TruthError for a session that is no recipe's.
+    Raises TruthError for a session that is no recipe's, and for footage of a motion that another version made.
     """
     recipe_path = session.path / RECIPE_COPY
     if not recipe_path.is_file():
@@ -67,6 +69,7 @@ def true_motion(shelf: FootageShelf, session: Session, last: int) -> TrueMotion:
         skeleton, _ = recipe_person(recipe, recipe_path.parent, np.random.default_rng(recipe.seed))
         motion = first_frames(recipe_motion(recipe, recipe_path.parent, skeleton), last)
         truth = marker_motion(motion)
+        _check_rendered(session, truth)
         places = {marker.name: place for place, marker in enumerate(body.markers)}
         common = [index for index, name in enumerate(truth.names) if name in places]
         np.savez(
@@ -79,6 +82,18 @@ def true_motion(shelf: FootageShelf, session: Session, last: int) -> TrueMotion:
     making = {"recipe": recipe_path.read_text(encoding="utf-8"), "body": body.name, "last": last}
     with np.load(made_once(shelf, "truth", making, make) / FILE) as kept:
         return TrueMotion(kept["poses"], kept["points"], kept["markers"])
+
+
+def _check_rendered(session: Session, truth: MarkerMotion) -> None:
+    """Raise TruthError unless the footage shows this very motion."""
+    assert session.truth_path is not None
+    rendered = read_trc(session.truth_path)
+    same = rendered.names == truth.names and len(rendered.positions) >= len(truth.positions)
+    if not same or not np.allclose(rendered.positions[: len(truth.positions)], truth.positions, atol=SAME_MM):
+        raise TruthError(
+            f"The footage '{session.name}' shows another motion than its recipe makes now.",
+            "It was rendered by another version of the studio: delete its folder, and it is rendered anew.",
+        )
 
 
 def joint_errors(body: BodyModel, columns: NDArray[np.int64], poses: Array, truth: TrueMotion) -> JointErrors:
