@@ -9,8 +9,10 @@ frames their labels; the density of what the reduction leaves out is taken to be
 
 Eq. 3 by itself loses people. A density in so many dimensions tells clusters apart so sharply that a particle a few
 degrees off is held by whichever cluster is the widest, whatever γ says, and Eq. 4 then carries it away. Hence a share
-of the particles takes its transition from γ alone. Measured on five dance clips (angles seen with noise, 200 particles,
-113 clusters): 38 degrees RMS with Eq. 3 alone, all sequences lost; 8 with a tenth of the particles by γ, none lost.
+of the particles takes its transition from γ alone. Measured on five dance clips (other performances than the
+training's, the true angles as the only evidence, 200 particles, λ = 0.3, 113 clusters, 509 states): mean error 19
+degrees and lost in 27 % of the frames by Eq. 3 alone, 6 degrees and lost in none with a tenth of the particles by γ;
+particles with Gaussian noise instead of a model 15 degrees.
 """
 
 from dataclasses import dataclass
