@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from studio.body.subject import Subject, write_subject
 from studio.capture.calibration_files import write_calibration
 from studio.capture.trc import write_trc
 from studio.geometry.camera import Camera
 from studio.geometry.rotations import axis_turn
-from studio.body.subject import Subject, write_subject
 from studio.sessions.importers.catalogue import import_source
 from studio.sessions.session import Session
 from studio.synthesis.person import (

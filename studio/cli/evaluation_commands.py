@@ -14,6 +14,7 @@ from studio.errors import TruthError
 from studio.evaluation.errors import evaluate
 from studio.evaluation.report import as_document, in_words
 from studio.experiments.benchmark import run_benchmark
+from studio.experiments.hull_benchmark import run_hull_benchmark
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.sessions.workspace import Workspace
 from studio.web.samples import install_sample
@@ -45,9 +46,10 @@ def evaluate_command(session: str, run: str, truth: Path | None) -> Mapping[str,
 @click.command()
 @command
 def bench() -> dict[str, object]:
-    """Measure the kernels against bare memory loads in the same run, and the answer to a moved slider."""
+    """Measure the kernels against bare memory loads in the same run, hulls beside the paper's, a slider's answer."""
     with progress("Measuring") as report:
         told = dict(run_benchmark(progress=report))
+        told["hull"] = run_hull_benchmark(progress=report)
         report("re-annealing", 0, 1)
         with tempfile.TemporaryDirectory() as folder:
             workspace = Workspace(Path(folder))

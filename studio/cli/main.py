@@ -14,6 +14,11 @@ COMMANDS = {
     ),
     "serve": ("serving_commands", "serve", "Open the studio on a workspace: prints the address to open."),
     "import": ("session_commands", "import_command", "Make a session from footage and calibration."),
+    "initialise": (
+        "initialisation_commands",
+        "initialise_command",
+        "Find the pose in a frame, and with it a start pose.",
+    ),
     "track": ("tracking_commands", "track", "Track a session and store the run."),
     "evaluate": ("evaluation_commands", "evaluate_command", "Measure a run against the true markers."),
     "compare": ("comparison_commands", "compare", "Compare trackers fairly on a session with a truth."),

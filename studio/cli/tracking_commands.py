@@ -15,11 +15,12 @@ from studio.errors import RunError, SettingsError
 from studio.knobs import allowed
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.start_pose_file import start_pose_from_file
-from studio.sessions.session import Session
+from studio.sessions.session import START_POSE_NAME, Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
 from studio.settings import knob_table
 from studio.tracking.catalogue import TRACKERS
+from studio.tracking.tracker import LOST, NO_EVIDENCE, RECOVERED
 from studio.weighting.catalogue import WEIGHTINGS
 from studio.worker.batch import BatchResult, track_to_end
 
@@ -110,7 +111,7 @@ def track(
             name=name,
             behaviour=behaviour,
         )
-        run = prepare_run(opened, _with_start_pose(request, opened, start_pose))
+        run = _prepared(opened, _with_start_pose(request, opened, start_pose))
     for line in run.record.notes:
         note(line)
     try:
@@ -126,7 +127,7 @@ def track(
         _write_poses(run, poses)
     text = (
         f"{opened.name} / {run.name}: {run.record.frame_count} frames in {result.seconds:.1f} s, "
-        f"seed {run.record.seed}"
+        f"seed {run.record.seed}{_how_it_went(run)}"
     )
     return {**_told(run, result), "text": text}
 
@@ -138,6 +139,36 @@ def _with_start_pose(request: RunRequest, session: Session, path: Path | None) -
     scaled = session.body(request.body or None, request.subject)
     pose, source = start_pose_from_file(path, scaled, request.first, session.manifest.fps)
     return dataclasses.replace(request, start_pose=pose, start_source=source)
+
+
+def _prepared(session: Session, request: RunRequest) -> StoredRun:
+    """The run, with progress where its start pose has to be found first."""
+    if request.start_pose is not None or (session.path / START_POSE_NAME).exists():
+        return prepare_run(session, request)
+    with progress(f"{session.name}: start pose") as report:
+        return prepare_run(session, request, report)
+
+
+def _went(run: StoredRun) -> dict[str, int]:
+    """How many frames were lost, without evidence, and found again after."""
+    with run.results() as results:
+        states = results.timeline().tracking
+    return {
+        "frames_lost": states.count(LOST),
+        "frames_without_evidence": states.count(NO_EVIDENCE),
+        "times_recovered": states.count(RECOVERED),
+    }
+
+
+def _how_it_went(run: StoredRun) -> str:
+    """The same in words, nothing where all frames were tracked."""
+    went = _went(run)
+    words = (
+        f"{went['frames_lost']} frames lost",
+        f"{went['frames_without_evidence']} without evidence",
+        f"found again {went['times_recovered']} times",
+    )
+    return f"; {', '.join(words)}" if any(went.values()) else ""
 
 
 def _told(run: StoredRun, result: BatchResult) -> dict[str, object]:
@@ -154,6 +185,7 @@ def _told(run: StoredRun, result: BatchResult) -> dict[str, object]:
         "evaluations_per_frame": result.evaluations_per_frame,
         "seconds": round(result.seconds, 3),
         "start_pose": record.start_source,
+        **_went(run),
     }
     if record.behaviour:
         told["behaviour"] = record.behaviour

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from studio.body.branches import within_limits
 from studio.body.model import BodyModel
 from studio.body.subject import Subject
-from studio.errors import BodyError, RunError
+from studio.errors import BodyError, RunError, StudioError
 from studio.runs.behaviour_models import chosen_model
+from studio.runs.initialising import InitialPose, Progress, initialise
 from studio.runs.search_space import parameter_names, session_sigma
 from studio.sessions.manifest import now
 from studio.sessions.run_record import RunRecord
@@ -55,9 +56,14 @@ class RunRequest:
     behaviour: str = ""
 
 
-def prepare_run(session: Session, request: RunRequest | None = None) -> StoredRun:
-    """Make a run's folder, ready to be tracked. Raises StudioError naming what is wrong; then nothing was
-    made."""
+def prepare_run(
+    session: Session, request: RunRequest | None = None, progress: Progress | None = None
+) -> StoredRun:
+    """Make a run's folder, ready to be tracked. Raises StudioError naming what is wrong; then nothing was made.
+
+    Where neither the request nor the session has a start pose and the body has no limits to begin between, the first
+    frame is searched for one, which takes a while. progress : told how far that is.
+    """
     asked = request or RunRequest()
     tracker = asked.tracker or session.manifest.tracker or DEFAULT_TRACKER
     weighting = asked.weighting or session.manifest.weighting or usual_weighting(tracker)
@@ -66,10 +72,15 @@ def prepare_run(session: Session, request: RunRequest | None = None) -> StoredRu
     if not 0 <= asked.seed < 2**63:
         raise RunError(f"The seed {asked.seed} cannot be used.", "Give a whole number of 0 or more.")
     body, notes = session.body_with_notes(asked.body or None, asked.subject)
-    start, source = start_pose(session, body, asked.start_pose, asked.start_source)
     behaviour = chosen_model(session, body, settings, asked.behaviour)
     if behaviour is not None and behaviour.note:
         notes = (*notes, behaviour.note)
+    start, source = start_pose(session, body, asked.start_pose, asked.start_source)
+    if start is None and not _limited(body):
+        model = str(behaviour.path) if behaviour else ""
+        found = _found(session, first, body, model, asked.seed, progress)
+        start, source = within_limits(body, found.pose), found.source
+        notes = (*notes, *([found.note] if found.note else []))
     record = RunRecord(
         name=asked.name or free_run_name(session),
         session=session.name,
@@ -112,9 +123,8 @@ def start_pose(
 ) -> tuple[Array | None, str]:
     """The pose that the first frame starts from (its angles rewritten into the limits), and where it came from.
 
-    None, where neither the request nor the session has one and every parameter has limits: then the search
-    starts uniformly between them (Fig. 12a). Raises RunError without start pose and limits, BodyError for a
-    wrong one.
+    None, where neither the request nor the session has one: then a search starts uniformly between the limits (Fig.
+    12a), or where there are none the body is looked for. Raises BodyError for a wrong one.
     """
     if given is not None:
         pose = np.asarray(given, dtype=np.float64)
@@ -127,13 +137,24 @@ def start_pose(
     stored = session.start_pose(body)
     if stored is not None:
         return stored, "the session's start pose"
-    limited = all(np.isfinite(entry.lower) and np.isfinite(entry.upper) for entry in body.parameters)
-    if not limited:
-        raise RunError(
-            f"Session '{session.name}' has no start pose.",
-            "Give one with --start-pose FILE (a CSV row, or a TRC), or set it in the studio.",
-        )
     return None, "uniform over the limits"
+
+
+def _found(
+    session: Session, frame: int, body: BodyModel, model: str, seed: int, progress: Progress | None
+) -> InitialPose:
+    """The pose in a run's first frame. Raises RunError where there is none to be found."""
+    try:
+        return initialise(session, frame, body=body, behaviour=model, seed=seed, progress=progress)
+    except StudioError as error:
+        raise RunError(
+            f"Session '{session.name}' has no start pose, and none can be found: {error.message}",
+            "Give one with --start-pose FILE (a CSV row, or a TRC), or set it in the studio.",
+        ) from None
+
+
+def _limited(body: BodyModel) -> bool:
+    return all(np.isfinite(entry.lower) and np.isfinite(entry.upper) for entry in body.parameters)
 
 
 def software_version() -> str:

@@ -35,7 +35,7 @@ class Reannealing:
 
     def result(self) -> FrameResult:
         """The frame's result. Raises RunError while layers are left."""
-        return self._search.result(self.settings.tracker)
+        return self._tracking.result_of(self._search, self.settings)
 
     def keep(self) -> None:
         """Make this the run's own frame; later frames are dropped, as they followed from the old one."""

@@ -18,6 +18,7 @@ import numpy as np
 from studio.errors import NotFoundError, RunError
 from studio.runs.pace import Pace, Progress
 from studio.runs.run_behaviour import RunBehaviour
+from studio.runs.run_watch import RunWatch
 from studio.sessions.results_codec import particle_arrays, particles_from
 from studio.sessions.results_store import ResultsReader, ResultsWriter
 from studio.sessions.stored_run import StoredRun
@@ -60,6 +61,14 @@ class TrackingRun:
         self.tracker = TRACKERS[self.record.tracker]
         self._reader = ResultsReader(run.folder)
         self._behaviour = RunBehaviour(run, self._reader)
+        self._watch = RunWatch(
+            problems,
+            self._reader,
+            lambda frame: self._settings_at(frame, 0)[1],
+            seed=self.record.seed,
+            first=self.record.first,
+            fps=self.record.fps,
+        )
         self._writer = ResultsWriter(run.folder)
         self._pace = Pace()
         self._load()
@@ -127,13 +136,13 @@ class TrackingRun:
             raise RunError(f"Run '{self.run.name}' has no frame left.", "Start a new run.")
         began = time.perf_counter()
         frame = self.next_frame
+        version, settings, is_new = self._settings_for(frame, self.layers_done)
         search = self._search or self._new_search(frame)
-        version, settings, is_new = self._settings_for(frame, search.state.layers_done)
         problem = self.problems.problem(frame, self._held_in(frame, settings))
         record = search.step(problem, version, settings.tracker)
         self._search, self._saved = search, False
         self._layers.append(record)
-        result = search.result(settings.tracker) if search.finished else None
+        result = self.result_of(search, settings) if search.finished else None
         if result is not None:
             self._writer.write_frame(result, self._layers, settings.recording.record_particles)
             self._next(result)
@@ -143,8 +152,15 @@ class TrackingRun:
             self._spent = []
         return Stepped(record, result, settings if is_new else None)
 
+    def result_of(self, search: FrameSearch, settings: RunSettings) -> FrameResult:
+        """The result of a finished search of a frame, with how the frame went."""
+        found = search.result(settings.tracker)
+        carried, sought = self.carried_into(search.frame), self._watch.is_sought(search.frame)
+        return self._watch.judged(found, carried, search.problem, sought)
+
     def _next(self, result: FrameResult) -> None:
         self._carried = (result.frame, result.carried)
+        self._watch.stored(result)
         self._search, self._layers, self._saved = None, [], True
         self.next_frame += 1
         self.done += 1
@@ -226,13 +242,20 @@ class TrackingRun:
     # ----------------------------------------------------------------- frames
 
     def _new_search(self, frame: int, state: SearchState | None = None) -> FrameSearch:
+        space = self._behaviour.space_in(frame)
+        carried = self._behaviour.carried_into(frame, self.carried_into(frame))
+        if state is None:
+            carried, sought = self._watch.start(frame, carried, space)
+        elif sought := self._watch.is_sought(frame):
+            # What it found is in the state already.
+            carried = Carried(None, memory=carried.memory)
         repeats = 1
-        if frame == self.record.first:
+        if frame == self.record.first or sought:
             repeats = self._settings_at(frame, 0)[1].tracker.start_repeats
         return FrameSearch(
             self.tracker,
-            self._behaviour.carried_into(frame, self.carried_into(frame)),
-            self._behaviour.space_in(frame),
+            carried,
+            space,
             seed=self.record.seed,
             frame=frame,
             repeats=repeats,
@@ -269,6 +292,7 @@ class TrackingRun:
         self._writer.write_frame(result, layers, settings.recording.record_particles)
         source = self.settings_source
         self._behaviour.forget()
+        self._watch.forget()
         self._load()
         self.settings_source = source
 

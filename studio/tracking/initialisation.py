@@ -41,6 +41,8 @@ LIMB_LAYERS, WHOLE_LAYERS = 5, 10
 DRAWN = 6
 """Poses of a limb that are weighed for each that is annealed; two thirds over its whole range, the others about it."""
 NEAR = 0.12
+PLACED, COMBINED = 400, 20
+"""Places tried for each limb of a pair while the other rests, and how many of the best are tried together."""
 RANGE_SHARE, MOVE, TURN = 0.15, 80.0, 0.25
 """Noise before it shrinks: a share of a joint's range; mm and radians of the root."""
 OPPOSITE_LINES = 2
@@ -162,7 +164,9 @@ class StartSearch:
         self._rounds, self._progress = rounds, progress
         self._done = self._steps = self._evaluations = 0
         self._noise = first_noise(space)
+        self._rest = rest
         self._limbs = _searched_limbs(space)
+        self._pairs = _pairs(space, self._limbs)
 
     def run(self, candidates: StartCandidates, known: Array | None = None) -> FoundStart:
         """The best pose that was found. Raises RunError for no candidates."""
@@ -204,6 +208,8 @@ class StartSearch:
     def _improved(self, line: Line, others: list[Line], entry: Round) -> Line:
         for number in self._rng.permutation(len(self._limbs)):
             line = self._with_limb(line, self._limbs[number], others, entry.limb_particles)
+        for pair in self._pairs:
+            line = self._with_pair(line, pair, others, entry.limb_particles)
         noise = entry.spread * self._noise
         found = self._annealed(line.pose[None], noise, entry.particles, WHOLE_LAYERS)
         self._step()
@@ -227,6 +233,30 @@ class StartSearch:
         found = self._annealed(drawn[best], np.zeros(len(line.pose)), count, LIMB_LAYERS)
         first = Line(drawn[best[0]], float(values[best[0]]))
         return max(line, first, found, key=lambda one: one.value)
+
+    def _with_pair(
+        self, line: Line, pair: tuple[IntArray, IntArray], others: list[Line], count: int
+    ) -> Line:
+        """The line with both arms, or both legs, placed anew: where one covers what belongs to the other, neither can
+        move alone.
+        """
+        places: list[Array] = []
+        for limb, other in (pair, pair[::-1]):
+            drawn = np.repeat(line.pose[None], PLACED, axis=0)
+            drawn[:, other] = self._rest[other]
+            lower, upper = self._space.lower[limb], self._space.upper[limb]
+            drawn[:, limb] = lower + self._rng.random((PLACED, len(limb))) * (upper - lower)
+            for place, one in enumerate([line, *others]):
+                drawn[place, limb] = one.pose[limb]
+            best = np.argsort(-self._values(drawn), kind="stable")[: COMBINED - 1]
+            places.append(np.concatenate([line.pose[None, limb], drawn[best][:, limb]]))
+        together = np.repeat(line.pose[None], COMBINED * COMBINED, axis=0)
+        together[:, pair[0]] = np.repeat(places[0], COMBINED, axis=0)
+        together[:, pair[1]] = np.tile(places[1], (COMBINED, 1))
+        values = self._values(together)
+        best = np.argsort(-values, kind="stable")[:count]
+        found = self._annealed(together[best], np.zeros(len(line.pose)), count, LIMB_LAYERS)
+        return max(line, Line(together[best[0]], float(values[best[0]])), found, key=lambda one: one.value)
 
     def _annealed(self, poses: Array, noise: Array, particles: int, layers: int) -> Line:
         """The best pose of an annealed search from some poses."""
@@ -310,3 +340,13 @@ def _searched_limbs(space: SearchSpace) -> tuple[IntArray, ...]:
     groups = [np.flatnonzero(space.limb == number) for number in np.unique(space.limb)]
     below = [group for group in groups if (space.hierarchy.depth[group] > 0).all()]
     return tuple(group for group in below if bounded[group].all())
+
+
+def _pairs(space: SearchSpace, limbs: tuple[IntArray, ...]) -> tuple[tuple[IntArray, IntArray], ...]:
+    """The limbs that are of one kind, such as both arms, two by two."""
+    kinds: dict[int, list[IntArray]] = {}
+    for limb in limbs:
+        kind = int(space.hierarchy.pair[limb[0]])
+        if kind >= 0:
+            kinds.setdefault(kind, []).append(limb)
+    return tuple((same[0], same[1]) for same in kinds.values() if len(same) == 2)

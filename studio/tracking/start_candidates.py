@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from studio.body.forward_kinematics import joint_frames
 from studio.body.model import BodyModel
 from studio.geometry.rotations import axis_turn
-from studio.volume.alignment import root_candidates, root_parameters, with_root_at
+from studio.volume.alignment import axes_of_pose, root_candidates, root_parameters, with_root_at
 from studio.volume.blob_model import cone_blobs
 from studio.volume.hull import Hull
+from studio.volume.tracking_space import Box
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -23,6 +24,8 @@ IntArray = NDArray[np.int64]
 HEADINGS = 16
 NARROW, WIDE = 0.12, 0.25
 """Standard deviations of the attitudes drawn about the rest pose, as shares of the joints' ranges; half of each."""
+MIDDLE_SHARE = 0.5
+"""Of each side of the box, where there is no hull."""
 UPRIGHT = 0.6
 """A hull whose longest axis is at least so vertical (cosine) is of somebody who stands, on feet or hands."""
 
@@ -42,13 +45,13 @@ def start_candidates(
     rng: np.random.Generator,
     body: BodyModel,
     hull: Hull | None,
-    middle: Array,
+    box: Box,
     per_family: int,
     prototypes: Array | None = None,
 ) -> StartCandidates:
     """Candidates of `per_family` poses for each of HEADINGS headings, and more where the hull lies.
 
-    hull : where the body is; None or empty: about `middle` (3,) mm, a place to look. prototypes : (K, D) poses that the
+    hull : where the body is; None or empty: anywhere in the middle of the `box`. prototypes : (K, D) poses that the
     body is known to take: half of each family's attitudes are drawn from them.
     """
     attitudes = _attitudes(rng, body, per_family * HEADINGS, prototypes)
@@ -56,12 +59,14 @@ def start_candidates(
     if not len(root):
         return StartCandidates(attitudes, np.arange(len(attitudes)) // per_family, fixed=True)
     seen = None if hull is None or hull.empty else hull
-    turned = _roots(body, seen, root, middle)
+    turned = _roots(body, seen, root)
     family = np.arange(len(turned) * per_family) // per_family
     poses = attitudes[np.arange(len(family)) % len(attitudes)].copy()
     poses[:, root] = turned[family][:, root]
-    target = middle if seen is None else seen.weights() @ seen.centres
-    return StartCandidates(_moved(body, poses, root, target), family, fixed=False)
+    targets = _places(rng, body, box, len(poses))
+    if seen is not None:
+        targets[:] = seen.weights() @ seen.centres
+    return StartCandidates(_moved(body, poses, root, targets), family, fixed=False)
 
 
 def facing(body: BodyModel, poses: Array) -> Array:
@@ -85,7 +90,14 @@ def _attitudes(rng: np.random.Generator, body: BodyModel, count: int, prototypes
     return np.clip(drawn, np.where(bounded, lower, -np.inf), np.where(bounded, upper, np.inf))
 
 
-def _roots(body: BodyModel, hull: Hull | None, root: IntArray, middle: Array) -> Array:
+def _places(rng: np.random.Generator, body: BodyModel, box: Box, count: int) -> Array:
+    """(count, 3) places of a body that stands somewhere in the middle of a box's floor."""
+    places = box.lower + (box.upper - box.lower) * (0.5 + MIDDLE_SHARE * (rng.random((count, 3)) - 0.5))
+    places[:, 2] = axes_of_pose(body, body.neutral).mean[2]
+    return places
+
+
+def _roots(body: BodyModel, hull: Hull | None, root: IntArray) -> Array:
     """(R, D) the rest pose turned about the vertical to every heading; then, where the hull lies or may be of somebody
     upside down, laid on its principal axes.
     """
@@ -94,7 +106,7 @@ def _roots(body: BodyModel, hull: Hull | None, root: IntArray, middle: Array) ->
     found = []
     for heading in range(HEADINGS):
         turn = axis_turn(2, np.array(2.0 * np.pi * heading / HEADINGS))
-        wanted = np.column_stack([turn @ frame[:, :3], middle])
+        wanted = np.column_stack([turn @ frame[:, :3], frame[:, 3]])
         found.append(with_root_at(body, number, root, body.neutral, wanted))
     if hull is not None:
         found += _laid(body, hull, number)
@@ -109,8 +121,8 @@ def _laid(body: BodyModel, hull: Hull, number: int) -> list[Array]:
     return [pose for pose, turn in zip(laid, turns, strict=True) if turn[2, 2] < UPRIGHT]
 
 
-def _moved(body: BodyModel, poses: Array, root: IntArray, target: Array) -> Array:
-    """Poses moved as a whole so that the middle of each one's volume is the target (3,)."""
+def _moved(body: BodyModel, poses: Array, root: IntArray, targets: Array) -> Array:
+    """Poses (N, D) moved as a whole so that the middle of each one's volume is its target (N, 3)."""
     lengths = np.array([index for index in root if body.parameters[index].kind == "length"], dtype=np.int64)
     blobs = cone_blobs(body)
 
@@ -124,6 +136,6 @@ def _moved(body: BodyModel, poses: Array, root: IntArray, target: Array) -> Arra
         pushed = poses.copy()
         pushed[:, index] += 1.0
         slopes.append(middles(pushed) - here)
-    steps = np.einsum("nki,ni->nk", np.linalg.pinv(np.stack(slopes, axis=2)), target - here)
+    steps = np.einsum("nki,ni->nk", np.linalg.pinv(np.stack(slopes, axis=2)), targets - here)
     moved[:, lengths] += steps
     return moved

@@ -1,0 +1,230 @@
+"""Where the body is and how it stands in a frame of a session, with nothing given but its dimensions.
+
+The masks' visual hull says where (Caillette, Galata & Howard 2007, section 6.2), `tracking.initialisation` how. All of
+it is a function of the frame's pictures, the body, the settings and the seed.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.behaviour.model_file import read_model
+from studio.body.model import BodyModel
+from studio.errors import RunError
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.geometry.camera import Camera
+from studio.runs.behaviour_models import fitting, model_folders, model_path
+from studio.runs.problem_source import ProblemSource
+from studio.runs.search_space import parameter_names, search_space, session_sigma
+from studio.sessions.named_rows import write_pose
+from studio.sessions.names import free_name
+from studio.sessions.session import START_POSE_NAME, Session
+from studio.settings import DEFAULT_TRACKER, default_settings
+from studio.tracking.initialisation import PER_FAMILY, ROUNDS, FoundStart, Round, StartSearch
+from studio.tracking.loss_detection import Onlooker, anything_seen
+from studio.tracking.start_candidates import facing, start_candidates
+from studio.tracking.tracker import FrameProblem, SearchSpace
+from studio.volume.body_space import space_of
+from studio.volume.hull import Hull
+from studio.volume.reconstruction import HullSettings, reconstruct
+from studio.volume.tracking_space import Box
+
+Array = NDArray[np.float64]
+
+WEIGHTING = "edge-region-silhouette"
+"""The one that tells poses apart best: of the three of its terms none alone found as many."""
+HULL_DEPTH = 6
+FEWEST_VIEWS = 2
+SURE_OVERLAP, NO_OVERLAP = 0.75, 0.5
+"""f_s of a start pose from which on its fit says nothing against it, and at which nothing speaks for it."""
+
+Progress = Callable[[str, int, int], None]
+
+
+class InitialisationCancelledError(RunError):
+    """The search for a start pose was cancelled."""
+
+    code = "cancelled"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class InitialPose:
+    """A start pose that was found.
+
+    names : of the parameters. pose : (D,). body : its name. confidence : 0 to 1, that the body stands so and faces so.
+    margin : log weight by which the best pose that faces the other way is beaten, inf without one. rival : that pose.
+    agreement : share of the last searches that face this way. overlap : f_s. hull_litres : volume of the hull, 0 where
+    there was none. note : what a person should know, "" if nothing.
+    """
+
+    frame: int
+    body: str
+    names: tuple[str, ...]
+    pose: Array
+    confidence: float
+    margin: float
+    rival: Array | None
+    agreement: float
+    overlap: float
+    hull_litres: float
+    evaluations: int
+    note: str
+
+    @property
+    def source(self) -> str:
+        """Where the pose came from, in words for a run's record."""
+        return f"found in frame {self.frame}, confidence {100.0 * self.confidence:.0f} %"
+
+
+def initialise(
+    session: Session,
+    frame: int = 0,
+    *,
+    body: BodyModel | None = None,
+    behaviour: str = "",
+    weighting: str = WEIGHTING,
+    seed: int = 0,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> InitialPose:
+    """The pose of the session's body in a frame.
+
+    body : the session's own by default. behaviour : name or path of a model whose prototypes are candidates. cancelled
+    : asked often; True ends the search with InitialisationCancelledError. Raises RunError where nothing is to be seen
+    in the frame, NotFoundError for a frame that is not there.
+    """
+    tree = body or session.body()
+    tell = _watched(progress, cancelled)
+    settings = default_settings(DEFAULT_TRACKER, weighting)
+    prototypes = None
+    if behaviour:
+        model = read_model(model_path(model_folders(session), behaviour))
+        prototypes = fitting(model, tree, session.manifest.fps).prototypes.poses
+    problems = ProblemSource(session, tree)
+    try:
+        tell("looking at the frame", 0, 1)
+        problem, evidence = problems.problem(frame, settings), problems.evidence(frame, settings)
+        masks = problems.evidence(frame, default_settings(DEFAULT_TRACKER, WEIGHTING))
+        cameras = problems.cameras
+    finally:
+        problems.close()
+    if not anything_seen(masks):
+        raise RunError(
+            f"Nothing is to be seen of a body in frame {frame} of session '{session.name}'.",
+            "Choose a frame in which the person is in view, or check the masks.",
+        )
+    hull, box, note = hull_of(tree, cameras, masks)
+    space = search_space(tree, session_sigma(session, tree, session.manifest.fps))
+    found = seek(
+        problem,
+        space,
+        tree,
+        hull,
+        box,
+        cameras=len(cameras),
+        seed=seed,
+        prototypes=prototypes,
+        progress=lambda done, total: tell("searching for the pose", done, total),
+    )
+    overlap = Onlooker(tree, cameras).sight(masks, found.pose).overlap
+    fit = float(np.clip((overlap - NO_OVERLAP) / (SURE_OVERLAP - NO_OVERLAP), 0.0, 1.0))
+    return InitialPose(
+        frame=evidence.frame,
+        body=tree.name,
+        names=parameter_names(tree),
+        pose=found.pose,
+        confidence=found.confidence * fit,
+        margin=found.margin,
+        rival=found.rival,
+        agreement=found.agreement,
+        overlap=overlap,
+        hull_litres=0.0 if hull is None else hull.volume() * 1e-6,
+        evaluations=found.evaluations,
+        note=note,
+    )
+
+
+def keep_pose(session: Session, found: InitialPose, replace: bool = False) -> Path:
+    """Write a found pose into the session's folder; returns the file.
+
+    It becomes the session's start pose if that has none, or with `replace` (the old one then stays beside it as
+    start_pose-before.csv, numbered if there are more). Else it is a file of its own for `--start-pose`, named after
+    its frame. Nothing that is stored is lost. A pose of another body than the session's never is its start pose.
+    """
+    own, taken = session.path / START_POSE_NAME, {path.name for path in session.path.glob("*.csv")}
+    if found.body == session.manifest.body and (replace or not own.exists()):
+        if own.exists():
+            own.rename(session.path / _free(f"{own.stem}-before", taken))
+        write_pose(own, found.names, found.pose)
+        return own
+    place = session.path / _free(f"{own.stem}-frame-{found.frame}", taken)
+    write_pose(place, found.names, found.pose)
+    return place
+
+
+def _free(stem: str, taken: set[str]) -> str:
+    return f"{free_name(stem, {Path(name).stem for name in taken})}.csv"
+
+
+def hull_of(
+    body: BodyModel, cameras: tuple[Camera, ...], evidence: FrameEvidence
+) -> tuple[Hull | None, Box, str]:
+    """The hull of a frame's masks, the space it was sought in, and in words why there is none."""
+    box = space_of(body, cameras)
+    if len(cameras) < FEWEST_VIEWS:
+        return None, box, "One camera makes no hull: the body was sought anywhere in the middle of its view."
+    hull = reconstruct(evidence, cameras, box, HullSettings(hull_depth=HULL_DEPTH))
+    if hull.empty:
+        return (
+            None,
+            box,
+            "The masks have no volume in common: the body was sought in the middle of the views.",
+        )
+    return hull, box, ""
+
+
+def seek(
+    problem: FrameProblem,
+    space: SearchSpace,
+    body: BodyModel,
+    hull: Hull | None,
+    box: Box,
+    *,
+    cameras: int,
+    seed: int,
+    rounds: tuple[Round, ...] = ROUNDS,
+    prototypes: Array | None = None,
+    known: Array | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> FoundStart:
+    """The search itself, for a frame that is a problem already. known : (K, D) poses to try as they are."""
+    rng = np.random.default_rng(np.random.SeedSequence((seed, 0xB0D1)))
+    candidates = start_candidates(rng, body, hull, box, PER_FAMILY, prototypes)
+    search = StartSearch(
+        problem,
+        space,
+        body.neutral,
+        lambda poses: facing(body, poses),
+        cameras=cameras,
+        seed=seed,
+        rounds=rounds,
+        progress=progress,
+    )
+    return search.run(candidates, known)
+
+
+def _watched(progress: Progress | None, cancelled: Callable[[], bool] | None) -> Progress:
+    """A progress callback that also ends a cancelled search."""
+
+    def tell(step: str, done: int, total: int) -> None:
+        if cancelled is not None and cancelled():
+            raise InitialisationCancelledError(
+                "The search for a start pose was cancelled.", "Start it again when you like."
+            )
+        if progress is not None:
+            progress(step, done, total)
+
+    return tell

@@ -1,0 +1,265 @@
+"""How each frame of a run went, and where the next one starts when the body was lost.
+
+All of it is a function of what is stored of the frames before, of the frame's own evidence, the settings and the seed,
+so that a run which is taken up again, or a frame that is annealed again, goes the same way bit for bit.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.model import BodyModel
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.geometry.camera import Camera
+from studio.runs.initialising import WEIGHTING, hull_of, seek
+from studio.sessions.results_reader import ResultsReader
+from studio.settings import RunSettings, default_settings
+from studio.tracking.initialisation import PER_FAMILY, QUICK
+from studio.tracking.loss_detection import Onlooker, WeightWatch, anything_seen
+from studio.tracking.particles import unweighted
+from studio.tracking.recovery_settings import INITIALISE, OFF
+from studio.tracking.start_candidates import start_candidates
+from studio.tracking.tracker import (
+    LOST,
+    NO_EVIDENCE,
+    RECOVERED,
+    TRACKED,
+    Carried,
+    FrameProblem,
+    FrameResult,
+    ParticleSet,
+    SearchSpace,
+)
+
+Array = NDArray[np.float64]
+
+SHORT_GAP_S = 0.1
+"""After less time without evidence the body is still about where it was."""
+
+
+@runtime_checkable
+class Sightings(Protocol):
+    """Problems that can show the evidence that they are made of (`ProblemSource`)."""
+
+    @property
+    def body(self) -> BodyModel:
+        """The body that is tracked."""
+        ...
+
+    @property
+    def cameras(self) -> tuple[Camera, ...]:
+        """In the order of the views."""
+        ...
+
+    def problem(self, frame: int, settings: RunSettings) -> FrameProblem:
+        """The frame as a function of poses."""
+        ...
+
+    def evidence(self, frame: int, settings: RunSettings) -> FrameEvidence:
+        """What is seen in it."""
+        ...
+
+
+@dataclass(slots=True)
+class Standing:
+    """What the frames before one say. state : of the last. streak : how many frames in a row went so. doubts : of the
+    last. weighed : settings of weighting and evidence that the distribution holds for.
+    """
+
+    watch: WeightWatch
+    state: str = TRACKED
+    streak: int = 0
+    doubts: int = 0
+    weighed: object = None
+
+
+class RunWatch:
+    """The watch over one run. settings_in : of a frame, as its first layer has them."""
+
+    def __init__(
+        self,
+        problems: object,
+        results: ResultsReader,
+        settings_in: Callable[[int], RunSettings],
+        *,
+        seed: int,
+        first: int,
+        fps: float,
+    ) -> None:
+        self._problems = problems if isinstance(problems, Sightings) else None
+        self._onlooker = (
+            Onlooker(problems.body, problems.cameras) if isinstance(problems, Sightings) else None
+        )
+        self._results, self._settings_in = results, settings_in
+        self._seed, self._first, self._fps = seed, first, fps
+        self._known: tuple[int, Standing] | None = None
+        self._sought: tuple[object, ParticleSet] | None = None
+
+    def forget(self) -> None:
+        """Frames that are stored have changed."""
+        self._known = self._sought = None
+
+    def start(self, frame: int, carried: Carried, space: SearchSpace) -> tuple[Carried, bool]:
+        """What a frame's search starts from, and whether that is a search for the body that was lost."""
+        settings = self._settings_in(frame)
+        if self._problems is None or settings.recovery.recovery == OFF or not self._is_due(frame, settings):
+            return carried, False
+        seeking = _seeking(settings)
+        masks = self._problems.evidence(frame, seeking)
+        if not anything_seen(masks):
+            return carried, False
+        key = (frame, settings.recovery.recovery, settings.evidence)
+        if self._sought is None or self._sought[0] != key:
+            self._sought = (key, self._found(frame, carried, space, settings, masks))
+        return Carried(self._sought[1], memory=carried.memory), True
+
+    def is_sought(self, frame: int) -> bool:
+        """Whether `start` looks for the body in that frame, as far as the frames before decide that."""
+        settings = self._settings_in(frame)
+        if self._problems is None or settings.recovery.recovery == OFF or not self._is_due(frame, settings):
+            return False
+        return anything_seen(self._problems.evidence(frame, _seeking(settings)))
+
+    def judged(
+        self, result: FrameResult, carried: Carried, problem: FrameProblem | None, sought: bool
+    ) -> FrameResult:
+        """The result with how its frame went; without evidence, with the pose held that came into it.
+
+        carried : into the frame. problem : the frame's, as the search was told it. sought : whether the search was
+        one for a body that was lost.
+        """
+        settings = self._settings_in(result.frame)
+        if self._problems is None or self._onlooker is None or settings.recovery.recovery == OFF:
+            return result
+        evidence = self._problems.evidence(result.frame, settings)
+        sight = self._onlooker.sight(evidence, result.estimate.pose, problem)
+        before = self._standing(result.frame)
+        if not sight.seen:
+            return _held(result, carried)
+        watch = before.watch if before.weighed == _weighed(settings) else WeightWatch(settings.weighting_name)
+        if not watch.is_lost(result.estimate.log_weight, sight):
+            back = sought or before.state in (LOST, NO_EVIDENCE)
+            return dataclasses.replace(result, tracking=RECOVERED if back else TRACKED, overlap=sight.overlap)
+        doubts = before.doubts + 1
+        lost = sought or before.state == LOST or doubts >= settings.recovery.lost_after
+        return dataclasses.replace(
+            result, tracking=LOST if lost else TRACKED, overlap=sight.overlap, doubts=doubts
+        )
+
+    def stored(self, result: FrameResult) -> None:
+        """A result is in the store."""
+        if self._known is not None and self._known[0] == result.frame:
+            standing = self._known[1]
+            self._tell(
+                standing,
+                result.frame,
+                result.tracking,
+                result.doubts,
+                result.estimate.log_weight,
+                result.overlap,
+            )
+            self._known = (result.frame + 1, standing)
+        else:
+            self._known = None
+
+    # ------------------------------------------------------------------ the frames before
+
+    def _standing(self, frame: int) -> Standing:
+        """What all frames before one say."""
+        if self._known is None or self._known[0] != frame:
+            line, standing = self._results.timeline(), Standing(WeightWatch(""))
+            for at in np.flatnonzero(line.frames < frame):
+                self._tell(
+                    standing,
+                    int(line.frames[at]),
+                    line.tracking[at],
+                    int(line.doubts[at]),
+                    float(line.log_weights[at]),
+                    float(line.overlaps[at]),
+                )
+            self._known = (frame, standing)
+        return self._known[1]
+
+    def _tell(
+        self, standing: Standing, frame: int, state: str, doubts: int, log_weight: float, overlap: float
+    ) -> None:
+        settings = self._settings_in(frame)
+        if standing.weighed != _weighed(settings):
+            standing.watch, standing.weighed = WeightWatch(settings.weighting_name), _weighed(settings)
+        if state in (TRACKED, RECOVERED) and not doubts:
+            standing.watch.well_tracked(log_weight, overlap)
+        standing.streak = standing.streak + 1 if state == standing.state else 1
+        standing.state, standing.doubts = state, doubts
+
+    def _is_due(self, frame: int, settings: RunSettings) -> bool:
+        """Whether the body is looked for: at once when lost, then at intervals; and after a time without evidence."""
+        before = self._standing(frame)
+        if frame == self._first:
+            return False
+        if before.state == NO_EVIDENCE:
+            return before.streak > SHORT_GAP_S * self._fps
+        return before.state == LOST and (before.streak - 1) % settings.recovery.recovery_interval == 0
+
+    # ------------------------------------------------------------------ the search
+
+    def _found(
+        self,
+        frame: int,
+        carried: Carried,
+        space: SearchSpace,
+        settings: RunSettings,
+        masks: FrameEvidence,
+    ) -> ParticleSet:
+        assert self._problems is not None
+        body, cameras = self._problems.body, self._problems.cameras
+        hull, box, _ = hull_of(body, cameras, masks)
+        prototypes = None if space.behaviour is None else space.behaviour.prototypes.poses
+        seed = int(np.random.SeedSequence((self._seed, frame)).generate_state(1)[0])
+        if settings.recovery.recovery != INITIALISE:
+            rng = np.random.default_rng(seed)
+            spread = start_candidates(rng, body, hull, box, PER_FAMILY, prototypes).poses
+            # The best comes first, where a swarm looks for the pose to start from.
+            weights = self._problems.problem(frame, _seeking(settings)).weigh(spread)
+            return unweighted(spread[np.argsort(-weights, kind="stable")])
+        found = seek(
+            self._problems.problem(frame, _seeking(settings)),
+            space,
+            body,
+            hull,
+            box,
+            cameras=len(cameras),
+            seed=seed,
+            rounds=QUICK,
+            prototypes=prototypes,
+            known=None if carried.estimate is None else carried.estimate[None],
+        )
+        return ParticleSet(found.pose[None], np.zeros(1))
+
+
+def _seeking(settings: RunSettings) -> RunSettings:
+    """The settings that a lost body is looked for with: the run's evidence, the weighting that tells most."""
+    return dataclasses.replace(
+        default_settings(settings.tracker_name, WEIGHTING),
+        evidence=settings.evidence,
+        recovery=settings.recovery,
+    )
+
+
+def _weighed(settings: RunSettings) -> tuple[object, ...]:
+    return settings.weighting_name, settings.weighting, settings.evidence
+
+
+def _held(result: FrameResult, carried: Carried) -> FrameResult:
+    """The frame's result with the pose and the particles that came into it, at rest."""
+    estimate, pose = result.estimate, carried.estimate
+    if pose is None and carried.particles is not None:
+        pose = np.exp(carried.particles.log_weights) @ carried.particles.poses
+    if pose is None:
+        return dataclasses.replace(result, tracking=NO_EVIDENCE)
+    still = dataclasses.replace(estimate, pose=pose, mean=pose, mode=pose)
+    handed_on = dataclasses.replace(carried, estimate=pose, previous_estimate=pose)
+    return dataclasses.replace(result, estimate=still, carried=handed_on, tracking=NO_EVIDENCE)
