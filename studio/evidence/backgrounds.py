@@ -69,8 +69,9 @@ class Backgrounds:
                 if path is not None:
                     found = learn_background(self._plate(camera, path, CLIP_FRAMES), least_noise)
                 else:
-                    median = gaussian_from_median(self._spread(camera, MEDIAN_FRAMES))
-                    found = independent_background(median.mean, median.variance, least_noise)
+                    frames = self._spread(camera, MEDIAN_FRAMES)
+                    median = gaussian_from_median(frames)
+                    found = independent_background(median.mean, median.variance, least_noise, len(frames))
                 for old in [key for key in self._yuv if key[0] == camera]:
                     del self._yuv[old]
                 self._yuv[camera, least_noise] = found

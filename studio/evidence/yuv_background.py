@@ -65,7 +65,9 @@ class YuvBackground:
 
 
 def learn_background(pictures: Sequence[Bytes], least_noise: float = LEAST_NOISE) -> YuvBackground:
-    """The Gaussian of each pixel of an empty clip, or of a plate (one picture).
+    """The Gaussian of each pixel's next value, from an empty clip of n pictures or a plate (n = 1).
+
+    Its covariance is (1 + 1 / n) times that of the noise, as the mean of n pictures has noise of its own.
 
     pictures : (H, W, 3) uint8 BGR each, at least one. least_noise : grey levels; no direction of BGR has a smaller
     standard deviation, so a plate, or a pixel that never changes, has a covariance that can be inverted.
@@ -78,18 +80,25 @@ def learn_background(pictures: Sequence[Bytes], least_noise: float = LEAST_NOISE
         total += level
         products += level[..., :, None] * level[..., None, :]
     mean = total / len(pictures)
-    return _background(mean, products / len(pictures) - mean[..., :, None] * mean[..., None, :], least_noise)
+    covariance = products / len(pictures) - mean[..., :, None] * mean[..., None, :]
+    return _background(mean, covariance, least_noise, len(pictures))
 
 
-def independent_background(mean: Floats, variance: Floats, least_noise: float = LEAST_NOISE) -> YuvBackground:
-    """Gaussians of a mean and a variance (H, W, 3) of each colour of BGR, taken as independent of each other."""
-    return _background(mean.astype(np.float64), variance[..., None] * np.eye(3), least_noise)
+def independent_background(
+    mean: Floats, variance: Floats, least_noise: float = LEAST_NOISE, pictures: int = 1
+) -> YuvBackground:
+    """Gaussians of a mean and a variance (H, W, 3) of each colour of BGR, taken as independent of each other.
+
+    pictures : that the mean is of.
+    """
+    return _background(mean.astype(np.float64), variance[..., None] * np.eye(3), least_noise, pictures)
 
 
-def _background(mean: Array, covariance: Array, least_noise: float) -> YuvBackground:
+def _background(mean: Array, covariance: Array, least_noise: float, pictures: int) -> YuvBackground:
     """BGR mean (H, W, 3) and covariance (H, W, 3, 3), made even where it is too small, in YUV."""
     spread, axes = np.linalg.eigh(covariance)
     # YUV is linear in the colours, so the floor may be laid in BGR, where a sensor's noise is even in all directions.
     axes = np.linalg.inv(YUV_OF_BGR).T @ axes
-    precision = (axes / np.maximum(spread, least_noise**2)[..., None, :]) @ np.swapaxes(axes, -1, -2)
+    spread = (1.0 + 1.0 / pictures) * np.maximum(spread, least_noise**2)
+    precision = (axes / spread[..., None, :]) @ np.swapaxes(axes, -1, -2)
     return YuvBackground((mean @ YUV_OF_BGR.T).astype(np.float32), precision.astype(np.float32))

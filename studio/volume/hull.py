@@ -16,8 +16,8 @@ class Hull:
     """K voxels of an octree; those well inside are larger than those at the surface.
 
     centres : (K, 3) mm, world. edges : (K,) mm, length of each voxel's edge. view_colours : (K, V, 3) 0 to 255, BGR,
-    mean colour of the voxel's samples in each view, NaN in a view that does not see it. colours : (K, 3) the
-    mean of these over the views that see it. depth : of the octree; 16 voxels a side are depth 4. box : the
+    mean colour of the voxel's foreground samples in each view, NaN in a view where it has none. colours : (K, 3) the
+    mean of these (of all samples where no view has any). depth : of the octree; 16 voxels a side are depth 4. box : the
     tracking space.
     """
 

@@ -116,17 +116,19 @@ def colour_share(
 ):
     """Colours of every `shares`-th block of the voxels. views : (K, V, 3), means : (K, 3), both filled.
 
-    A voxel's colour in a view is the mean BGR of its samples that are not background, else of all its samples, NaN
-    where none lies in the picture.
+    A voxel's colour in a view is the mean BGR of its samples that are not background, NaN where there are none; its
+    own colour the mean of these, or that of all samples where no view has any.
     """
     place, by_pixels = np.empty(PLACE), rules[PIXELS] > 0.0
+    one, none = np.float32(1.0), np.float32(np.nan)
     for turn in range(shares_of(len(centres), share, shares)):
         index = (turn // BLOCK * shares + share) * BLOCK + turn % BLOCK
-        blue = green = red = seen = np.float32(0.0)
         x, y, z = centres[index, 0], centres[index, 1], centres[index, 2]
+        blue = green = red = any_blue = any_green = any_red = np.float32(0.0)
+        seen, looked = 0, 0
         for view in range(len(cameras)):
             width, height = int(cameras[view, WIDTH]), int(cameras[view, HEIGHT])
-            count, chosen, found = 0, 0, False
+            count, chosen = 0, 0
             if place_voxel(cameras, view, x, y, z, 0.5 * edges[index], place):
                 count = sample_count(place, rules[SAMPLING])
             b = g = r = np.float32(0.0)
@@ -143,28 +145,26 @@ def colour_share(
                     above = starts[1, view] + row * (width + 1) + column
                     below = above + width + 1
                     differs = sums[below + 1] - sums[below] - sums[above + 1] + sums[above] > 0
-                if differs and not found:
-                    b = g = r = np.float32(0.0)
-                    chosen, found = 0, True
-                if differs or not found:
-                    b += np.float32(picture[at, 0])
-                    g += np.float32(picture[at, 1])
-                    r += np.float32(picture[at, 2])
-                    chosen += 1
-            amount = np.float32(1.0) / np.float32(chosen) if chosen else np.float32(np.nan)
+                pb, pg, pr = (
+                    np.float32(picture[at, 0]),
+                    np.float32(picture[at, 1]),
+                    np.float32(picture[at, 2]),
+                )
+                any_blue, any_green, any_red, looked = any_blue + pb, any_green + pg, any_red + pr, looked + 1
+                if differs:
+                    b, g, r, chosen = b + pb, g + pg, r + pr, chosen + 1
+            amount = one / np.float32(chosen) if chosen else none
             views[index, view, 0], views[index, view, 1], views[index, view, 2] = (
                 b * amount,
                 g * amount,
                 r * amount,
             )
             if chosen:
-                blue, green, red, seen = (
-                    blue + b * amount,
-                    green + g * amount,
-                    red + r * amount,
-                    seen + np.float32(1.0),
-                )
-        means[index, 0], means[index, 1], means[index, 2] = blue / seen, green / seen, red / seen
+                blue, green, red, seen = blue + b * amount, green + g * amount, red + r * amount, seen + 1
+        if seen == 0:
+            blue, green, red, seen = any_blue, any_green, any_red, looked
+        amount = one / np.float32(seen)
+        means[index, 0], means[index, 1], means[index, 2] = blue * amount, green * amount, red * amount
 
 
 @njit(cache=True, nogil=True, parallel=True)

@@ -4,11 +4,18 @@ A voxel is carved when one view shows only background where it projects to, kept
 foreground, and otherwise cut into eight, down to the last depth. Where the paper is silent:
 
 - A voxel still undecided at the last depth is kept when in every view that sees it at least `hull_edge_share` of its
-  samples are foreground. Keeping all of them would lay a shell of half a voxel around the body; half is even.
+  samples are foreground. A half would be even but loses what sticks out, everything is a shell around the body.
 - A view carves only what it sees: what lies outside its picture (or partly outside, until the last depth, where the
   centre decides) is left to the others. A voxel seen by fewer than `hull_least_views` views is carved.
 - With masks as evidence the share of mask pixels is counted over the whole rectangle around the voxel's projection
   by summed areas, instead of at samples: no mask pixel at all carves, nothing but mask pixels is foreground.
+- With pixels, distances are found in small tiles when the first sample falls into one (`distance_kernels`). Samples
+  miss the tips of limbs now and then: of a body of cones in five views a hull from pixels holds 98.7 %, one from masks
+  99.9 % (`tests/volume/test_reconstruction.py`); knob `hull_sampling` buys more.
+- Colours are of the samples that are not background, so that the rim of a body is not mixed with what is behind it.
+
+Of the last depth's rule, volume kept of that body and its hull's volume over its own, from masks at depth 7 (8): share
+0.5: 97.7 %, 1.34 (99.2 %, 1.34); 0.35: 98.4 %, 1.39; 0.2: 99.9 %, 1.73 (99.9 %, 1.49); 0.05: 100 %, 1.83 (100 %, 1.51).
 """
 
 from dataclasses import dataclass

@@ -146,3 +146,37 @@ def test_a_plate_of_nearly_the_footages_size_is_fitted_the_way_it_was_made() -> 
     assert np.abs(found.astype(int) - barred).mean() < 3.0
     with pytest.raises(FootageError, match="408x306"):
         fitted_plate(plate, plate[:, :350], "p")
+
+
+def test_a_hull_is_carved_from_pixels_only_where_every_camera_has_an_empty_view(footage: Footage) -> None:
+    backgrounds = Backgrounds(footage)
+
+    def maker(cameras: slice, **changes: str) -> EvidenceMaker:
+        settings = dataclasses.replace(SETTINGS, **changes)
+        return EvidenceMaker(CAMERAS[cameras], footage, backgrounds, settings, "hull")
+
+    plates = slice(1, 3)
+    assert maker(plates).hull_of_pixels
+    assert not maker(slice(0, 3)).hull_of_pixels
+    assert not maker(slice(1, 4)).hull_of_pixels
+    assert not maker(plates, hull_evidence="masks").hull_of_pixels
+    assert not maker(plates, background_model="knn").hull_of_pixels
+    assert maker(slice(0, 4), hull_evidence="pixels").hull_of_pixels
+    for view in maker(slice(0, 4), hull_evidence="pixels").evidence(9).views:
+        assert view.background is not None
+        assert view.mask.max() == view.edges.max() == 0
+        assert overlap(view.background.squared_distances(view.picture) > 60.0, true_mask(9)) > 0.8
+    for view in maker(slice(0, 4)).evidence(9).views:
+        assert view.background is None
+        assert view.edges.max() == 0
+        assert overlap(view.mask, true_mask(9)) > 0.9
+    assert not EvidenceMaker(CAMERAS[plates], footage, backgrounds, SETTINGS).hull_of_pixels
+
+
+def test_empty_views_are_learnt_once_for_a_noise_floor(footage: Footage) -> None:
+    backgrounds = Backgrounds(footage)
+    first = backgrounds.yuv("clip", 2.5)
+    assert backgrounds.yuv("clip", 2.5) is first
+    noisier = backgrounds.yuv("clip", 20.0)
+    picture = footage.picture("clip", 3)
+    assert np.median(noisier.squared_distances(picture)) < 0.2 * np.median(first.squared_distances(picture))

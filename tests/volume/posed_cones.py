@@ -69,14 +69,18 @@ class Cones:
 
     def points(self, spacing: float) -> np.ndarray:
         """(N, 3) a grid's points that lie in the body; each stands for spacing³ of its volume."""
-        ends = np.concatenate([self.frames[:, :, 3], self.frames[:, :, 3] + self.frames[:, :, 2] * self.shapes[:, :1]])
+        ends = np.concatenate(
+            [self.frames[:, :, 3], self.frames[:, :, 3] + self.frames[:, :, 2] * self.shapes[:, :1]]
+        )
         low, high = ends.min(axis=0) - 250.0, ends.max(axis=0) + 250.0
         axes = [np.arange(a, b, spacing) for a, b in zip(low, high, strict=True)]
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         return grid[self.contains(grid)]
 
 
-def evidence_of(masks: list[np.ndarray], cameras: tuple[Camera, ...], rng: np.random.Generator) -> FrameEvidence:
+def evidence_of(
+    masks: list[np.ndarray], cameras: tuple[Camera, ...], rng: np.random.Generator
+) -> FrameEvidence:
     """Masks as a frame, in noisy pictures that are bright where the mask is."""
     views = []
     for camera, mask in zip(cameras, masks, strict=True):
