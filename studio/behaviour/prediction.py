@@ -20,8 +20,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-# Offered here too: motion without pictures stands beside motion with them.
-from studio.behaviour.generation import generate as generate
 from studio.behaviour.model import BehaviourModel
 from studio.behaviour.prediction_kernels import choose_arcs, rooted_noise
 from studio.errors import BehaviourError

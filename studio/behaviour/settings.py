@@ -44,7 +44,7 @@ class LearningSettings:
         help="Shape of the clusters where they are found; a full one costs more frames to live.",
     )  # fmt: skip
     reduced_dimensions: int = knob(
-        10, 0, 200, 1, label="reduced dimensions", takes_effect="new run",
+        6, 0, 200, 1, label="reduced dimensions", takes_effect="new run",
         help="Principal components in which clusters are found; 0 takes the whole feature space.",
     )  # fmt: skip
     clustering_patience: int = knob(
