@@ -2,7 +2,8 @@
 
 A Gaussian with a full covariance in p dimensions has N = p + p (p + 1) / 2 parameters and dies below N / 2 points
 (Figueiredo & Jain): with the 38 features of a 25-parameter body that is 390 frames, so that 13 000 frames hold at most
-33 clusters. In the 10 first principal components it is 33 frames.
+33 clusters (16 were found; 113 with diagonal covariances). In the first 6 principal components it is 14 frames, and 124
+clusters were found, those that particles track best with.
 """
 
 from dataclasses import dataclass
