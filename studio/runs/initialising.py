@@ -23,7 +23,7 @@ from studio.sessions.named_rows import write_pose
 from studio.sessions.names import free_name
 from studio.sessions.session import START_POSE_NAME, Session
 from studio.settings import DEFAULT_TRACKER, default_settings
-from studio.tracking.initialisation import PER_FAMILY, ROUNDS, FoundStart, Round, StartSearch
+from studio.tracking.initialisation import PER_FAMILY, THOROUGH, Effort, FoundStart, StartSearch
 from studio.tracking.loss_detection import Onlooker, anything_seen
 from studio.tracking.start_candidates import facing, start_candidates
 from studio.tracking.tracker import FrameProblem, SearchSpace
@@ -195,7 +195,7 @@ def seek(
     *,
     cameras: int,
     seed: int,
-    rounds: tuple[Round, ...] = ROUNDS,
+    effort: Effort = THOROUGH,
     prototypes: Array | None = None,
     known: Array | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -210,7 +210,7 @@ def seek(
         lambda poses: facing(body, poses),
         cameras=cameras,
         seed=seed,
-        rounds=rounds,
+        effort=effort,
         progress=progress,
     )
     return search.run(candidates, known)

@@ -233,7 +233,7 @@ class RunWatch:
             box,
             cameras=len(cameras),
             seed=seed,
-            rounds=QUICK,
+            effort=QUICK,
             prototypes=prototypes,
             known=None if carried.estimate is None else carried.estimate[None],
         )
