@@ -128,6 +128,10 @@ class Director:
         """Show a start pose under the sliders; None ends it."""
         self._presenter.post(lambda: self.state.edit_pose(pose))
 
+    def propose_pose(self, pose: Array, said: str) -> None:
+        """Show a start pose that was found, and what is said of it."""
+        self._presenter.post(lambda: self.state.propose_pose(pose, said))
+
     def save_pose(self, pose: Array) -> None:
         """Store a start pose for the session."""
         self._presenter.post(lambda: self.state.save_pose(pose))

@@ -80,6 +80,11 @@ class PoseEditor:
                 slider.value = shown
         self._dress()
 
+    def propose(self, pose: Array) -> None:
+        """Put the sliders at a pose that somebody else found, ready to be looked at, changed and saved."""
+        self.show_pose(pose)
+        self._edited()
+
     def _slider(self, parameter: Parameter, index: int, value: float) -> viser.GuiSliderHandle[float]:
         shown = shown_value(parameter, value)
         low, high = slider_limits(parameter, shown)

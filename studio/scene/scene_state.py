@@ -151,6 +151,13 @@ class SceneState:
         self._edited = pose
         self._presenter.redraw()
 
+    def propose_pose(self, pose: Array, said: str) -> None:
+        """Show a start pose that was found, if it is one of the body that is shown; say how sure it is."""
+        if self.run is not None and len(self.run.opened.body.parameters) == len(pose):
+            self._panel.pose.propose(pose)
+            self.edit_pose(pose)
+        tell(self._server, "Start pose found", said)
+
     def save_pose(self, pose: Array) -> None:
         """Store a start pose for the session."""
         if self.run is None:

@@ -4,8 +4,10 @@ Started and stopped by the web application (building viser blocks for a moment: 
 may be called from any thread; they post what is wished to the scene's own thread and return.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields
+
+import numpy as np
 
 from studio.errors import SettingsError
 from studio.scene.director import Director
@@ -70,6 +72,14 @@ class SceneStage:
         """
         if self._director is not None:
             self._director.show_run(session, run, frame, layer)
+
+    def propose_pose(self, session: str, pose: Sequence[float], said: str) -> None:
+        """Show a start pose (D,) that was found for a session; said : how sure it is, for the viewers."""
+        if self._director is None:
+            return
+        if self.shown.session != session:
+            self._director.show_run(session, "", None, None)
+        self._director.propose_pose(np.array(pose, dtype=np.float64), said)
 
     def show_frame(self, frame: int) -> None:
         """Show a stored frame; where it is not stored the nearest one."""

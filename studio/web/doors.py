@@ -19,6 +19,7 @@ from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.workspace import Workspace
 from studio.web.event_stream import EventStream
 from studio.web.import_schemas import ImportState
+from studio.web.initialisation_schemas import InitialisationState
 from studio.web.presets import Preset
 from studio.worker.commands import Close, Command
 from studio.worker.comparison_desk import ComparisonDesk, ComparisonState
@@ -119,6 +120,10 @@ class Stage(Protocol):
         """Show a session, a run of it, a frame, a layer's cloud."""
         ...
 
+    def propose_pose(self, session: str, pose: Sequence[float], said: str) -> None:
+        """Show a start pose that was found for a session, and what is said of it."""
+        ...
+
     def show_frame(self, frame: int) -> None:
         """Show a stored frame."""
         ...
@@ -149,8 +154,8 @@ class Doors:
     """Everything a route may use, kept in `app.state.doors`.
 
     scene_port : of the inner viser server, 0 while it is not running. footage_roots : folders that may be
-    imported from. presets : the studio's own. log_path : the server's log file. imports, uploads : those
-    under way, by their identifiers. desk : where comparisons are worked at.
+    imported from. presets : the studio's own. log_path : the server's log file. imports,
+    initialisations, uploads : those under way, by their identifiers. desk : where comparisons are worked at.
     """
 
     workspace: Workspace
@@ -162,6 +167,7 @@ class Doors:
     log_path: Path | None = None
     scene_port: int = 0
     imports: dict[str, ImportState] = field(default_factory=dict)
+    initialisations: dict[str, InitialisationState] = field(default_factory=dict)
     uploads: dict[str, dict[str, int]] = field(default_factory=dict)
     stops: dict[str, threading.Event] = field(default_factory=dict)
     jobs: set[asyncio.Task[None]] = field(default_factory=set)

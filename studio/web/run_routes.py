@@ -66,7 +66,7 @@ def make_run(session: OpenSession, wish: RunRequest, doors: Door) -> RunLine:
         weighting=wish.weighting or "",
         body=wish.body or "",
         start_pose=None if wish.start_pose is None else np.array(wish.start_pose),
-        start_source="" if wish.start_pose is None else "set in the studio",
+        start_source="" if wish.start_pose is None else wish.start_source or "set in the studio",
         first=wish.first,
         last=wish.last,
         seed=wish.seed,

@@ -239,6 +239,7 @@ class RunRequest(Request):
     seed: int = Field(0, ge=0, le=2**63 - 1)
     settings: dict[str, Value] = {}
     start_pose: list[float] | None = Field(None, description="Radians and mm, in the body's order.")
+    start_source: str = Field("", max_length=200, description="Where that pose came from, in words.")
     behaviour: RunName | None = Field(
         None, description="A model of the workspace; null: the only one, if needed."
     )

@@ -2,7 +2,7 @@
 
 import socket
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -98,6 +98,9 @@ class RecordingStage:
         self, session: str, run: str = "", frame: int | None = None, layer: int | None = None
     ) -> None:
         self.calls.append(("run", session, run, frame, layer))
+
+    def propose_pose(self, session: str, pose: Sequence[float], said: str) -> None:
+        self.calls.append(("pose", session, tuple(pose), said))
 
     def show_frame(self, frame: int) -> None:
         self.calls.append(("frame", frame))

@@ -3,6 +3,7 @@
 import { fetchJson, post, runPath, sessionPath } from "./api.js";
 import { openForm } from "./dialogs.js";
 import { refreshSessions, openSession } from "./rail.js";
+import { findStartPose, tellFound } from "./start_pose.js";
 import { set } from "./state.js";
 
 const NOISE = "noise", BEHAVIOUR = "behaviour";
@@ -33,6 +34,9 @@ function showBehaviour(form, knobs, trackers) {
 /** Open the form for a session; `like` is a run whose settings are taken over. */
 export async function newRunForm(entry, like = null) {
   const { trackers, weightings, bodies, behaviours, presets } = await fetchJson("/api/choices");
+  // Bodies whose every parameter has limits may begin anywhere between them; the others need a pose.
+  const detail = await fetchJson(sessionPath(entry.name));
+  const needsPose = !detail.has_start_pose && detail.body.parameters.some((one) => one.lower === null || one.upper === null);
   const usual = (tracker) => trackers.find((one) => one.name === tracker)?.weighting;
   let chosen = false;
   const first = { tracker: like?.tracker ?? entry.tracker, weighting: like?.weighting ?? entry.weighting };
@@ -51,6 +55,7 @@ export async function newRunForm(entry, like = null) {
         { name: "last", label: "Last frame", kind: "number", min: 0, max: entry.frame_count - 1, value: entry.frame_count - 1 }],
       [{ name: "seed", label: "Seed", kind: "number", min: 0, value: like ? like.seed + 1 : 0, hint: "The same seed gives the same run." },
         { name: "name", label: "Name", value: "", placeholder: "numbered", pattern: "[A-Za-z0-9_\\-]{0,64}" }],
+      [{ name: "find", kind: "check", label: "find the start pose in the first frame", value: needsPose }],
     ],
     // A tracker brings its usual weighting along, unless the session or the person wants another.
     changed: async (name, form) => {
@@ -64,13 +69,18 @@ export async function newRunForm(entry, like = null) {
       }
       showBehaviour(form, knobs, trackers);
     },
-    send: async (values) => {
+    send: async (values, report) => {
+      const found = values.find
+        ? await findStartPose(entry.name, { frame: Number(values.first), body: values.body || null, behaviour: values.behaviour || null }, report)
+        : null;
+      if (found) tellFound(found);
       const preset = presets.find((one) => one.name === values.preset);
       const guided = values.prediction === BEHAVIOUR ? { prediction: BEHAVIOUR } : {};
       const made = await post(`${sessionPath(entry.name)}/runs`, {
         name: values.name || null, tracker: values.tracker, weighting: values.weighting, body: values.body || null, seed: Number(values.seed),
         first: Number(values.first), last: Number(values.last) + 1, settings: { ...preset?.values, ...guided },
         behaviour: values.behaviour || null,
+        ...(found ? { start_pose: found.pose, start_source: found.source } : {}),
       });
       await refreshSessions();
       openSession(entry.name, made.name);

@@ -6,6 +6,7 @@ import { openForm, openMenu } from "./dialogs.js";
 import { importForm } from "./importing.js";
 import { complain, say } from "./messages.js";
 import { newRunForm } from "./new_run.js";
+import { startPoseForm } from "./start_pose.js";
 import { get, set, watch } from "./state.js";
 
 const list = document.getElementById("sessions");
@@ -78,6 +79,7 @@ function sessionMenu(button, entry) {
   const run = get("run") ?? undefined;
   openMenu(button, [
     ["New run…", () => newRunForm(entry)],
+    ["Find the start pose…", () => startPoseForm(entry)],
     ...(entry.has_truth ? [["Compare trackers…", () => { location.href = comparisonsPath(entry); }]] : []),
     ["Rename…", () => renameForm("session", path, entry.name, open, async (name) => { await refreshSessions(); if (open) openSession(name, run); })],
     ["Duplicate", async () => { try { const made = await post(`${path}/duplicate`); await refreshSessions(); say(`${entry.name} is copied as ${made.name}.`); } catch (error) { complain(error); } }],
