@@ -31,6 +31,7 @@ def followed(error: float, seed: int = 0, lost: int = 0, frames: int = 90) -> Fo
     positions[frames - lost :] = 400.0
     return Followed(
         angle_deg=angles.tolist(),
+        limb_deg=angles.tolist(),
         position_mm=positions.tolist(),
         lost=(positions > 150.0).tolist(),
         free=[0.1] * frames,
@@ -276,6 +277,7 @@ def test_a_second_pass_must_be_better() -> None:
 def test_ratios_and_root_mean_squares() -> None:
     run = followed(10.0)
     assert run.angle_rms == pytest.approx(np.sqrt(np.mean(np.square(run.angle_deg))))
+    assert run.limb_rms == pytest.approx(run.angle_rms)
     assert run.position_rms == pytest.approx(np.sqrt(np.mean(np.square(run.position_mm))))
     halves = comparing.ratio("half", [followed(5.0, 1)], [followed(10.0, 1)], "lower")
     assert halves.ours == pytest.approx(0.5, rel=0.01)

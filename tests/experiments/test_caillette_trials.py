@@ -151,10 +151,17 @@ def test_errors_are_wrapped_and_over_the_joints_alone(shelf) -> None:
     columns = feature_space(body, 30.0).columns
     moved = truth.poses.copy()
     moved[:, columns[3]] += 2.0 * np.pi
-    moved[:, 0] += 100.0
+    names = [entry.name for entry in body.parameters]
+    moved[:, names.index("pelvis_x")] += 100.0
     found = joint_errors(body, columns, moved, truth)
     np.testing.assert_allclose(found.angle_deg, 0.0, atol=1e-9)
+    np.testing.assert_allclose(found.limb_deg, 0.0, atol=1e-4)
     assert found.position_mm.min() > 70.0
+    tipped = truth.poses.copy()
+    tipped[:, names.index("pelvis_rz")] += 0.2
+    level = joint_errors(body, columns, tipped, truth)
+    np.testing.assert_allclose(level.angle_deg, 0.0, atol=1e-9)
+    assert 0.0 < level.limb_deg.max() < np.degrees(0.2)
     one = truth.poses.copy()
     one[:, columns[5]] += 0.1
     expected = np.degrees(0.1) / np.sqrt(len(columns))

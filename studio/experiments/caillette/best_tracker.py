@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from studio.experiments.caillette.comparing import (
+    POSITION,
     Groups,
     Runs,
     by_contender,
@@ -111,9 +112,7 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
         )
         for clip in CLIPS
     )
-    charts = tuple(
-        curves(f"RMS joint position error, {clip}", _on(clip, groups), positions=True) for clip in CLIPS
-    )
+    charts = tuple(curves(f"RMS joint position error, {clip}", _on(clip, groups), POSITION) for clip in CLIPS)
     quick = any(_learnt_one(outcome) for outcome in outcomes)
     settings = {
         "evaluations": EVALUATIONS,
@@ -150,7 +149,7 @@ def _words(groups: Groups) -> str:
         best = own[f"{order[0]}, {clip}"]
         told.append(
             f"On the {clip} the nearest is {order[0]}: {means[order[0]]:.0f} mm mean marker error, "
-            f"{mean_of(best):.1f}° RMS joint angle, {np.mean([run.milliseconds for run in best]):.0f} ms a frame on "
+            f"{mean_of(best):.1f}° RMS limb direction, {np.mean([run.milliseconds for run in best]):.0f} ms a frame on "
             f"one core; then {order[1]} ({means[order[1]]:.0f} mm) and {order[2]} ({means[order[2]]:.0f} mm); the "
             f"furthest {order[-1]} ({means[order[-1]]:.0f} mm)."
         )

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from studio.experiments.caillette.comparing import (
     OFF_MM,
+    POSITION,
     by_contender,
     curves,
     error_number,
@@ -92,7 +93,7 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
         words,
         (*claims, *others),
         (summary_table("Blobs fitted from the tracker's own expectations", groups),),
-        (curves("RMS joint position error over the first exercise", groups, positions=True),),
+        (curves("RMS joint position error over the first exercise", groups, POSITION),),
         {"footage": TEST, "weighting": BLOBS, "memory": MEMORY, "training": training_words(quick)},
     )
 

@@ -14,6 +14,7 @@ import numpy as np
 from studio.body.catalogue import load_body
 from studio.experiments.caillette.comparing import (
     Groups,
+    angle,
     by_contender,
     mean_of,
     position,
@@ -87,16 +88,17 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
         ratio("memory 10 over memory 1", groups[group(10)], first, "lower"),
     )
     others = (
+        ratio(f"memory {MEMORIES[-1]} over memory 1, joint angle", last, first, "", angle),
         ratio(f"memory {MEMORIES[-1]} over memory 1, joint position", last, first, "", position),
         number("rank correlation of error and memory", falling, ""),
         *(
-            number(f"joint angle, RMS: {name}", [run.angle_rms for run in runs_], "°")
+            number(f"limb direction, RMS: {name}", [run.limb_rms for run in runs_], "°")
             for name, runs_ in groups.items()
         ),
     )
     listed = ", ".join(f"{error:.1f}" for error in errors)
     words = (
-        f"RMS joint angle error with memory {', '.join(map(str, MEMORIES))}: {listed}°, states "
+        f"RMS error of limb directions with memory {', '.join(map(str, MEMORIES))}: {listed}°, states "
         f"{', '.join(str(entry['states']) for entry in asked)}. " + _reason(claims, asked)
     )
     return Findings(
@@ -110,7 +112,7 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
 
 
 def _falls(groups: Groups, seed: int) -> float:
-    errors = [groups[group(memory)][seed].angle_rms for memory in MEMORIES]
+    errors = [groups[group(memory)][seed].limb_rms for memory in MEMORIES]
     ranks = np.argsort(np.argsort(errors))
     return float(np.corrcoef(np.arange(len(ranks)), ranks)[0, 1])
 
@@ -133,7 +135,7 @@ def _reason(claims: Sequence[Number], asked: Sequence[Mapping[str, Any]]) -> str
 
 
 def _chart(groups: Groups) -> Chart:
-    values = [[run.angle_rms for run in groups[group(memory)]] for memory in MEMORIES]
+    values = [[run.limb_rms for run in groups[group(memory)]] for memory in MEMORIES]
     series = Series(
         "200 guided particles (bars: lowest and highest seed)",
         tuple(float(memory) for memory in MEMORIES),
@@ -141,7 +143,7 @@ def _chart(groups: Groups) -> Chart:
         low=tuple(min(row) for row in values),
         high=tuple(max(row) for row in values),
     )
-    return Chart("Error over memory", "lines", "memory (frames)", "RMS joint angle error (°)", (series,))
+    return Chart("Error over memory", "lines", "memory (frames)", "RMS limb direction error (°)", (series,))
 
 
 def _entropies(asked: Sequence[Mapping[str, Any]]) -> Chart:

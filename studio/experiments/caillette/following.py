@@ -65,12 +65,13 @@ class Follow:
 
 @dataclass(frozen=True, slots=True)
 class Followed:
-    """What a run reached. Of each frame: angle_deg, position_mm : RMS over joint angles and over markers; lost : a
-    marker is off by more than 150 mm; free : share of the particles that no model moved, empty where none guides them.
-    mean_mm : mean marker error. evaluations : of a frame. milliseconds : of a frame's search.
+    """What a run reached. Of each frame: angle_deg, limb_deg, position_mm : RMS over joint angles, limbs' directions
+    and markers; lost : a marker is off by more than 150 mm; free : share of the particles that no model moved, empty
+    where none guides them. mean_mm : mean marker error. evaluations : of a frame. milliseconds : of a frame's search.
     """
 
     angle_deg: list[float]
+    limb_deg: list[float]
     position_mm: list[float]
     lost: list[bool]
     free: list[float]
@@ -82,6 +83,11 @@ class Followed:
     def angle_rms(self) -> float:
         """RMS over frames and joint angles, degrees."""
         return float(np.sqrt(np.mean(np.square(self.angle_deg))))
+
+    @property
+    def limb_rms(self) -> float:
+        """RMS over frames and limbs of the angle between found and true axis, degrees."""
+        return float(np.sqrt(np.mean(np.square(self.limb_deg))))
 
     @property
     def position_rms(self) -> float:
@@ -181,6 +187,7 @@ def followed(session: Session, truth: TrueMotion, way: Way) -> Followed:
     found = joint_errors(body, feature_space(body, session.manifest.fps).columns, way.poses, truth)
     return Followed(
         _rounded(found.angle_deg),
+        _rounded(found.limb_deg),
         _rounded(found.position_mm),
         [bool(value) for value in found.lost],
         [round(value, 4) for value in way.free],

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from studio.experiments.caillette.comparing import (
+    angle,
     curves,
     error_number,
     mean_of,
@@ -91,9 +92,10 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
     }
     numbers = (
         claim,
+        ratio("the same, joint angle", groups[SECOND], groups[PLAIN], "", angle),
         ratio("the same, joint position", groups[SECOND], groups[PLAIN], "", position),
         ratio("learning while tracking over not learning", groups[FIRST], groups[PLAIN], ""),
-        *(error_number(f"joint angle, RMS: {name}", runs) for name, runs in groups.items()),
+        *(error_number(f"limb direction, RMS: {name}", runs) for name, runs in groups.items()),
         *(
             number(
                 f"{what} learnt",
@@ -104,8 +106,8 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
         ),
     )
     words = (
-        f"On a clip never learnt the RMS joint angle error is {mean_of(groups[PLAIN]):.1f}° without online learning, "
-        f"{mean_of(groups[FIRST]):.1f}° while the run learns (a lesson every {INTERVAL} frames) and "
+        f"On a clip never learnt the RMS error of limb directions is {mean_of(groups[PLAIN]):.1f}° without online "
+        f"learning, {mean_of(groups[FIRST]):.1f}° while the run learns (a lesson every {INTERVAL} frames) and "
         f"{mean_of(groups[SECOND]):.1f}° in a second pass with what the first has learnt; joint positions "
         f"{mean_of(groups[PLAIN], position):.0f}, {mean_of(groups[FIRST], position):.0f} and "
         f"{mean_of(groups[SECOND], position):.0f} mm RMS. Particles that go their own way are {shares[PLAIN]:.0f} %, "
@@ -118,7 +120,7 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
         words,
         numbers,
         (summary_table("Passes over the clip", groups),),
-        (curves("RMS joint angle error", groups),),
+        (curves("RMS limb direction error", groups),),
         {"footage": UNSEEN, "particles": PARTICLES, "memory": MEMORY, "training": training_words(quick)},
     )
 

@@ -1,8 +1,9 @@
 """What behaviour models are learnt from, and the models, learnt once and kept beside the footage.
 
-Three performances of each exercise as the paper has them: the recording itself and two made from it, whose tempo and
-angles change slowly by a little; each is smoothed by several amounts (section 7.1), which makes about 13 000 frames of
-two exercises. Everything is on the body in its own proportions: a model fits the body in any size.
+Three performances of each exercise as the paper has them: the recording itself and two more, made as the test is (the
+recipe's option `performance`: tempo and joints change slowly by a little); each is smoothed by several amounts (section
+7.1), which makes about 13 000 frames of two exercises. Everything is on the body in its own proportions: a model fits
+the body in any size.
 """
 
 import dataclasses
@@ -13,6 +14,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,13 +26,12 @@ from studio.body.model import BodyModel
 from studio.experiments.caillette.learnt_files import made_once
 from studio.experiments.caillette.pointing import POINTING, pointing_poses
 from studio.experiments.footage_shelf import FootageShelf
-from studio.experiments.reproduction_plan import recipe_digest
 from studio.synthesis.person import first_frames
-from studio.synthesis.recipe_file import find_recipe, read_recipe
+from studio.synthesis.recipe_file import JOINED, find_recipe, read_recipe
 from studio.synthesis.recipes import recipe_motion
 from studio.synthesis.recorded_clip import sampled
 from studio.training.learning import learn
-from studio.training.oversampling import OversamplingSettings
+from studio.training.oversampling import OversamplingSettings, performed
 from studio.training.resampling import frame_times
 from studio.training.sources import FPS, Recording, fitted_person
 from studio.training.targets import skeleton_of_body
@@ -45,7 +46,8 @@ MODEL, NUMBERS, POSES = "model.behaviour", "learnt.json", "poses.npy"
 class Training:
     """What a model is learnt from and how; plain values.
 
-    sources : recipes of people's motion, or "pointing". frames : of each at 30 Hz, 0 for all. performances : of each.
+    sources : recipes of people's motion, or "pointing". frames : of each at 30 Hz, 0 for all. performances : of each,
+    the first as recorded.
     smoothings : of each performance. memory, epsilon : of the automaton. clusters : further learning knobs. seed : of
     performances and clustering. tested : recipes on whose motion the entropy is measured.
     """
@@ -76,8 +78,8 @@ class Training:
         return LearningSettings(memory=self.memory, epsilon=self.epsilon, **self.clusters)
 
     def material(self) -> OversamplingSettings:
-        """The knobs of what is made of a recording."""
-        return OversamplingSettings(performances=self.performances, smoothings=self.smoothings)
+        """The knobs of what is made of a performance."""
+        return OversamplingSettings(smoothings=self.smoothings)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,24 +91,42 @@ class Lesson:
     seconds: float
 
 
-def recorded(shelf: FootageShelf, source: str, body: BodyModel, frames: int = 0) -> Recording:
-    """A source's motion on the body, fitted once. frames : at 30 Hz from the first, 0 for all.
+def recorded(
+    shelf: FootageShelf, source: str, body: BodyModel, frames: int = 0, performance: int = 0
+) -> Recording:
+    """A source's motion on the body, fitted once. frames : at 30 Hz from the first, 0 for all. performance : which, 0
+    for the source as it is.
 
     Raises StudioError for an unknown recipe and for recorded motion that is not there.
     """
     if source == POINTING:
-        return Recording(source, FPS, pointing_poses(body, FPS))
-    recipe = recipe_digest(source)
+        return _performed(Recording(source, FPS, pointing_poses(body, FPS)), body, performance)
+    path = find_recipe(source)
+    recipe = read_recipe(path)
+    own = performance > 0 and recipe.motion == JOINED
+    if own:
+        recipe = msgspec.structs.replace(
+            recipe, options={**recipe.options, "performance": float(performance)}
+        )
 
     def make(folder: Path) -> None:
-        path = find_recipe(source)
-        motion = recipe_motion(read_recipe(path), path.parent, skeleton_of_body(body))
+        motion = recipe_motion(recipe, path.parent, skeleton_of_body(body))
         times = frame_times((motion.frame_count - 1) / motion.fps, FPS)
         shown = first_frames(sampled(motion, times, FPS), frames or None)
         np.save(folder / POSES, fitted_person(shown, body, source).poses)
 
-    making = {"source": source, "recipe": recipe, "body": body.name, "frames": frames, "fps": FPS}
-    return Recording(source, FPS, np.load(made_once(shelf, "motion", making, make) / POSES))
+    making = {"recipe": msgspec.to_builtins(recipe), "body": body.name, "frames": frames, "fps": FPS}
+    found = Recording(source, FPS, np.load(made_once(shelf, "motion", making, make) / POSES))
+    return found if own else _performed(found, body, performance)
+
+
+def _performed(recording: Recording, body: BodyModel, performance: int) -> Recording:
+    """Another performance of what no recipe can perform anew: tempo and angles change slowly by a little."""
+    if performance == 0:
+        return recording
+    rng = np.random.default_rng(performance)
+    poses = performed(body, recording.poses, recording.fps, OversamplingSettings(), rng)
+    return dataclasses.replace(recording, poses=poses)
 
 
 def learnt(shelf: FootageShelf, training: Training) -> Lesson:
@@ -130,7 +150,11 @@ def learnt(shelf: FootageShelf, training: Training) -> Lesson:
 def lesson_of(shelf: FootageShelf, training: Training) -> Lesson:
     """The model of a training set, learnt now: to measure how long it takes."""
     body = load_body(training.body)
-    recordings = [recorded(shelf, source, body, training.frames) for source in training.sources]
+    recordings = [
+        recorded(shelf, source, body, training.frames, _number(training, performance))
+        for source in training.sources
+        for performance in range(training.performances)
+    ]
     tested = [recorded(shelf, source, body, training.frames) for source in training.tested]
     began = time.perf_counter()
     model, told = learn(
@@ -139,13 +163,21 @@ def lesson_of(shelf: FootageShelf, training: Training) -> Lesson:
     return Lesson(model, told.frames, time.perf_counter() - began)
 
 
+def _number(training: Training, performance: int) -> int:
+    """The number of a performance: other ones with every seed, the first always as recorded."""
+    return performance + training.performances * training.seed if performance else 0
+
+
 def _learn(shelf: FootageShelf, training: Training, folder: Path) -> None:
     _write(folder, lesson_of(shelf, training))
 
 
 def _making(training: Training) -> dict[str, Any]:
     named = [name for name in (*training.sources, *training.tested) if name != POINTING]
-    return {**training.plain(), "recipes": [recipe_digest(name) for name in named]}
+    return {
+        **training.plain(),
+        "recipes": [msgspec.to_builtins(read_recipe(find_recipe(name))) for name in named],
+    }
 
 
 def _write(folder: Path, lesson: Lesson) -> None:

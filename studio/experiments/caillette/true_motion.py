@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.body.forward_kinematics import marker_points
+from studio.body.forward_kinematics import limb_frames, marker_points
 from studio.body.model import BodyModel
 from studio.capture.trc import MarkerMotion, read_trc
 from studio.errors import TruthError
@@ -44,11 +44,13 @@ class TrueMotion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointErrors:
-    """Of each frame (F,). angle_deg : RMS over the joint angles (all but the root's), wrapped. position_mm : RMS over
-    the markers. mean_mm : their mean. lost : whether any marker is off by more than LOST_MM.
+    """Of each frame (F,). angle_deg : RMS over the joint angles (all but the root's), wrapped. limb_deg : RMS over the
+    limbs of the angle between found and true axis. position_mm : RMS over the markers. mean_mm : their mean. lost :
+    whether any marker is off by more than LOST_MM.
     """
 
     angle_deg: Array
+    limb_deg: Array
     position_mm: Array
     mean_mm: Array
     lost: NDArray[np.bool_]
@@ -100,10 +102,13 @@ def joint_errors(body: BodyModel, columns: NDArray[np.int64], poses: Array, trut
     """Errors of poses (F, D), the first F frames of the truth. columns : (d,) the joint angles in the pose vector."""
     true = truth.poses[: len(poses)]
     away = np.degrees((poses - true + np.pi) % (2.0 * np.pi) - np.pi)[:, columns]
+    axes, true_axes = (limb_frames(body, each)[..., 2] for each in (poses, true))
+    turned = np.degrees(np.arccos(np.clip((axes * true_axes).sum(axis=2), -1.0, 1.0)))
     found = marker_points(body, poses)[:, truth.markers]
     apart = np.linalg.norm(found - truth.points[: len(poses)], axis=2)
     return JointErrors(
         np.sqrt((away**2).mean(axis=1)),
+        np.sqrt((turned**2).mean(axis=1)),
         np.sqrt((apart**2).mean(axis=1)),
         apart.mean(axis=1),
         (apart > LOST_MM).any(axis=1),
