@@ -91,11 +91,11 @@ def conclude_same(outcomes: Sequence[Outcome]) -> Findings:
         *_errors(groups),
     )
     words = (
-        f"RMS error of limb directions: {_told(groups)}. By joint angles, the figure's own measure, which are "
-        f"singular where an arm points sideways: {_told(groups, angle)}. The guided tracker weighs 200 poses a frame, "
-        f"the others 5000. The annealed filter is the one of the paper's time (planned noise); the studio's improved "
-        f"one reaches {mean_of(groups[IMPROVED.name]):.1f}° and {mean_of(groups[IMPROVED.name], position):.0f} mm beside the "
-        f"guided {mean_of(ours):.1f}° and {mean_of(ours, position):.0f} mm."
+        f"RMS error of limb directions: {_told(groups)}. By joint angles, the figure's own measure, which are singular "
+        f"where an arm points sideways: {_told(groups, angle)}. The guided tracker weighs 200 poses a frame, the "
+        "others 5000. The annealed filter is the one of the paper's time (planned noise); the studio's improved one "
+        f"reaches {mean_of(groups[IMPROVED.name]):.1f}° and {mean_of(groups[IMPROVED.name], position):.0f} mm beside "
+        f"the guided {mean_of(ours):.1f}° and {mean_of(ours, position):.0f} mm."
     )
     return _findings(outcomes, words, claims, others, groups)
 
