@@ -3,9 +3,32 @@
 import math
 from collections.abc import Mapping
 
+import numpy as np
+
 from studio.body.assembly import assemble
+from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.errors import BodyError
+
+FOOT = "foot"
+
+
+def with_usual_feet(body: BodyModel) -> BodyModel:
+    """The body with feet of the usual share of its height where its file knows of feet, but their length is zero;
+    itself where it has feet or knows of none. Its pose vector stays what it is.
+    """
+    if body.definition is None:
+        return body
+    declared = body.definition.dimensions
+    missing = {
+        name: declared[name].of_height
+        for name, value in body.dimensions.items()
+        if value == 0.0 and FOOT in name.split("_") and name in declared and declared[name].of_height
+    }
+    if not missing:
+        return body
+    height = float(np.ptp(limb_ends(body, body.neutral)[0, ..., 2]))
+    return with_dimensions(body, {name: share * height for name, share in missing.items() if share})
 
 
 def with_dimensions(body: BodyModel, changes: Mapping[str, float]) -> BodyModel:

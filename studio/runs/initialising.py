@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.behaviour.model_file import read_model
+from studio.body.dimensions import with_usual_feet
 from studio.body.model import BodyModel
 from studio.errors import RunError
 from studio.evidence.frame_evidence import FrameEvidence
@@ -22,7 +23,7 @@ from studio.runs.search_space import parameter_names, search_space, session_sigm
 from studio.sessions.named_rows import write_pose
 from studio.sessions.names import free_name
 from studio.sessions.session import START_POSE_NAME, Session
-from studio.settings import DEFAULT_TRACKER, default_settings
+from studio.settings import DEFAULT_TRACKER, RunSettings, default_settings
 from studio.tracking.initialisation import PER_FAMILY, THOROUGH, Effort, FoundStart, StartSearch
 from studio.tracking.loss_detection import Onlooker, anything_seen
 from studio.tracking.start_candidates import facing, start_candidates
@@ -31,6 +32,7 @@ from studio.volume.body_space import space_of
 from studio.volume.hull import Hull
 from studio.volume.reconstruction import HullSettings, reconstruct
 from studio.volume.tracking_space import Box
+from studio.weighting.catalogue import WEIGHTINGS
 
 Array = NDArray[np.float64]
 
@@ -106,7 +108,7 @@ def initialise(
     problems = ProblemSource(session, tree)
     try:
         tell("looking at the frame", 0, 1)
-        problem, evidence = problems.problem(frame, settings), problems.evidence(frame, settings)
+        evidence = problems.evidence(frame, settings)
         masks = problems.evidence(frame, default_settings(DEFAULT_TRACKER, WEIGHTING))
         cameras = problems.cameras
     finally:
@@ -119,7 +121,7 @@ def initialise(
     hull, box, note = hull_of(tree, cameras, masks)
     space = search_space(tree, session_sigma(session, tree, session.manifest.fps))
     found = seek(
-        problem,
+        whole_problem(tree, cameras, settings, evidence),
         space,
         tree,
         hull,
@@ -184,6 +186,17 @@ def hull_of(
             "The masks have no volume in common: the body was sought in the middle of the views.",
         )
     return hull, box, ""
+
+
+def whole_problem(
+    body: BodyModel, cameras: tuple[Camera, ...], settings: RunSettings, evidence: FrameEvidence
+) -> FrameProblem:
+    """A frame as a function of the body's poses, the body having feet even where it is tracked without: which way they
+    point tells front from back.
+    """
+    whole = with_usual_feet(body)
+    weigher = WEIGHTINGS[settings.weighting_name].prepare(whole, cameras, settings.weighting)
+    return weigher.problem(evidence)
 
 
 def seek(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
-from studio.runs.initialising import WEIGHTING, hull_of, seek
+from studio.runs.initialising import WEIGHTING, hull_of, seek, whole_problem
 from studio.sessions.results_reader import ResultsReader
 from studio.settings import RunSettings, default_settings
 from studio.tracking.initialisation import PER_FAMILY, QUICK
@@ -218,15 +218,16 @@ class RunWatch:
         body, cameras = self._problems.body, self._problems.cameras
         hull, box, _ = hull_of(body, cameras, masks)
         prototypes = None if space.behaviour is None else space.behaviour.prototypes.poses
+        problem = whole_problem(body, cameras, _seeking(settings), masks)
         seed = int(np.random.SeedSequence((self._seed, frame)).generate_state(1)[0])
         if settings.recovery.recovery != INITIALISE:
             rng = np.random.default_rng(seed)
             spread = start_candidates(rng, body, hull, box, PER_FAMILY, prototypes).poses
             # The best comes first, where a swarm looks for the pose to start from.
-            weights = self._problems.problem(frame, _seeking(settings)).weigh(spread)
+            weights = problem.weigh(spread)
             return unweighted(spread[np.argsort(-weights, kind="stable")])
         found = seek(
-            self._problems.problem(frame, _seeking(settings)),
+            problem,
             space,
             body,
             hull,
