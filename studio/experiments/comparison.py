@@ -216,8 +216,14 @@ def _attempt(plan: Plan, entrant: Entrant, seed: int) -> Attempt:
         plan.first,
         plan.last,
         body=plan.body,
-        behaviour=plan.behaviour_path if needs_model(entrant.tracker, entrant.settings().tracker) else "",
+        behaviour=_behaviour_of(plan, entrant),
     )
+
+
+def _behaviour_of(plan: Plan, entrant: Entrant) -> str:
+    """The file of the model that an entrant is guided by, "" for one that is not."""
+    guided = plan.behaviour_path and needs_model(entrant.tracker, entrant.settings().tracker)
+    return plan.behaviour_path if guided else ""
 
 
 def _seed_result(name: str, seed: int, values: Mapping[str, Any]) -> SeedResult:
