@@ -91,7 +91,7 @@ def usual(trial: Trial) -> dict:
     if arguments.get("alone"):
         return learnt_sizes(len(arguments["training"]["sources"]))
     if "entropy_of" in arguments:
-        return {"states": 90 * (arguments["memory"] + 1), "train": 0.2, "test": 0.5}
+        return {"states": 90 * (arguments["memory"] + 1), "train": 0.2, "test": 0.5, "stays": 0.8}
     if "tracker" not in arguments:
         return table_1(arguments["seed"])
     if trial.label.startswith("online learning"):
