@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from studio.errors import RunError
 from studio.tracking.start_candidates import StartCandidates
-from studio.tracking.start_lines import AtEase, Line, LineSteps, Round, limited
+from studio.tracking.start_lines import OPPOSITE_LINES, AtEase, Line, LineSteps, Round, limited
 from studio.tracking.tracker import FrameProblem, SearchSpace
 
 Array = NDArray[np.float64]
@@ -35,7 +35,6 @@ SURVIVING = 20
 FAMILY_LAYERS, FAMILY_PARTICLES, FAMILY_SPREAD = 8, 100, 0.6
 RANGE_SHARE, MOVE, TURN = 0.15, 80.0, 0.25
 """Noise before it shrinks: a share of a joint's range; mm and radians of the root."""
-OPPOSITE_LINES = 2
 MARGIN_SCALE = 0.03
 """Log weight a camera by which the right facing usually wins (see `confidence`)."""
 THREADS = 2
@@ -120,7 +119,7 @@ class StartSearch:
         if not len(candidates.poses):
             raise RunError("There is no pose to begin a search with.", "Give candidates.")
         groups = self._groups(candidates)
-        self._total = len(groups) + sum(entry.lines for entry in self._effort.rounds)
+        self._total = len(groups) + sum(entry.most for entry in self._effort.rounds)
         with ThreadPoolExecutor(THREADS, thread_name_prefix="start-pose") as threads:
             spread, steps = FAMILY_SPREAD * self._noise, self._steps
             lines = self._all(
@@ -134,7 +133,7 @@ class StartSearch:
                 lines += [Line(pose, value) for pose, value in zip(known, values, strict=True)]
             for number, entry in enumerate(self._effort.rounds):
                 lines = self._round(threads, lines, entry, number + 1)
-                self._done = len(groups) + sum(one.lines for one in self._effort.rounds[: number + 1])
+                self._done = len(groups) + sum(one.most for one in self._effort.rounds[: number + 1])
         return self._found(lines)
 
     def _groups(self, candidates: StartCandidates) -> list[Array]:

@@ -30,6 +30,8 @@ NEAR = 0.12
 PLACED, COMBINED = 400, 20
 """Places tried for each limb of a pair while the other rests, and how many of the best are tried together."""
 IMPOSSIBLE = 1e6
+OPPOSITE_LINES = 2
+"""Lines that face the other way than the best one and are kept whatever they weigh."""
 COMFORT = 1.0
 """Log weight a camera of an attitude whose joints are all a whole range away from rest (`AtEase`)."""
 
@@ -44,6 +46,11 @@ class Round:
     limb_particles: int
     particles: int
     spread: float
+
+    @property
+    def most(self) -> int:
+        """Lines at most."""
+        return self.lines + OPPOSITE_LINES
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,64 @@
+"""Masks of a body's cones, drawn with OpenCV as the hulls of their ends: an artist of its own, and a rough one."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.forward_kinematics import limb_frames
+from studio.body.model import BodyModel
+from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
+from studio.geometry.camera import Camera
+from studio.geometry.projection import project
+
+Array = NDArray[np.float64]
+RING = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+
+
+def ring_of_cameras(count: int, width: int = 320, height: int = 240) -> tuple[Camera, ...]:
+    """Cameras on a circle of 3.5 m, 2 m up, looking at the middle of a person who stands at the origin."""
+    cameras = []
+    for number in range(count):
+        angle = 2.0 * np.pi * number / count + 0.4
+        centre = np.array([3500.0 * np.cos(angle), 3500.0 * np.sin(angle), 2000.0])
+        ahead = np.array([0.0, 0.0, 950.0]) - centre
+        ahead /= np.linalg.norm(ahead)
+        right = np.cross(ahead, [0.0, 0.0, 1.0])
+        right /= np.linalg.norm(right)
+        rotation = np.stack([right, np.cross(ahead, right), ahead])
+        focal = 0.95 * width
+        matrix = np.array([[focal, 0.0, (width - 1) / 2], [0.0, focal, (height - 1) / 2], [0.0, 0.0, 1.0]])
+        cameras.append(
+            Camera(f"cam{number + 1}", width, height, matrix, np.zeros(5), rotation, -rotation @ centre)
+        )
+    return tuple(cameras)
+
+
+def drawn_mask(body: BodyModel, pose: Array, camera: Camera) -> NDArray[np.uint8]:
+    """(H, W) 0 and 255: each limb the convex hull of two discs that stand across its axis."""
+    mask = np.zeros((camera.height, camera.width), np.uint8)
+    for limb, frame in zip(body.drawn, limb_frames(body, pose)[0], strict=True):
+        across = np.stack([limb.scale_x * np.cos(RING), limb.scale_y * np.sin(RING), 0.0 * RING], axis=1)
+        ends = [
+            radius * across + [0.0, 0.0, along]
+            for radius, along in ((limb.radius_start, 0.0), (limb.radius_end, limb.length))
+        ]
+        points = np.concatenate(ends) @ frame[:, :3].T + frame[:, 3]
+        pixels = np.round(project(camera, points)[0]).astype(np.int32)
+        cv2.fillConvexPoly(mask, cv2.convexHull(pixels), 255)
+    return mask
+
+
+def drawn_evidence(
+    body: BodyModel, pose: Array | None, cameras: tuple[Camera, ...], frame: int = 0
+) -> FrameEvidence:
+    """A frame of somebody bright before noise; None: nobody there."""
+    rng, views = np.random.default_rng(frame), []
+    for camera in cameras:
+        size = (camera.height, camera.width)
+        mask = np.zeros(size, np.uint8) if pose is None else drawn_mask(body, pose, camera)
+        shade = rng.integers(70, 110, (*size, 3), dtype=np.uint8)
+        picture = np.where(mask[..., None] > 0, np.uint8(200), shade)
+        near = cv2.GaussianBlur(cv2.Canny(mask, 50, 150), (0, 0), 1.5)
+        edges = cv2.normalize(near, np.empty_like(near), 0, 255, cv2.NORM_MINMAX)
+        views.append(ViewEvidence(camera.name, picture, mask, edges.astype(np.uint8)))
+    return FrameEvidence(frame, tuple(views))
