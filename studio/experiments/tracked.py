@@ -23,12 +23,11 @@ from studio.geometry.camera import Camera
 from studio.runs.behaviour_models import check_prediction, fitting, model_folders, model_path
 from studio.runs.run_behaviour import learner_of
 from studio.runs.search_space import search_space, session_sigma
-from studio.runs.tracking_run import start_of
 from studio.sessions.session import Session
 from studio.settings import RunSettings, changed_settings, default_settings
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.frame_loop import search_frame
-from studio.tracking.tracker import LayerRecord
+from studio.tracking.tracker import LayerRecord, start_of
 from studio.weighting.catalogue import WEIGHTINGS
 
 Array = NDArray[np.float64]

@@ -25,7 +25,7 @@ from studio.sessions.stored_run import StoredRun
 from studio.settings import RunSettings, SettingsEntry, SettingsHistory, settings_from_values, values
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.frame_loop import FrameSearch, SearchState, held_over
-from studio.tracking.tracker import Carried, FrameProblem, FrameResult, LayerRecord, ParticleSet
+from studio.tracking.tracker import Carried, FrameProblem, FrameResult, LayerRecord, start_of
 
 # The newest settings and their version; asked before each layer.
 SettingsSource = Callable[[], tuple[int, RunSettings]]
@@ -295,11 +295,3 @@ class TrackingRun:
         self._watch.forget()
         self._load()
         self.settings_source = source
-
-
-def start_of(pose: tuple[float, ...] | None) -> Carried:
-    """What a run starts from: one particle at the start pose, or (None) nothing, for a uniform start.
-
-    A start pose is no estimate: the way from it to the first frame's result is no velocity (Eq. 10).
-    """
-    return Carried(None if pose is None else ParticleSet(np.array(pose)[None], np.zeros(1)))

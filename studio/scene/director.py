@@ -124,13 +124,9 @@ class Director:
         self.wishes.make_current(run.opened.session.path, run.opened.run.folder)
         self.wishes.reanneal(frame)
 
-    def edit_pose(self, pose: Array | None) -> None:
-        """Show a start pose under the sliders; None ends it."""
-        self._presenter.post(lambda: self.state.edit_pose(pose))
-
-    def propose_pose(self, pose: Array, said: str) -> None:
-        """Show a start pose that was found, and what is said of it."""
-        self._presenter.post(lambda: self.state.propose_pose(pose, said))
+    def edit_pose(self, pose: Array | None, found: str = "") -> None:
+        """Show a start pose under the sliders; None ends it. found : what is said of one that was found."""
+        self._presenter.post(lambda: self.state.edit_pose(pose, found))
 
     def save_pose(self, pose: Array) -> None:
         """Store a start pose for the session."""

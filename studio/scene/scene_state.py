@@ -146,17 +146,18 @@ class SceneState:
             self._dress()
         self._presenter.redraw()
 
-    def edit_pose(self, pose: Array | None) -> None:
-        """Show a start pose being edited; None ends it."""
+    def edit_pose(self, pose: Array | None, found: str = "") -> None:
+        """Show a start pose being edited; None ends it.
+
+        found : what is said of a pose that was found; it is shown if it is one of the body that is shown.
+        """
+        if found and pose is not None:
+            tell(self._server, "Start pose found", found)
+            if self.run is None or len(self.run.opened.body.parameters) != len(pose):
+                return
+            self._panel.pose.propose(pose)
         self._edited = pose
         self._presenter.redraw()
-
-    def propose_pose(self, pose: Array, said: str) -> None:
-        """Show a start pose that was found, if it is one of the body that is shown; say how sure it is."""
-        if self.run is not None and len(self.run.opened.body.parameters) == len(pose):
-            self._panel.pose.propose(pose)
-            self.edit_pose(pose)
-        tell(self._server, "Start pose found", said)
 
     def save_pose(self, pose: Array) -> None:
         """Store a start pose for the session."""

@@ -79,7 +79,7 @@ class SceneStage:
             return
         if self.shown.session != session:
             self._director.show_run(session, "", None, None)
-        self._director.propose_pose(np.array(pose, dtype=np.float64), said)
+        self._director.edit_pose(np.array(pose, dtype=np.float64), said)
 
     def show_frame(self, frame: int) -> None:
         """Show a stored frame; where it is not stored the nearest one."""
@@ -100,10 +100,6 @@ class SceneStage:
         """Put the viewers into a camera's place, or back where they were (None or "")."""
         if self._director is not None:
             self._director.look_through(camera or None)
-
-    def set_dark(self, dark: bool) -> None:
-        """Take the dark or the light theme."""
-        self.set_options(dark=dark)
 
     def set_options(self, **changes: object) -> None:
         """Change what is drawn, by the names of `ViewOptions`. Raises SettingsError for a name that is

@@ -90,6 +90,14 @@ class Carried:
     memory: Mapping[str, Array] = field(default_factory=dict)
 
 
+def start_of(pose: tuple[float, ...] | None) -> Carried:
+    """What a run starts from: one particle at the start pose, or (None) nothing, for a uniform start.
+
+    A start pose is no estimate: the way from it to the first frame's result is no velocity (Eq. 10).
+    """
+    return Carried(None if pose is None else ParticleSet(np.array(pose)[None], np.zeros(1)))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Estimate:
     """The pose that is reported. pose, mean, mode : (D,). log_weight : the best particle's log w."""

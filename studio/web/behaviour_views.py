@@ -6,8 +6,8 @@ from dataclasses import asdict, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.behaviour.model import BehaviourModel, automaton_of
 from studio.behaviour.generation import generate
+from studio.behaviour.model import BehaviourModel, automaton_of
 from studio.body.extremities import extremities
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel

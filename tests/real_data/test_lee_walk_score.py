@@ -11,12 +11,12 @@ import pytest
 
 from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import search_space
-from studio.runs.tracking_run import start_of
 from studio.sessions.importers.catalogue import import_source
 from studio.sessions.session import Session
 from studio.settings import changed_settings, default_settings
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.frame_loop import search_frame
+from studio.tracking.tracker import start_of
 from studio.weighting.bodytrack import score
 
 pytestmark = pytest.mark.real_data

@@ -13,13 +13,13 @@ from studio.experiments.benchmark import made_evidence, ring_of_cameras
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import default_sigma, search_space
-from studio.runs.tracking_run import TrackingRun, start_of
+from studio.runs.tracking_run import TrackingRun
 from studio.sessions.session import Session
 from studio.settings import changed_settings, default_settings
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.evaluations import evaluations_of, knobs_for_evaluations
 from studio.tracking.frame_loop import search_frame
-from studio.tracking.tracker import FrameResult
+from studio.tracking.tracker import FrameResult, start_of
 from studio.weighting.catalogue import WEIGHTINGS
 
 PAIRS = [(tracker, weighting) for tracker in TRACKERS for weighting in WEIGHTINGS]

@@ -141,7 +141,7 @@ def test_a_person_sees_the_run_and_moves_the_survival_rate(
 
     page.get_by_role("tab", name="Show").click()
     page.get_by_text("layer 4").first.wait_for(timeout=PATIENCE * 1000)
-    stage.set_dark(False)
+    stage.set_options(dark=False)
     until(page, lambda: np.median(seen("scene-light")) > 180)
     stage.look_through("cam1")
     until(page, lambda: stage.shown.look_through == "cam1" and abs(np.median(seen("scene-camera")) - 95) < 30)

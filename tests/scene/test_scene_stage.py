@@ -191,7 +191,7 @@ def test_looking_through_a_camera_by_its_name(stage: SceneStage) -> None:
 def test_the_theme_changes_every_colour(stage: SceneStage) -> None:
     open_run(stage)
     before = drawing(stage).body.handles[0].color
-    stage.set_dark(False)
+    stage.set_options(dark=False)
     stage.set_options(colour_by="weight")
     until(lambda: drawing(stage).body.handles[0].color != before)
     until(lambda: stage._director.state.options.colour_by == "weight")  # pyright: ignore[reportOptionalMemberAccess]

@@ -47,7 +47,9 @@ def test_the_guide_carries_what_experiments_found_with_its_verdict(studio: Studi
     assert "{{reproduction}}" not in text
     rows = re.findall(r"<tr>\n<td>.*?<code>([\w-]+)</code>.*?</td>\n<td>.*?</td>\n<td>(.*?)</td>", text)
     told = {name: verdict.removesuffix(" (not firm)") for name, verdict in rows}
-    assert {name for name in EXPERIMENTS if not name.startswith("caillette-")} <= set(told) <= set(EXPERIMENTS)
+    assert (
+        {name for name in EXPERIMENTS if not name.startswith("caillette-")} <= set(told) <= set(EXPERIMENTS)
+    )
     assert set(told.values()) <= set(VERDICTS)
 
 

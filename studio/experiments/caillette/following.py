@@ -20,12 +20,11 @@ from studio.experiments.tracking_trials import Contender
 from studio.runs.behaviour_models import fitting
 from studio.runs.run_behaviour import learner_of
 from studio.runs.search_space import search_space, session_sigma
-from studio.runs.tracking_run import start_of
 from studio.sessions.session import Session
 from studio.settings import RunSettings, changed_settings, default_settings
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.frame_loop import search_frame
-from studio.tracking.tracker import LayerRecord, SearchSpace
+from studio.tracking.tracker import LayerRecord, SearchSpace, start_of
 
 Array = NDArray[np.float64]
 

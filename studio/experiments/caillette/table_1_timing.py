@@ -14,12 +14,11 @@ from studio.experiments.caillette.setting import BLOBS, GUIDED, guided
 from studio.experiments.footage_shelf import FootageShelf
 from studio.runs.behaviour_models import fitting
 from studio.runs.search_space import search_space, session_sigma
-from studio.runs.tracking_run import start_of
 from studio.sessions.session import Session
 from studio.settings import changed_settings, default_settings
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.frame_loop import search_frame
-from studio.tracking.tracker import Carried, FrameResult
+from studio.tracking.tracker import Carried, FrameResult, start_of
 from studio.volume.blob_fitting import fit_blobs
 from studio.volume.hull import Hull
 from studio.volume.reconstruction import Reconstructor

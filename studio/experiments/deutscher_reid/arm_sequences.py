@@ -20,12 +20,11 @@ from studio.experiments.deutscher_reid.setting import annealing_as_ten
 from studio.experiments.experiment import Scale, Trial
 from studio.experiments.footage_shelf import FootageShelf
 from studio.runs.search_space import default_sigma, search_space
-from studio.runs.tracking_run import start_of
 from studio.synthesis.arm_footage import arm_motion
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.frame_loop import search_frame
 from studio.tracking.settings import AnnealedSettings
-from studio.tracking.tracker import FrameProblem, SearchSpace
+from studio.tracking.tracker import FrameProblem, SearchSpace, start_of
 
 Array = NDArray[np.float64]
 

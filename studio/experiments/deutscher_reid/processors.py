@@ -19,10 +19,10 @@ from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, 
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import number
 from studio.runs.search_space import default_sigma, search_space
-from studio.runs.tracking_run import start_of
 from studio.settings import changed_settings, default_settings
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.frame_loop import search_frame
+from studio.tracking.tracker import start_of
 from studio.weighting.catalogue import WEIGHTINGS
 
 PAPER = 0.8
