@@ -14,18 +14,20 @@ Array = NDArray[np.float64]
 RING = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
 
 
-def ring_of_cameras(count: int, width: int = 320, height: int = 240) -> tuple[Camera, ...]:
-    """Cameras on a circle of 3.5 m, 2 m up, looking at the middle of a person who stands at the origin."""
+def ring_of_cameras(
+    count: int, width: int = 320, height: int = 240, distance: float = 3500.0
+) -> tuple[Camera, ...]:
+    """Cameras on a circle about a person who stands at the origin, 2 m up, looking at their middle."""
     cameras = []
     for number in range(count):
         angle = 2.0 * np.pi * number / count + 0.4
-        centre = np.array([3500.0 * np.cos(angle), 3500.0 * np.sin(angle), 2000.0])
+        centre = np.array([distance * np.cos(angle), distance * np.sin(angle), 2000.0])
         ahead = np.array([0.0, 0.0, 950.0]) - centre
         ahead /= np.linalg.norm(ahead)
         right = np.cross(ahead, [0.0, 0.0, 1.0])
         right /= np.linalg.norm(right)
         rotation = np.stack([right, np.cross(ahead, right), ahead])
-        focal = 0.95 * width
+        focal = 0.95 * width * distance / 3500.0
         matrix = np.array([[focal, 0.0, (width - 1) / 2], [0.0, focal, (height - 1) / 2], [0.0, 0.0, 1.0]])
         cameras.append(
             Camera(f"cam{number + 1}", width, height, matrix, np.zeros(5), rotation, -rotation @ centre)

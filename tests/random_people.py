@@ -64,6 +64,28 @@ def random_people(
     return dataclasses.replace(motion, root=root)
 
 
+def random_moments(
+    motions: list[PersonMotion],
+    count: int,
+    rng: np.random.Generator,
+    middle: tuple[float, float] = (0.0, 0.0),
+    reach: float = 400.0,
+) -> PersonMotion:
+    """`count` random moments of motions in turn, each turned to a random heading and put anywhere within `reach` mm of
+    the `middle`, as the frames of one motion. All motions are of one skeleton.
+    """
+    roots, turns = [], []
+    for number in range(count):
+        motion = motions[number % len(motions)]
+        moment = int(rng.integers(motion.frame_count))
+        turn = axis_turn(2, np.array(rng.uniform(-np.pi, np.pi)))
+        place = np.array(middle) + rng.uniform(-reach, reach, 2)
+        roots.append([*place, motion.root[moment, 2]])
+        turns.append({name: turn @ frames[moment] for name, frames in motion.turns.items()})
+    together = {name: np.stack([one[name] for one in turns]) for name in turns[0]}
+    return PersonMotion(motions[0].skeleton, FPS, np.array(roots), together)
+
+
 def _add_leg(
     turns: dict[str, np.ndarray],
     side: str,

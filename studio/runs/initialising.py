@@ -28,10 +28,11 @@ from studio.tracking.initialisation import PER_FAMILY, THOROUGH, Effort, FoundSt
 from studio.tracking.loss_detection import Onlooker, anything_seen
 from studio.tracking.start_candidates import facing, start_candidates
 from studio.tracking.tracker import FrameProblem, SearchSpace
+from studio.volume.alignment import root_parameters
 from studio.volume.body_space import space_of
 from studio.volume.hull import Hull
 from studio.volume.reconstruction import HullSettings, reconstruct
-from studio.volume.tracking_space import Box
+from studio.volume.tracking_space import HEIGHT, Box
 from studio.weighting.catalogue import WEIGHTINGS
 
 Array = NDArray[np.float64]
@@ -40,6 +41,8 @@ WEIGHTING = "edge-region-silhouette"
 """The one that tells poses apart best: of the three of its terms none alone found as many."""
 HULL_DEPTH = 6
 FEWEST_VIEWS = 2
+HIPS, NEAR, FAR, AHEAD, AROUND = 950.0, 1500.0, 8000.0, 3500.0, 1500.0
+"""mm, where a single camera looks: height of hips, how far they may be, how far they are taken to be, and about."""
 SURE_OVERLAP, NO_OVERLAP = 0.75, 0.5
 """f_s of a start pose from which on its fit says nothing against it, and at which nothing speaks for it."""
 
@@ -175,9 +178,10 @@ def hull_of(
     body: BodyModel, cameras: tuple[Camera, ...], evidence: FrameEvidence
 ) -> tuple[Hull | None, Box, str]:
     """The hull of a frame's masks, the space it was sought in, and in words why there is none."""
-    box = space_of(body, cameras)
     if len(cameras) < FEWEST_VIEWS:
+        box = _before(cameras[0]) if len(root_parameters(body)) else space_of(body, cameras)
         return None, box, "One camera makes no hull: the body was sought anywhere in the middle of its view."
+    box = space_of(body, cameras)
     hull = reconstruct(evidence, cameras, box, HullSettings(hull_depth=HULL_DEPTH))
     if hull.empty:
         return (
@@ -186,6 +190,15 @@ def hull_of(
             "The masks have no volume in common: the body was sought in the middle of the views.",
         )
     return hull, box, ""
+
+
+def _before(camera: Camera) -> Box:
+    """The space in the middle of one camera's view: about where its axis is at the height of hips, if that is near."""
+    ahead, centre = camera.rotation[2], camera.centre
+    distance = (HIPS - centre[2]) / ahead[2] if ahead[2] else np.inf
+    place = centre + ahead * (distance if NEAR < distance < FAR else AHEAD)
+    half = np.array([AROUND, AROUND, 0.0])
+    return Box(place * [1, 1, 0] - half, place * [1, 1, 0] + half + [0.0, 0.0, HEIGHT])
 
 
 def whole_problem(
