@@ -1,0 +1,175 @@
+"""A run that is thrown off: noticed, held or searched for, the same way however often it is interrupted."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from interrupted_session import BLACK, GONE, interrupted
+
+from studio.body.forward_kinematics import marker_points
+from studio.capture.trc import read_trc
+from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.problem_source import ProblemSource
+from studio.runs.reannealing import Reannealing
+from studio.runs.tracking_run import TrackingRun
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.tracking.tracker import LOST, NO_EVIDENCE, RECOVERED, TRACKED, FrameResult
+
+WALK = Path(__file__).parents[2] / "sample_sessions" / "walk"
+STEP, FPS = 3, 20.0
+SMALL = {"particles": 100, "layers": 6}
+
+
+@pytest.fixture(scope="module")
+def walk() -> Session:
+    return Session(WALK)
+
+
+@pytest.fixture(scope="module")
+def black(walk: Session, tmp_path_factory: pytest.TempPathFactory) -> Session:
+    """The bundled walk at 20 Hz, four frames, then five black ones, and four more; the person walks on meanwhile."""
+    frames = [STEP * number for number in range(13)]
+    return interrupted(walk, tmp_path_factory.mktemp("black") / "walk", frames, range(4, 9), BLACK, FPS)
+
+
+def made(session: Session, **wish: object) -> StoredRun:
+    changes = SMALL | dict(wish.pop("changes", {}))  # pyright: ignore[reportCallIssue, reportArgumentType]
+    return prepare_run(session, RunRequest(changes=changes, **wish))  # pyright: ignore[reportArgumentType]
+
+
+class Tracker:
+    """A run being tracked, with its footage."""
+
+    def __init__(self, session: Session, run: StoredRun) -> None:
+        self.problems = ProblemSource(session, run.body(), run.cameras())
+        self.tracking = TrackingRun(run, self.problems)
+
+    def __enter__(self) -> TrackingRun:
+        return self.tracking
+
+    def __exit__(self, *_: object) -> None:
+        self.tracking.close()
+        self.problems.close()
+
+
+def tracked(session: Session, run: StoredRun) -> list[FrameResult]:
+    """All results of a run that is tracked to its end."""
+    results = []
+    with Tracker(session, run) as tracking:
+        while not tracking.finished:
+            stepped = tracking.step_layer()
+            if stepped.result is not None:
+                results.append(stepped.result)
+    return results
+
+
+def errors(session: Session, walk: Session, results: list[FrameResult]) -> list[float]:
+    """Mean marker error of each frame, mm."""
+    assert walk.truth_path is not None
+    truth, body = read_trc(walk.truth_path), session.body()
+    order = [truth.names.index(marker.name) for marker in body.markers]
+    found = marker_points(body, np.stack([result.estimate.pose for result in results]))
+    wanted = truth.positions[[STEP * result.frame for result in results]][:, order]
+    return np.linalg.norm(found - wanted, axis=2).mean(axis=1).tolist()
+
+
+@pytest.fixture(scope="module")
+def through(black: Session) -> tuple[StoredRun, list[FrameResult]]:
+    """A run through the black frames, never interrupted."""
+    run = made(black, name="through")
+    return run, tracked(black, run)
+
+
+def test_black_frames_are_held_and_the_body_is_found_after_them(
+    black: Session, walk: Session, through: tuple[StoredRun, list[FrameResult]]
+) -> None:
+    run, results = through
+    states = [result.tracking for result in results]
+    assert states == [TRACKED] * 4 + [NO_EVIDENCE] * 5 + [RECOVERED] + [TRACKED] * 3
+    for result in results[4:9]:
+        assert np.array_equal(result.estimate.pose, results[3].estimate.pose)
+    assert max(errors(black, walk, results)[9:]) < 80.0
+    with run.results() as stored:
+        line = stored.timeline()
+    assert line.tracking == tuple(states)
+    assert np.isnan(line.overlaps[4:9]).all()
+    assert (line.overlaps[[*range(4), *range(9, 13)]] > 0.7).all()
+
+
+def test_a_run_taken_up_again_in_the_frame_of_the_search_gives_the_same_bits(
+    black: Session, through: tuple[StoredRun, list[FrameResult]]
+) -> None:
+    expected, run = through[1], made(black, name="interrupted")
+    results: list[FrameResult] = []
+    for _ in range(20):
+        with Tracker(black, run) as tracking:
+            while not tracking.finished:
+                stepped = tracking.step_layer()
+                if stepped.result is not None:
+                    results.append(stepped.result)
+                inside = tracking.layers_done in (3, 8) and tracking.next_frame in (6, 9, 10)
+                if inside:
+                    break
+            if tracking.finished:
+                break
+    assert [result.tracking for result in results] == [result.tracking for result in expected]
+    for one, other in zip(results, expected, strict=True):
+        assert np.array_equal(one.estimate.pose, other.estimate.pose), one.frame
+        assert (one.layers, one.evaluations, one.doubts) == (other.layers, other.evaluations, other.doubts)
+
+
+def test_the_frame_of_the_search_annealed_again_is_the_same(
+    black: Session, through: tuple[StoredRun, list[FrameResult]]
+) -> None:
+    run, results = through
+    with Tracker(black, run) as tracking:
+        again = Reannealing(tracking, 9, *tracking.latest_settings())
+        while not again.finished:
+            again.step_layer()
+        result = again.result()
+    assert result.tracking == RECOVERED
+    assert np.array_equal(result.estimate.pose, results[9].estimate.pose)
+
+
+def test_switched_off_nothing_is_looked_for(black: Session) -> None:
+    run = made(black, name="off", last=7, changes={"recovery": "off"})
+    results = tracked(black, run)
+    assert {result.tracking for result in results} == {TRACKED}
+    assert all(np.isnan(result.overlap) for result in results)
+    assert not np.array_equal(results[4].estimate.pose, results[3].estimate.pose)
+
+
+def test_a_run_that_starts_beside_the_body_is_lost_and_finds_it(walk: Session, tmp_path: Path) -> None:
+    frames = [STEP * number for number in range(9)]
+    session = interrupted(walk, tmp_path / "walk", frames, range(0), BLACK, FPS)
+    start = session.start_pose()
+    assert start is not None
+    body = session.body()
+    away = start.copy()
+    away[[entry.name for entry in body.parameters].index("pelvis_x")] += 1500.0
+    results = tracked(session, made(session, start_pose=away, last=6))
+    states = [result.tracking for result in results]
+    assert states[:4] == [TRACKED, TRACKED, LOST, RECOVERED]
+    assert [result.doubts for result in results[:4]] == [1, 2, 3, 0]
+    found = errors(session, walk, results)
+    assert min(found[:3]) > 300.0
+    assert max(found[3:]) < 150.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", [BLACK, GONE])
+@pytest.mark.parametrize("tracker", ["annealed", "swarm", "condensation"])
+def test_every_tracker_tracks_again_within_a_second(
+    walk: Session, tmp_path: Path, tracker: str, kind: str
+) -> None:
+    """A second of black pictures; the person leaves and comes back a second further on. 9 of 10 seeds."""
+    frames, blind = [STEP * number for number in range(50)], range(12, 32)
+    session, good = interrupted(walk, tmp_path / "walk", frames, blind, kind, FPS), 0
+    for seed in range(10):
+        results = tracked(session, prepare_run(session, RunRequest(tracker=tracker, seed=seed)))
+        states, apart = [result.tracking for result in results], errors(session, walk, results)
+        reported = all(states[frame] in (NO_EVIDENCE, LOST) for frame in blind)
+        # Back on the body within a second of evidence, and to the end.
+        good += reported and RECOVERED in states[32:] and max(apart[-3:]) < 100.0
+    assert good >= 9
