@@ -90,7 +90,9 @@ class EntropyLine(Answer):
 
 
 class Entropies(Answer):
-    """The automaton learnt again from the first four fifths of every recording's labels, tested on the rest."""
+    """The automaton learnt again from four of five recordings (where there are fewer than five: four fifths of each),
+    tested on the rest.
+    """
 
     lines: list[EntropyLine]
 

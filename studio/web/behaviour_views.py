@@ -24,13 +24,14 @@ from studio.web.behaviour_schemas import (
 )
 
 Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 ARROW_SECONDS = 0.2
 LEAST_TRANSITION = 0.02
 """Transitions that are rarer than this, of the times a cluster is left, would only blacken the picture."""
 MEMORIES = (0, 1, 2, 3, 5, 8, 10, 15, 20, 30)
 EPSILON_FACTORS = (1.0, 10.0)
-TRAINING_SHARE = 0.8
+FIFTH = 5
 FAR_END = 1
 
 
@@ -65,9 +66,7 @@ def detail_of(summary: ModelSummary, model: BehaviourModel, body: BodyModel) -> 
 
 def entropies_of(model: BehaviourModel) -> Entropies:
     """Eq. 2 over memory, at the model's own ε and at a larger one."""
-    cut = [max(1, round(TRAINING_SHARE * len(labels))) for labels in model.making.labels]
-    train = [labels[:end] for labels, end in zip(model.making.labels, cut, strict=True)]
-    test = [labels[end:] for labels, end in zip(model.making.labels, cut, strict=True) if len(labels) > end]
+    train, test = _parted(model.making.labels)
     settings = model.making.settings
     lines = []
     for epsilon in dict.fromkeys(max(settings.epsilon, 0.01) * factor for factor in EPSILON_FACTORS):
@@ -85,6 +84,18 @@ def entropies_of(model: BehaviourModel) -> Entropies:
             )
         )
     return Entropies(lines=lines)
+
+
+def _parted(recordings: tuple[IntArray, ...]) -> tuple[list[IntArray], list[IntArray]]:
+    """Labels to learn from and to test on: every fifth recording, or the last fifth of each where there are few."""
+    if len(recordings) >= FIFTH:
+        kept = [labels for place, labels in enumerate(recordings) if place % FIFTH != FIFTH - 1]
+        return kept, list(recordings[FIFTH - 1 :: FIFTH])
+    ends = [max(1, len(labels) - len(labels) // FIFTH) for labels in recordings]
+    parts = list(zip(recordings, ends, strict=True))
+    return [labels[:end] for labels, end in parts], [
+        labels[end:] for labels, end in parts if len(labels) > end
+    ]
 
 
 def walk_of(model: BehaviourModel, body: BodyModel, frames: int, seed: int) -> GeneratedWalk:

@@ -54,7 +54,7 @@ async function show(name) {
   content.replaceChildren(element("div", { className: "column" }, element("p", { className: "lead", textContent: "Reading…" })));
   const told = await fetchJson(pathOf(name));
   if (open !== name) return;
-  const entropies = element("figure", { className: "drawing low" }, element("p", { className: "lead", textContent: "Learning again with other memories…" }));
+  const entropies = element("figure", { className: "entropies" }, element("p", { className: "lead", textContent: "Learning again with other memories…" }));
   const automaton = element("div", { className: "drawing", role: "img", ariaLabel: "Which cluster follows which" });
   const cards = clusterCards(told);
   const walk = walkCard(pathOf(name), told);
@@ -69,7 +69,7 @@ async function show(name) {
       element("section", { className: "card-box" }, element("h2", { textContent: "What follows what" }),
         element("p", { className: "lead", textContent: "One dot a cluster, as large as it is frequent; a line as strong as the transition is probable once the cluster is left. Choose a dot to see its pose." }), automaton),
       element("section", { className: "card-box" }, element("h2", { textContent: "Memory and entropy" }),
-        element("p", { className: "lead", textContent: "The automaton learnt again from four fifths of the recordings, and how many bits a frame it needs to say the rest: a memory is long enough where the lower lines end falling, too long where they part." }), entropies, lengths(told)))));
+        element("p", { className: "lead", textContent: "The automaton learnt again from four fifths of the recordings, and how many bits a frame it needs to say them and the rest. A memory is long enough where the lines end falling, too long where that of the test rises." }), entropies, lengths(told)))));
   closing.push(drawAutomaton(automaton, told, echarts, (cluster) => cards.choose(cluster)), cards.close);
   await drawEntropies(entropies, name);
 }
