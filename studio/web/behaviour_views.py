@@ -29,7 +29,7 @@ IntArray = NDArray[np.int64]
 ARROW_SECONDS = 0.2
 LEAST_TRANSITION = 0.02
 """Transitions that are rarer than this, of the times a cluster is left, would only blacken the picture."""
-MEMORIES = (0, 1, 2, 3, 5, 8, 10, 15, 20, 30)
+MEMORIES = (1, 2, 3, 5, 8, 10, 15, 20, 30)
 EPSILON_FACTORS = (1.0, 10.0)
 FIFTH = 5
 FAR_END = 1
