@@ -3,7 +3,8 @@
 First frame by frame, forwards and backwards, each from its neighbour; these paths are then fitted as wholes, where
 unsteady angles cost something (`smooth_path`): that settles what markers leave open (twists of straight limbs, joints
 near their singular positions). A path that is at first held very steady and let loose by and by finds the spelling of
-the joints that goes on without a jump; the best stretches of all paths are joined (`path_splicing`) and fitted again.
+the joints that goes on without a jump, and paths begun in the joints' other spellings (`other_spellings`) find what
+limits keep from the first; the best stretches of all paths are joined (`path_splicing`) and fitted again.
 Angles stay within the body's limits throughout.
 """
 
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from studio.body.model import BodyModel
 from studio.training.marker_problem import MarkerProblem
+from studio.training.other_spellings import respelt
 from studio.training.path_splicing import spliced
 from studio.training.smooth_path import SmoothPath, Steadiness
 from studio.training.targets import Targets
@@ -27,6 +29,8 @@ STEADY = Steadiness(acceleration=90.0, speed=8.0, rest=1.5)
 STEADY_FPS = 30.0
 STRICTER = ((1.0,), (4.0, 2.0, 1.0), (16.0, 8.0, 4.0, 2.0, 1.0))
 """How much steadier than that the paths are held on the way to it."""
+OTHERS = (4.0, 2.0, 1.0)
+"""The same for paths that begin in the joints' other spellings."""
 PATH_STEPS, LAST_STEPS = 10, 25
 BAD_SHARE, BAD_MM = 2.5, 60.0
 
@@ -47,7 +51,8 @@ def fit_poses(body: BodyModel, targets: Targets, fps: float, progress: Progress 
     """
     problem, steady = MarkerProblem(body, targets), STEADY.at_rate(fps / STEADY_FPS)
     frames, paths, told = targets.frame_count, [], 0
-    total = 2 * frames + PATH_STEPS * frames * 2 * sum(map(len, STRICTER)) + LAST_STEPS * frames
+    refinements = sum(map(len, STRICTER)) + 2 * len(OTHERS)
+    total = 2 * frames + PATH_STEPS * frames * 2 * refinements + LAST_STEPS * frames
     for backwards in (False, True):
 
         def tell(more: int) -> None:
@@ -57,8 +62,11 @@ def fit_poses(body: BodyModel, targets: Targets, fps: float, progress: Progress 
                 progress("fitting the body", min(told, total), total)
 
         start = _followed(problem, backwards, tell)
-        for grades in STRICTER:
-            path = start
+        others = [respelt(body, start * problem.scale, beyond) / problem.scale for beyond in (False, True)]
+        for grades, path in (
+            *((grades, start) for grades in STRICTER),
+            *((OTHERS, other) for other in others),
+        ):
             for times in grades:
                 path = _refined(problem, path, steady.times(times), PATH_STEPS)
                 tell(PATH_STEPS * frames)

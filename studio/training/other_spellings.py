@@ -1,0 +1,75 @@
+"""Paths written the other way: three turns in a row have two spellings, and a fit that follows a movement from frame
+to frame finds only the one it began with, pressed against a limit where the other goes on.
+
+About three different axes, turns by α, β, γ are the turns by α + π, π - β, γ + π. The second spelling has its middle
+turn beyond a right angle where the first has not; an arm that goes overhead sideways changes from one to the other.
+The three may belong to one joint, or to a joint of two turns and the first turn of a joint straight behind it (a
+shoulder that swings and spreads, with the twist taken at the elbow).
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.model import MOVE, TURN, BodyModel, Joint, Step
+
+Array = NDArray[np.float64]
+Triple = tuple[int, int, int]
+
+
+def triples(body: BodyModel) -> tuple[Triple, ...]:
+    """Parameters of every three turns in a row about three axes; the root's, which have no limits, are left out."""
+    found: list[Triple] = []
+    for index, joint in enumerate(body.joints):
+        if joint.parent < 0:
+            continue
+        own = _turns(joint)
+        carried = [
+            _turns(child)[:1] for child in body.joints if child.parent == index and _straight_behind(child)
+        ]
+        rows = [own[:3]] if len(own) >= 3 else [own + first for first in carried if len(own) == 2 and first]
+        for row in rows:
+            if len({step.axis for step in row}) == 3:
+                found.append((row[0].parameter, row[1].parameter, row[2].parameter))
+                break
+    return tuple(found)
+
+
+def respelt(body: BodyModel, path: Array, beyond: bool) -> Array:
+    """The path (F, D), in radians, with every triple written so that its middle turn is beyond a right angle, or so
+    that it never is; within the limits, pressed to them where the other spelling lies outside.
+    """
+    lower = np.array([entry.lower for entry in body.parameters])
+    upper = np.array([entry.upper for entry in body.parameters])
+    found = path.copy()
+    for triple in triples(body):
+        first, second, third = triple
+        wrong = (np.abs(path[:, second]) > 0.5 * math.pi) != beyond
+        other = path[:, triple] + math.pi
+        other[:, 1] = math.pi - path[:, second]
+        for place, parameter in enumerate((first, second, third)):
+            wound = _wound(other[:, place], lower[parameter], upper[parameter])
+            found[:, parameter] = np.where(wrong, wound, path[:, parameter])
+    return found
+
+
+def _wound(angles: Array, lower: float, upper: float) -> Array:
+    """Angles by whole turns as near the middle of their limits as can be, and then within them."""
+    if not (math.isfinite(lower) and math.isfinite(upper)):
+        return np.arctan2(np.sin(angles), np.cos(angles))
+    middle = 0.5 * (lower + upper)
+    return np.clip(angles - 2.0 * math.pi * np.round((angles - middle) / (2.0 * math.pi)), lower, upper)
+
+
+def _straight_behind(joint: Joint) -> bool:
+    """Whether a joint is moved along nothing but its own first turn's axis before it turns."""
+    for place, step in enumerate(joint.steps):
+        if step.kind == TURN:
+            return all(before.kind == MOVE and before.axis == step.axis for before in joint.steps[:place])
+    return False
+
+
+def _turns(joint: Joint) -> list[Step]:
+    """The joint's turns that parameters drive."""
+    return [step for step in joint.steps if step.kind == TURN and step.parameter >= 0]
