@@ -26,6 +26,7 @@ from studio.experiments.caillette.setting import (
     BLOBS,
     GUIDED,
     MEMORY,
+    SIGMA,
     TEST,
     UNSEEN,
     last_frame,
@@ -38,7 +39,7 @@ from studio.experiments.tracking_trials import Contender
 from studio.tracking.evaluations import knobs_for_evaluations
 
 EVALUATIONS = 1000
-FRAMES = 120
+FRAMES = 100
 MOST_SEEDS = 3
 """There are eight contenders on two clips, and a weight of edges costs twenty times that of blobs."""
 EDGES = "edge-region-silhouette"
@@ -47,7 +48,12 @@ PREDICTION = {"prediction": "behaviour"}
 
 def contender(name: str, tracker: str, weighting: str, **changes: str) -> Contender:
     """A tracker of so many evaluations."""
-    return Contender(name, tracker, weighting, {**knobs_for_evaluations(tracker, EVALUATIONS), **changes})
+    return Contender(
+        name,
+        tracker,
+        weighting,
+        {**knobs_for_evaluations(tracker, EVALUATIONS), **SIGMA, **changes},
+    )
 
 
 CONTENDERS = (

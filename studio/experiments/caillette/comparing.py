@@ -6,6 +6,7 @@ for every tracker alike. So trackers are judged by the angle between a limb and 
 the joints changes; joint angles stand beside it.
 """
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -53,6 +54,14 @@ def limb(run: Followed) -> float:
 def position(run: Followed) -> float:
     """A run's RMS joint position error, mm."""
     return run.position_rms
+
+
+def beginning(run: Followed, frames: int) -> Followed:
+    """The run as if it had ended after so many frames; `mean_mm` stays that of the whole."""
+    parts = {
+        name: getattr(run, name)[:frames] for name in ("angle_deg", "limb_deg", "position_mm", "lost", "free")
+    }
+    return dataclasses.replace(run, **parts)
 
 
 def longest_loss(run: Followed) -> float:

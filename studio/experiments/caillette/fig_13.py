@@ -40,6 +40,8 @@ from studio.experiments.statistics import number, overall
 
 MEMORIES = (1, 2, 5, 10, 20, 30)
 FEW = guided(200)
+FRAMES = 200
+"""Before the pirouettes, in which every tracker is lost whatever its model remembers."""
 
 
 def group(memory: int) -> str:
@@ -49,7 +51,7 @@ def group(memory: int) -> str:
 
 def trials(scale: Scale) -> tuple[Trial, ...]:
     """Every memory with every seed, and what each automaton says of the test performance."""
-    last, taught = last_frame(TEST, scale.quick), training(scale.quick)
+    last, taught = last_frame(TEST, scale.quick, FRAMES), training(scale.quick)
     found = []
     for memory in MEMORIES:
         model = dataclasses.replace(taught, memory=memory)

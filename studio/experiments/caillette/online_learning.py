@@ -26,6 +26,7 @@ from studio.experiments.caillette.setting import (
     BLOBS,
     GUIDED,
     MEMORY,
+    SIGMA,
     UNSEEN,
     last_frame,
     training,
@@ -50,6 +51,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
         "model_free_share": 0.1,
         "estimate": "mode",
         "learning_interval": INTERVAL,
+        **SIGMA,
     }
     return tuple(
         Trial(

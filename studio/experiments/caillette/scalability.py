@@ -22,7 +22,7 @@ from studio.experiments.statistics import number, overall
 CLASSES = (EXERCISE, EXERCISE_2, "walk-with-turns", "run", "jumps", "handstand")
 """Recipes, whose motion is taken without rendering it."""
 FRAMES, QUICK_FRAMES, QUICK_CLASSES = 150, 60, 3
-MOST_SEEDS = 3
+MOST_SEEDS = 2
 PARTICLES, ROUNDS = 1000, 12
 UNAFFECTED = 2.0
 """Prediction with all classes takes at most so many times what it does with one."""
