@@ -47,4 +47,4 @@ def _empty(path: Path) -> np.ndarray:
     reader = cv2.VideoCapture(str(path))
     read, picture = reader.read()
     reader.release()
-    return picture if read else cv2.imread(str(path))
+    return np.asarray(picture if read else cv2.imread(str(path)))

@@ -24,6 +24,7 @@ from studio.runs.initialising import (
 )
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.search_space import default_sigma, parameter_names, search_space
+from studio.runs.start_pose_file import start_pose_from_file
 from studio.sessions.session import Session
 from studio.settings import default_settings
 from studio.synthesis.motions import make_motion
@@ -164,4 +165,5 @@ def test_the_file_is_one_that_track_takes(session_on_disk: Session, tmp_path: Pa
     place = keep_pose(session_on_disk, found(session_on_disk, 3))
     copy = tmp_path / "pose.csv"
     copy.write_bytes(place.read_bytes())
-    assert np.array_equal(session_on_disk.start_pose(), session_on_disk.body().neutral)
+    body = session_on_disk.body()
+    assert np.array_equal(start_pose_from_file(copy, body, 3, 60.0)[0], body.neutral)
