@@ -1,0 +1,52 @@
+"""`studio initialise`, and what `studio track` says of runs that were lost."""
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from studio.cli.main import main
+from studio.sessions.session import Session
+from studio.sessions.workspace import Workspace
+
+
+def test_a_start_pose_is_written_and_then_kept(session_on_disk: Session) -> None:
+    runner = CliRunner()
+    first = runner.invoke(main, ["initialise", "toy", "--json"])
+    assert first.exit_code == 0, first.output
+    told = json.loads(first.stdout)
+    assert (told["session"], told["frame"], told["body"]) == ("toy", 0, "planar_arm4")
+    assert told["confidence"] > 0.8
+    assert set(told["pose"]) == {entry.name for entry in session_on_disk.body().parameters}
+    stored = session_on_disk.start_pose()
+    assert stored is not None
+    assert stored.tolist() == pytest.approx(list(told["pose"].values()))
+    second = runner.invoke(main, ["initialise", "toy", "--frame", "3", "--seed", "1"])
+    assert second.exit_code == 0, second.output
+    assert "start_pose-frame-3.csv" in second.stdout
+    assert "confidence" in second.stdout
+    third = runner.invoke(main, ["initialise", "toy", "--replace", "--json"])
+    assert json.loads(third.stdout)["file"].endswith("start_pose.csv")
+    assert (session_on_disk.path / "start_pose-before.csv").is_file()
+
+
+@pytest.mark.parametrize(
+    ("words", "cause"),
+    [
+        (["--frame", "99"], "Frames 99:100 do not lie"),
+        (["--behaviour", "none-such"], "There is no behaviour model"),
+        (["--body", "nobody"], "There is no body"),
+    ],
+)
+def test_refusals(session_on_disk: Session, words: list[str], cause: str) -> None:
+    told = CliRunner().invoke(main, ["initialise", "toy", *words])
+    assert told.exit_code == 2
+    assert cause in " ".join(told.stderr.split())
+    assert not (session_on_disk.path / "start_pose.csv").exists()
+
+
+def test_track_tells_how_it_went(session_on_disk: Session) -> None:
+    words = ["track", "toy", "--frames", ":2", "--particles", "30", "--layers", "3", "--json"]
+    told = json.loads(CliRunner().invoke(main, words).stdout)
+    assert told["frames_lost"] + told["frames_without_evidence"] + told["times_recovered"] <= 2
+    assert len(Workspace().session("toy").runs()) == 1
