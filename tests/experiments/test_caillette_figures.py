@@ -80,7 +80,10 @@ def clusters_outcome(trial: Trial, clusters: float, states: float) -> dict:
         for epsilon in clusters_and_states.EPSILONS
         for memory in clusters_and_states.MEMORIES
     ]
-    return {"clusters": clusters, "frames": 13000, "seconds": 20.0, "kept": 0.9, "cells": cells}
+    sets = (clusters_and_states.TRAIN, clusters_and_states.TEST_SET, clusters_and_states.NEVER)
+    inside = dict.fromkeys(sets, 0.5)
+    found = {"clusters": clusters, "frames": 13000, "seconds": 20.0, "kept": 0.9, "inside": inside}
+    return {**found, "cells": cells}
 
 
 def usual(trial: Trial) -> dict:
