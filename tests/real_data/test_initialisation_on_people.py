@@ -94,6 +94,7 @@ def twin_in_random_moments(real_data: Path, place: Path, count: int) -> Session:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(3600)
 @pytest.mark.parametrize("name", ["human31", "human25"])
 def test_the_twin_is_found_in_18_of_20_random_moments(
     real_data: Path, tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch
