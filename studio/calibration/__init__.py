@@ -1,0 +1,1 @@
+"""Cameras solved from boards, floor and axes, and checks of a calibration in words."""

@@ -1,0 +1,1 @@
+"""Motion files out of a run, each read back after writing."""
