@@ -1,0 +1,179 @@
+"""The tracks of a run: what the search found, and what was made of it since, side by side.
+
+`raw` is what the results store holds; every other track is one file `tracks/<name>.npz` in the run's folder, so that
+refining or smoothing never writes over what was found. Frames that are missing from a track are gaps.
+"""
+
+import io
+import itertools
+import math
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.errors import NotFoundError, SessionError
+from studio.sessions.atomic_files import write_bytes
+from studio.sessions.names import checked_name, is_name
+from studio.sessions.stored_run import StoredRun
+from studio.tracking.tracker import TRACKING_STATES
+from studio.typed_decoding import decode_json
+
+Array = NDArray[np.float64]
+Plain = Any
+"""What JSON can hold."""
+
+RAW = "raw"
+FOLDER, ENDING = "tracks", ".npz"
+SCHEMA_VERSION = 1
+ENTRIES = ("frames", "poses", "confidence", "states", "made_by", "schema")
+KNOWN_STATES = (*TRACKING_STATES, "")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """The poses of a run's frames, found or made.
+
+    name : "raw", "refined", "smoothed", … frames : (K,) ascending; a missing number is a gap. poses : (K, D) radians
+    and mm. confidence : (K,) 0 to 1, NaN unknown (of the search: how well the silhouettes agree, f_s). states : K words
+    of `tracking.tracker.TRACKING_STATES`, "" unknown. made_by : how the track was made, {} for raw: "verb", "from" and
+    the settings.
+    """
+
+    name: str
+    frames: NDArray[np.int64]
+    poses: Array
+    confidence: Array
+    states: tuple[str, ...]
+    made_by: Mapping[str, Plain] = field(default_factory=dict)
+
+
+def track_names(run: StoredRun) -> tuple[str, ...]:
+    """The run's tracks, raw first, the others by name."""
+    found = (path.stem for path in (run.folder / FOLDER).glob(f"*{ENDING}"))
+    return (RAW, *sorted(name for name in found if is_name(name) and name != RAW))
+
+
+def read_track(run: StoredRun, name: str = RAW) -> Track:
+    """A track by its name. Raises NotFoundError where there is none, SessionError where it is damaged."""
+    if name == RAW:
+        return _raw_track(run)
+    path = _path(run, name)
+    if not path.is_file():
+        raise NotFoundError(
+            f"Run '{run.name}' has no track '{name[:64]}'.",
+            f"It has: {', '.join(track_names(run))}. Make others with 'studio refine' or 'studio smooth'.",
+        )
+    try:
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as archive:
+            entries = {entry: archive[entry] for entry in ENTRIES}
+        track = _from_entries(name, entries)
+        _check(track, len(run.record.parameters))
+    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile, msgspec.DecodeError) as error:
+        raise SessionError(
+            f"Track '{name}' of run '{run.name}' cannot be read ({error}).",
+            "Make it again with 'studio refine' or 'studio smooth', or delete its file.",
+        ) from None
+    return track
+
+
+def write_track(run: StoredRun, track: Track, *, replace: bool = False) -> Path:
+    """Keep a track beside the run's others, in one step; returns its file.
+
+    replace : write over a derived track of that name. Raises SessionError for "raw", a name that is taken, or arrays
+    that do not fit each other or the run.
+    """
+    if track.name.lower() == RAW:
+        raise SessionError(
+            f"Track '{RAW}' is what the search found and stays as it is.", "Choose another name with --into."
+        )
+    path = _path(run, track.name)
+    try:
+        _check(track, len(run.record.parameters))
+    except ValueError as error:
+        raise SessionError(
+            f"Track '{track.name}' does not fit run '{run.name}': {error}.", "Give one row a frame."
+        ) from None
+    if path.exists() and not replace:
+        raise SessionError(
+            f"Run '{run.name}' has a track '{track.name}' already.", "Choose another name, or replace it."
+        )
+    stream = io.BytesIO()
+    np.savez_compressed(
+        stream,
+        schema=np.array(SCHEMA_VERSION),
+        frames=np.asarray(track.frames, dtype="<i8"),
+        poses=np.asarray(track.poses, dtype="<f8"),
+        confidence=np.asarray(track.confidence, dtype="<f8"),
+        states=np.array([KNOWN_STATES.index(state) for state in track.states], dtype="|u1"),
+        made_by=np.array(msgspec.json.encode(dict(track.made_by)).decode()),
+    )
+    path.parent.mkdir(exist_ok=True)
+    write_bytes(path, stream.getvalue())
+    return path
+
+
+def stretches(frames: NDArray[np.int64]) -> tuple[slice, ...]:
+    """Slices of rows whose frames (K,) follow each other without a gap."""
+    breaks = np.flatnonzero(np.diff(frames) != 1) + 1
+    edges = [0, *breaks.tolist(), len(frames)]
+    return tuple(slice(first, last) for first, last in itertools.pairwise(edges) if last > first)
+
+
+def _path(run: StoredRun, name: str) -> Path:
+    return run.folder / FOLDER / f"{checked_name(name, 'track')}{ENDING}"
+
+
+def _raw_track(run: StoredRun) -> Track:
+    """What the results store holds; a run that has no frame yet has an empty track."""
+    with run.results() as results:
+        frames, poses = results.poses()
+        timeline = results.timeline()
+    told = dict(
+        zip(timeline.frames.tolist(), zip(timeline.overlaps, timeline.tracking, strict=True), strict=True)
+    )
+    known = [told.get(frame, (math.nan, "")) for frame in frames.tolist()]
+    return Track(
+        RAW,
+        frames,
+        poses if len(frames) else np.zeros((0, len(run.record.parameters))),
+        np.array([entry[0] for entry in known], dtype=np.float64),
+        tuple(entry[1] for entry in known),
+    )
+
+
+def _from_entries(name: str, entries: Mapping[str, NDArray[Any]]) -> Track:
+    """A track from its file's arrays. Raises ValueError, DecodeError."""
+    if int(entries["schema"]) > SCHEMA_VERSION:
+        raise ValueError(f"schema version {int(entries['schema'])} is newer than this studio")
+    codes = entries["states"].tolist()
+    if any(code >= len(KNOWN_STATES) for code in codes):
+        raise ValueError("a state that is not known")
+    return Track(
+        name,
+        entries["frames"].astype(np.int64),
+        entries["poses"].astype(np.float64),
+        entries["confidence"].astype(np.float64),
+        tuple(KNOWN_STATES[code] for code in codes),
+        decode_json(str(entries["made_by"]).encode(), dict[str, Any]),
+    )
+
+
+def _check(track: Track, dimension: int) -> None:
+    """Raises ValueError where the arrays do not fit each other or the body."""
+    count = len(track.frames)
+    if track.poses.shape != (count, dimension):
+        raise ValueError(f"poses of shape {track.poses.shape} for {count} frames of {dimension} parameters")
+    if track.confidence.shape != (count,) or len(track.states) != count:
+        raise ValueError("confidence and states need one entry a frame")
+    if np.any(np.diff(track.frames) <= 0):
+        raise ValueError("frames do not ascend")
+    if not np.isfinite(track.poses).all():
+        raise ValueError("a pose has a number that is not finite")
+    if any(state not in KNOWN_STATES for state in track.states):
+        raise ValueError("a state that is not known")
