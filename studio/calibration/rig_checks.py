@@ -1,0 +1,165 @@
+"""What the cameras' own numbers tell: up axis, floor, unit, place, resolution."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.calibration.findings import Finding
+from studio.capture.sanity import FAR_FROM_AXES, LARGEST_RIG_MM, SMALLEST_RIG_MM, common_target
+from studio.geometry.camera import Camera
+from studio.geometry.rotations import orthonormality_error
+
+Array = NDArray[np.float64]
+
+ROTATION_TOLERANCE = 1e-3
+LEVEL, UPRIGHT = 0.3, 0.2
+"""Cameras stand upright about an axis if their pictures' rows lie across it within the first (sine) and their
+pictures' up has at least the second of it."""
+AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+CENTRED = (0.2, 0.8)
+SIZE_TOLERANCE = 0.02
+ASPECT_TOLERANCE = 0.01
+
+
+def rig_findings(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
+    """Doubts that need nothing but the cameras."""
+    wrong = _rotations(cameras)
+    if wrong:
+        return wrong
+    return (*_up_axis(cameras), *_floor(cameras), *_unit(cameras), *_place(cameras), *_principal(cameras))
+
+
+def size_findings(
+    cameras: Sequence[Camera], footage_sizes: Mapping[str, tuple[int, int]]
+) -> tuple[Finding, ...]:
+    """Footage that was not recorded at the size its camera was calibrated for."""
+    found: list[Finding] = []
+    for camera in cameras:
+        size = footage_sizes.get(camera.name, (camera.width, camera.height))
+        across, down = size[0] / camera.width, size[1] / camera.height
+        if max(abs(across - 1.0), abs(down - 1.0)) <= SIZE_TOLERANCE:
+            continue
+        told = f"Camera {camera.name} recorded {size[0]}x{size[1]} pixels and was calibrated at"
+        told = f"{told} {camera.width}x{camera.height}"
+        if abs(across / down - 1.0) < ASPECT_TOLERANCE:
+            message = f"{told}: the recording has {across:.3g} times the resolution."
+            remedy = "Scale the calibration to the recording, or record at the calibrated resolution."
+        elif (size[0] - size[1]) * (camera.width - camera.height) < 0:
+            message = f"{told}: one is upright, the other lies on its side."
+            remedy = "Turn the footage as it was when it was calibrated."
+        else:
+            message = f"{told}: the shape of the picture differs, so part of it was cut off."
+            remedy = "Record with the same mode of the camera as for the calibration, or calibrate again."
+        found.append(Finding("resolution", "blocks", message, remedy, (camera.name,)))
+    return tuple(found)
+
+
+def looks_at_one_place(cameras: Sequence[Camera]) -> tuple[str, ...]:
+    """Names of the cameras that do not look at the place that the others look at; none for parallel axes."""
+    target = common_target(tuple(cameras))
+    if target is None:
+        return ()
+    away = []
+    for camera in cameras:
+        seen = camera.rotation @ target + camera.translation
+        if seen[2] <= 0.0 or np.hypot(seen[0], seen[1]) > FAR_FROM_AXES * seen[2]:
+            away.append(camera.name)
+    return tuple(away)
+
+
+def upright_about(cameras: Sequence[Camera], axis: Array) -> bool:
+    """Whether all pictures stand upright if the (3,) unit vector `axis` points up."""
+    rows = np.array([camera.rotation[0] @ axis for camera in cameras])
+    ups = np.array([-camera.rotation[1] @ axis for camera in cameras])
+    return bool(np.sqrt(np.mean(rows**2)) < LEVEL and ups.min() > UPRIGHT)
+
+
+def _rotations(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
+    found: list[Finding] = []
+    for camera in cameras:
+        if np.isfinite(camera.rotation).all() and np.linalg.det(camera.rotation) < 0.0:
+            message = f"The rotation of camera {camera.name} mirrors the world (its determinant is -1)."
+            remedy = "The axes were taken for left-handed ones: flip one axis where the calibration was made."
+            found.append(Finding("handedness", "blocks", message, remedy, (camera.name,)))
+        elif orthonormality_error(camera.rotation) > ROTATION_TOLERANCE:
+            message = f"The rotation matrix of camera {camera.name} is no rotation."
+            remedy = "Check that the nine numbers are complete, or export the calibration again."
+            found.append(Finding("rotation", "blocks", message, remedy, (camera.name,)))
+    return tuple(found)
+
+
+def _up_axis(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
+    if upright_about(cameras, np.array(AXES["Z"])):
+        return ()
+    for name, direction in AXES.items():
+        for sign, word in ((1.0, ""), (-1.0, "minus ")):
+            if upright_about(cameras, sign * np.array(direction)):
+                message = f"The world's {word}{name} axis points up in all pictures, not Z."
+                remedy = (
+                    f"Turn the world so that {word}{name} becomes Z, or export the calibration with Z up."
+                )
+                return (Finding("up-axis", "blocks", message, remedy),)
+    return ()
+
+
+def _floor(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
+    low = tuple(camera.name for camera in cameras if camera.centre[2] < 0.0)
+    if not low:
+        return ()
+    most = 2 * len(low) > len(cameras)
+    message = f"Camera {', '.join(low)} lies under the floor (z < 0)."
+    remedy = (
+        "The world is mirrored or its Z axis points down: set the floor again, with Z up."
+        if most
+        else "Check that the floor is at z = 0 and that this camera's calibration is its own."
+    )
+    return (Finding("below-floor", "blocks" if most else "warns", message, remedy, low),)
+
+
+def _unit(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
+    if len(cameras) < 2:
+        return ()
+    centres = np.array([camera.centre for camera in cameras])
+    spread = float(np.linalg.norm(centres - centres.mean(axis=0), axis=1).max())
+    if SMALLEST_RIG_MM < spread < LARGEST_RIG_MM:
+        return ()
+    message = f"The cameras lie within {spread:.3g} mm of their middle"
+    if 0.5 < spread <= SMALLEST_RIG_MM:
+        message = f"{message}: metres were taken for millimetres, it seems."
+        remedy = "Multiply the translations by 1000, or name the unit when importing."
+    elif spread > LARGEST_RIG_MM:
+        message = f"{message}: millimetres were taken for metres, it seems."
+        remedy = "Divide the translations by 1000, or name the unit when importing."
+    else:
+        message, remedy = f"{message}: they are all in one place.", "Calibrate where the cameras stand."
+    return (Finding("scale", "blocks", message, remedy),)
+
+
+def _place(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
+    away = looks_at_one_place(cameras)
+    if not away:
+        return ()
+    message = f"Camera {', '.join(away)} does not look where the others look."
+    remedy = "Check that each calibration belongs to its footage and was not exchanged."
+    return (Finding("no-common-view", "warns", message, remedy, away),)
+
+
+def _principal(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
+    found: list[Finding] = []
+    for camera in cameras:
+        cx, cy = camera.matrix[0, 2] / camera.width, camera.matrix[1, 2] / camera.height
+        if CENTRED[0] < cx < CENTRED[1] and CENTRED[0] < cy < CENTRED[1]:
+            continue
+        factor = 0.5 * (2.0 * cx + 2.0 * cy)
+        scaled = abs(cx - cy) < 0.15 and (factor > 1.6 or factor < 0.4)
+        message = (
+            f"Camera {camera.name} has its principal point at ({camera.matrix[0, 2]:.0f},"
+            f" {camera.matrix[1, 2]:.0f}), far from the centre of {camera.width}x{camera.height} pixels."
+        )
+        remedy = "Check that the picture size is the calibration's."
+        if scaled:
+            remedy = f"The calibration seems made at {factor:.2g} times this resolution: scale it."
+        code = "resolution" if scaled else "principal-point"
+        found.append(Finding(code, "blocks" if scaled else "warns", message, remedy, (camera.name,)))
+    return tuple(found)
