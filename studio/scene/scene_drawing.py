@@ -12,6 +12,7 @@ from studio.runs.colour_tokens import colour_tokens
 from studio.scene.body_view import BodyView
 from studio.scene.camera_views import CameraViews
 from studio.scene.floor_view import FloorView
+from studio.scene.frame_volume import FrameVolume
 from studio.scene.limb_meshes import METRES_PER_MM
 from studio.scene.moment import Moment
 from studio.scene.opened_run import OpenedRun
@@ -19,6 +20,7 @@ from studio.scene.particle_view import CloudStyle, ParticleView
 from studio.scene.stick_figure import TruthView
 from studio.scene.trail_view import TrailView
 from studio.scene.view_options import ViewOptions
+from studio.scene.volume_view import VolumeView
 
 Bytes = NDArray[np.uint8]
 
@@ -43,11 +45,18 @@ class SceneDrawing:
         self.beside = BodyView(server, body, tokens, name="/stored", ghost=True)
         self.particles = ParticleView(server, body)
         self.trails = TrailView(server, body)
+        self.volume = VolumeView(server, body)
         self.cameras = CameraViews(server, opened.cameras, tokens)
         self.truth = TruthView(server, body, opened.truth.names, tokens) if opened.truth else None
         self._names = [limb.name for limb in body.drawn]
 
-    def draw(self, moment: Moment, options: ViewOptions, layer: int | None) -> None:
+    def draw(
+        self,
+        moment: Moment,
+        options: ViewOptions,
+        layer: int | None,
+        volume: FrameVolume | None = None,
+    ) -> None:
         """Bring everything but the pictures to a moment, in one step for the viewers."""
         if options.dark != self._dark:
             self.recolour(options.dark)
@@ -64,6 +73,7 @@ class SceneDrawing:
             self.trails.show(
                 moment.frame, options.trail_markers, int(options.trail_frames), tokens, visible=options.trails
             )
+            self.volume.show(volume, moment.pose, tokens, hull=options.hull, blobs=options.blobs)
             self.cameras.show(options.cameras, options.pictures)
             # Through a camera the floor is the one in the picture.
             self.floor.show(self.cameras.through is None)
@@ -127,6 +137,7 @@ class SceneDrawing:
             self.beside,
             self.particles,
             self.trails,
+            self.volume,
             self.cameras,
             self.truth,
         ):

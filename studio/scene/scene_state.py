@@ -74,7 +74,8 @@ class SceneState:
             return
         place = self._workspace.session(session)
         opened = OpenedRun(place, place.run(run) if run else None)
-        self.run = current = ShownRun(SceneDrawing(self._server, opened, self.options.dark), opened)
+        drawing = SceneDrawing(self._server, opened, self.options.dark)
+        self.run = current = ShownRun(drawing, opened, self._volume_made, self._refused)
         current.drawing.on_camera_clicked(self._camera_clicked)
         current.drawing.first_view(move_viewers=not same_place)
         self.shown = replace(
@@ -82,6 +83,7 @@ class SceneState:
         )
         self._panel.settings.show_settings(current.settings)
         self._panel.show.show_body(opened.body)
+        self._panel.show.offer_blobs(current.has_blobs)
         self._panel.pose.show_body(opened.body, opened.start_pose())
         self._follow_shown()
         self._show_state()
@@ -227,6 +229,10 @@ class SceneState:
         self._presenter.post(
             lambda: self.look_through(None if camera == self.shown.look_through else camera, True)
         )
+
+    def _volume_made(self) -> None:
+        """A hull is there, which was made in another thread."""
+        self._presenter.post(lambda: self._presenter.redraw(pictures=False))
 
     def draw(self) -> None:
         """Bring everything but the pictures up to date."""

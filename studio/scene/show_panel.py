@@ -24,6 +24,16 @@ _SWITCHES = (
     ("trails", "trails", "Where the chosen joints went."),
     ("cameras", "cameras", "The cameras; click one to look through it."),
     ("pictures", "pictures", "The pictures on the cameras."),
+    (
+        "hull",
+        "visual hull",
+        "What the silhouettes leave of space in this frame, as voxels in their mean colours; with the body over it.",
+    ),
+    (
+        "blobs",
+        "coloured blobs",
+        "Blobs fitted to the voxels, in the colours learnt; as cages those that the shown pose has of itself.",
+    ),
 )
 
 
@@ -77,6 +87,10 @@ class ShowPanel:
             self._checklist(
                 "Joints with trails", "trail_markers", tuple(marker.name for marker in body.markers)
             )
+
+    def offer_blobs(self, offered: bool) -> None:
+        """Offer the blobs, or do not: only a run that is weighed by them has any."""
+        self.inputs["blobs"][0].visible = offered
 
     def show_layers(self, count: int, layer: int | None) -> None:
         """Offer so many layers and show which is chosen."""

@@ -1,13 +1,15 @@
 """One opened run as it stands in the scene: its data, its handles, its pictures, its settings."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.errors import StudioError
 from studio.knobs import Value
 from studio.runs.search_space import parameter_names
+from studio.scene.frame_volume import FrameVolumes, has_blobs
 from studio.scene.live_search import LiveSearch
 from studio.scene.moment import Moment, moment_of
 from studio.scene.opened_run import OpenedRun
@@ -26,9 +28,17 @@ _TRAIL_SECONDS = 1.0
 class ShownRun:
     """Used by the presenter's thread only; `frames` is replaced whole and may be read by any."""
 
-    def __init__(self, drawing: SceneDrawing, opened: OpenedRun) -> None:
+    def __init__(
+        self,
+        drawing: SceneDrawing,
+        opened: OpenedRun,
+        volume_made: Callable[[], None] = lambda: None,
+        failed: Callable[[StudioError], None] = lambda _: None,
+    ) -> None:
+        """volume_made, failed : called from another thread, when a hull was made or why it could not be."""
         self.drawing, self.opened = drawing, opened
         self.pictures = ViewPictures(opened)
+        self.volumes = FrameVolumes(opened, volume_made, failed)
         self.settings = opened.settings()
         self.frames: tuple[int, ...] = tuple(opened.frames())
         self._trails_read = float("-inf")
@@ -48,7 +58,9 @@ class ShownRun:
         if options.trails and self._trails_stale and now - self._trails_read >= _TRAIL_SECONDS:
             self.drawing.read_poses()
             self._trails_read, self._trails_stale = now, False
-        self.drawing.draw(moment, options, layer)
+        wanted = options.hull or (options.blobs and self.has_blobs)
+        volume = self.volumes.of(moment, self.settings, blobs=options.blobs) if wanted else None
+        self.drawing.draw(moment, options, layer, volume)
 
     def hang(self, moment: Moment, options: ViewOptions, layer: int | None) -> None:
         """Compose the pictures of a moment and hang them on the cameras."""
@@ -82,7 +94,13 @@ class ShownRun:
         """Take the run out of the scene and let go of its files."""
         self.drawing.remove()
         self.pictures.close()
+        self.volumes.close()
         self.opened.close()
+
+    @property
+    def has_blobs(self) -> bool:
+        """Whether the run is weighed by blobs."""
+        return self.opened.run is not None and has_blobs(self.settings)
 
     @property
     def _layers_wanted(self) -> int:

@@ -12,8 +12,9 @@ class ViewOptions:
     whose end points are drawn; None takes the extremities (limbs on which no other limb begins). colour_by
     : "layer" or "weight". point_size : metres. trails : paths of `trail_markers` (None: the extremities')
     over `trail_frames` frames before and after the shown one (0: all). cameras, pictures : frusta and the
-    pictures on them. overlays : what is drawn over the pictures, of `runs.overlay_drawing.OVERLAYS`. dark :
-    the theme.
+    pictures on them. hull : the frame's visual hull as voxels. blobs : the blobs fitted to it beside the
+    answer's own, in runs that are weighed by them. overlays : what is drawn over the pictures, of
+    `runs.overlay_drawing.OVERLAYS`. dark : the theme.
     """
 
     body: bool = True
@@ -29,6 +30,8 @@ class ViewOptions:
     trail_frames: int = 60
     cameras: bool = True
     pictures: bool = True
+    hull: bool = False
+    blobs: bool = False
     overlays: tuple[str, ...] = ("outline",)
     dark: bool = True
 

@@ -1,0 +1,182 @@
+"""What a frame's hull and blobs are made of, in a thread of its own: looking at them never holds up scene or search.
+
+The hull is carved from the evidence of the run's own settings. In a run that is weighed by blobs it is the run's very
+hull, with the blobs fitted from the shown answer and the memory that came into the frame; in every other run the blob
+weighting's default knobs carve it.
+"""
+
+import contextlib
+import dataclasses
+import os
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numba
+from numpy import float64
+from numpy.typing import NDArray
+
+from studio.errors import StudioError
+from studio.runs.problem_source import ProblemSource
+from studio.scene.moment import Moment
+from studio.scene.opened_run import OpenedRun
+from studio.settings import RunSettings, default_settings
+from studio.volume.blob_model import BlobMixture, BlobModel
+from studio.volume.hull import Hull
+from studio.weighting.blobs import BlobProblem, blob_mixture
+
+Array = NDArray[float64]
+
+BLOBS = "blobs"
+FEWEST_VIEWS = 2
+KEPT = 6
+LEAST_PAUSE_SECONDS = 0.05
+"""Between two frames; a frame that took longer is followed by as long a pause: half a core at most."""
+NICENESS = 10
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameVolume:
+    """hull : of the frame. model : the blobs that the run knew then, fitted : to the voxels; None without blobs, the
+    latter also where nothing is seen.
+    """
+
+    frame: int
+    hull: Hull
+    model: BlobModel | None = None
+    fitted: BlobMixture | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Wish:
+    key: tuple[object, ...]
+    frame: int
+    settings: RunSettings
+    pose: Array | None
+    memory: Mapping[str, Array]
+
+
+def has_blobs(settings: RunSettings) -> bool:
+    """Whether a run with these settings has blobs to show."""
+    return settings.weighting_name == BLOBS
+
+
+class FrameVolumes:
+    """Makes the volumes of an opened run on demand, the newest wish first, and keeps the last few.
+
+    ready : called from the thread when one was made. failed : called from it with a reason, once for each.
+    """
+
+    def __init__(
+        self, opened: OpenedRun, ready: Callable[[], None], failed: Callable[[StudioError], None]
+    ) -> None:
+        self._opened, self._ready, self._failed = opened, ready, failed
+        self._session, self._body, self._cameras = opened.session, opened.body, opened.cameras
+        self._kept: OrderedDict[tuple[object, ...], FrameVolume | None] = OrderedDict()
+        self._newest: FrameVolume | None = None
+        self._wish: _Wish | None = None
+        self._said: set[str] = set()
+        self._lock = threading.Lock()
+        self._wake, self._stopping = threading.Event(), threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def of(self, moment: Moment, settings: RunSettings, *, blobs: bool) -> FrameVolume | None:
+        """The volume of a moment; until it is made, the one that was shown before. blobs : wanted with the hull."""
+        frame = self._opened.span[0] if moment.frame is None else moment.frame
+        wish = self._wish_for(frame, moment.pose, settings, blobs=blobs and has_blobs(settings))
+        with self._lock:
+            if wish.key in self._kept:
+                self._kept.move_to_end(wish.key)
+                self._newest = self._kept[wish.key]
+                return self._newest
+            self._wish = wish
+        self._wake.set()
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._work, name="scene-volumes", daemon=True)
+            self._thread.start()
+        return self._newest
+
+    def close(self) -> None:
+        """End the thread and let go of the footage."""
+        self._stopping.set()
+        self._wake.set()
+        if self._thread is not None:
+            self._thread.join(timeout=10.0)
+
+    def _wish_for(self, frame: int, pose: Array | None, settings: RunSettings, *, blobs: bool) -> _Wish:
+        chosen = settings if has_blobs(settings) else _carving(settings)
+        if not blobs or pose is None:
+            return _Wish((frame, chosen.evidence, chosen.weighting), frame, chosen, None, {})
+        key = (frame, chosen.evidence, chosen.weighting, pose.tobytes())
+        before = self._opened.result(frame - 1) if key not in self._kept else None
+        memory = before.carried.memory if before is not None else {}
+        return _Wish(key, frame, chosen, pose.copy(), memory)
+
+    def _work(self) -> None:
+        _step_back()
+        problems: ProblemSource | None = None
+        try:
+            while not self._stopping.is_set():
+                self._wake.wait()
+                self._wake.clear()
+                with self._lock:
+                    wish, self._wish = self._wish, None
+                if wish is None or self._stopping.is_set():
+                    continue
+                problems = self._make(wish, problems)
+        finally:
+            if problems is not None:
+                problems.close()
+
+    def _make(self, wish: _Wish, problems: ProblemSource | None) -> ProblemSource | None:
+        began = time.monotonic()
+        made: FrameVolume | None = None
+        try:
+            if len(self._cameras) < FEWEST_VIEWS:
+                raise StudioError(
+                    "One camera makes no visual hull.",
+                    "Hulls are shown of sessions with two cameras or more.",
+                )
+            problems = problems or ProblemSource(self._session, self._body, self._cameras)
+            made = _volume(problems, wish)
+        except StudioError as problem:
+            self._complain(problem)
+        with self._lock:
+            self._kept[wish.key] = made
+            while len(self._kept) > KEPT:
+                self._kept.popitem(last=False)
+        self._ready()
+        self._stopping.wait(max(LEAST_PAUSE_SECONDS, time.monotonic() - began))
+        return problems
+
+    def _complain(self, problem: StudioError) -> None:
+        if str(problem) not in self._said:
+            self._said.add(str(problem))
+            self._failed(problem)
+
+
+def _volume(problems: ProblemSource, wish: _Wish) -> FrameVolume:
+    """Raises FootageError, NotFoundError, CalibrationError."""
+    problem = problems.problem(wish.frame, wish.settings)
+    assert isinstance(problem, BlobProblem)
+    if wish.pose is None:
+        return FrameVolume(wish.frame, problem.hull)
+    expected = problem.expecting(wish.pose[None], wish.memory)
+    return FrameVolume(wish.frame, problem.hull, expected.model, blob_mixture(expected))
+
+
+def _carving(settings: RunSettings) -> RunSettings:
+    """The settings that carve the hull of a run that is weighed otherwise: its own evidence, default knobs."""
+    return dataclasses.replace(
+        default_settings(settings.tracker_name, BLOBS), evidence=settings.evidence, recovery=settings.recovery
+    )
+
+
+def _step_back() -> None:
+    """Let this thread use one core, and only what others leave."""
+    numba.set_num_threads(1)
+    if hasattr(os, "setpriority"):
+        with contextlib.suppress(OSError):
+            os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)

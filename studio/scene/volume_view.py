@@ -1,0 +1,162 @@
+"""The visual hull as voxels and the coloured blobs as ellipsoids (Caillette, Galata & Howard 2007, Figs. 3 to 6).
+
+Voxels are instances of one box, in their own sizes and mean colours. Blobs are instances of one ball, drawn out to
+`BLOB_REACH` standard deviations: a solid cylinder's reaches its surface at two. The blobs fitted to the frame's voxels
+are solid and wear the colours that were learnt, those that the shown pose makes of the body stand beside them as cages
+in the colours of their limbs' sides.
+"""
+
+import numpy as np
+import trimesh
+import viser
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from studio.body.model import BodyModel
+from studio.runs.colour_tokens import ColourTokens
+from studio.scene.frame_volume import FrameVolume
+from studio.scene.limb_meshes import METRES_PER_MM
+from studio.volume.blob_model import BlobMixture, BlobModel
+from studio.volume.hull import Hull
+
+Array = NDArray[np.float64]
+Bytes = NDArray[np.uint8]
+
+BLOB_REACH = 2.0
+BALL_FINENESS, CAGE_FINENESS = 2, 1
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+class VolumeView:
+    """Hull and blobs of one moment; what is drawn already is not sent again."""
+
+    def __init__(self, server: viser.ViserServer, body: BodyModel) -> None:
+        self._server, self._body = server, body
+        self.voxels = _Instances(server, "/hull", trimesh.creation.box((1.0, 1.0, 1.0)))
+        self.fitted = _Instances(
+            server, "/blobs/fitted", trimesh.creation.icosphere(subdivisions=BALL_FINENESS)
+        )
+        self.own = _Instances(
+            server, "/blobs/own", trimesh.creation.icosphere(subdivisions=CAGE_FINENESS), cage=True
+        )
+        self._drawn: dict[str, tuple[object, ...]] = {}
+
+    def show(
+        self, volume: FrameVolume | None, pose: Array | None, tokens: ColourTokens, *, hull: bool, blobs: bool
+    ) -> None:
+        """Draw what there is of a volume. pose : (D,) whose own blobs are drawn. hull, blobs : what is wanted."""
+        voxels = volume.hull if volume is not None and hull else None
+        model = volume.model if volume is not None and blobs else None
+        with self._server.atomic():
+            if self._is_new("voxels", voxels):
+                self.voxels.draw(*(voxel_instances(voxels) if voxels is not None else NOTHING))
+            fitted = volume.fitted if volume is not None and blobs else None
+            if self._is_new("fitted", fitted, tokens.name):
+                self.fitted.draw(
+                    *(blob_instances(fitted, tokens["ghost"]) if fitted is not None else NOTHING)
+                )
+            shown = None if model is None or pose is None else pose.tobytes()
+            if self._is_new("own", model, shown, tokens.name):
+                drawn = NOTHING if model is None or pose is None else self._own(model, pose, tokens)
+                self.own.draw(*drawn)
+
+    def remove(self) -> None:
+        """Take it all out of the scene."""
+        for part in (self.voxels, self.fitted, self.own):
+            part.draw(*NOTHING)
+        self._drawn.clear()
+
+    def _own(self, model: BlobModel, pose: Array, tokens: ColourTokens) -> tuple[Array, Array, Array, Bytes]:
+        mixture = model.mixture(self._body, pose[None]).at(0)
+        positions, turns, scales, _ = blob_instances(mixture, tokens["ghost"])
+        sides = [tokens[f"limb-{self._body.drawn[int(limb)].side}"] for limb in model.limb]
+        return positions, turns, scales, np.array(sides, dtype=np.uint8)
+
+    def _is_new(self, part: str, *look: object) -> bool:
+        before = self._drawn.get(part, (None,))
+        same = len(before) == len(look) and all(
+            one is other or (isinstance(one, (str, bytes)) and one == other)
+            for one, other in zip(before, look, strict=True)
+        )
+        self._drawn[part] = look
+        return not same
+
+
+def voxel_instances(hull: Hull) -> tuple[Array, Array, Array, Bytes]:
+    """Positions (K, 3) and edges (K, 3) in metres, turns (K, 4) wxyz, colours (K, 3) red green blue."""
+    edges = np.repeat(hull.edges[:, None] * METRES_PER_MM, 3, axis=1)
+    return (
+        hull.centres * METRES_PER_MM,
+        np.tile(UPRIGHT, (len(edges), 1)),
+        edges,
+        _rgb(hull.colours, (128,) * 3),
+    )
+
+
+def blob_instances(mixture: BlobMixture, unknown: tuple[int, int, int]) -> tuple[Array, Array, Array, Bytes]:
+    """Positions (B, 3) and half axes (B, 3) in metres, turns (B, 4) wxyz, colours (B, 3) of a mixture of one pose.
+
+    unknown : the colour of blobs that have learnt none.
+    """
+    variances, axes = np.linalg.eigh(mixture.covariances)
+    # Eigenvectors come with any handedness; a turn has one.
+    axes[..., 0] *= np.sign(np.linalg.det(axes))[:, None]
+    turns = Rotation.from_matrix(axes).as_quat(scalar_first=True)
+    reach = BLOB_REACH * np.sqrt(np.maximum(variances, 0.0)) * METRES_PER_MM
+    return mixture.means * METRES_PER_MM, turns, reach, _rgb(mixture.colours, unknown)
+
+
+def _rgb(levels: NDArray[np.floating], unknown: tuple[int, ...]) -> Bytes:
+    """Blue, green, red levels as bytes red, green, blue; rows with NaN take the other colour."""
+    known = np.isfinite(levels).all(axis=1, keepdims=True)
+    colours = np.where(known, levels[:, ::-1], np.array(unknown, dtype=np.float64))
+    return np.clip(np.round(colours), 0, 255).astype(np.uint8)
+
+
+NOTHING = (np.zeros((0, 3)), np.zeros((0, 4)), np.zeros((0, 3)), np.zeros((0, 3), dtype=np.uint8))
+
+
+class _Instances:
+    """Many of one mesh. A set of another size is a new handle: a viewer never sees places and colours that do not
+    belong together.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, name: str, mesh: trimesh.Trimesh, *, cage: bool = False
+    ) -> None:
+        self._server, self._name, self._mesh, self._cage = server, name, mesh, cage
+        self.handle: viser.BatchedMeshHandle | None = None
+
+    def draw(self, positions: Array, turns: Array, scales: Array, colours: Bytes) -> None:
+        """Show so many; none takes the handle away."""
+        handle = self.handle
+        if handle is not None and len(handle.batched_positions) == len(positions):
+            handle.batched_positions = positions.astype(np.float32)
+            handle.batched_wxyzs = turns.astype(np.float32)
+            handle.batched_scales = scales.astype(np.float32)
+            handle.batched_colors = colours
+            return
+        if handle is not None:
+            handle.remove()
+            self.handle = None
+        if len(positions):
+            self.handle = self._added(positions, turns, scales, colours)
+
+    def _added(
+        self, positions: Array, turns: Array, scales: Array, colours: Bytes
+    ) -> viser.BatchedMeshHandle:
+        return self._server.scene.add_batched_meshes_simple(
+            self._name,
+            np.asarray(self._mesh.vertices, dtype=np.float32),
+            np.asarray(self._mesh.faces, dtype=np.uint32),
+            batched_wxyzs=turns.astype(np.float32),
+            batched_positions=positions.astype(np.float32),
+            batched_scales=scales.astype(np.float32),
+            batched_colors=colours,
+            lod="off",
+            wireframe=self._cage,
+            opacity=None,
+            flat_shading=False,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
