@@ -137,7 +137,7 @@ def walkers_from(
     if previous.estimate is None or previous.previous_estimate is None:
         return Walkers(poses, *near(rng, poses, space), free)
     columns = columns_of(space)
-    movement = (previous.estimate - previous.previous_estimate)[columns]
+    movement = (previous.estimate - previous.previous_estimate)[columns] / space.steps
     velocity = np.tile(movement, (len(poses), 1))
     return Walkers(poses, states_at(rng, model_of(space), poses[:, columns], velocity), velocity, free)
 
@@ -145,35 +145,37 @@ def walkers_from(
 def walked(
     rng: np.random.Generator, walkers: Walkers, space: SearchSpace, rules: GuidedRules, sigma: Array
 ) -> Walkers:
-    """One frame further (Eq. 3 and 4). sigma : (D,) noise of what the model does not know, or does not move."""
+    """One frame further (Eq. 3 and 4), or as many as the space has `steps`. sigma : (D,) noise of what the model does
+    not know, or does not move, over all of them.
+    """
     model, columns = model_of(space), columns_of(space)
     free = walkers.free
     noise = rng.standard_normal(walkers.poses.shape) * sigma
     poses = walkers.poses + np.where(free[:, None], noise, rules.global_scale * noise)
-    moved = propagate(
-        rng,
-        model,
-        walkers.states,
-        walkers.poses[:, columns],
-        walkers.velocity,
-        rules.attenuation,
-        rules.entering,
-    )
-    poses[:, columns] = np.where(free[:, None], poses[:, columns], moved.values)
-    velocity = np.where(free[:, None], walkers.velocity, moved.velocities)
-    alone = followed(rng, model, walkers.states, poses[:, columns], velocity)
-    return Walkers(poses, np.where(free, alone, moved.states), velocity, free)
+    states, angles, velocity = walkers.states, walkers.poses[:, columns], walkers.velocity
+    for _ in range(space.steps):
+        moved = propagate(rng, model, states, angles, velocity, rules.attenuation, rules.entering)
+        states, angles, velocity = moved.states, moved.values, moved.velocities
+    poses[:, columns] = np.where(free[:, None], poses[:, columns], angles)
+    velocity = np.where(free[:, None], walkers.velocity, velocity)
+    alone = followed(rng, model, walkers.states, poses[:, columns], velocity, space.steps)
+    return Walkers(poses, np.where(free, alone, states), velocity, free)
 
 
 def followed(
-    rng: np.random.Generator, model: BehaviourModel, states: Indices, angles: Array, velocity: Array
+    rng: np.random.Generator,
+    model: BehaviourModel,
+    states: Indices,
+    angles: Array,
+    velocity: Array,
+    frames: int = 1,
 ) -> Indices:
     """(N,) the states that particles are in after they went to angles (N, d) by velocity (N, d): the cluster of both
-    is the next symbol, taken as often as a frame has steps of the automaton (`steps_per_frame`, in the mean).
+    is the next symbol, taken as often as `frames` have steps of the automaton (`steps_per_frame`, in the mean).
     """
     labels = _labelled(model, angles, velocity)
-    whole = int(model.steps_per_frame)
-    left = model.steps_per_frame - whole
+    whole = int(frames * model.steps_per_frame)
+    left = frames * model.steps_per_frame - whole
     for _ in range(whole):
         states = model.automaton.next_state[states, labels]
     stepping = rng.random(len(states)) < left

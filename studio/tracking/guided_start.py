@@ -112,8 +112,8 @@ def arrived(rng: np.random.Generator, poses: Array, extra: Arrays, space: Search
     if CAME_FROM_STATES not in extra:
         return without_past(extra) | _found_near(rng, poses, space)
     columns = columns_of(space)
-    velocity = (poses - extra[CAME_FROM])[:, columns]
-    states = followed(rng, model_of(space), extra[CAME_FROM_STATES], poses[:, columns], velocity)
+    velocity = (poses - extra[CAME_FROM])[:, columns] / space.steps
+    states = followed(rng, model_of(space), extra[CAME_FROM_STATES], poses[:, columns], velocity, space.steps)
     return without_past(extra) | {STATES: states, VELOCITY: velocity}
 
 

@@ -80,6 +80,6 @@ def leader_arrived(rng: np.random.Generator, leader: Array, extra: Arrays, space
         states, velocity = near(rng, leader[None], space)
         return kept | {LEADER_STATE: states, LEADER_VELOCITY: velocity}
     columns = columns_of(space)
-    velocity = (leader - extra[BEFORE])[:, columns]
-    state = followed(rng, model_of(space), extra[BEFORE_STATE], leader[None, columns], velocity)
+    velocity = (leader - extra[BEFORE])[:, columns] / space.steps
+    state = followed(rng, model_of(space), extra[BEFORE_STATE], leader[None, columns], velocity, space.steps)
     return kept | {LEADER_STATE: state, LEADER_VELOCITY: velocity}

@@ -47,7 +47,8 @@ class SearchSpace:
     names : D parameter names. lower, upper : (D,) limits, ±inf where unbounded. sigma : (D,) σ0, the standard
     deviation of the diffusion from one frame to the next (mm, rad). limb : (D,) int, equal numbers belong to
     one limb and are neighbours (crossover by whole limbs). hierarchy : the body's tree (a swarm's partitions).
-    behaviour : what the body tends to do, at the footage's rate; None where a run has no model.
+    behaviour : what the body tends to do, at the footage's rate; None where a run has no model. steps : frames
+    since the last one that was tracked (a live run drops some); sigma is for all of them, the model takes each.
     """
 
     names: tuple[str, ...]
@@ -57,6 +58,7 @@ class SearchSpace:
     limb: NDArray[np.int64]
     hierarchy: Hierarchy
     behaviour: BehaviourModel | None = None
+    steps: int = 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
