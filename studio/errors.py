@@ -81,3 +81,9 @@ class BehaviourError(StudioError):
     """A behaviour model that cannot be learnt, read or used with this body."""
 
     status, code = 422, "behaviour"
+
+
+class ExportError(StudioError):
+    """An export that cannot be made, or that did not read back as what was written."""
+
+    status, code = 422, "export"

@@ -1,0 +1,58 @@
+"""What an export may be asked for: one declaration an option, from which command, API and page make theirs."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from studio.knobs import knob
+
+OWN = "own"
+AUTO = "auto"
+MM_PER_UNIT = {"mm": 1.0, "cm": 10.0, "m": 1000.0}
+
+
+@dataclass(frozen=True, slots=True)
+class ExportOptions:
+    """The options of an export; every format takes some of them (`formats.ExportFormat.takes`).
+
+    first, last : frames, half open; last 0 means to the end. fps 0 : as it was tracked.
+    """
+
+    title: ClassVar[str] = "Export"
+
+    track: str = knob("raw", help="Which track: raw is what the search found; others were made of it.")
+    first: int = knob(0, 0, 100_000_000, label="from frame", help="The first frame.")
+    last: int = knob(0, 0, 100_000_000, label="to frame", help="The frame after the last; 0: to the end.")
+    fps: float = knob(0.0, 0.0, 1000.0, label="frame rate", unit="Hz", help="Poses in between are made; 0: as tracked.")
+    lost: str = knob(
+        "gap",
+        label="lost frames",
+        choices=("gap", "keep"),
+        help="Frames in which the body was lost become gaps, or keep the pose that was held.",
+    )
+    unit: str = knob(AUTO, choices=(AUTO, "m", "cm", "mm"), help="Of lengths; auto: what the format's readers expect.")
+    up: str = knob(
+        AUTO, label="up axis", choices=(AUTO, "y", "z"), help="Auto: what the format's readers expect; z: the world's."
+    )
+    names: str = knob(
+        OWN,
+        choices=(OWN, "halpe26", "mixamo", "opensim"),
+        help="Names of points and bones: the body's own, or those that another program knows.",
+    )
+    rest: str = knob(
+        "tpose",
+        label="rest pose",
+        choices=("tpose", "neutral"),
+        help="The skeleton without motion: arms stretched sideways, or the body's neutral pose.",
+    )
+    euler: str = knob(
+        "ZXY",
+        label="rotation order",
+        choices=("ZXY", "ZYX", "XYZ", "XZY", "YXZ", "YZX"),
+        help="Of the rotation channels, first applied last.",
+    )
+    angles: str = knob("degrees", choices=("degrees", "radians"), help="Of the angles in the table.")
+    mesh: bool = knob(True, help="The body's cones go with the skeleton.")
+    split: bool = knob(False, help="More frames than the format counts go into several files.")
+    camera: str = knob("", help="Only this camera's video; none: one video a camera.")
+    height: int = knob(0, 0, 4320, label="picture height", unit="px", help="Of the videos; 0: as it was recorded.")
+    calibration: str = knob("", label="calibration format", help="Which writer of calibrations; none: the ending's own.")
