@@ -54,6 +54,11 @@ class Board:
                 f"Squares of {self.square_mm:g} mm cannot be.", "Measure the printed board."
             )
         if self.kind == "chessboard":
+            if across == down:
+                raise CalibrationError(
+                    f"A chessboard with {across}x{down} inner corners looks the same after a quarter turn.",
+                    "Use a board with unlike numbers of columns and rows, or a ChArUco board.",
+                )
             return
         if not 0.0 < self.marker_mm < self.square_mm:
             raise CalibrationError(
@@ -88,7 +93,7 @@ class Board:
         """(K, 3) all inner corners in the board's frame, mm."""
         across, down = self.corners
         grid = np.stack(np.meshgrid(np.arange(across), np.arange(down)), axis=-1).reshape(-1, 2)
-        return np.column_stack([grid * self.square_mm, np.zeros(len(grid))])
+        return np.column_stack([grid * self.square_mm, np.zeros(len(grid))]).astype(np.float64)
 
     @property
     def turn_symmetric(self) -> bool:

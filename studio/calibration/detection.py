@@ -1,0 +1,109 @@
+"""Boards found in pictures: ChArUco and chessboard corners, sub-pixel, with the first corner told apart.
+
+Only calls that OpenCV 4.10 and 5 both have. Chessboard corners come in any of several orders; here they are put into
+the board's own: never mirrored, and beginning at the corner whose outer square is black where the board
+tells. Boards that look the same after half a turn (`Board.turn_symmetric`) keep the order that begins
+furthest to the top left; who compares views settles the rest.
+"""
+
+import cv2
+import cv2.aruco
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.calibration.boards import Board
+from studio.calibration.sightings import Sighting
+
+Array = NDArray[np.float64]
+Bytes = NDArray[np.uint8]
+
+FEWEST_CORNERS = 6
+SHARP_WINDOW = (5, 5)
+
+
+class BoardFinder:
+    """Finds one board in pictures. mirrored_too : also look into the mirrored picture where none is found."""
+
+    def __init__(self, board: Board, mirrored_too: bool = True) -> None:
+        self.board = board
+        self._mirrored_too = mirrored_too and board.kind == "charuco"
+        self._charuco = _charuco_detector(board) if board.kind == "charuco" else None
+
+    def find(self, picture: Bytes, camera: str, frame: int, name: str = "") -> Sighting | None:
+        """The board in a (H, W, 3) BGR or (H, W) grey picture, None if fewer than six of its corners are seen."""
+        grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY) if picture.ndim == 3 else picture
+        found, mirrored = self._corners(grey), False
+        if found is None and self._mirrored_too:
+            found, mirrored = self._corners(np.ascontiguousarray(grey[:, ::-1])), True
+        if found is None:
+            return None
+        size = (int(grey.shape[1]), int(grey.shape[0]))
+        return Sighting(camera, frame, name or f"frame {frame}", size, *found, mirrored=mirrored)
+
+    def _corners(self, grey: NDArray) -> tuple[NDArray[np.int64], Array] | None:
+        if self._charuco is not None:
+            return _charuco_corners(self._charuco, grey)
+        pixels = _chessboard_corners(self.board, grey)
+        return None if pixels is None else (np.arange(len(pixels), dtype=np.int64), pixels)
+
+
+def sharpness(picture: Bytes, sighting: Sighting) -> float:
+    """How sharp the board is: the mean gradient over its standard deviation of grey levels, inside its bounds."""
+    low = np.maximum(np.floor(sighting.pixels.min(axis=0)).astype(int) - 2, 0)
+    high = np.ceil(sighting.pixels.max(axis=0)).astype(int) + 3
+    part = picture[low[1] : high[1], low[0] : high[0]]
+    grey = (part.mean(axis=2) if part.ndim == 3 else part).astype(np.float32)
+    steps = np.hypot(cv2.Sobel(grey, cv2.CV_32F, 1, 0), cv2.Sobel(grey, cv2.CV_32F, 0, 1))
+    return float(np.percentile(steps, 95) / max(float(grey.std()), 1.0))
+
+
+def _charuco_detector(board: Board) -> cv2.aruco.CharucoDetector:
+    detection = cv2.aruco.DetectorParameters()
+    detection.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+    return cv2.aruco.CharucoDetector(
+        board.opencv_board(), cv2.aruco.CharucoParameters(), detection, cv2.aruco.RefineParameters()
+    )
+
+
+def _charuco_corners(
+    detector: cv2.aruco.CharucoDetector, grey: NDArray
+) -> tuple[NDArray[np.int64], Array] | None:
+    corners, ids, _, _ = detector.detectBoard(grey)
+    if ids is None or len(ids) < FEWEST_CORNERS:
+        return None
+    order = np.argsort(np.ravel(ids))
+    numbers = np.ravel(ids)[order].astype(np.int64)
+    return numbers, np.asarray(corners, dtype=np.float64).reshape(-1, 2)[order]
+
+
+def _chessboard_corners(board: Board, grey: NDArray) -> Array | None:
+    """(K, 2) all corners row by row in the board's order, None if not all are seen."""
+    across, down = board.corners
+    flags = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE
+    seen, corners = cv2.findChessboardCornersSB(grey, (across, down), flags=flags)
+    if not seen:
+        return None
+    grid = np.asarray(corners, dtype=np.float64).reshape(down, across, 2)
+    return _in_order(board, grid, grey).reshape(-1, 2)
+
+
+def _in_order(board: Board, grid: Array, grey: NDArray) -> Array:
+    """(rows, columns, 2) corners, not mirrored, beginning where the board begins."""
+    along, downwards = grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]
+    if along[0] * downwards[1] - along[1] * downwards[0] < 0.0:
+        grid = grid[:, ::-1]
+    turned = grid[::-1, ::-1]
+    if board.turn_symmetric:
+        return grid if grid[0, 0].sum() <= turned[0, 0].sum() else turned
+    return grid if _outer_level(grid, grey) <= _outer_level(turned, grey) else turned
+
+
+def _outer_level(grid: Array, grey: NDArray) -> float:
+    """Grey level of the squares diagonally before the first corner and inside of it; both have one colour."""
+    inner = grid[:2, :2].mean(axis=(0, 1))
+    outer = 2.0 * grid[0, 0] - inner
+    places = np.array([inner, outer], np.float32).reshape(1, 2, 2)
+    levels = cv2.remap(
+        grey, places[..., 0], places[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
+    return float(np.mean(levels))
