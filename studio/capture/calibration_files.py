@@ -1,35 +1,50 @@
 """Calibrations as files: which ones a folder holds, reading any of them, writing the canonical one.
 
 Everything is converted to mm. Where a format does not name its unit, the distance between cameras
-tells: rigs are metres wide, so a number above 50 means mm. Names, rotations and shapes are checked; see
-`sanity.py`.
+tells: rigs are metres wide, so a number above 50 means mm. Names, rotations, lenses and shapes are checked; see
+`sanity.py` and `calibration_parts.py`. Formats to write for other tools: `CALIBRATION_WRITERS`.
 """
 
 import dataclasses
-import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import cv2
 import numpy as np
 
-from studio.capture.calibration_toml import (
-    AssumedCrop,
-    is_canonical,
-    looks_like_calibration,
-    read_toml,
-    write_toml,
+from studio.capture.calibration_bouguet import BOUGUET_SUFFIX, bouguet_files, read_bouguet
+from studio.capture.calibration_easymocap import (
+    EXTRINSICS,
+    INTRINSICS,
+    is_easymocap,
+    read_easymocap,
 )
+from studio.capture.calibration_opencv import opencv_files, read_opencv
+from studio.capture.calibration_parts import AssumedCrop, FoundCameras, Intrinsics
+from studio.capture.calibration_qualisys import is_qualisys, read_qualisys
+from studio.capture.calibration_storage import STORAGE_SUFFIXES
+from studio.capture.calibration_toml import is_canonical, looks_like_calibration, read_toml, write_toml
+from studio.capture.calibration_writers import CALIBRATION_WRITERS, CalibrationWriter, WrittenCalibration
 from studio.capture.naming import listed, natural_key
-from studio.capture.sanity import check_rotation, quarter_turns
+from studio.capture.sanity import quarter_turns
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
 
-BOUGUET_SUFFIX = ".cal"
-BOUGUET_NUMBERS = 25
-BOUGUET_SIZE = (640, 480)
+__all__ = [
+    "CALIBRATION_WRITERS",
+    "AssumedCrop",
+    "Calibration",
+    "CalibrationWriter",
+    "Intrinsics",
+    "WrittenCalibration",
+    "export_calibration",
+    "find_calibrations",
+    "read_calibration",
+    "read_intrinsics",
+    "write_calibration",
+]
+
 MM_FROM = 50.0
-ROTATIONS_AGREE = 1e-3
+PICKLES = frozenset((".pickle", ".pkl"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,7 +53,7 @@ class Calibration:
 
     label : the file's (or folder's) name. unit_note : the unit found and how, a sentence. sources : the
     files, to be kept byte for byte. sizes_known : False where the format has no picture size and
-    640x480 stands in for it.
+    a stand-in takes its place.
     crops : assumptions that an earlier import stored. notes : what was left out.
     """
 
@@ -57,10 +72,11 @@ class Calibration:
 
 
 def find_calibrations(folder: Path) -> tuple[Path, ...]:
-    """Everything in a folder that can be read as a calibration: TOML files, and the folder itself for its
-    .cal files.
+    """Everything in a folder that can be read as a calibration: files, or the folder itself for several that belong
+    together.
 
-        A session's own `cameras.toml` stands for the originals that lie beside it.
+    A session's own `cameras.toml` stands for the originals that lie beside it, and any TOML for the files of other
+    formats, which it is usually made from.
     """
     if not folder.is_dir():
         return ()
@@ -72,34 +88,43 @@ def find_calibrations(folder: Path) -> tuple[Path, ...]:
     ]
     if any(folder.glob(f"*{BOUGUET_SUFFIX}")):
         found.append(folder)
+    if not found:
+        found = _of_other_tools(folder)
     return tuple(sorted(found, key=lambda path: natural_key(path.name)))
 
 
 def read_calibration(path: Path) -> Calibration:
-    """The cameras of a TOML file, of one .cal file, or of a folder of .cal files.
+    """The cameras of a file of any format that is known, or of a folder of files that belong together.
 
-    Raises CalibrationError naming file, camera and entry: wrong shapes, numbers that are not finite, a
-    rotation that is none, a fisheye camera, a name given twice.
+    Raises CalibrationError naming file, camera and entry: wrong shapes, numbers that are not finite or no camera's,
+    a rotation that is none, a fisheye camera, a name given twice.
     """
-    if path.is_dir():
-        files = tuple(sorted(path.glob(f"*{BOUGUET_SUFFIX}"), key=lambda file: natural_key(file.name)))
-        if not files:
-            raise CalibrationError(f"Folder '{path.name}' holds no .cal files.", "Name a calibration file.")
-        cameras = tuple(_read_bouguet(file) for file in files)
-        return _finished(Calibration(path.name, cameras, "", files, sizes_known=False), "")
-    if not path.is_file():
-        raise CalibrationError(f"There is no calibration '{path}'.", "Check the path.")
-    if path.suffix.lower() == BOUGUET_SUFFIX:
-        return _finished(Calibration(path.name, (_read_bouguet(path),), "", (path,), sizes_known=False), "")
-    if path.suffix.lower() != ".toml":
+    found = _read(path)
+    if not found.cameras:
         raise CalibrationError(
-            f"'{path.name}' is no calibration format that can be read.",
-            "Give a Pose2Sim, aniposelib, FreeMoCap or Caliscope TOML, or Bouguet .cal files.",
+            f"'{path.name}' places no camera in the world.", "Calibrate the extrinsics and export again."
         )
-    read = read_toml(path)
-    notes = tuple(f"Camera {name} has no place in the world and is left out." for name in read.unposed)
-    calibration = Calibration(path.name, read.cameras, "", (path,), crops=read.crops, notes=notes)
-    return _finished(calibration, read.unit, turned=is_canonical(path))
+    notes = tuple(f"Camera {lens.name} has no place in the world and is left out." for lens in found.unposed)
+    calibration = Calibration(
+        path.name, found.cameras, "", found.sources, found.sizes_known, found.crops, (*found.notes, *notes)
+    )
+    return _finished(calibration, found.unit, turned=is_canonical(path))
+
+
+def read_intrinsics(path: Path) -> tuple[Intrinsics, ...]:
+    """The lenses of a calibration in natural order of their names, whether or not it places the cameras.
+
+    Raises CalibrationError as `read_calibration` does.
+    """
+    found = _read(path)
+    posed = [
+        Intrinsics(camera.name, camera.width, camera.height, camera.matrix, camera.distortion)
+        for camera in found.cameras
+    ]
+    lenses = sorted([*posed, *found.unposed], key=lambda lens: natural_key(lens.name))
+    if not lenses:
+        raise CalibrationError(f"'{path.name}' holds no camera.", "Export the calibration again.")
+    return tuple(lenses)
 
 
 def write_calibration(
@@ -107,6 +132,67 @@ def write_calibration(
 ) -> None:
     """Write the canonical TOML: mm, sizes, quarter turns for display, and the crops that were assumed."""
     write_toml(cameras, path, crops)
+
+
+def export_calibration(cameras: tuple[Camera, ...], path: Path, writer: str) -> WrittenCalibration:
+    """Write cameras for another tool. writer : a name of `CALIBRATION_WRITERS`. Raises CalibrationError."""
+    if writer not in CALIBRATION_WRITERS:
+        raise CalibrationError(
+            f"There is no calibration format '{writer}' to write.", f"Known: {listed(CALIBRATION_WRITERS)}."
+        )
+    return CALIBRATION_WRITERS[writer].write(cameras, path)
+
+
+def _of_other_tools(folder: Path) -> list[Path]:
+    """Qualisys files, EasyMocap's pair, OpenCV files (all of them together are one calibration)."""
+    found = [path for path in folder.iterdir() if path.is_file() and is_qualisys(path)]
+    if is_easymocap(folder):
+        return [*found, folder / INTRINSICS]
+    opened = opencv_files(folder)
+    return [*found, *((folder,) if len(opened) > 1 else opened)]
+
+
+def _read(path: Path) -> FoundCameras:
+    """What a file or folder holds, by the reader of its format."""
+    if path.is_dir():
+        return _read_folder(path)
+    if not path.is_file():
+        raise CalibrationError(f"There is no calibration '{path}'.", "Check the path.")
+    suffix = path.suffix.lower()
+    if suffix == BOUGUET_SUFFIX:
+        return read_bouguet(path)
+    if is_qualisys(path):
+        return read_qualisys(path)
+    if path.name.lower() in (INTRINSICS, EXTRINSICS):
+        return read_easymocap(path)
+    if suffix in STORAGE_SUFFIXES:
+        return read_opencv(path)
+    if suffix in PICKLES:
+        raise CalibrationError(
+            f"'{path.name}' is a Python pickle, which can run any program when it is opened; it is not read.",
+            "Convert it where you trust it (Pose2Sim converts OpenCap's), and give the TOML.",
+        )
+    if suffix != ".toml":
+        raise CalibrationError(
+            f"'{path.name}' is no calibration format that can be read.",
+            "Give a Pose2Sim, aniposelib, FreeMoCap or Caliscope TOML, EasyMocap's or OpenCV's YAML, a Qualisys"
+            " .qca.txt, or Bouguet .cal files.",
+        )
+    return read_toml(path)
+
+
+def _read_folder(folder: Path) -> FoundCameras:
+    """Files that are one calibration together."""
+    if bouguet_files(folder):
+        return read_bouguet(folder)
+    if is_easymocap(folder):
+        return read_easymocap(folder)
+    if opencv_files(folder):
+        return read_opencv(folder)
+    raise CalibrationError(
+        f"Folder '{folder.name}' holds no .cal files, no intri.yml with extri.yml and no OpenCV files.",
+        "Name a calibration file.",
+    )
 
 
 def _finished(read: Calibration, unit: str, turned: bool = False) -> Calibration:
@@ -138,29 +224,3 @@ def _unit(cameras: tuple[Camera, ...], named: str) -> tuple[float, str]:
         scale,
         f"The calibration is taken to be in {unit} (cameras are {distance:.4g} apart or from the origin).",
     )
-
-
-def _read_bouguet(path: Path) -> Camera:
-    """One camera of 25 numbers: fx fy cx cy skew, k1 k2 p1 p2 k3, R (rows), T, om; om repeats R as
-    Rodrigues."""
-    where = f"'{path.name}'"
-    try:
-        values = np.array([float(word) for word in path.read_text(encoding="utf-8").split()])
-    except (OSError, UnicodeDecodeError, ValueError) as problem:
-        raise CalibrationError(f"{where} is not a list of numbers ({problem}).", "Export it again.") from None
-    if len(values) != BOUGUET_NUMBERS or not np.all(np.isfinite(values)):
-        raise CalibrationError(
-            f"{where} holds {np.count_nonzero(np.isfinite(values))} finite numbers, not {BOUGUET_NUMBERS}.",
-            "A .cal file has fx fy cx cy skew, five distortions, nine of the rotation, T and om.",
-        )
-    fx, fy, cx, cy, skew = values[:5]
-    if fx <= 0.0 or fy <= 0.0:
-        raise CalibrationError(f"{where}: focal lengths {fx:g}, {fy:g}.", "They are positive pixels.")
-    rotation = check_rotation(values[10:19].reshape(3, 3), where)
-    repeated = np.asarray(cv2.Rodrigues(values[22:25].copy())[0])
-    if not math.isclose(float(np.abs(rotation - repeated).max()), 0.0, abs_tol=ROTATIONS_AGREE):
-        raise CalibrationError(
-            f"{where}: rotation matrix and rotation vector say different things.", "Export the file again."
-        )
-    matrix = np.array([[fx, skew * fx, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
-    return Camera(path.stem, *BOUGUET_SIZE, matrix, values[5:10], rotation, values[19:22])

@@ -7,7 +7,6 @@ distortion numbers they write, and in where the camera's name is. The canonical 
 """
 
 import tomllib
-from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
@@ -15,6 +14,7 @@ import numpy as np
 import tomli_w
 from numpy.typing import NDArray
 
+from studio.capture.calibration_parts import AssumedCrop, FoundCameras, Intrinsics, checked_intrinsics
 from studio.capture.sanity import check_rotation
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
@@ -22,56 +22,6 @@ from studio.geometry.camera import Camera
 Array = NDArray[np.float64]
 
 CANONICAL = "capture-studio"
-DISTORTION_NUMBERS = (4, 5)
-
-
-@dataclass(frozen=True, slots=True)
-class AssumedCrop:
-    """How footage is taken to have been made from the calibrated picture.
-
-    calibrated : (width, height) that the calibration was made for. scale : what the whole picture was scaled
-    by first. left, top, right, bottom : pixels then cut off, negative where black bars were added.
-    """
-
-    left: float
-    top: float
-    right: float
-    bottom: float
-    calibrated: tuple[int, int]
-    scale: float = 1.0
-
-    def words(self, camera: str) -> str:
-        """The assumption as a sentence."""
-        sides = {"left": self.left, "right": self.right, "top": self.top, "bottom": self.bottom}
-        cut = [f"{pixels:g} px at the {side}" for side, pixels in sides.items() if pixels > 0.0]
-        added = [f"{-pixels:.3g} px at the {side}" for side, pixels in sides.items() if pixels < 0.0]
-        what = [
-            *([f"a centred crop cut off {' and '.join(cut)}"] if cut else []),
-            *([f"{' and '.join(added)} were added around it"] if added else []),
-        ]
-        size = f"{self.calibrated[0]}x{self.calibrated[1]}"
-        if self.scale != 1.0:
-            return (
-                f"Camera {camera}: assumed crop: none (0 px), as the footage has black bars: the whole {size}"
-                f" picture was scaled by {self.scale:.4f} and {'; '.join(what)}."
-            )
-        return (
-            f"Camera {camera}: assumed crop: of the calibrated {size} picture {'; '.join(what)};"
-            f" the principal point is moved by ({0.0 - self.left:g}, {0.0 - self.top:g}) px."
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class TomlCalibration:
-    """Cameras with translations in the file's own unit. unit : "mm" if the file says so, else "".
-
-    unposed : cameras left out because the file gives them no place in the world.
-    """
-
-    cameras: tuple[Camera, ...]
-    unit: str
-    crops: dict[str, AssumedCrop]
-    unposed: tuple[str, ...]
 
 
 def looks_like_calibration(path: Path) -> bool:
@@ -84,32 +34,32 @@ def looks_like_calibration(path: Path) -> bool:
     return bool(_camera_tables(document))
 
 
-def read_toml(path: Path) -> TomlCalibration:
+def read_toml(path: Path) -> FoundCameras:
     """The cameras of a TOML calibration. Raises CalibrationError naming file, camera and entry."""
     try:
         document = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as problem:
         raise CalibrationError(f"'{path.name}' is not TOML: {problem}.", "Export it again.") from None
-    tables = _camera_tables(document)
     metadata = document.get("metadata")
     metadata = metadata if isinstance(metadata, dict) else {}
     cameras: list[Camera] = []
     crops: dict[str, AssumedCrop] = {}
-    unposed: list[str] = []
-    for section, table in tables.items():
+    unposed: list[Intrinsics] = []
+    for section, table in _camera_tables(document).items():
         name = _name(section, table)
+        where = f"'{path.name}', camera {name}"
+        lens = _lens(where, name, table)
         if table.get("rotation") is None or table.get("translation") is None:
-            unposed.append(name)
+            unposed.append(lens)
             continue
-        cameras.append(_camera(f"'{path.name}', camera {name}", name, table))
+        turns = int(_numbers(where, table, "quarter_turns", ())) % 4 if "quarter_turns" in table else 0
+        cameras.append(
+            lens.placed(_rotation(where, table), _numbers(where, table, "translation", (3,)), turns)
+        )
         crop = table.get("assumed_crop")
         if isinstance(crop, dict):
-            crops[name] = _crop(f"'{path.name}', camera {name}", crop)
-    if not cameras:
-        raise CalibrationError(
-            f"'{path.name}' places no camera in the world.", "Calibrate the extrinsics and export again."
-        )
-    return TomlCalibration(tuple(cameras), _unit(metadata), crops, tuple(unposed))
+            crops[name] = _crop(where, crop)
+    return FoundCameras(tuple(cameras), _unit(metadata), (path,), tuple(unposed), crops=crops)
 
 
 def write_toml(cameras: tuple[Camera, ...], path: Path, crops: dict[str, AssumedCrop] | None = None) -> None:
@@ -165,44 +115,21 @@ def _name(section: str, table: dict[str, object]) -> str:
     return f"cam_{number}" if isinstance(number, int) else section
 
 
-def _camera(where: str, name: str, table: dict[str, object]) -> Camera:
-    """One camera from its table."""
+def _lens(where: str, name: str, table: dict[str, object]) -> Intrinsics:
+    """A camera's lens from its table."""
     if table.get("fisheye") is True:
         raise CalibrationError(
             f"{where} is a fisheye camera, whose distortion the pinhole model cannot describe.",
             "Calibrate it with the pinhole model, or undistort its footage first.",
         )
     size = _numbers(where, table, "size" if "size" in table else "image_size", (2,))
-    if np.any(size < 1) or np.any(size != np.round(size)):
-        raise CalibrationError(f"{where}: size {size.tolist()} is no picture size.", "Give [width, height].")
-    matrix = _numbers(where, table, "matrix", (3, 3))
-    if matrix[0, 0] <= 0 or matrix[1, 1] <= 0 or matrix[1, 0] != 0 or matrix[2].tolist() != [0.0, 0.0, 1.0]:
-        raise CalibrationError(
-            f"{where}: matrix is no intrinsic matrix.", "It is [[fx, s, cx], [0, fy, cy], [0, 0, 1]]."
-        )
-    return Camera(
+    return checked_intrinsics(
+        where,
         name,
-        int(size[0]),
-        int(size[1]),
-        matrix,
-        _distortion(where, table),
-        _rotation(where, table),
-        _numbers(where, table, "translation", (3,)),
-        int(_numbers(where, table, "quarter_turns", ())) % 4 if "quarter_turns" in table else 0,
+        (float(size[0]), float(size[1])),
+        _numbers(where, table, "matrix", (3, 3)),
+        _numbers(where, table, "distortions", None),
     )
-
-
-def _distortion(where: str, table: dict[str, object]) -> Array:
-    """(5,) k1 k2 p1 p2 k3; four numbers mean k3 = 0, further ones must be zero."""
-    values = np.atleast_1d(_numbers(where, table, "distortions", None))
-    if values.ndim == 2 and 1 in values.shape:
-        values = values.ravel()
-    if values.ndim != 1 or len(values) < DISTORTION_NUMBERS[0] or np.any(values[5:] != 0.0):
-        raise CalibrationError(
-            f"{where}: distortions has {values.size} numbers, the model has k1, k2, p1, p2 and k3.",
-            "Calibrate with four or five distortion coefficients.",
-        )
-    return np.concatenate([values[:5], np.zeros(max(0, 5 - len(values)))])
 
 
 def _rotation(where: str, table: dict[str, object]) -> Array:

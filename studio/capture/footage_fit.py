@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.capture.calibration_toml import AssumedCrop
+from studio.capture.calibration_parts import AssumedCrop
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
 

@@ -10,7 +10,7 @@ import tomli_w
 from toy_footage import rig
 
 from studio.capture.calibration_files import find_calibrations, read_calibration, write_calibration
-from studio.capture.calibration_toml import AssumedCrop
+from studio.capture.calibration_parts import AssumedCrop
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
 
@@ -71,8 +71,8 @@ def test_cameras_are_in_natural_order(tmp_path: Path) -> None:
 
 
 def test_four_distortions_mean_no_k3(tmp_path: Path) -> None:
-    path = write(tmp_path / "c.toml", {"c": table(CAMERAS[0], distortions=[0.1, 0.2, 0.3, 0.4])})
-    np.testing.assert_array_equal(read_calibration(path).cameras[0].distortion, [0.1, 0.2, 0.3, 0.4, 0.0])
+    path = write(tmp_path / "c.toml", {"c": table(CAMERAS[0], distortions=[0.1, 0.2, 0.003, 0.004])})
+    np.testing.assert_array_equal(read_calibration(path).cameras[0].distortion, [0.1, 0.2, 0.003, 0.004, 0.0])
 
 
 def test_caliscope_matrix_rotation_and_unposed_cameras(tmp_path: Path) -> None:
@@ -179,8 +179,10 @@ def test_a_name_given_twice_is_refused(tmp_path: Path) -> None:
 def test_what_a_folder_holds(tmp_path: Path) -> None:
     assert find_calibrations(tmp_path / "none") == ()
     write(tmp_path / "Config.toml", {"project": {"fps": 60}})
-    (tmp_path / "Calib.qca.txt").write_text("<xml/>")
+    (tmp_path / "Calib.txt").write_text("<xml/>")
     assert find_calibrations(tmp_path) == ()
+    (tmp_path / "Calib.qca.txt").write_text("<xml/>")
+    assert find_calibrations(tmp_path) == (tmp_path / "Calib.qca.txt",)
     first = write(tmp_path / "Calib_a.toml", {"c": table(CAMERAS[0])})
     assert find_calibrations(tmp_path) == (first,)
     write_cal(tmp_path / "cam1.cal", CAMERAS[0])
@@ -194,7 +196,7 @@ def test_a_file_that_is_no_toml_or_unknown(tmp_path: Path) -> None:
     with pytest.raises(CalibrationError, match="is not TOML"):
         read_calibration(tmp_path / "calibration.toml")
     (tmp_path / "c.pickle").write_bytes(b"\x80\x04")
-    with pytest.raises(CalibrationError, match="no calibration format"):
+    with pytest.raises(CalibrationError, match="is a Python pickle"):
         read_calibration(tmp_path / "c.pickle")
     with pytest.raises(CalibrationError, match="There is no calibration"):
         read_calibration(tmp_path / "gone.toml")

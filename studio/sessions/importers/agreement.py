@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from studio.capture.calibration_files import Calibration
-from studio.capture.calibration_toml import AssumedCrop
+from studio.capture.calibration_parts import AssumedCrop
 from studio.capture.naming import listed
 from studio.capture.pictures import PicturesMeasure
 from studio.capture.video import VideoMeasure
