@@ -23,6 +23,7 @@ from studio.runs.problem_source import ProblemSource
 from studio.scene.moment import Moment
 from studio.scene.opened_run import OpenedRun
 from studio.settings import RunSettings, default_settings
+from studio.volume.alignment import root_parameters
 from studio.volume.blob_model import BlobMixture, BlobModel
 from studio.volume.hull import Hull
 from studio.weighting.blobs import BlobProblem, blob_mixture
@@ -32,8 +33,8 @@ Array = NDArray[float64]
 BLOBS = "blobs"
 FEWEST_VIEWS = 2
 KEPT = 6
-LEAST_PAUSE_SECONDS = 0.05
-"""Between two frames; a frame that took longer is followed by as long a pause: half a core at most."""
+LEAST_PAUSE_SECONDS, LONGEST_PAUSE_SECONDS = 0.05, 0.5
+"""Between two frames: as long as the last one took, so that at most half a core goes into it."""
 NICENESS = 10
 
 
@@ -134,9 +135,9 @@ class FrameVolumes:
         began = time.monotonic()
         made: FrameVolume | None = None
         try:
-            if len(self._cameras) < FEWEST_VIEWS:
+            if len(self._cameras) < FEWEST_VIEWS and len(root_parameters(self._body)):
                 raise StudioError(
-                    "One camera makes no visual hull.",
+                    "One camera makes no visual hull of a body that moves about.",
                     "Hulls are shown of sessions with two cameras or more.",
                 )
             problems = problems or ProblemSource(self._session, self._body, self._cameras)
@@ -148,7 +149,8 @@ class FrameVolumes:
             while len(self._kept) > KEPT:
                 self._kept.popitem(last=False)
         self._ready()
-        self._stopping.wait(max(LEAST_PAUSE_SECONDS, time.monotonic() - began))
+        took = time.monotonic() - began
+        self._stopping.wait(min(LONGEST_PAUSE_SECONDS, max(LEAST_PAUSE_SECONDS, took)))
         return problems
 
     def _complain(self, problem: StudioError) -> None:

@@ -23,7 +23,10 @@ Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 
 BLOB_REACH = 2.0
+SOLID = 0.75
+"""Opacity of fitted blobs: those of the pose lie within them."""
 BALL_FINENESS, CAGE_FINENESS = 2, 1
+SMOOTH, FLAT, CAGE = "smooth", "flat", "cage"
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 
@@ -32,12 +35,12 @@ class VolumeView:
 
     def __init__(self, server: viser.ViserServer, body: BodyModel) -> None:
         self._server, self._body = server, body
-        self.voxels = _Instances(server, "/hull", trimesh.creation.box((1.0, 1.0, 1.0)))
+        self.voxels = _Instances(server, "/hull", trimesh.creation.box((1.0, 1.0, 1.0)), look=FLAT)
         self.fitted = _Instances(
             server, "/blobs/fitted", trimesh.creation.icosphere(subdivisions=BALL_FINENESS)
         )
         self.own = _Instances(
-            server, "/blobs/own", trimesh.creation.icosphere(subdivisions=CAGE_FINENESS), cage=True
+            server, "/blobs/own", trimesh.creation.icosphere(subdivisions=CAGE_FINENESS), look=CAGE
         )
         self._drawn: dict[str, tuple[object, ...]] = {}
 
@@ -106,6 +109,15 @@ def blob_instances(mixture: BlobMixture, unknown: tuple[int, int, int]) -> tuple
     return mixture.means * METRES_PER_MM, turns, reach, _rgb(mixture.colours, unknown)
 
 
+def as_light(colours: Bytes) -> Bytes:
+    """Bytes of a screen's colours as bytes of linear light (IEC 61966-2-1): viser's viewer takes those of instances for
+    light and shows dark cloth pale otherwise. Those of other meshes it converts itself.
+    """
+    share = colours / 255.0
+    light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    return np.round(255.0 * light).astype(np.uint8)
+
+
 def _rgb(levels: NDArray[np.floating], unknown: tuple[int, ...]) -> Bytes:
     """Blue, green, red levels as bytes red, green, blue; rows with NaN take the other colour."""
     known = np.isfinite(levels).all(axis=1, keepdims=True)
@@ -122,9 +134,9 @@ class _Instances:
     """
 
     def __init__(
-        self, server: viser.ViserServer, name: str, mesh: trimesh.Trimesh, *, cage: bool = False
+        self, server: viser.ViserServer, name: str, mesh: trimesh.Trimesh, *, look: str = SMOOTH
     ) -> None:
-        self._server, self._name, self._mesh, self._cage = server, name, mesh, cage
+        self._server, self._name, self._mesh, self._look = server, name, mesh, look
         self.handle: viser.BatchedMeshHandle | None = None
 
     def draw(self, positions: Array, turns: Array, scales: Array, colours: Bytes) -> None:
@@ -134,7 +146,7 @@ class _Instances:
             handle.batched_positions = positions.astype(np.float32)
             handle.batched_wxyzs = turns.astype(np.float32)
             handle.batched_scales = scales.astype(np.float32)
-            handle.batched_colors = colours
+            handle.batched_colors = as_light(colours)
             return
         if handle is not None:
             handle.remove()
@@ -152,11 +164,11 @@ class _Instances:
             batched_wxyzs=turns.astype(np.float32),
             batched_positions=positions.astype(np.float32),
             batched_scales=scales.astype(np.float32),
-            batched_colors=colours,
+            batched_colors=as_light(colours),
             lod="off",
-            wireframe=self._cage,
-            opacity=None,
-            flat_shading=False,
+            wireframe=self._look == CAGE,
+            opacity=SOLID if self._look == SMOOTH else None,
+            flat_shading=self._look == FLAT,
             cast_shadow=False,
             receive_shadow=False,
         )
