@@ -1,9 +1,9 @@
 """Qualisys Track Manager's `.qca.txt`: XML with mm and 1/64 px, cameras by their serial.
 
-`transform` holds the camera in the world: its place x y z and a rotation, r11 r21 r31 being one *row* of the matrix
-(the file counts by column), whose axes are those of a camera that looks along -z; half a turn about x makes them
-OpenCV's. Distortion coefficients are OpenCV's as they stand; they are *not* in 64ths (the TOML that Pose2Sim makes of
-such a file divides them). `viewrotation` says how the picture is turned for people; pixels are the sensor's.
+`transform` holds the camera in the world: its place x y z and its axes, r11 r12 r13 being the first one (the matrix
+from camera to world, column after column). These are the axes of a camera that looks along -z; half a turn about x
+makes them OpenCV's. Distortion coefficients are OpenCV's as they stand; they are *not* in 64ths (the TOML that Pose2Sim
+makes of such a file divides them). `viewrotation` says how the picture is turned for people; pixels are the sensor's.
 """
 
 import xml.parsers.expat
@@ -95,12 +95,9 @@ def _camera(where: str, name: str, entry: Element) -> Camera:
     transform = entry.find("transform")
     if transform is None:
         raise CalibrationError(f"{where} has no 'transform'.", "Calibrate in QTM and export it again.")
-    world_from_view = _numbers(
-        where, transform, *(f"r{row}{column}" for column in (1, 2, 3) for row in (1, 2, 3))
-    )
+    axes = _numbers(where, transform, *(f"r{axis}{part}" for axis in (1, 2, 3) for part in (1, 2, 3)))
     centre = _numbers(where, transform, "x", "y", "z")
-    turned = check_rotation(world_from_view.reshape(3, 3), where)
-    rotation = HALF_TURN_ABOUT_X @ turned.T
+    rotation = HALF_TURN_ABOUT_X @ check_rotation(axes.reshape(3, 3), where)
     return _lens(where, name, entry).placed(rotation, -rotation @ centre)
 
 
