@@ -19,6 +19,7 @@ from studio.body.subject import Subject
 from studio.errors import BodyError, RunError, StudioError
 from studio.runs.behaviour_models import chosen_model
 from studio.runs.initialising import InitialPose, Progress, initialise
+from studio.runs.live_request import check_live, live_changes
 from studio.runs.search_space import parameter_names, session_sigma
 from studio.sessions.manifest import now
 from studio.sessions.run_record import RunRecord
@@ -39,7 +40,8 @@ class RunRequest:
     start_pose : (D,) radians and mm, instead of the session's; start_source : where it came from, in words.
     first, last : frames, half open; last None means all. changes : knobs by flat name. name : "" for run-1,
     run-2, … behaviour : a behaviour model, by its name in the workspace's models or by path; "" for the only one that
-    fits where the settings need one.
+    fits where the settings need one. live : frames come on the footage's clock and are dropped where they come too
+    fast (`live_run`). to_and_fro : a live run goes forth and back through the footage; `last` may lie behind its end.
     """
 
     tracker: str = ""
@@ -54,6 +56,8 @@ class RunRequest:
     changes: Mapping[str, object] = field(default_factory=dict)
     name: str = ""
     behaviour: str = ""
+    live: bool = False
+    to_and_fro: bool = False
 
 
 def prepare_run(
@@ -67,8 +71,10 @@ def prepare_run(
     asked = request or RunRequest()
     tracker = asked.tracker or session.manifest.tracker or DEFAULT_TRACKER
     weighting = asked.weighting or session.manifest.weighting or usual_weighting(tracker)
-    settings = changed_settings(default_settings(tracker, weighting), asked.changes)
-    first, last = checked_frames(session, asked.first, asked.last)
+    changes = live_changes(asked.changes) if asked.live else asked.changes
+    settings = changed_settings(default_settings(tracker, weighting), changes)
+    check_live(settings, live=asked.live, to_and_fro=asked.to_and_fro)
+    first, last = checked_frames(session, asked.first, asked.last, endless=asked.to_and_fro)
     if not 0 <= asked.seed < 2**63:
         raise RunError(f"The seed {asked.seed} cannot be used.", "Give a whole number of 0 or more.")
     body, notes = session.body_with_notes(asked.body or None, asked.subject)
@@ -101,16 +107,22 @@ def prepare_run(
         software=software_version(),
         notes=tuple(notes),
         behaviour=behaviour.name if behaviour else "",
+        live=asked.live,
+        to_and_fro=asked.to_and_fro,
     )
     text = _body_text(session, asked.body or body.name)
     return session.new_run(record, text, behaviour.path if behaviour else None)
 
 
-def checked_frames(session: Session, first: int, last: int | None) -> tuple[int, int]:
-    """The frames of a run, half open. Raises RunError if any lies outside the footage, or there are none."""
+def checked_frames(
+    session: Session, first: int, last: int | None, *, endless: bool = False
+) -> tuple[int, int]:
+    """The frames of a run, half open. endless : the last may lie behind the footage's end. Raises RunError if any lies
+    outside the footage, or there are none.
+    """
     count = session.manifest.frame_count
     end = count if last is None else last
-    if not 0 <= first < end <= count:
+    if not 0 <= first < (min(end, count) if endless else end) <= count:
         raise RunError(
             f"Frames {first}:{end} do not lie in the footage of '{session.name}'.",
             f"It has frames 0:{count} (the last one not included).",

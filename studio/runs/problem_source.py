@@ -12,6 +12,7 @@ from concurrent.futures import CancelledError, Executor, Future
 from typing import Any, TypeVar
 
 from studio.body.model import BodyModel
+from studio.capture.footage import Footage
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
@@ -33,7 +34,7 @@ class ProblemSource:
 
     cameras : the run's snapshot, by default the session's. executor : makes the next frame ready; None:
     nobody does. views : another executor, which shares out a frame's cameras. last : the frame after the last
-    one that is worth making ready.
+    one that is worth making ready. footage : to be closed with this, by default the session's.
     """
 
     def __init__(
@@ -45,10 +46,11 @@ class ProblemSource:
         last: int | None = None,
         executor: Executor | None = None,
         views: Executor | None = None,
+        footage: Footage | None = None,
     ) -> None:
         self.body = body
         self.cameras = cameras or session.cameras()
-        self.footage = session.footage()
+        self.footage = footage or session.footage()
         self._last = self.footage.frame_count if last is None else last
         self._backgrounds = Backgrounds(self.footage)
         self._executor = executor
@@ -61,7 +63,7 @@ class ProblemSource:
 
     def problem(self, frame: int, settings: RunSettings) -> FrameProblem:
         """The frame as a function of poses. Raises FootageError, NotFoundError."""
-        self._await(_problem_key(frame, settings))
+        self._await(problem_key(frame, settings))
         problem = self._problem(frame, settings)
         if self._executor is not None and frame + 1 < self._last:
             self._prepare(frame + 1, settings, self._executor)
@@ -70,7 +72,7 @@ class ProblemSource:
     def evidence(self, frame: int, settings: RunSettings) -> FrameEvidence:
         """What is seen in the frame, as the settings' weighting wants it. Raises FootageError,
         NotFoundError."""
-        key = _evidence_key(frame, settings)
+        key = evidence_key(frame, settings)
         with self._making:
             found = _kept(self._evidence, key)
             if found is None:
@@ -98,7 +100,7 @@ class ProblemSource:
             self.footage.close()
 
     def _problem(self, frame: int, settings: RunSettings) -> FrameProblem:
-        key = _problem_key(frame, settings)
+        key = problem_key(frame, settings)
         with self._making:
             found = _kept(self._problems, key)
         if found is not None:
@@ -118,7 +120,7 @@ class ProblemSource:
         return found
 
     def _prepare(self, frame: int, settings: RunSettings, executor: Executor) -> None:
-        key = _problem_key(frame, settings)
+        key = problem_key(frame, settings)
         if key in self._problems or (self._coming is not None and self._coming[0] == key):
             return
         if self._coming is not None and not self._coming[1].done():
@@ -137,11 +139,13 @@ class ProblemSource:
                 return
 
 
-def _evidence_key(frame: int, settings: RunSettings) -> Hashable:
+def evidence_key(frame: int, settings: RunSettings) -> Hashable:
+    """What a frame's evidence depends on."""
     return (frame, settings.evidence, WEIGHTINGS[settings.weighting_name].edge_kind)
 
 
-def _problem_key(frame: int, settings: RunSettings) -> Hashable:
+def problem_key(frame: int, settings: RunSettings) -> Hashable:
+    """What a frame as a function of poses depends on."""
     return (frame, settings.evidence, settings.weighting_name, settings.weighting)
 
 

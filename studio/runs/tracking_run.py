@@ -16,6 +16,7 @@ from typing import Protocol
 import numpy as np
 
 from studio.errors import NotFoundError, RunError
+from studio.runs.frame_steps import HandedOn, space_over
 from studio.runs.pace import Pace, Progress
 from studio.runs.run_behaviour import RunBehaviour
 from studio.runs.run_watch import RunWatch
@@ -25,7 +26,7 @@ from studio.sessions.stored_run import StoredRun
 from studio.settings import RunSettings, SettingsEntry, SettingsHistory, settings_from_values, values
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.frame_loop import FrameSearch, SearchState, held_over
-from studio.tracking.tracker import Carried, FrameProblem, FrameResult, LayerRecord, start_of
+from studio.tracking.tracker import Carried, FrameProblem, FrameResult, LayerRecord
 
 # The newest settings and their version; asked before each layer.
 SettingsSource = Callable[[], tuple[int, RunSettings]]
@@ -90,7 +91,7 @@ class TrackingRun:
         frames = self._reader.frames()
         self.next_frame = frames[-1] + 1 if frames else self.record.first
         self.done = len(frames)
-        self._carried: tuple[int, Carried] | None = None
+        self._handed = HandedOn(self._reader, self.record, frames)
         self._search: FrameSearch | None = None
         self._layers: list[LayerRecord] = []
         self._spent: list[float] = []
@@ -144,7 +145,7 @@ class TrackingRun:
         self._layers.append(record)
         result = self.result_of(search, settings) if search.finished else None
         if result is not None:
-            self._writer.write_frame(result, self._layers, settings.recording.record_particles)
+            self._store(result, settings)
             self._next(result)
         self._spent.append(time.perf_counter() - began)
         if result is not None:
@@ -158,8 +159,11 @@ class TrackingRun:
         carried, sought = self.carried_into(search.frame), self._watch.is_sought(search.frame)
         return self._watch.judged(found, carried, search.problem, sought)
 
+    def _store(self, result: FrameResult, settings: RunSettings) -> None:
+        self._writer.write_frame(result, self._layers, settings.recording.record_particles)
+
     def _next(self, result: FrameResult) -> None:
-        self._carried = (result.frame, result.carried)
+        self._handed.stored(result)
         self._watch.stored(result)
         self._search, self._layers, self._saved = None, [], True
         self.next_frame += 1
@@ -242,7 +246,7 @@ class TrackingRun:
     # ----------------------------------------------------------------- frames
 
     def _new_search(self, frame: int, state: SearchState | None = None) -> FrameSearch:
-        space = self._behaviour.space_in(frame)
+        space = space_over(self._behaviour.space_in(frame), self._handed.steps_to(frame))
         carried = self._behaviour.carried_into(frame, self.carried_into(frame))
         if state is None:
             carried, sought = self._watch.start(frame, carried, space)
@@ -250,7 +254,7 @@ class TrackingRun:
             # What it found is in the state already.
             carried = Carried(None, memory=carried.memory)
         repeats = 1
-        if frame == self.record.first or sought:
+        if self._handed.is_first(frame) or sought:
             repeats = self._settings_at(frame, 0)[1].tracker.start_repeats
         return FrameSearch(
             self.tracker,
@@ -263,12 +267,8 @@ class TrackingRun:
         )
 
     def carried_into(self, frame: int) -> Carried:
-        """What a frame starts from: the end of the frame before, in the run's first frame its start pose."""
-        if frame == self.record.first:
-            return start_of(self.record.start_pose)
-        if self._carried is None or self._carried[0] != frame - 1:
-            self._carried = (frame - 1, self._reader.result(frame - 1).carried)
-        return self._carried[1]
+        """What a frame starts from: the end of the frame tracked before, in the run's first frame its start pose."""
+        return self._handed.into(frame)
 
     def search_again(self, frame: int) -> FrameSearch:
         """A new search of a frame that can be searched: same start and random keys; nothing of it is stored.

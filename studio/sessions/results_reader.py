@@ -132,9 +132,14 @@ class ResultsReader:
 
     def _tracking(self) -> dict[int, tuple[str, float | None, int]]:
         """How each frame went; nothing in stores older than that table."""
-        if not self._query("SELECT name FROM sqlite_master WHERE type = 'table' AND name = 'tracking'"):
+        if not self._has_table("tracking"):
             return {}
         return {row[0]: row[1:] for row in self._query("SELECT frame, state, overlap, doubts FROM tracking")}
+
+    def _has_table(self, name: str) -> bool:
+        """Whether the store has a table; older ones have fewer."""
+        rows = self._query(f"SELECT name FROM sqlite_master WHERE type = 'table' AND name = '{name}'")
+        return bool(rows)
 
     def settings_history(self) -> list[SettingsEntry]:
         """Every version of the settings that was in use, oldest first."""
@@ -156,8 +161,23 @@ class ResultsReader:
         rows = self._query("SELECT COUNT(*) FROM frames")
         return rows[0][0] if rows else 0
 
+    def last_before(self, frame: int) -> int | None:
+        """The last finished frame before one; None where there is none."""
+        rows = self._query("SELECT MAX(frame) FROM frames WHERE frame < ?", (frame,))
+        return rows[0][0] if rows else None
+
+    def arrivals(self) -> tuple[NDArray[np.int64], Array]:
+        """Of a live run the finished frames (K,) that came on a clock, and when (K, 2) their pictures had come and
+        their poses were ready, seconds; nothing of other runs.
+        """
+        if not self._has_table("arrivals"):
+            return np.zeros(0, dtype=np.int64), np.zeros((0, 2))
+        rows = self._query("SELECT frame, arrived, ready FROM arrivals ORDER BY frame")
+        frames = np.array([row[0] for row in rows], dtype=np.int64)
+        return frames, np.array([row[1:] for row in rows], dtype=np.float64).reshape(-1, 2)
+
     def ended(self) -> str:
-        """ "cancelled" if a person ended the run, else ""."""
+        """ "cancelled" if a person ended the run, "finished" if a live one is over, else ""."""
         rows = self._query("SELECT value FROM meta WHERE key = 'ended'")
         return rows[0][0] if rows else ""
 

@@ -43,6 +43,7 @@ CREATE TABLE IF NOT EXISTS partial (
 CREATE TABLE IF NOT EXISTS tracking (
     frame INTEGER PRIMARY KEY, state TEXT NOT NULL, overlap REAL, doubts INTEGER NOT NULL);
 CREATE TABLE IF NOT EXISTS partial_layers (layer INTEGER PRIMARY KEY, blob BLOB NOT NULL);
+CREATE TABLE IF NOT EXISTS arrivals (frame INTEGER PRIMARY KEY, arrived REAL NOT NULL, ready REAL NOT NULL);
 """
 
 
@@ -106,17 +107,26 @@ class ResultsWriter:
         self._lock.free()
 
     def write_frame(
-        self, result: FrameResult, layers: Iterable[LayerRecord], particles: int | None = None
+        self,
+        result: FrameResult,
+        layers: Iterable[LayerRecord],
+        particles: int | None = None,
+        *,
+        came: tuple[float, float] | None = None,
     ) -> None:
         """Store a finished frame with all its layers in one transaction; the unfinished frame's state goes.
 
         particles : how many of each layer's set are recorded (None: all); the set at the end of the frame is
-        in `result.carried` and always whole.
+        in `result.carried` and always whole. came : of a live run's frame, when its pictures had come and when its
+        pose was ready, seconds of one clock.
         """
         statements: list[tuple[str, tuple[object, ...]]] = [
             ("DELETE FROM layers WHERE frame = ?", (result.frame,)),
             ("DELETE FROM tracking WHERE frame = ?", (result.frame,)),
+            ("DELETE FROM arrivals WHERE frame = ?", (result.frame,)),
         ]
+        if came is not None:
+            statements.append(("INSERT INTO arrivals VALUES (?, ?, ?)", (result.frame, *came)))
         overlap = result.overlap if math.isfinite(result.overlap) else None
         told = (result.frame, result.tracking, overlap, result.doubts)
         statements.append(("INSERT INTO tracking VALUES (?, ?, ?, ?)", told))
@@ -167,6 +177,7 @@ class ResultsWriter:
                 ("DELETE FROM frames WHERE frame >= ?", (frame,)),
                 ("DELETE FROM layers WHERE frame >= ?", (frame,)),
                 ("DELETE FROM tracking WHERE frame >= ?", (frame,)),
+                ("DELETE FROM arrivals WHERE frame >= ?", (frame,)),
                 (
                     "DELETE FROM settings WHERE frame >= ? AND version > (SELECT MIN(version) FROM settings)",
                     (frame,),
@@ -182,7 +193,9 @@ class ResultsWriter:
         self._transaction([("INSERT OR REPLACE INTO settings VALUES (?, ?, ?, ?)", row)])
 
     def mark_ended(self, how: str) -> None:
-        """Note that a person ended the run (`how`: "cancelled"), or with "" that it goes on."""
+        """Note that a person ended the run (`how`: "cancelled"), that a live one is over ("finished"), or with "" that
+        it goes on.
+        """
         if how:
             self._transaction([("INSERT OR REPLACE INTO meta VALUES ('ended', ?)", (how,))])
         else:

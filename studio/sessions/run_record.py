@@ -29,7 +29,9 @@ class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     subject. parameters : names of the pose vector. start_pose : radians and mm, None where the search starts
     uniformly. start_source : where it came from, in words. sigma : σ0 of every parameter from frame to frame,
     rad and mm. software : the studio's version. notes : what a reader of the results should know. behaviour : name of
-    the behaviour model whose copy the run keeps, "" without one.
+    the behaviour model whose copy the run keeps, "" without one. live : frames came on a clock and those that came too
+    fast were dropped; which were tracked, the results store says. to_and_fro : the footage goes forth and back without
+    an end (`capture.to_and_fro`), so that `last` may lie behind its end.
     """
 
     schema: int = SCHEMA_VERSION
@@ -52,6 +54,8 @@ class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     software: str = ""
     notes: tuple[str, ...] = ()
     behaviour: str = ""
+    live: bool = False
+    to_and_fro: bool = False
 
     @property
     def frame_count(self) -> int:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.worker.open_run import OpenRun
+from studio.worker.open_live_run import opened
 
 # Called with a step in words, frames done and frames in all.
 Report = Callable[[str, int, int], None]
@@ -31,20 +31,20 @@ def track_to_end(session: Session, run: StoredRun, report: Report) -> BatchResul
     """
     began = time.perf_counter()
     total = run.record.frame_count
-    opened = OpenRun(str(session.path), str(run.folder))
+    at_hand = opened(str(session.path), str(run.folder))
     evaluations, beta = 0, float("nan")
     try:
-        opened.tracking.mark_going_on()
-        report("compiling kernels, once", opened.tracking.done, total)
-        opened.warm_up()
-        while not opened.tracking.finished:
-            stepped = opened.step_layer()
-            if stepped.result is not None:
+        at_hand.tracking.mark_going_on()
+        report("compiling kernels, once", at_hand.tracking.done, total)
+        at_hand.warm_up()
+        while not at_hand.tracking.finished:
+            stepped = at_hand.step_layer()
+            if stepped is not None and stepped.result is not None:
                 evaluations, beta = stepped.result.evaluations, stepped.record.beta
-                report(f"{session.name} / {run.name}", opened.tracking.done, total)
+                report(f"{session.name} / {run.name}", at_hand.tracking.done, total)
     except KeyboardInterrupt:
-        opened.tracking.mark_cancelled()
+        at_hand.tracking.mark_cancelled()
         raise
     finally:
-        opened.close()
+        at_hand.close()
     return BatchResult(evaluations, beta, time.perf_counter() - began)

@@ -4,6 +4,7 @@ the store except a layer's own cloud, which travels with `LayerFinished` so that
 import math
 from dataclasses import dataclass, field
 
+from studio.runs.live_summary import LiveStanding
 from studio.tracking.tracker import FrameResult, LayerRecord
 
 Value = bool | int | float | str
@@ -26,7 +27,7 @@ class StateChanged(Event):
     finished. frames_per_second and seconds_left : measured, NaN while unknown. message, hint : for failed and
     lost. waiting : (session, run) names of the runs that are tracked after this one. selected : the frame
     that re-anneal works on, -1 for none. seconds_a_layer : what each tracked layer takes at least, 0 as fast as
-    it can (`commands.SetPace`); both estimates hold for this pace.
+    it can (`commands.SetPace`); both estimates hold for this pace. live : how a live run keeps up, None for others.
     """
 
     state: str
@@ -42,6 +43,7 @@ class StateChanged(Event):
     waiting: tuple[tuple[str, str], ...] = ()
     selected: int = -1
     seconds_a_layer: float = 0.0
+    live: LiveStanding | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,10 +75,14 @@ class LayerFinished(Event):
 
 @dataclass(frozen=True, slots=True)
 class FrameFinished(Event):
-    """A frame's result (stored unless reannealed)."""
+    """A frame's result (stored unless reannealed); of a live run without particles and memory.
+
+    latency_ms : from the last picture's arrival to the pose, NaN where the run is not live.
+    """
 
     result: FrameResult
     reannealed: bool = False
+    latency_ms: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)

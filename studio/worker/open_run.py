@@ -1,6 +1,7 @@
 """The run that the process has in hand: its search, its settings mailbox, its footage, and a question being
 asked of a frame (re-annealing)."""
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -32,16 +33,9 @@ class OpenRun:
         record = self.stored.record
         self._ahead = ThreadPoolExecutor(1, thread_name_prefix="next-frame")
         self._views = ThreadPoolExecutor(VIEW_THREADS, thread_name_prefix="view")
-        self._problems = ProblemSource(
-            self.session,
-            self.stored.body(),
-            self.stored.cameras(),
-            last=record.last,
-            executor=self._ahead,
-            views=self._views,
-        )
+        self._problems = self._problem_source(record.last)
         try:
-            self.tracking = TrackingRun(self.stored, self._problems)
+            self.tracking = self._tracking_run(self._problems)
         except StudioError:
             self._close_problems()
             raise
@@ -82,9 +76,16 @@ class OpenRun:
         pose = np.array(start) if start is not None else self.stored.body().neutral
         problem.weigh(pose[None])
 
-    def step_layer(self) -> Stepped:
-        """Do the next layer of the run."""
+    def step_layer(self) -> Stepped | None:
+        """Do the next layer of the run; None where a live run has no picture yet."""
         return self.tracking.step_layer()
+
+    def rest(self) -> None:
+        """Nothing is tracked for now."""
+
+    def when_stored(self, action: Callable[[], None]) -> None:
+        """Do something once all that is finished is stored."""
+        action()
 
     def target(self, frame: int = -1) -> int:
         """The frame that a question is about: the one named, else the selected, else the unfinished or last
@@ -129,6 +130,20 @@ class OpenRun:
             self.tracking.close()
         finally:
             self._close_problems()
+
+    def _problem_source(self, last: int) -> ProblemSource:
+        """The run's frames, the next one made ready while this one is searched."""
+        return ProblemSource(
+            self.session,
+            self.stored.body(),
+            self.stored.cameras(),
+            last=last,
+            executor=self._ahead,
+            views=self._views,
+        )
+
+    def _tracking_run(self, problems: ProblemSource) -> TrackingRun:
+        return TrackingRun(self.stored, problems)
 
     def _close_problems(self) -> None:
         self._problems.close()

@@ -6,8 +6,10 @@ import time
 from collections.abc import Callable
 
 from studio.knobs import Value
+from studio.runs.live_run import LiveRun, without_particles
+from studio.runs.tracking_run import Stepped
 from studio.settings import RunSettings, values
-from studio.worker.events import Event, LogLine, SettingsApplied, StateChanged
+from studio.worker.events import Event, FrameFinished, LayerFinished, LogLine, SettingsApplied, StateChanged
 from studio.worker.open_run import OpenRun
 from studio.worker.search_pace import SearchPace
 from studio.worker.waiting_runs import WaitingRuns
@@ -56,6 +58,7 @@ class Reporter:
                 waiting=waiting,
                 selected=run.selected,
                 seconds_a_layer=pace,
+                live=tracking.standing if isinstance(tracking, LiveRun) else None,
             )
         )
 
@@ -70,6 +73,20 @@ class Reporter:
         changed = tuple(name for name, value in now.items() if self._values.get(name, value) != value)
         self._values = now
         self.post(SettingsApplied(*names_of(run), version, frame, layer, now, changed))
+
+    def stepped(self, run: OpenRun, stepped: Stepped, asked_at: float) -> None:
+        """Say what a layer brought; of a frame once it is stored. asked_at : see `LayerFinished`."""
+        record, result, tracking = stepped.record, stepped.result, run.tracking
+        if stepped.applied is not None:
+            self.settings(run, record.settings_version, stepped.applied, record.frame, record.layer)
+        self.post(LayerFinished(*names_of(run), record, False, asked_at))
+        if result is None:
+            return
+        event = FrameFinished(*names_of(run), result)
+        if isinstance(tracking, LiveRun):
+            light = without_particles(result)
+            event = FrameFinished(*names_of(run), light, latency_ms=tracking.latency_ms)
+        run.when_stored(lambda: self.post(event))
 
     def log(self, run: OpenRun | None, level: str, text: str) -> None:
         """Write a line into the run's log and say it."""

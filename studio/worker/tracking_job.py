@@ -15,6 +15,7 @@ from typing import Any
 from studio.errors import RunError, StudioError
 from studio.worker import commands
 from studio.worker.events import Acknowledged, Event, FrameFinished, LayerFinished
+from studio.worker.open_live_run import opened
 from studio.worker.open_run import FINISHED, PAUSED, OpenRun
 from studio.worker.reporter import IDLE, Reporter, names_of, unforeseen
 from studio.worker.search_pace import SearchPace
@@ -125,17 +126,14 @@ class TrackingJob:
     def _advance_tracking(self, run: OpenRun) -> None:
         self._pace.begin()
         stepped = run.step_layer()
-        record, result = stepped.record, stepped.result
-        if stepped.applied is not None:
-            self._say.settings(run, record.settings_version, stepped.applied, record.frame, record.layer)
-        self._say.post(LayerFinished(*names_of(run), record, False, self._asked_at))
-        if result is not None:
-            self._say.post(FrameFinished(*names_of(run), result))
+        result = stepped.result if stepped is not None else None
+        if stepped is not None:
+            self._say.stepped(run, stepped, self._asked_at)
         if run.tracking.finished:
             self._say.log(run, "info", f"Finished: {run.tracking.done} frames.")
             self._state(FINISHED)
             self._begin_waiting()
-        elif self._goal == ONE_LAYER or (self._goal == TO_FRAME_END and result is not None):
+        elif (stepped and self._goal == ONE_LAYER) or (self._goal == TO_FRAME_END and result is not None):
             run.tracking.save()
             self._state(PAUSED)
         elif result is not None:
@@ -164,12 +162,12 @@ class TrackingJob:
     # ------------------------------------------------------------------ commands
 
     def _open(self, session: str, run_folder: str) -> None:
-        opened = self._run
-        if opened is not None and opened.stored.folder == Path(run_folder).resolve():
+        before = self._run
+        if before is not None and before.stored.folder == Path(run_folder).resolve():
             self._say.state_again(self._run)
             return
         # The new one is opened before the old one is let go, so that a refusal changes nothing.
-        following = OpenRun(session, run_folder)
+        following = opened(session, run_folder)
         self.close()
         self._run = following
         version, settings = following.mailbox.latest()
@@ -296,4 +294,6 @@ class TrackingJob:
         self._begin_waiting()
 
     def _state(self, name: str, message: str = "", hint: str = "") -> None:
+        if self._run is not None and name not in (TRACKING, COMPILING):
+            self._run.rest()
         self._say.state(self._run, name, message, hint)

@@ -1,0 +1,85 @@
+"""The frames of a live run: one made ready while another is searched.
+
+Whoever makes frames ready and whoever searches them are two threads that share nothing but finished frames (`Ready`),
+so neither waits for the other. What else is asked for, a frame with other settings or the masks that a lost body is
+looked for in, comes from the run's `ProblemSource`.
+"""
+
+import time
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+
+from studio.body.model import BodyModel
+from studio.capture.frame_clock import Arrival
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.geometry.camera import Camera
+from studio.runs.problem_source import ProblemSource, evidence_key, problem_key
+from studio.settings import RunSettings
+from studio.tracking.tracker import FrameProblem
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ready:
+    """A frame that can be searched. arrival : when its pictures came. began, done : when it was begun to be made ready,
+    and when it was. evidence_key, problem_key : what they hold for (`problem_source`).
+    """
+
+    arrival: Arrival
+    evidence: FrameEvidence
+    problem: FrameProblem
+    evidence_key: Hashable
+    problem_key: Hashable
+    began: float
+    done: float
+
+    @property
+    def frame(self) -> int:
+        """Its number."""
+        return self.arrival.frame
+
+
+class LiveProblems:
+    """A run's frames, the one at hand without a wait. `ready` in one thread, all else in another.
+
+    clock : the arrivals', seconds.
+    """
+
+    def __init__(self, source: ProblemSource, clock: Callable[[], float] = time.monotonic) -> None:
+        self._source, self._clock = source, clock
+        self._at_hand: Ready | None = None
+
+    @property
+    def body(self) -> BodyModel:
+        """The body that is tracked."""
+        return self._source.body
+
+    @property
+    def cameras(self) -> tuple[Camera, ...]:
+        """In the order of the views."""
+        return self._source.cameras
+
+    def ready(self, arrival: Arrival, settings: RunSettings) -> Ready:
+        """Decode a set's pictures and make of them what is searched. Raises FootageError, NotFoundError."""
+        began, frame = self._clock(), arrival.frame
+        evidence = self._source.evidence(frame, settings)
+        problem = self._source.problem(frame, settings)
+        keys = evidence_key(frame, settings), problem_key(frame, settings)
+        return Ready(arrival, evidence, problem, *keys, began, self._clock())
+
+    def take(self, ready: Ready) -> None:
+        """Make a frame the one at hand."""
+        self._at_hand = ready
+
+    def problem(self, frame: int, settings: RunSettings) -> FrameProblem:
+        """The frame as a function of poses."""
+        ready = self._at_hand
+        if ready is not None and ready.problem_key == problem_key(frame, settings):
+            return ready.problem
+        return self._source.problem(frame, settings)
+
+    def evidence(self, frame: int, settings: RunSettings) -> FrameEvidence:
+        """What is seen in it."""
+        ready = self._at_hand
+        if ready is not None and ready.evidence_key == evidence_key(frame, settings):
+            return ready.evidence
+        return self._source.evidence(frame, settings)

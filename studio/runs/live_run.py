@@ -1,0 +1,147 @@
+"""A run that keeps up with its pictures: of the sets that came while a frame was searched only the newest is tracked.
+
+Which frames it tracks depends on the machine and on what else that has to do. Everything else does not: the frames that
+were tracked stand in the results store, and given them every pose follows bit for bit from the run's record, as with
+any run (`live_replay` tracks them again and compares). What a dropped frame does to the search: `frame_steps`.
+
+Frames come by `take`; a frame at hand is searched by `step_layer` as always. Its results are stored by an executor, in
+order, a moment later.
+"""
+
+import dataclasses
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor
+
+from studio.runs.live_problems import LiveProblems, Ready
+from studio.runs.live_summary import LiveMeter, LiveStanding
+from studio.runs.pace import Progress
+from studio.runs.storing_behind import StoringBehind
+from studio.runs.tracking_run import TrackingRun
+from studio.sessions.stored_run import StoredRun
+from studio.settings import RunSettings
+from studio.tracking.frame_loop import FrameSearch
+from studio.tracking.tracker import FrameResult, LayerRecord
+
+OVER = "finished"
+REHEARSALS = 3
+"""Predictions by a model need two frames before."""
+
+
+class LiveRun(TrackingRun):
+    """The one who tracks a stored live run. storing : writes results, one after the other; None: they are written at
+    once. clock : seconds, the same as the arrivals'.
+    """
+
+    def __init__(
+        self,
+        run: StoredRun,
+        problems: LiveProblems,
+        storing: Executor | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._clock, self._live_problems = clock, problems
+        self._came: tuple[int, float] | None = None
+        self.latency_ms = float("nan")
+        super().__init__(run, problems)
+        self._behind = StoringBehind(storing)
+        with run.results() as results:
+            self.meter = LiveMeter(results.frames())
+            self._over = results.ended() == OVER
+
+    @property
+    def standing(self) -> LiveStanding:
+        """Dropped frames, rate and latency at this moment."""
+        return self.meter.standing
+
+    @property
+    def finished(self) -> bool:
+        """Whether the last frame was tracked, or dropped."""
+        return self._over or super().finished
+
+    @property
+    def between_frames(self) -> bool:
+        """Whether a frame can be taken."""
+        return self._search is None
+
+    def take(self, ready: Ready) -> None:
+        """Make a frame the next one to be searched; those between are dropped."""
+        self._live_problems.take(ready)
+        self.next_frame = ready.frame
+        self._came = (ready.frame, ready.arrival.complete)
+
+    def end(self) -> None:
+        """No further frame will come."""
+        self.meter.passed(self.record.last - 1)
+        self._behind.wait()
+        self._over = True
+        self._writer.mark_ended(OVER)
+
+    def when_stored(self, action: Callable[[], None]) -> None:
+        """Do something once all that is finished is stored; in the thread that stores."""
+        self._behind.do(action)
+
+    def save(self) -> None:
+        """As `TrackingRun.save`, with everything stored that waits to be."""
+        self._behind.wait()
+        self._came = None
+        self.meter.paused()
+        super().save()
+
+    def mark_going_on(self) -> None:
+        """Note that a cancelled run goes on after all."""
+        super().mark_going_on()
+        self._over = False
+
+    def progress(self, least: float = 0.0) -> Progress:
+        """How far the run got, by its frames' numbers; it lasts as long as its footage does."""
+        passed, total = self.next_frame - self.record.first, self.record.frame_count
+        passed = total if self.finished else passed
+        return Progress(self.done, total, self.standing.frames_per_second, (total - passed) / self.record.fps)
+
+    def rehearse(self) -> None:
+        """Search the next frame some times over and keep nothing of it, so that all is compiled and loaded."""
+        version, settings = self.settings_source()
+        frame, carried = self.next_frame, self.carried_into(self.next_frame)
+        problem = self.problems.problem(frame, settings)
+        for _ in range(REHEARSALS):
+            search = FrameSearch(
+                self.tracker, carried, self._behaviour.space, seed=self.record.seed, frame=frame
+            )
+            while not search.finished:
+                search.step(problem, version, settings.tracker)
+            carried = self.result_of(search, settings).carried
+
+    def _next(self, result: FrameResult) -> None:
+        super()._next(result)
+        if self.next_frame >= self.record.last:
+            self.end()
+
+    def _store(self, result: FrameResult, settings: RunSettings) -> None:
+        came, ready = self._came, self._clock()
+        times = None
+        if came is not None and came[0] == result.frame:
+            times = (came[1], ready)
+            self.meter.tracked(result.frame, *times)
+        else:
+            # Gone on with after a pause: nobody waited for it.
+            self.meter.passed(result.frame)
+        self.latency_ms = 1e3 * (times[1] - times[0]) if times else float("nan")
+        layers, kept = tuple(self._layers), settings.recording.record_particles
+        self._behind.do(lambda: self._writer.write_frame(result, layers, kept, came=times))
+
+    def keep(
+        self, result: FrameResult, layers: list[LayerRecord], version: int, settings: RunSettings
+    ) -> None:
+        """As `TrackingRun.keep`; a run that was over goes on from there."""
+        self._behind.wait()
+        super().keep(result, layers, version, settings)
+        with self.run.results() as results:
+            self.meter = LiveMeter(results.frames())
+        self._over = False
+
+
+def without_particles(result: FrameResult) -> FrameResult:
+    """A result for those who look on: all but what the next frame starts from, which is large."""
+    carried = dataclasses.replace(result.carried, particles=None, memory={})
+    return dataclasses.replace(result, carried=carried)

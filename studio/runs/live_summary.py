@@ -1,0 +1,128 @@
+"""How a live run went: which frames it dropped, how fast it was, how long a pose took to come."""
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.errors import NotFoundError
+from studio.sessions.stored_run import StoredRun
+
+Array = NDArray[np.float64]
+
+WATCHED = 60
+"""Frames that the rate and the latency on screen are of."""
+
+
+@dataclass(frozen=True, slots=True)
+class LiveStanding:
+    """A live run at this moment. dropped : frames that came and were not tracked, so far. dropped_share : of all that
+    came. latency_ms : median over the last frames, NaN before the first. frames_per_second : over the same, NaN before
+    the second.
+    """
+
+    dropped: int
+    dropped_share: float
+    latency_ms: float
+    frames_per_second: float
+
+
+class LiveMeter:
+    """Measures a live run as it goes."""
+
+    def __init__(self, tracked: Sequence[int] = ()) -> None:
+        """tracked : the frames it has already."""
+        self._came = (tracked[-1] - tracked[0] + 1) if tracked else 0
+        self._tracked, self._newest = len(tracked), tracked[-1] if tracked else None
+        self._last: deque[tuple[float, float]] = deque(maxlen=WATCHED)
+
+    def passed(self, frame: int) -> None:
+        """Frames up to this one came; it need not be tracked."""
+        self._came += 1 if self._newest is None else max(0, frame - self._newest)
+        self._newest = frame if self._newest is None else max(frame, self._newest)
+
+    def tracked(self, frame: int, came: float, ready: float) -> None:
+        """A frame was tracked. came, ready : when its pictures had come and when its pose was ready, seconds."""
+        self.passed(frame)
+        self._tracked += 1
+        self._last.append((came, ready))
+
+    def paused(self) -> None:
+        """Forget what rates are measured by: time that passes now is nobody's."""
+        self._last.clear()
+
+    @property
+    def standing(self) -> LiveStanding:
+        """Where the run stands."""
+        times = np.array(self._last).reshape(-1, 2)
+        dropped = self._came - self._tracked
+        return LiveStanding(
+            dropped=dropped,
+            dropped_share=dropped / self._came if self._came else 0.0,
+            latency_ms=1e3 * float(np.median(times[:, 1] - times[:, 0])) if len(times) else float("nan"),
+            frames_per_second=rate_of(times[:, 1]),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LiveSummary:
+    """tracked, dropped : frame numbers, ascending; together all from the first tracked one to the last that came.
+    frames_per_second : tracked ones from the first pose to the last, pauses left out; NaN for fewer than two. latencies
+    (K,) : ms from the last picture of a set to its pose, frame by frame.
+    """
+
+    tracked: tuple[int, ...]
+    dropped: tuple[int, ...]
+    frames_per_second: float
+    latencies: Array
+
+    @property
+    def dropped_share(self) -> float:
+        """Of all frames that came."""
+        came = len(self.tracked) + len(self.dropped)
+        return len(self.dropped) / came if came else 0.0
+
+    def latency(self, share: float) -> float:
+        """The latency, ms, that so large a share of the frames keeps under; NaN without frames."""
+        return float(np.quantile(self.latencies, share)) if len(self.latencies) else float("nan")
+
+
+def summary_of(run: StoredRun) -> LiveSummary:
+    """How a stored live run went. Raises NotFoundError for a run that was not live."""
+    if not run.record.live:
+        raise NotFoundError(f"Run '{run.name}' was not tracked live.", "Choose a live run.")
+    with run.results() as results:
+        tracked, over = results.frames(), results.ended() == "finished"
+        _, times = results.arrivals()
+    came = range(tracked[0], run.record.last if over else tracked[-1] + 1) if tracked else range(0)
+    known = set(tracked)
+    return LiveSummary(
+        tracked=tuple(tracked),
+        dropped=tuple(frame for frame in came if frame not in known),
+        frames_per_second=rate_of(times[:, 1]),
+        latencies=1e3 * (times[:, 1] - times[:, 0]),
+    )
+
+
+def rate_of(ready: Array) -> float:
+    """Frames a second of frames that were ready at these times (K,), seconds; gaps over a second are pauses."""
+    gaps = np.diff(ready)
+    gaps = gaps[(gaps > 0.0) & (gaps <= PAUSE_SECONDS)]
+    return len(gaps) / float(gaps.sum()) if len(gaps) else float("nan")
+
+
+def in_words(dropped: Sequence[int], most: int = 8) -> str:
+    """Frame numbers as a person reads them, neighbours joined: "3, 7-9"."""
+    runs: list[tuple[int, int]] = []
+    for frame in dropped:
+        if runs and frame == runs[-1][1] + 1:
+            runs[-1] = (runs[-1][0], frame)
+        else:
+            runs.append((frame, frame))
+    words = [f"{first}" if first == last else f"{first}-{last}" for first, last in runs]
+    return ", ".join(words[:most]) + (f" and {len(words) - most} more gaps" if len(words) > most else "")
+
+
+PAUSE_SECONDS = 1.0

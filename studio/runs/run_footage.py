@@ -1,0 +1,18 @@
+"""The footage of a run, whose frame numbers are not always the files' own."""
+
+from studio.capture.footage import Footage
+from studio.capture.to_and_fro import ToAndFro
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+
+
+def footage_of(session: Session, run: StoredRun | None) -> Footage:
+    """The footage by a run's frame numbers, the session's own without a run; close it when done.
+
+    Raises FootageError if a file is gone.
+    """
+    footage = session.footage()
+    if run is None or not run.record.to_and_fro:
+        return footage
+    footage.close()
+    return ToAndFro(footage.source, footage.folder)

@@ -1,0 +1,30 @@
+"""Results written in the order they came, a moment later, so that the search does not wait for the disk."""
+
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+
+MOST_WAITING = 60
+"""Frames that may wait to be stored: then the search waits for the disk after all."""
+
+
+class StoringBehind:
+    """executor : of one thread, which keeps the order; None: everything is done at once. Used by one thread."""
+
+    def __init__(self, executor: Executor | None) -> None:
+        self._executor = executor
+        self._waiting: deque[Future[None]] = deque()
+
+    def do(self, action: Callable[[], None]) -> None:
+        """Do something after all that was asked before. Raises what one of those failed with."""
+        if self._executor is None:
+            action()
+            return
+        while self._waiting and (self._waiting[0].done() or len(self._waiting) >= MOST_WAITING):
+            self._waiting.popleft().result()
+        self._waiting.append(self._executor.submit(action))
+
+    def wait(self) -> None:
+        """Return when all is done. Raises what one of it failed with."""
+        while self._waiting:
+            self._waiting.popleft().result()
