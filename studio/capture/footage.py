@@ -58,7 +58,7 @@ class Footage:
         self.frame_count, self.fps = source.frame_count, source.fps
         self._by_name = {camera.name: camera for camera in source.cameras}
         self._pictures = {
-            camera.name: _Kept(_reader(camera.kind, folder / camera.path, camera), camera, colour_as_it_is)
+            camera.name: _Kept(camera_reader(camera, folder), camera, colour_as_it_is)
             for camera in source.cameras
         }
         self._masks = {
@@ -94,6 +94,12 @@ class Footage:
         entry = self._by_name[camera].background
         return self.folder / entry if entry else None
 
+    def turned_background(self, camera: str, picture: Bytes) -> Bytes:
+        """A background picture of a camera (H, W, 3), turned as its footage is, unless it was turned already."""
+        source = self._by_name[camera]
+        height, width = picture.shape[:2]
+        return turned_picture(picture, background_turn(source, width, height))
+
     def close(self) -> None:
         """Close all files."""
         for kept in (*self._pictures.values(), *self._masks.values()):
@@ -116,7 +122,37 @@ def open_footage(source: FootageSource, session_folder: Path) -> Footage:
                     f"Footage '{entry}' of camera {camera.name} is not there.",
                     "Put the file back, or import the session again.",
                 )
+        if not 0 <= camera.offset <= camera.frame_count - source.frame_count:
+            raise FootageError(
+                f"Camera {camera.name} has {camera.frame_count} frames, which {source.frame_count} from frame"
+                f" {camera.offset} on are not among.",
+                "Correct its offset with 'studio synchronise', or import the session again.",
+            )
     return Footage(source, session_folder)
+
+
+def camera_reader(source: CameraSource, session_folder: Path) -> Reader:
+    """The frames of one camera's file or folder as they lie there: not turned, counted from the file's first one."""
+    path = session_folder / source.path
+    if source.kind == "video":
+        return VideoReader(path, source.frame_count)
+    return PictureReader(path, source.frame_count)
+
+
+def turned_picture(picture: Bytes, degrees: int) -> Bytes:
+    """(H, W, 3) turned clockwise by 0, 90, 180 or 270 degrees."""
+    return np.ascontiguousarray(np.rot90(picture, -degrees // 90)) if degrees else picture
+
+
+def background_turn(source: CameraSource, width: int, height: int) -> int:
+    """Degrees clockwise by which a background of width x height is to be turned to lie as the footage does.
+
+    One that lies as the turned footage already, where that can be seen from its shape, stays as it is.
+    """
+    sideways = source.turned in (90, 270) and source.width != source.height
+    if sideways and (width - height) * (source.width - source.height) > 0:
+        return 0
+    return source.turned
 
 
 def colour_as_it_is(picture: Bytes) -> Bytes:
@@ -144,7 +180,7 @@ class _Kept:
             if found is not None:
                 self._kept.move_to_end(index)
                 return found
-            picture = self._reader.read(index)
+            picture = turned_picture(self._reader.read(index + self._camera.offset), self._camera.turned)
             height, width = picture.shape[:2]
             if (width, height) != (self._camera.width, self._camera.height):
                 raise FootageError(
@@ -161,12 +197,6 @@ class _Kept:
 
     def close(self) -> None:
         self._reader.close()
-
-
-def _reader(kind: str, path: Path, camera: CameraSource) -> Reader:
-    return (
-        VideoReader(path, camera.frame_count) if kind == "video" else PictureReader(path, camera.frame_count)
-    )
 
 
 def _mask_reader(path: Path) -> Reader:

@@ -16,7 +16,9 @@ class CameraSource:
     path, masks, background : relative to the session folder with forward slashes, or absolute where the
     footage is referred to; masks (video or folder) and background (picture or clip) are "" if there is
     none.
-    width, height : pixels. frame_count : frames that decode, whatever the file's header claims.
+    width, height : pixels, as they are after turning. frame_count : frames that decode, whatever the file's header
+    claims. offset : the file's frame that was taken at the session's frame 0. turned : degrees clockwise by which the
+    pictures (masks and background too) are turned, beyond what the file itself asks for: 0, 90, 180 or 270.
     """
 
     name: str
@@ -27,13 +29,20 @@ class CameraSource:
     frame_count: int
     masks: str = ""
     background: str = ""
+    offset: int = 0
+    turned: Literal[0, 90, 180, 270] = 0
+
+    @property
+    def last(self) -> int:
+        """Frames of the session that the camera has: those before it lie within its file."""
+        return self.frame_count - self.offset
 
 
 @dataclass(frozen=True, slots=True)
 class FootageSource:
     """All cameras' footage, in the order of the session's cameras.
 
-    fps : frames per second. frame_count : frames that every camera has.
+    fps : frames per second. frame_count : frames that every camera has, each after its own offset.
     """
 
     fps: float

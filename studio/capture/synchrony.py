@@ -1,0 +1,218 @@
+"""By how many frames cameras began apart, estimated from how much moves in their pictures.
+
+A movement begins and ends in all views at once, so the motion energy (mean absolute difference of successive pictures,
+reduced and grey) rises and falls together. For each two cameras the correlation of both courses is taken at every lag;
+the peak against the next best one says how far to trust it. Cameras are then put in order along the most trusted pairs,
+and other trusted pairs must agree. An estimate is shown to a person; nothing here applies it.
+"""
+
+import itertools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.capture.footage_source import FootageSource
+from studio.capture.naming import listed
+from studio.errors import FootageError
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+WIDTH = 96
+MOST_FRAMES = 3000
+MOST_SECONDS = 5.0
+FEWEST_FRAMES = 12
+FLAT_GREY_LEVELS = 0.03
+"""Courses whose spread (5 to 95 %) is below this are of sensor noise or a still picture."""
+LEAST_OVERLAP = 0.5
+SURE_PEAK, SURE_RATIO = 0.5, 1.2
+MOST_RATIO = 99.0
+AGREE = 1
+
+
+@dataclass(frozen=True, slots=True)
+class PairLag:
+    """How two cameras lie in time: frame f of `first` was taken with frame f + lag of `second`.
+
+    peak : correlation at that lag, -1 to 1. ratio : peak over the next best one (99 where there is none).
+    """
+
+    first: str
+    second: str
+    lag: int
+    peak: float
+    ratio: float
+
+    @property
+    def sure(self) -> bool:
+        """Whether the peak stands out."""
+        return self.peak >= SURE_PEAK and self.ratio >= SURE_RATIO
+
+
+@dataclass(frozen=True, slots=True)
+class Synchrony:
+    """An estimate. offsets : each camera's frame that belongs to frame 0, the smallest being 0.
+
+    confidence : peak over second peak on the weakest link that a camera's offset rests on. sure : whether every link
+    stands out and no trusted pair contradicts. notes : doubts, sentences.
+    """
+
+    offsets: dict[str, int]
+    confidence: dict[str, float]
+    pairs: tuple[PairLag, ...]
+    sure: bool
+    notes: tuple[str, ...]
+
+
+def motion_energy(read: Callable[[int], NDArray[np.uint8]], count: int, tell: Callable[[int], None] | None = None) -> Array:
+    """(count - 1,) mean absolute difference of each picture to the one before it, grey levels.
+
+    read(k) : (H, W, 3) uint8 BGR of frame k; tell : called with the frames done.
+    """
+    energy = np.zeros(max(0, count - 1))
+    before: NDArray[np.float32] | None = None
+    for index in range(count):
+        grey = cv2.cvtColor(read(index), cv2.COLOR_BGR2GRAY)
+        height = max(1, round(grey.shape[0] * WIDTH / grey.shape[1]))
+        small = cv2.resize(grey, (WIDTH, height), interpolation=cv2.INTER_AREA).astype(np.float32)
+        if before is not None:
+            energy[index - 1] = float(np.abs(small - before).mean())
+        before = small
+        if tell is not None:
+            tell(index + 1)
+    return energy
+
+
+def estimate_offsets(energies: Mapping[str, Array], fps: float, most_seconds: float = MOST_SECONDS) -> Synchrony:
+    """Offsets from the motion energies of cameras with the same frame rate.
+
+    most_seconds : the largest offset that is looked for. Raises FootageError naming a camera that shows too few frames
+    or no motion.
+    """
+    if len(energies) < 2:
+        raise FootageError("One camera alone has nothing to be synchronised with.", "Give two cameras or more.")
+    courses = {name: _course(name, energy) for name, energy in energies.items()}
+    pairs = tuple(
+        pair_lag(first, second, courses[first], courses[second], round(most_seconds * fps))
+        for first, second in itertools.combinations(courses, 2)
+    )
+    placed, confidence, links = _along_best_pairs(tuple(courses), pairs)
+    least = min(placed.values())
+    offsets = {name: placed[name] - least for name in courses}
+    against = [
+        pair for pair in pairs
+        if pair.sure and abs(offsets[pair.second] - offsets[pair.first] - pair.lag) > AGREE
+    ]  # fmt: skip
+    weak = [f"{link.first} and {link.second}" for link in links if not link.sure]
+    notes = (
+        *((f"The motion of {'; '.join(weak)} does not tell their offset reliably.",) if weak else ()),
+        *(
+            f"{pair.first} and {pair.second} by themselves are {pair.lag:+d} frames apart, unlike the others say."
+            for pair in against
+        ),
+    )
+    return Synchrony(offsets, {name: confidence[name] for name in courses}, pairs, not (weak or against), notes)
+
+
+def pair_lag(first: str, second: str, a: Array, b: Array, most: int) -> PairLag:
+    """The lag at which course b (K,) repeats course a (J,) best, of at most `most` frames either way."""
+    fewest = max(FEWEST_FRAMES - 1, round(LEAST_OVERLAP * min(len(a), len(b))))
+    lags = [lag for lag in range(-most, most + 1) if _overlap(len(a), len(b), lag) >= fewest]
+    scores = np.array([_correlation(a, b, lag) for lag in lags])
+    best = int(np.argmax(scores))
+    left, right = best, best
+    while left > 0 and scores[left - 1] < scores[left]:
+        left -= 1
+    while right < len(scores) - 1 and scores[right + 1] < scores[right]:
+        right += 1
+    others = np.concatenate([scores[:left], scores[right + 1 :]])
+    second_peak = float(others.max()) if len(others) else 0.0
+    peak = float(scores[best])
+    ratio = min(MOST_RATIO, peak / second_peak) if second_peak > 0.0 else MOST_RATIO
+    return PairLag(first, second, lags[best], peak, ratio if peak > 0.0 else 0.0)
+
+
+def estimate_synchrony(
+    source: FootageSource,
+    reader: Callable[[int], Callable[[int], NDArray[np.uint8]]],
+    progress: Progress | None = None,
+    most_seconds: float = MOST_SECONDS,
+) -> Synchrony:
+    """Offsets of a session's cameras, whatever offsets it has now, from the first frames of every file.
+
+    reader(k) : what reads camera k's pictures by the file's own frame numbers. progress(step, done, total).
+    Raises FootageError.
+    """
+    energies: dict[str, Array] = {}
+    for index, camera in enumerate(source.cameras):
+        count = min(camera.frame_count, MOST_FRAMES)
+
+        def tell(done: int, name: str = camera.name, total: int = count) -> None:
+            if progress is not None:
+                progress(f"motion in {name}", done, total)
+
+        energies[camera.name] = motion_energy(reader(index), count, tell)
+    return estimate_offsets(energies, source.fps, most_seconds)
+
+
+def _course(name: str, energy: Array) -> Array:
+    """The energy's logarithm above its own quiet level. Raises FootageError if nothing can be told from it."""
+    if len(energy) < FEWEST_FRAMES - 1:
+        raise FootageError(
+            f"Camera {name} has {len(energy) + 1} frames, too few to see when things move.",
+            f"Give at least {FEWEST_FRAMES} frames, or the offsets by hand.",
+        )
+    low, high = np.percentile(energy, [5.0, 95.0])
+    if high - low < FLAT_GREY_LEVELS:
+        raise FootageError(
+            f"What moves in camera {name} stays the same all the time (from {low:.2f} to {high:.2f} grey levels), so"
+            " its pictures do not tell when they were taken.",
+            "Give the offsets by hand, or footage in which movements begin and end.",
+        )
+    return np.log(np.maximum(energy, 0.5 * low) + 0.1 * (high - low))
+
+
+def _overlap(a: int, b: int, lag: int) -> int:
+    return min(a, b - lag) - max(0, -lag)
+
+
+def _correlation(a: Array, b: Array, lag: int) -> float:
+    """Pearson's r of a[f] and b[f + lag] over the frames that both have; 0 where one of them is flat there."""
+    first, last = max(0, -lag), min(len(a), len(b) - lag)
+    x, y = a[first:last], b[first + lag : last + lag]
+    x, y = x - x.mean(), y - y.mean()
+    length = float(np.sqrt((x @ x) * (y @ y)))
+    return float(x @ y) / length if length > 1e-12 else 0.0
+
+
+def _along_best_pairs(
+    names: tuple[str, ...], pairs: tuple[PairLag, ...]
+) -> tuple[dict[str, int], dict[str, float], list[PairLag]]:
+    """Places in time, the weakest ratio on each camera's way, and the pairs used: the most trusted spanning tree."""
+    ranked = sorted(pairs, key=lambda pair: (pair.sure, pair.peak * min(pair.ratio, 3.0)), reverse=True)
+    placed, confidence = {ranked[0].first: 0}, {ranked[0].first: ranked[0].ratio}
+    links: list[PairLag] = []
+    while len(placed) < len(names):
+        link = next(pair for pair in ranked if (pair.first in placed) != (pair.second in placed))
+        if link.first in placed:
+            known, new, step = link.first, link.second, link.lag
+        else:
+            known, new, step = link.second, link.first, -link.lag
+        placed[new] = placed[known] + step
+        confidence[new] = min(link.ratio, confidence[known])
+        links.append(link)
+    return placed, confidence, links
+
+
+def in_words(found: Synchrony) -> str:
+    """One line a camera: its offset and how far to trust it; then the doubts."""
+    lines = [
+        f"{name}: {offset:+d} frames (peak {found.confidence[name]:.2f} times the next best)"
+        for name, offset in found.offsets.items()
+    ]
+    if not found.sure:
+        lines.append(f"Not reliable for {listed(found.offsets)}: check by eye before you apply it.")
+    return "\n".join([*lines, *found.notes])
