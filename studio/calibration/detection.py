@@ -18,14 +18,19 @@ Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 
 FEWEST_CORNERS = 6
-SHARP_WINDOW = (5, 5)
+OFF_PLANE = 0.15
+"""Corners may lie this share of their spacing off a plane's picture (root mean square); a wrong row gives 0.4."""
 
 
 class BoardFinder:
-    """Finds one board in pictures. mirrored_too : also look into the mirrored picture where none is found."""
+    """Finds one board in pictures.
 
-    def __init__(self, board: Board, mirrored_too: bool = True) -> None:
-        self.board = board
+    thorough : try slower searches for chessboards that the first does not find (single pictures, not videos).
+    mirrored_too : also look into the mirrored picture where none is found (ChArUco; a chessboard has no handedness).
+    """
+
+    def __init__(self, board: Board, *, thorough: bool = True, mirrored_too: bool = True) -> None:
+        self.board, self._thorough = board, thorough
         self._mirrored_too = mirrored_too and board.kind == "charuco"
         self._charuco = _charuco_detector(board) if board.kind == "charuco" else None
 
@@ -43,7 +48,7 @@ class BoardFinder:
     def _corners(self, grey: NDArray) -> tuple[NDArray[np.int64], Array] | None:
         if self._charuco is not None:
             return _charuco_corners(self._charuco, grey)
-        pixels = _chessboard_corners(self.board, grey)
+        pixels = _chessboard_corners(self.board, grey, self._thorough)
         return None if pixels is None else (np.arange(len(pixels), dtype=np.int64), pixels)
 
 
@@ -76,15 +81,56 @@ def _charuco_corners(
     return numbers, np.asarray(corners, dtype=np.float64).reshape(-1, 2)[order]
 
 
-def _chessboard_corners(board: Board, grey: NDArray) -> Array | None:
-    """(K, 2) all corners row by row in the board's order, None if not all are seen."""
+def _chessboard_corners(board: Board, grey: NDArray, thorough: bool) -> Array | None:
+    """(K, 2) all corners row by row in the board's order, None if not all are seen.
+
+    Searches that may take a neighbour for a corner are believed only if the corners lie on one plane.
+    """
     across, down = board.corners
+    for search in (_sector_search, _exhaustive_search, _classic_search)[: 3 if thorough else 1]:
+        corners = search(grey, (across, down))
+        if corners is None:
+            continue
+        ordered = _in_order(board, np.asarray(corners, dtype=np.float64).reshape(down, across, 2), grey)
+        if on_a_plane(board, ordered.reshape(-1, 2)):
+            return ordered.reshape(-1, 2)
+    return None
+
+
+def on_a_plane(board: Board, pixels: Array) -> bool:
+    """Whether all (K, 2) corners are a picture of the board's plane, give or take what a lens may bend."""
+    flat = board.points[:, :2]
+    homography, _ = cv2.findHomography(flat, pixels, 0)
+    if homography is None:
+        return False
+    across, down = board.corners
+    off = cv2.perspectiveTransform(flat[None], homography)[0] - pixels
+    spacing = np.median(np.linalg.norm(np.diff(pixels.reshape(down, across, 2), axis=0), axis=-1))
+    return bool(np.sqrt((off**2).sum(axis=1).mean()) < OFF_PLANE * spacing)
+
+
+def _sector_search(grey: NDArray, size: tuple[int, int]) -> NDArray | None:
+    flags = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE
+    seen, corners = cv2.findChessboardCornersSB(grey, size, flags=flags)
+    return corners if seen else None
+
+
+def _exhaustive_search(grey: NDArray, size: tuple[int, int]) -> NDArray | None:
     flags = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE
-    seen, corners = cv2.findChessboardCornersSB(grey, (across, down), flags=flags)
+    seen, corners = cv2.findChessboardCornersSB(grey, size, flags=flags)
+    return corners if seen else None
+
+
+def _classic_search(grey: NDArray, size: tuple[int, int]) -> NDArray | None:
+    flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_FAST_CHECK
+    seen, corners = cv2.findChessboardCorners(grey, size, flags=flags)
     if not seen:
         return None
-    grid = np.asarray(corners, dtype=np.float64).reshape(down, across, 2)
-    return _in_order(board, grid, grey).reshape(-1, 2)
+    rows = np.asarray(corners).reshape(size[1], size[0], 2)
+    spacing = float(np.median(np.linalg.norm(np.diff(rows, axis=0), axis=-1)))
+    reach = int(np.clip(0.25 * spacing, 2, 11))
+    until = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 50, 0.002)
+    return cv2.cornerSubPix(grey, corners, (reach, reach), (-1, -1), until)
 
 
 def _in_order(board: Board, grid: Array, grey: NDArray) -> Array:

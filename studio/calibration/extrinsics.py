@@ -1,0 +1,269 @@
+"""Where the cameras stand, from boards that several of them saw at once.
+
+Pairs of cameras vote on their relative pose; the most trusted pairs make a tree; every frame's board gets the pose on
+which its cameras agree best; then bundle adjustment, once more without the views that do not fit.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.calibration.board_poses import BoardView, PairPose, pair_pose, views_by_camera
+from studio.calibration.boards import Board
+from studio.calibration.bundle import Bundle, Observations, adjusted, errors_of, kept_inliers, rotated
+from studio.calibration.intrinsics import Lens
+from studio.calibration.sightings import Sighting
+from studio.capture.naming import listed, natural_key
+from studio.errors import CalibrationError
+from studio.geometry.camera import Camera
+from studio.geometry.rigid import compose, inverse, rigid
+from studio.geometry.rotations import rotation_from_vector, vector_from_rotation
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+MOST_FRAMES = 90
+CLIPPED_PX = 30.0
+OUTLYING, LEAST_OUTLYING_PX = 4.0, 1.5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rig:
+    """Solved cameras, in the frame of the first one until the floor is set.
+
+    boards : frame → (3, 4) world_from_board, mm. turned : (camera, frame) of boards counted from their other end.
+    rms : camera → pixels over the views used. views : camera → how many. dropped : views left out as not fitting.
+    pairs : what the pairs said.
+    """
+
+    cameras: tuple[Camera, ...]
+    boards: Mapping[int, Array]
+    turned: frozenset[tuple[str, int]]
+    rms: Mapping[str, float]
+    views: Mapping[str, int]
+    dropped: int
+    pairs: tuple[PairPose, ...] = field(default=())
+
+
+def solve_rig(
+    board: Board,
+    sightings: Sequence[Sighting],
+    lenses: Mapping[str, Lens],
+    *,
+    refine_lenses: bool = False,
+    progress: Progress | None = None,
+) -> Rig:
+    """The cameras named by `lenses` from what they saw at the same frame numbers.
+
+    Raises CalibrationError naming the cameras that share no board view with the others.
+    """
+    names = sorted(lenses, key=natural_key)
+    report = progress or (lambda step, done, total: None)
+    views = views_by_camera(board, sightings, lenses)
+    pairs = []
+    couples = list(combinations(names, 2))
+    for number, (first, second) in enumerate(couples):
+        report("Comparing cameras", number, len(couples))
+        pair = pair_pose(first, second, views)
+        if pair is not None:
+            pairs.append(pair)
+    poses = _tree(names, pairs)
+    frames = _chosen_frames(names, views)
+    boards, turned = _board_poses(board, names, views, frames, poses, lenses)
+    report("Adjusting all together", 0, 2)
+    bundle, seen = _bundle(board, names, views, frames, poses, boards, turned, lenses)
+    bundle = adjusted(bundle, seen)
+    errors = errors_of(bundle, seen)
+    limit = max(OUTLYING * float(np.median(errors)), LEAST_OUTLYING_PX)
+    kept, dropped = kept_inliers(bundle, seen, limit)
+    missing = [name for number, name in enumerate(names) if not np.any(kept.camera == number)]
+    if missing:
+        raise CalibrationError(
+            f"No board view of camera {listed(missing)} agrees with the other cameras.",
+            "Check that its footage runs in step with the others', is not mirrored and has its own lens's calibration.",
+        )
+    report("Adjusting all together", 1, 2)
+    bundle = adjusted(bundle, kept, refine_lenses)
+    report("Adjusting all together", 2, 2)
+    return _rig(names, lenses, frames, bundle, kept, dropped, tuple(pairs), turned)
+
+
+def _tree(names: Sequence[str], pairs: Sequence[PairPose]) -> dict[str, Array]:
+    """Camera → (3, 4) camera_from_world along the most trusted pairs; the first camera is the world."""
+    if len(names) < 2:
+        raise CalibrationError(f"{len(names)} camera alone cannot be placed.", "Give footage of two or more.")
+    poses = {names[0]: rigid(np.eye(3), np.zeros(3))}
+    order = sorted(pairs, key=lambda pair: -pair.trust)
+    while len(poses) < len(names):
+        step = next((pair for pair in order if (pair.first in poses) != (pair.second in poses)), None)
+        if step is None:
+            away = [name for name in names if name not in poses]
+            raise CalibrationError(
+                f"Camera {listed(away)} saw the board in no frame together with camera {listed(poses)}.",
+                "Carry the board through the places that neighbouring cameras both see; frames are paired by number.",
+            )
+        if step.first in poses:
+            poses[step.second] = compose(step.second_from_first, poses[step.first])
+        else:
+            poses[step.first] = compose(inverse(step.second_from_first), poses[step.second])
+    return poses
+
+
+def _chosen_frames(names: Sequence[str], views: Mapping[str, Mapping[int, BoardView]]) -> list[int]:
+    """Frames that two or more cameras saw; if there are many, those that serve the least served pairs."""
+    together = {}
+    for frame in sorted(set().union(*(views[name] for name in names))):
+        pairs = list(combinations([name for name in names if frame in views[name]], 2))
+        if pairs:
+            together[frame] = pairs
+    served: dict[tuple[str, str], int] = {pair: 0 for pairs in together.values() for pair in pairs}
+    chosen: list[int] = []
+    while together and len(chosen) < MOST_FRAMES:
+        frame = max(together, key=lambda each: (sum(0.5 ** served[pair] for pair in together[each]), -each))
+        for pair in together.pop(frame):
+            served[pair] += 1
+        chosen.append(frame)
+    return sorted(chosen)
+
+
+def _board_poses(
+    board: Board,
+    names: Sequence[str],
+    views: Mapping[str, Mapping[int, BoardView]],
+    frames: Sequence[int],
+    poses: Mapping[str, Array],
+    lenses: Mapping[str, Lens],
+) -> tuple[dict[int, Array], frozenset[tuple[str, int]]]:
+    """Frame → world_from_board on which its cameras agree best, and the views that count from the other end."""
+    boards: dict[int, Array] = {}
+    turned: set[tuple[str, int]] = set()
+    for frame in frames:
+        seen = [name for name in names if frame in views[name]]
+        best, ends = np.inf, list[tuple[str, bool]]()
+        for name in seen:
+            view = views[name][frame]
+            for pose in view.poses[~view.turned]:
+                candidate = compose(inverse(poses[name]), pose)
+                costs = [
+                    _cost(board, candidate, poses[other], lenses[other], views[other][frame])
+                    for other in seen
+                ]
+                total = sum(min(pair) for pair in costs)
+                if total < best:
+                    best, boards[frame] = total, candidate
+                    ends = [(other, pair[1] < pair[0]) for other, pair in zip(seen, costs, strict=True)]
+        turned |= {(other, frame) for other, end in ends if end}
+    return boards, frozenset(turned)
+
+
+def _cost(board: Board, pose: Array, camera: Array, lens: Lens, view: BoardView) -> tuple[float, float]:
+    """Clipped mean pixels between a board's pose and a view, and the same counted from the board's other end."""
+    sighting = view.sighting
+    costs = []
+    for ids in (sighting.ids, len(board.points) - 1 - sighting.ids):
+        local = board.points[ids] @ pose[:, :3].T + pose[:, 3]
+        seen = local @ camera[:, :3].T + camera[:, 3]
+        ahead = np.maximum(seen[:, 2:], 1.0)
+        flat = seen[:, :2] / ahead
+        # The lens's bending is left out on both sides alike: a coarse measure to choose by.
+        centre, focal = lens.matrix[:2, 2], np.diag(lens.matrix)[:2]
+        off = np.linalg.norm(flat * focal + centre - sighting.pixels, axis=1)
+        costs.append(float(np.minimum(off, CLIPPED_PX).mean()))
+        if not board.turn_symmetric:
+            return costs[0], np.inf
+    return costs[0], costs[1]
+
+
+def _bundle(
+    board: Board,
+    names: Sequence[str],
+    views: Mapping[str, Mapping[int, BoardView]],
+    frames: Sequence[int],
+    poses: Mapping[str, Array],
+    boards: Mapping[int, Array],
+    turned: frozenset[tuple[str, int]],
+    lenses: Mapping[str, Lens],
+) -> tuple[Bundle, Observations]:
+    parts: list[tuple[Array, ...]] = []
+    for number, name in enumerate(names):
+        for moment, frame in enumerate(frames):
+            if frame in views[name]:
+                sighting = views[name][frame].sighting
+                ids = len(board.points) - 1 - sighting.ids if (name, frame) in turned else sighting.ids
+                one = np.full(len(ids), 1)
+                parts.append((one * number, one * moment, board.points[ids], sighting.pixels))
+    camera, moment, points, pixels = (np.concatenate(column) for column in zip(*parts, strict=True))
+    seen = Observations(camera.astype(np.int64), moment.astype(np.int64), points, pixels)
+    return (
+        Bundle(
+            np.array([_vector(poses[name]) for name in names]),
+            np.array([_vector(boards[frame]) for frame in frames]),
+            np.array([_lens_row(lenses[name]) for name in names]),
+        ),
+        seen,
+    )
+
+
+def _vector(pose: Array) -> Array:
+    return np.concatenate([vector_from_rotation(pose[:, :3]), pose[:, 3]])
+
+
+def _lens_row(lens: Lens) -> Array:
+    matrix = lens.matrix
+    return np.array([matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *lens.distortion])
+
+
+def _rig(
+    names: Sequence[str],
+    lenses: Mapping[str, Lens],
+    frames: Sequence[int],
+    bundle: Bundle,
+    seen: Observations,
+    dropped: int,
+    pairs: tuple[PairPose, ...],
+    turned: frozenset[tuple[str, int]],
+) -> Rig:
+    errors = errors_of(bundle, seen)
+    cameras, rms, views = [], {}, {}
+    for number, name in enumerate(names):
+        fx, fy, cx, cy = bundle.lenses[number, :4]
+        vector = bundle.cameras[number]
+        cameras.append(
+            Camera(
+                name,
+                *lenses[name].size,
+                np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]),
+                bundle.lenses[number, 4:].copy(),
+                rotation_from_vector(vector[:3]),
+                vector[3:].copy(),
+            )
+        )
+        mine = seen.camera == number
+        rms[name] = float(np.sqrt(np.mean(errors[mine] ** 2)))
+        views[name] = len(np.unique(seen.moment[mine]))
+    used = set(seen.moment.tolist())
+    boards = {
+        frame: rigid(rotation_from_vector(row[:3]), row[3:].copy())
+        for number, (frame, row) in enumerate(zip(frames, bundle.boards, strict=True))
+        if number in used
+    }
+    return Rig(tuple(cameras), boards, turned, rms, views, dropped, pairs)
+
+
+def moved(rig: Rig, new_from_old: Array) -> Rig:
+    """The rig in another world: (3, 4) new_from_old."""
+    back = inverse(new_from_old)
+    cameras = []
+    for camera in rig.cameras:
+        pose = compose(rigid(camera.rotation, camera.translation), back)
+        cameras.append(replace(camera, rotation=pose[:, :3].copy(), translation=pose[:, 3].copy()))
+    boards = {frame: compose(new_from_old, pose) for frame, pose in rig.boards.items()}
+    return replace(rig, cameras=tuple(cameras), boards=boards)
+
+
+def board_points(board: Board, pose: Array) -> Array:
+    """(K, 3) a board's corners in the world."""
+    return rotated(np.repeat(_vector(pose)[None, :3], len(board.points), 0), board.points) + pose[:, 3]

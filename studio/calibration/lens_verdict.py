@@ -1,0 +1,116 @@
+"""Whether the pictures are enough for a lens, in words: what is missing and what to photograph."""
+
+import numpy as np
+
+from studio.calibration.findings import Finding
+from studio.calibration.intrinsics import Lens
+
+FEW, TOO_FEW = 10, 4
+GOOD_COVERAGE, POOR_COVERAGE = 0.5, 0.2
+ENOUGH_TILT = 25.0
+"""Degrees; boards that all face the camera cannot tell focal length from distance."""
+TILTED_BOARDS = 3
+SURE, UNSURE = 0.01, 0.03
+"""Two standard deviations of the focal length, as a share of it: above the first it is said, above the second it
+blocks."""
+SHARP = 1.0
+"""Pixels of residual per 1000 of width, above which the pictures or the board are doubtful."""
+UNLIKE_FOCAL = (0.35, 6.0)
+
+
+def lens_findings(lens: Lens) -> tuple[Finding, ...]:
+    """What speaks against a lens; none for one that can be trusted."""
+    found = [*_amount(lens), *_tilt(lens), *_precision(lens)]
+    return tuple(sorted(found, key=lambda finding: finding.severity != "blocks"))
+
+
+def verdict(lens: Lens) -> str:
+    """One sentence: the focal length, how sure, from what."""
+    focal = float(np.mean(np.diag(lens.matrix)[:2]))
+    return (
+        f"Camera {lens.camera}: focal length {focal:.1f} ± {2.0 * lens.focal_deviation:.1f} px (95 %), residual"
+        f" {lens.rms:.2f} px over {len(lens.used)} of {len(lens.residuals)} pictures that cover"
+        f" {lens.coverage.share:.0%} of the view."
+    )
+
+
+def _amount(lens: Lens) -> list[Finding]:
+    found: list[Finding] = []
+    count, share, about = len(lens.used), lens.coverage.share, (lens.camera,)
+    if count < FEW:
+        found.append(
+            Finding(
+                "few-pictures",
+                "blocks" if count < TOO_FEW else "warns",
+                f"Camera {lens.camera} was calibrated from {count} pictures.",
+                f"Take {FEW} to 30 pictures, or a minute of video, with the board in other places and tilts.",
+                about,
+            )
+        )
+    if share < GOOD_COVERAGE:
+        empty = ", ".join(lens.coverage.empty_parts) or "the edges"
+        found.append(
+            Finding(
+                "coverage",
+                "blocks" if share < POOR_COVERAGE else "warns",
+                f"The board was seen in {share:.0%} of the picture of camera {lens.camera} only; hardly in: {empty}.",
+                "Hold the board there too: distortion is not known where no corner was seen.",
+                about,
+            )
+        )
+    return found
+
+
+def _tilt(lens: Lens) -> list[Finding]:
+    tilts = np.array([residual.tilt for residual in lens.used])
+    if np.count_nonzero(tilts >= ENOUGH_TILT) >= min(TILTED_BOARDS, len(tilts)):
+        return []
+    return [
+        Finding(
+            "little-tilt",
+            "warns",
+            f"Only {np.count_nonzero(tilts >= ENOUGH_TILT)} of {len(tilts)} boards before camera {lens.camera} were"
+            f" tilted by {ENOUGH_TILT:.0f}° or more (the most: {tilts.max():.0f}°).",
+            "Tilt the board by 30° to 45° to either side: a board that faces the camera does not tell focal length"
+            " from distance.",
+            (lens.camera,),
+        )
+    ]
+
+
+def _precision(lens: Lens) -> list[Finding]:
+    found: list[Finding] = []
+    focal = float(np.mean(np.diag(lens.matrix)[:2]))
+    doubt = 2.0 * lens.focal_deviation / focal
+    if doubt > SURE:
+        found.append(
+            Finding(
+                "uncertain-focal",
+                "blocks" if doubt > UNSURE else "warns",
+                f"The focal length of camera {lens.camera} is {focal:.0f} px give or take {doubt:.1%}.",
+                "Take more pictures, tilted and at unlike distances.",
+                (lens.camera,),
+            )
+        )
+    relative = lens.rms * 1000.0 / lens.size[0]
+    if relative > SHARP:
+        found.append(
+            Finding(
+                "residual",
+                "blocks" if relative > 5.0 * SHARP else "warns",
+                f"The corners of camera {lens.camera} miss the model by {lens.rms:.2f} px.",
+                "Use a flat, stiff board and pictures without motion blur; check the board's numbers of squares.",
+                (lens.camera,),
+            )
+        )
+    if not UNLIKE_FOCAL[0] < focal / max(lens.size) < UNLIKE_FOCAL[1]:
+        found.append(
+            Finding(
+                "unlikely-focal",
+                "blocks",
+                f"The focal length of camera {lens.camera}, {focal:.0f} px, is unlike any usual lens.",
+                "Check the board's numbers and take more pictures with the board tilted.",
+                (lens.camera,),
+            )
+        )
+    return found
