@@ -1,0 +1,46 @@
+"""Distances to a silhouette's border, against brute force."""
+
+import numpy as np
+import pytest
+
+from studio.evidence.distance_maps import distances_of
+
+
+def disc(size: int = 61, radius: float = 17.0) -> np.ndarray:
+    rows, columns = np.mgrid[:size, :size]
+    return np.where(np.hypot(columns - 30, rows - 28) <= radius, 255, 0).astype(np.uint8)
+
+
+def test_signed_distances_are_those_of_brute_force() -> None:
+    mask = disc()
+    inside, outside = np.argwhere(mask > 0), np.argwhere(mask == 0)
+    found = distances_of(mask).signed
+    for row, column in [(28, 30), (28, 46), (28, 48), (0, 0), (60, 12), (15, 31)]:
+        others = outside if mask[row, column] else inside
+        away = np.hypot(*(others - [row, column]).T).min() - 0.5
+        assert found[row, column] == pytest.approx(-away if mask[row, column] else away, abs=1e-4)
+
+
+def test_border_points_lie_on_the_border_and_point_away() -> None:
+    found = distances_of(disc())
+    middle = found.border - [30.0, 28.0]
+    radii = np.linalg.norm(middle, axis=1)
+    assert len(radii) > 60
+    assert radii.min() > 15.5
+    assert radii.max() <= 17.0
+    assert np.all((found.outward * middle / radii[:, None]).sum(axis=1) > 0.95)
+
+
+def test_points_are_no_more_than_asked_for_and_spread_around() -> None:
+    found = distances_of(disc(), most=20)
+    assert 10 <= len(found.border) <= 20
+    angles = np.sort(np.arctan2(*(found.border - [30.0, 28.0]).T))
+    assert np.diff(angles).max() < 1.0
+
+
+def test_the_pictures_own_border_and_empty_masks_have_no_points() -> None:
+    mask = np.zeros((40, 50), np.uint8)
+    mask[10:30, :20] = 255
+    assert distances_of(mask).border[:, 0].min() > 0
+    for empty in (np.zeros((40, 50), np.uint8), np.full((40, 50), 255, np.uint8)):
+        assert distances_of(empty).border.shape == (0, 2)
