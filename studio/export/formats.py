@@ -45,7 +45,7 @@ FORMATS = _named(
         "glb",
         "GLB animated body",
         "Opens in Blender, Unity, Godot, three.js and Windows' 3D viewer; skeleton, cones and motion in one file.",
-        (*FRAMES, "names", "rest", "mesh"),
+        (*FRAMES, "names", "rest"),
         unit="m",
         up="y",
         media_type="model/gltf-binary",

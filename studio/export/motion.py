@@ -57,6 +57,14 @@ def motion_of(run: StoredRun, options: ExportOptions) -> Motion:
     return even_motion(run.body(), run.record.fps, read_track(run, options.track), options)
 
 
+def no_motion(run: StoredRun) -> Motion:
+    """No frame at all, for exports that are not of the motion."""
+    body, none = run.body(), np.zeros(0)
+    return Motion(
+        body, run.record.fps, none, none, np.zeros((0, len(body.parameters))), none.astype(bool), none, ()
+    )
+
+
 def even_motion(body: BodyModel, fps: float, track: Track, options: ExportOptions) -> Motion:
     """A track cut, filled and brought to a frame rate."""
     last = options.last or int(track.frames[-1] + 1 if len(track.frames) else 0)

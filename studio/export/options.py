@@ -22,16 +22,23 @@ class ExportOptions:
     track: str = knob("raw", help="Which track: raw is what the search found; others were made of it.")
     first: int = knob(0, 0, 100_000_000, label="from frame", help="The first frame.")
     last: int = knob(0, 0, 100_000_000, label="to frame", help="The frame after the last; 0: to the end.")
-    fps: float = knob(0.0, 0.0, 1000.0, label="frame rate", unit="Hz", help="Poses in between are made; 0: as tracked.")
+    fps: float = knob(
+        0.0, 0.0, 1000.0, label="frame rate", unit="Hz", help="Poses in between are made; 0: as tracked."
+    )
     lost: str = knob(
         "gap",
         label="lost frames",
         choices=("gap", "keep"),
         help="Frames in which the body was lost become gaps, or keep the pose that was held.",
     )
-    unit: str = knob(AUTO, choices=(AUTO, "m", "cm", "mm"), help="Of lengths; auto: what the format's readers expect.")
+    unit: str = knob(
+        AUTO, choices=(AUTO, "m", "cm", "mm"), help="Of lengths; auto: what the format's readers expect."
+    )
     up: str = knob(
-        AUTO, label="up axis", choices=(AUTO, "y", "z"), help="Auto: what the format's readers expect; z: the world's."
+        AUTO,
+        label="up axis",
+        choices=(AUTO, "y", "z"),
+        help="Auto: what the format's readers expect; z: the world's.",
     )
     names: str = knob(
         OWN,
@@ -51,8 +58,11 @@ class ExportOptions:
         help="Of the rotation channels, first applied last.",
     )
     angles: str = knob("degrees", choices=("degrees", "radians"), help="Of the angles in the table.")
-    mesh: bool = knob(True, help="The body's cones go with the skeleton.")
     split: bool = knob(False, help="More frames than the format counts go into several files.")
     camera: str = knob("", help="Only this camera's video; none: one video a camera.")
-    height: int = knob(0, 0, 4320, label="picture height", unit="px", help="Of the videos; 0: as it was recorded.")
-    calibration: str = knob("", label="calibration format", help="Which writer of calibrations; none: the ending's own.")
+    height: int = knob(
+        0, 0, 4320, label="picture height", unit="px", help="Of the videos; 0: as it was recorded."
+    )
+    calibration: str = knob(
+        "", label="calibration format", help="Which writer of calibrations; none: the ending's own."
+    )

@@ -1,0 +1,161 @@
+"""Exports of a run: options settled, the file written in a folder of its own, read back, and only then offered."""
+
+import dataclasses
+import os
+import zipfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from studio.errors import ExportError
+from studio.export.bvh_writing import write_bvh
+from studio.export.calibration_file import write_cameras
+from studio.export.formats import ExportFormat
+from studio.export.glb_writing import write_glb
+from studio.export.marker_files import write_c3d_file, write_trc_file
+from studio.export.motion import motion_of, no_motion
+from studio.export.options import AUTO, ExportOptions
+from studio.export.overlay_video import write_videos
+from studio.export.table_files import write_csv, write_npz, write_parquet
+from studio.export.task import ExportCancelledError, ExportTask, Writer, Written
+from studio.knobs import changed
+from studio.sessions.atomic_files import discard, new_folder_beside, sync_folder
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+
+Progress = Callable[[str, int, int], None]
+
+WRITERS: dict[str, Writer] = {
+    "bvh": write_bvh,
+    "glb": write_glb,
+    "trc": write_trc_file,
+    "c3d": write_c3d_file,
+    "csv": write_csv,
+    "parquet": write_parquet,
+    "npz": write_npz,
+    "mp4": write_videos,
+    "toml": write_cameras,
+    "yml": write_cameras,
+}
+"""Formats that this storey writes itself; a scene's recording is handed in from the storey of the scene."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExportReport:
+    """What came of an export.
+
+    files : written, and nothing else. checked : what reading back showed. notes : sentences on gaps, names and axes.
+    """
+
+    format: str
+    files: tuple[Path, ...]
+    frames: int
+    fps: float
+    checked: str
+    notes: tuple[str, ...]
+
+    @property
+    def size(self) -> int:
+        """Bytes of all files."""
+        return sum(path.stat().st_size for path in self.files)
+
+
+def settled(form: ExportFormat, asked: Mapping[str, object]) -> ExportOptions:
+    """Options from what was asked, "auto" settled for the format.
+
+    Raises SettingsError for unknown names and values, ExportError for an option that the format does not take, or a
+    range of frames that is none.
+    """
+    options = changed(ExportOptions(), asked)
+    for name in asked:
+        if name not in form.takes and getattr(options, name) != getattr(ExportOptions(), name):
+            raise ExportError(
+                f"Option '{name}' means nothing to {form.title} ({form.name}).",
+                f"It takes {', '.join(form.takes)}.",
+            )
+    if options.last and options.last <= options.first:
+        raise ExportError(
+            f"No frame lies from {options.first} to before {options.last}.",
+            "Let 'last' be greater than 'first'.",
+        )
+    unit = form.unit if options.unit == AUTO else options.unit
+    up = form.up if options.up == AUTO else options.up
+    return dataclasses.replace(options, unit=unit or "mm", up=up or "z")
+
+
+def export_run(
+    session: Session,
+    run: StoredRun,
+    form: ExportFormat,
+    asked: Mapping[str, object],
+    place: Path,
+    *,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+    record_scene: Writer | None = None,
+    pack: bool = False,
+) -> ExportReport:
+    """Export a run to `place`, which is written over only when the new file has read back as it should.
+
+    asked : options by name. record_scene : the writer of scene recordings. pack : several files become one zip.
+    cancelled : asked often; True ends it with ExportCancelledError. Raises ExportError and whatever a run raises that
+    cannot be read.
+    """
+    options = settled(form, asked)
+    writer = record_scene if form.what == "scene" else WRITERS.get(form.name)
+    if writer is None:
+        raise ExportError(
+            f"{form.title} cannot be written here.", "Export it from the page or the command line."
+        )
+    motion = no_motion(run) if form.what == "cameras" else motion_of(run, options)
+    folder = _working_folder(place)
+
+    def step(words: str, done: int, total: int) -> None:
+        if cancelled is not None and cancelled():
+            raise ExportCancelledError("The export was cancelled.", "Start it again when you like.")
+        if progress is not None:
+            progress(words, done, total)
+
+    try:
+        written = writer(ExportTask(session, run, motion, options, folder / place.name, step))
+        step("finishing", 1, 1)
+        files = _packed(written, place) if pack and len(written.files) > 1 else written.files
+        moved = tuple(_in_place(path, place.parent) for path in files)
+    except OSError as error:
+        raise ExportError(
+            f"'{place.name}' cannot be written ({error.strerror or error}).",
+            "Check the disk's room and the folder.",
+        ) from None
+    finally:
+        discard(folder)
+    sync_folder(place.parent)
+    notes = (*motion.notes, *written.notes)
+    return ExportReport(form.name, moved, len(motion.frames), motion.fps, written.checked, notes)
+
+
+def _working_folder(place: Path) -> Path:
+    """A hidden folder beside the place. Raises ExportError where nothing can be written."""
+    if place.is_dir():
+        raise ExportError(f"'{place.name}' is a folder.", "Name a file.")
+    try:
+        return new_folder_beside(place)
+    except OSError as error:
+        raise ExportError(
+            f"Nothing can be written beside '{place.name}' ({error.strerror}).", "Choose another folder."
+        ) from None
+
+
+def _packed(written: Written, place: Path) -> tuple[Path, ...]:
+    """The files as one zip, stored as they are: what is in them is packed already."""
+    archive = written.files[0].parent / f"{place.stem}-{place.suffix.removeprefix('.')}.zip"
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_STORED) as packed:
+        for path in written.files:
+            packed.write(path, path.name)
+    return (archive,)
+
+
+def _in_place(path: Path, folder: Path) -> Path:
+    """Move a finished file to where it was wanted, in one step."""
+    place = folder / path.name
+    os.replace(path, place)
+    return place

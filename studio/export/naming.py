@@ -1,0 +1,126 @@
+"""Names that other programs know: which point of the body each is, and what its joints are called there.
+
+The maps are data (`name_maps/*.toml`). A body that lacks a point is exported without it, and that is said.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.forward_kinematics import joint_frames
+from studio.body.model import BodyModel
+from studio.errors import ExportError
+from studio.export.options import OWN
+from studio.typed_decoding import decode_toml
+
+Array = NDArray[np.float64]
+
+
+class PlaceEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Where a point is: at a marker, or a share of the way along a drawn limb's axis."""
+
+    marker: str = ""
+    limb: str = ""
+    at: float = 0.0
+
+
+class NameMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """points : by the program's name, the places in order of preference. joints : the program's name of a body's
+    joint.
+    """
+
+    title: str
+    source: str
+    points: dict[str, tuple[PlaceEntry, ...]]
+    joints: dict[str, str]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Points:
+    """M points fixed to a body's joints. joints (M,), offsets (M, 3) mm in the joints' frames. note : what is missing."""
+
+    names: tuple[str, ...]
+    joints: NDArray[np.int64]
+    offsets: Array
+    note: str = ""
+
+    def positions(self, body: BodyModel, poses: Array) -> Array:
+        """(N, M, 3) mm in the world."""
+        frames = joint_frames(body, poses)[:, self.joints]
+        return (frames[..., :3] @ self.offsets[..., None])[..., 0] + frames[..., 3]
+
+
+@cache
+def name_map(name: str) -> NameMap:
+    """A map by its name. Raises ExportError for one that there is not."""
+    found = files("studio.export") / "name_maps" / f"{name}.toml"
+    if not name.isalnum() or not found.is_file():
+        raise ExportError(
+            f"There is no map of names '{name[:40]}'.", "Choose own, halpe26, mixamo or opensim."
+        )
+    return decode_toml(found.read_bytes(), NameMap)
+
+
+def points_of(body: BodyModel, names: str) -> Points:
+    """The points of a body under the names of a map ("own": its markers). Raises ExportError if it has none."""
+    if names == OWN:
+        found = {
+            marker.name: (marker.joint, np.asarray(marker.offset, dtype=float)) for marker in body.markers
+        }
+        missing: list[str] = []
+    else:
+        places = name_map(names).points
+        found = {name: place for name, entries in places.items() if (place := _place(body, entries))}
+        missing = [name for name in places if name not in found]
+    if not found:
+        raise ExportError(
+            f"Body '{body.name}' has none of the points of '{names}'.", "Export with the body's own names."
+        )
+    note = ""
+    if missing:
+        title = name_map(names).title
+        note = f"Body '{body.name}' has no {_listed(missing)}: these points of {title} are left out."
+    joints = np.array([joint for joint, _ in found.values()], dtype=np.int64)
+    return Points(tuple(found), joints, np.array([offset for _, offset in found.values()]), note)
+
+
+def joint_names(own: tuple[str, ...], names: str) -> tuple[tuple[str, ...], str]:
+    """What joints are called under a map, those that it does not name by their own; and a sentence on that."""
+    if names == OWN:
+        return own, ""
+    known = name_map(names).joints
+    told, kept = [], []
+    for name in own:
+        renamed = known.get(name, name)
+        if name not in known or renamed in told:
+            kept.append(name)
+            renamed = name
+        told.append(renamed)
+    note = (
+        f"{name_map(names).title} has no name for {_listed(kept)}: these joints keep their own."
+        if kept
+        else ""
+    )
+    return tuple(told), note
+
+
+def _place(body: BodyModel, entries: tuple[PlaceEntry, ...]) -> tuple[int, Array] | None:
+    """The joint and offset of the first place that the body has."""
+    markers = {marker.name: marker for marker in body.markers}
+    limbs = {limb.name: limb for limb in body.drawn}
+    for entry in entries:
+        if entry.marker in markers:
+            marker = markers[entry.marker]
+            return marker.joint, np.asarray(marker.offset, dtype=float)
+        if entry.limb in limbs:
+            limb = limbs[entry.limb]
+            return limb.joint, np.array([0.0, 0.0, entry.at * limb.length])
+    return None
+
+
+def _listed(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

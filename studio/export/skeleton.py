@@ -1,0 +1,171 @@
+"""A body as the skeleton of an animation: a rest pose of offsets, and turns away from it.
+
+In the rest pose no joint is turned: `offsets` lead from each joint's pivot to its children's, along the world's axes.
+A pose turns each joint by the rotation that takes its frame from rest to there. The rest pose is a T-pose where the
+body has arms and legs (what Blender, Mixamo and retargeting tools expect): legs straight down, arms stretched sideways
+with the palms down, facing x; otherwise the body's neutral pose.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.forward_kinematics import marker_points
+from studio.body.model import BodyModel
+from studio.export.joint_tree import JointTree, joint_tree
+
+Array = NDArray[np.float64]
+
+LIMB_MARKERS = tuple(
+    f"{side}{name}" for side in "LR" for name in ("Shoulder", "Elbow", "Wrist", "Hip", "Knee", "Ankle")
+)
+CHAINS = (("Shoulder", "Elbow"), ("Elbow", "Wrist"), ("Hip", "Knee"), ("Knee", "Ankle"))
+DOWN = np.array([0.0, 0.0, -1.0])
+STUB_MM = 50.0
+NOTHING_MM = 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Skeleton:
+    """J joints in the rest pose, mm along the world's axes (z up).
+
+    tree : their names, parents and how poses place them. offsets (J, 3) : from the parent's pivot. turns (J, 3, 3) :
+    the frames' rotations at rest. ends : for joints without children the far end of what they carry, from the pivot;
+    None for others. kind : "T-pose" or "neutral pose".
+    """
+
+    body: BodyModel
+    tree: JointTree
+    offsets: Array
+    turns: Array
+    ends: tuple[Array | None, ...]
+    kind: str
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The joints' own names."""
+        return self.tree.names
+
+    @property
+    def rest_pivots(self) -> Array:
+        """(J, 3) mm where the joints are in the rest pose, the root at the origin."""
+        places = np.zeros_like(self.offsets)
+        for joint, parent in enumerate(self.tree.parents):
+            if parent >= 0:
+                places[joint] = places[parent] + self.offsets[joint]
+        return places
+
+    def animated(self, poses: Array) -> tuple[Array, Array]:
+        """Translations (N, J, 3) mm and turns (N, J, 3, 3) of each joint in its parent's turned frame."""
+        pivots, frames = self.tree.placed(poses)
+        turned = frames @ self.turns.transpose(0, 2, 1)
+        moves, turns = np.broadcast_to(self.offsets, pivots.shape).copy(), turned.copy()
+        for joint, parent in enumerate(self.tree.parents):
+            if parent < 0:
+                moves[:, joint] = pivots[:, joint]
+                continue
+            back = turned[:, parent].transpose(0, 2, 1)
+            turns[:, joint] = back @ turned[:, joint]
+            if self.tree.moving[joint]:
+                moves[:, joint] = (back @ (pivots[:, joint] - pivots[:, parent])[..., None])[..., 0]
+        return moves, turns
+
+
+def skeleton_of(body: BodyModel, rest: str = "tpose") -> Skeleton:
+    """The skeleton of a body. rest : "tpose" (where the body has arms and legs) or "neutral"."""
+    tree = joint_tree(body)
+    neutral = body.neutral[None]
+    pivots, frames = (part[0] for part in tree.placed(neutral))
+    aims = _aims(body) if rest == "tpose" else {}
+    turns = _aimed(body, tree, frames, aims)
+    offsets = np.zeros_like(pivots)
+    for joint, parent in enumerate(tree.parents):
+        if parent >= 0:
+            offsets[joint] = turns[parent] @ frames[parent].T @ (pivots[joint] - pivots[parent])
+    kind = "T-pose" if aims else "neutral pose"
+    return Skeleton(body, tree, offsets, turns, _ends(body, tree, turns, offsets), kind)
+
+
+def follow(skeleton: Skeleton, moves: Array, turns: Array) -> tuple[Array, Array]:
+    """World places (N, J, 3) and turns (N, J, 3, 3) of joints that are moved and turned in their parents.
+
+    It is what every reader of such a file does; here it checks the files that were written.
+    """
+    places, turned = np.zeros_like(moves), np.zeros_like(turns)
+    for joint, parent in enumerate(skeleton.tree.parents):
+        if parent < 0:
+            places[:, joint], turned[:, joint] = moves[:, joint], turns[:, joint]
+        else:
+            step = (turned[:, parent] @ moves[:, joint][..., None])[..., 0]
+            places[:, joint] = places[:, parent] + step
+            turned[:, joint] = turned[:, parent] @ turns[:, joint]
+    return places, turned
+
+
+def _aims(body: BodyModel) -> dict[int, tuple[Array, Array]]:
+    """For the joints of arms and legs: the bone's direction in the neutral pose and in the T-pose (world)."""
+    index = {marker.name: at for at, marker in enumerate(body.markers)}
+    if not {"Neck", *LIMB_MARKERS} <= set(index):
+        return {}
+    points = marker_points(body, body.neutral)[0]
+    across = points[index["LShoulder"]] - points[index["RShoulder"]]
+    across[2] = 0.0
+    if np.linalg.norm(across) < NOTHING_MM:
+        return {}
+    across /= np.linalg.norm(across)
+    aims = {}
+    for side, outwards in (("L", across), ("R", -across)):
+        for start, end in CHAINS:
+            here, there = index[side + start], index[side + end]
+            aim = outwards if start in ("Shoulder", "Elbow") else DOWN
+            aims[body.markers[here].joint] = (points[there] - points[here], aim)
+    return aims
+
+
+def _aimed(body: BodyModel, tree: JointTree, frames: Array, aims: dict[int, tuple[Array, Array]]) -> Array:
+    """The frames' rotations at rest: each follows its parent, and those with an aim turn to it the short way."""
+    wanted = {tree.whole[joint]: aim for joint, aim in aims.items()}
+    turns = frames.copy()
+    for joint, parent in enumerate(tree.parents):
+        carried = turns[parent] @ frames[parent].T if parent >= 0 else np.eye(3)
+        turns[joint] = carried @ frames[joint]
+        if joint in wanted:
+            bone, aim = wanted[joint]
+            turns[joint] = _short_way(carried @ bone, aim) @ turns[joint]
+    return turns
+
+
+def _short_way(start: Array, aim: Array) -> Array:
+    """The smallest rotation that takes one direction to another (not opposite ones)."""
+    one, two = start / np.linalg.norm(start), aim / np.linalg.norm(aim)
+    axis, cosine = np.cross(one, two), float(one @ two)
+    cross = np.array([[0.0, -axis[2], axis[1]], [axis[2], 0.0, -axis[0]], [-axis[1], axis[0], 0.0]])
+    return np.eye(3) + cross + cross @ cross / (1.0 + cosine)
+
+
+def _ends(body: BodyModel, tree: JointTree, turns: Array, offsets: Array) -> tuple[Array | None, ...]:
+    """Of each joint without children the farthest of its limbs' ends and markers, else a stub that goes on."""
+    origins, pivots = tree.origins(body.neutral[None])[0], tree.placed(body.neutral[None])[0][0]
+    frames = tree.placed(body.neutral[None])[1][0]
+    carried: dict[int, list[Array]] = {}
+    for limb in body.drawn:
+        tips = [np.zeros(3), np.array([0.0, 0.0, limb.length])]
+        carried.setdefault(tree.whole[limb.joint], []).extend(tips)
+    for marker in body.markers:
+        carried.setdefault(tree.whole[marker.joint], []).append(np.asarray(marker.offset))
+    ends: list[Array | None] = []
+    for joint in range(len(tree.names)):
+        if joint in tree.parents:
+            ends.append(None)
+            continue
+        shift = frames[joint].T @ (origins[joint] - pivots[joint])
+        reach = [turns[joint] @ (point + shift) for point in carried.get(joint, [])]
+        farthest = max(reach, key=np.linalg.norm, default=np.zeros(3))
+        ends.append(farthest if np.linalg.norm(farthest) > NOTHING_MM else _stub(offsets[joint]))
+    return tuple(ends)
+
+
+def _stub(offset: Array) -> Array:
+    length = float(np.linalg.norm(offset))
+    return STUB_MM * (offset / length if length > NOTHING_MM else -DOWN)

@@ -1,0 +1,155 @@
+"""Poses and points as tables and arrays: CSV, Parquet, NPZ. Gaps are empty, null or NaN; confidence goes along."""
+
+import csv
+import json
+import math
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from studio.body.forward_kinematics import joint_frames
+from studio.errors import ExportError
+from studio.export.axes import Axes
+from studio.export.marker_files import marked_points
+from studio.export.task import ExportTask, Written, agreed, apart
+
+Array = NDArray[np.float64]
+
+DEGREE_SIGNS = {"degrees": "deg", "radians": "rad"}
+FIRST_COLUMNS = ("frame", "time [s]", "state", "confidence")
+ROWS_A_STEP = 500
+
+
+def write_csv(task: ExportTask) -> Written:
+    """One row a frame: number, time, state, confidence, the pose's entries, the points. The heads name the units."""
+    points, places = marked_points(task)
+    motion, options = task.motion, task.options
+    poses = np.where(motion.known[:, None], motion.poses, np.nan)
+    angle = np.array([entry.kind == "angle" for entry in motion.body.parameters])
+    shown = poses.copy()
+    shown[:, angle] *= 180.0 / math.pi if options.angles == "degrees" else 1.0
+    shown[:, ~angle] /= task.axes.mm
+    signs = [DEGREE_SIGNS[options.angles] if turned else options.unit for turned in angle]
+    heads = [
+        *FIRST_COLUMNS,
+        *(f"{entry.name} [{sign}]" for entry, sign in zip(motion.body.parameters, signs, strict=True)),
+        *(f"{name} {axis} [{options.unit}]" for name in points.names for axis in "xyz"),
+    ]
+    table = np.concatenate([shown, task.axes.points(places).reshape(len(places), -1)], axis=1)
+    with task.place.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(heads)
+        for row, values in enumerate(table):
+            if row % ROWS_A_STEP == 0:
+                task.step("writing", row, len(table))
+            first = (f"{motion.frames[row]:.12g}", f"{motion.times[row]:.9f}", motion.states[row])
+            writer.writerow([*first, _cell(motion.confidence[row]), *map(_cell, values)])
+    task.step("reading back", len(table), len(table))
+    checked = _read_csv_back(task, heads, places, poses, angle)
+    notes = [f"Angles in {options.angles}, lengths in {options.unit}, {options.up.upper()} up."]
+    if options.up == "y":
+        notes.append("The pose's entries stay those of the world, z up; the points are turned.")
+    return Written((task.place,), checked, (*notes, *_point_notes(task, points.note, "empty cells")))
+
+
+def write_parquet(task: ExportTask) -> Written:
+    """A row a frame and point: frame, time, name, x, y, z, conf; what else is known is the schema's metadata."""
+    points, places = marked_points(task)
+    motion, count = task.motion, len(points.names)
+    converted = task.axes.points(places).reshape(-1, 3)
+    columns = {
+        "frame": pa.array(np.repeat(motion.frames, count)),
+        "time": pa.array(np.repeat(motion.times, count)),
+        "name": pa.array(np.tile(np.array(points.names), len(places)).tolist()).dictionary_encode(),
+        **{axis: pa.array(converted[:, at], from_pandas=True) for at, axis in enumerate("xyz")},
+        "conf": pa.array(np.repeat(motion.confidence, count), from_pandas=True),
+    }
+    told = {
+        **task.source,
+        "unit": task.options.unit,
+        "up": task.options.up,
+        "fps": f"{motion.fps:.12g}",
+        "names": task.options.names,
+    }
+    table = pa.table(columns).replace_schema_metadata(told)
+    task.step("writing", 0, 2)
+    pq.write_table(table, task.place, compression="zstd")
+    task.step("reading back", 1, 2)
+    read = pq.read_table(task.place)
+    values = np.stack([read.column(axis).to_numpy() for axis in "xyz"], axis=-1).reshape(places.shape)
+    checked = agreed(task.place, apart(task.axes.points_back(values), places))
+    return Written((task.place,), checked, _point_notes(task, points.note, "null"))
+
+
+def write_npz(task: ExportTask) -> Written:
+    """Arrays by name, readable without pickles; `about` is a JSON text that says what they are."""
+    points, places = marked_points(task)
+    motion, axes = task.motion, task.axes
+    frames = joint_frames(motion.body, motion.poses)
+    frames[~motion.known] = np.nan
+    poses = np.where(motion.known[:, None], motion.poses, np.nan)
+    arrays = {
+        "frames": motion.frames,
+        "times": motion.times,
+        "states": np.array(motion.states),
+        "confidence": motion.confidence,
+        "poses": poses,
+        "parameters": np.array([entry.name for entry in motion.body.parameters]),
+        "markers": axes.points(places),
+        "marker_names": np.array(points.names),
+        "joints": axes.points(frames[..., 3]),
+        "joint_rotations": _turned_frames(axes, frames[..., :3]),
+        "joint_names": np.array([joint.name for joint in motion.body.joints]),
+        "joint_parents": np.array([joint.parent for joint in motion.body.joints]),
+    }
+    about = {
+        **task.source,
+        "unit": task.options.unit,
+        "up": task.options.up,
+        "fps": motion.fps,
+        "poses": "radians and mm of the body's parameters, world z up, whatever unit and up say",
+        "joint_rotations": "columns are the joint's axes in the file's world",
+    }
+    task.step("writing", 0, 2)
+    np.savez_compressed(task.place, about=np.array(json.dumps(about)), **arrays)
+    task.step("reading back", 1, 2)
+    with np.load(task.place, allow_pickle=False) as read:
+        same = all(
+            np.array_equal(read[name], value, equal_nan=value.dtype.kind == "f")
+            for name, value in arrays.items()
+        )
+        difference = apart(axes.points_back(read["markers"]), places) if same else math.inf
+    return Written((task.place,), agreed(task.place, difference), _point_notes(task, points.note, "NaN"))
+
+
+def _turned_frames(axes: Axes, turns: Array) -> Array:
+    """The joints' axes, written in the file's world."""
+    return axes.turn @ turns
+
+
+def _cell(value: float) -> str:
+    return "" if math.isnan(value) else repr(float(value))
+
+
+def _read_csv_back(
+    task: ExportTask, heads: list[str], places: Array, poses: Array, angle: NDArray[np.bool_]
+) -> str:
+    """Compare points and angles of the file with those that were meant."""
+    with task.place.open(newline="", encoding="utf-8") as stream:
+        rows = list(csv.reader(stream))
+    if rows[0] != heads or len(rows) != len(places) + 1:
+        raise ExportError(f"'{task.place.name}' reads back with other columns or rows.", "Export it again.")
+    start = len(FIRST_COLUMNS)
+    table = np.array([[float(cell) if cell else math.nan for cell in row[start:]] for row in rows[1:]])
+    read = task.axes.points_back(table[:, poses.shape[1] :].reshape(places.shape))
+    angles = table[:, : poses.shape[1]][:, angle]
+    angles = angles if task.options.angles == "degrees" else np.degrees(angles)
+    turned = np.nan_to_num(np.abs(angles - np.degrees(poses[:, angle]))).max(initial=0.0)
+    return agreed(task.place, apart(read, places), float(turned))
+
+
+def _point_notes(task: ExportTask, note: str, how: str) -> tuple[str, ...]:
+    count = int((~task.motion.known).sum())
+    return (*([f"{count} frames are missing in it, as {how}."] if count else []), *([note] if note else []))

@@ -1,0 +1,102 @@
+"""What a writer of a format is given, what it hands back, and how closely a file that was read back must agree."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.errors import ExportError
+from studio.export.axes import Axes
+from studio.export.motion import Motion
+from studio.export.options import ExportOptions
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+
+Array = NDArray[np.float64]
+
+LEAST_MM, LEAST_DEGREES = 0.1, 0.01
+
+
+class ExportCancelledError(ExportError):
+    """The export was cancelled; nothing of it is kept."""
+
+    code = "cancelled"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExportTask:
+    """One file to be written.
+
+    options : with "auto" settled. place : the file, in an empty folder of its own; more files may be written beside
+    it. step(words, done, total) : to be called while it is written; raises ExportCancelledError.
+    """
+
+    session: Session
+    run: StoredRun
+    motion: Motion
+    options: ExportOptions
+    place: Path
+    step: Callable[[str, int, int], None]
+
+    @property
+    def axes(self) -> Axes:
+        """The file's unit and up axis."""
+        return Axes(self.options.unit, self.options.up)
+
+    @property
+    def source(self) -> dict[str, str]:
+        """Where the motion comes from, for files that have a place for it."""
+        return {
+            "session": self.run.session_name,
+            "run": self.run.name,
+            "track": self.options.track,
+            "body": self.motion.body.name,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """files : what was written, the first the one that was asked for. checked : what reading it back showed, in words.
+    notes : what whoever uses the file should know.
+    """
+
+    files: tuple[Path, ...]
+    checked: str
+    notes: tuple[str, ...] = ()
+
+
+Writer = Callable[[ExportTask], Written]
+
+
+def agreed(file: Path, points_mm: float, turns_degrees: float | None = None) -> str:
+    """What reading a file back showed, in words. Raises ExportError where it is not what was written.
+
+    points_mm, turns_degrees : the largest differences between what was written and what was read.
+    """
+    turned = 0.0 if turns_degrees is None else turns_degrees
+    if not (points_mm <= LEAST_MM and turned <= LEAST_DEGREES):
+        raise ExportError(
+            f"'{file.name}' does not read back as what was written: {points_mm:.3g} mm and {turned:.3g} degrees apart.",
+            "Export it again; if it stays so, report the run to the studio's makers.",
+        )
+    words = f"read back within {max(points_mm, 1e-4):.4f} mm"
+    return words if turns_degrees is None else f"{words} and {max(turned, 1e-4):.4f}°"
+
+
+def apart(one: Array, other: Array) -> float:
+    """The largest distance of points (..., 3), infinite where they are not missing in the same places."""
+    if one.shape != other.shape or not np.array_equal(np.isnan(one), np.isnan(other)):
+        return float("inf")
+    distances = np.linalg.norm(np.nan_to_num(one - other), axis=-1)
+    return float(distances.max(initial=0.0))
+
+
+def turned_apart(one: Array, other: Array) -> float:
+    """The largest angle between rotations (..., 3, 3), degrees."""
+    if one.shape != other.shape:
+        return float("inf")
+    # Of two rotations |A - B| (Frobenius) = 2 √2 sin(angle / 2), exact for small angles too.
+    chord = np.linalg.norm(one - other, axis=(-2, -1)) / (2.0 * np.sqrt(2.0))
+    return float(np.degrees(2.0 * np.arcsin(np.clip(chord, 0.0, 1.0))).max(initial=0.0))

@@ -1,0 +1,54 @@
+"""Run inside Blender (`blender --background --python`): what it sees of a BVH or GLB, as JSON.
+
+Arguments after "--": the file, the JSON to write, the frames a second. Blender turns files that are Y up into its own
+world, z up; what is written here is Blender's world, in metres.
+"""
+
+import builtins
+import json
+import sys
+
+import bpy
+
+# Debian's Blender 3.4 opens BVH files in mode "rU", which its own Python 3.11 no longer knows; nothing else is mended.
+_open = builtins.open
+builtins.open = lambda path, mode="r", *rest, **named: _open(path, mode.replace("U", ""), *rest, **named)
+
+source, target, fps = sys.argv[sys.argv.index("--") + 1 :]
+bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.context.scene.render.fps = round(float(fps))
+if source.endswith(".bvh"):
+    bpy.ops.import_anim.bvh(filepath=source, use_fps_scale=False, update_scene_duration=True)
+else:
+    # Its default shading fails there on any mesh (numpy has no "np.bool" any more); this is the importer's other choice.
+    bpy.ops.import_scene.gltf(filepath=source, import_shading="SMOOTH")
+armature = next(entry for entry in bpy.data.objects if entry.type == "ARMATURE")
+action = armature.animation_data.action
+first, last = (round(value) for value in action.frame_range)
+heads, turns = [], []
+for frame in range(first, last + 1):
+    bpy.context.scene.frame_set(frame)
+    world = armature.matrix_world
+    heads.append({bone.name: list(world @ bone.head) for bone in armature.pose.bones})
+    turns.append(
+        {
+            bone.name: [
+                list(row)
+                for row in (world @ bone.matrix).to_3x3()
+                @ (world @ bone.bone.matrix_local).to_3x3().inverted()
+            ]
+            for bone in armature.pose.bones
+        }
+    )
+meshes = [entry for entry in bpy.data.objects if entry.type == "MESH"]
+answer = {
+    "version": bpy.app.version_string,
+    "bones": [bone.name for bone in armature.data.bones],
+    "first": first,
+    "heads": heads,
+    "turns": turns,
+    "vertices": sum(len(entry.data.vertices) for entry in meshes),
+    "skinned": any(modifier.type == "ARMATURE" for entry in meshes for modifier in entry.modifiers),
+}
+with open(target, "w", encoding="utf-8") as stream:
+    json.dump(answer, stream)
