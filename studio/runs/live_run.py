@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Executor
 
+from studio.errors import RunError
 from studio.runs.live_problems import LiveProblems, Ready
 from studio.runs.live_summary import LiveMeter, LiveStanding
 from studio.runs.pace import Progress
@@ -69,6 +70,14 @@ class LiveRun(TrackingRun):
         self._live_problems.take(ready)
         self.next_frame = ready.frame
         self._came = (ready.frame, ready.arrival.complete)
+
+    def go_to(self, frame: int) -> None:
+        """Search `frame` next, however long ago it came. Raises RunError inside another frame."""
+        if not self.between_frames and frame != self.next_frame:
+            raise RunError(
+                f"Frame {self.next_frame} is not searched to its end.", "Do the layers that are left."
+            )
+        self.next_frame, self._came = frame, None
 
     def end(self) -> None:
         """No further frame will come."""

@@ -1,0 +1,71 @@
+"""Footage and behaviour model that live tracking is measured on: all that is needed comes with the studio.
+
+Two seconds of a rendered walk are too short to sustain anything, and rendering more takes minutes. So every video is
+written anew, forth and back through its frames until it is long enough: files of that length, decoded frame by frame
+as any recording is.
+"""
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from studio.behaviour.model_file import write_model
+from studio.behaviour.model_learning import learn_model
+from studio.behaviour.settings import LearningSettings
+from studio.body.catalogue import load_body
+from studio.capture.to_and_fro import folded
+from studio.sessions.manifest import write_manifest
+from studio.sessions.session import Session
+from studio.synthesis.clips import ClipWriter
+from studio.synthesis.recipes import synthesize
+from studio.training.sources import recipe_recording
+
+Progress = Callable[[str, int, int], None]
+
+RECIPE = "walk-five-cameras"
+QUALITY = 19.0
+
+
+def make_footage(place: Path, seconds: float, progress: Progress | None = None) -> Session:
+    """The session, made in the folder `place`, which is not there yet. progress : told (step, done, total)."""
+    synthesize(RECIPE, place, progress)
+    lengthen(Session(place), seconds, progress)
+    return Session(place)
+
+
+def lengthen(session: Session, seconds: float, progress: Progress | None = None) -> None:
+    """Write a session's videos anew, so long and forth and back; nothing where they are long enough."""
+    manifest = session.manifest
+    source, count = manifest.footage, round(seconds * manifest.fps)
+    if count <= source.frame_count:
+        return
+    footage = session.footage()
+    cameras = []
+    for number, camera in enumerate(source.cameras):
+        clip = [footage.picture(camera.name, frame) for frame in range(source.frame_count)]
+        path = session.path / camera.path
+        longer = path.with_name(f"{path.stem}-long.mp4")
+        with ClipWriter(longer, (camera.width, camera.height), source.fps, QUALITY) as writer:
+            for frame in range(count):
+                writer.add(clip[folded(frame, source.frame_count)])
+        entry = longer.relative_to(session.path).as_posix()
+        cameras.append(dataclasses.replace(camera, path=entry, frame_count=count))
+        if progress is not None:
+            progress("writing long videos", number + 1, len(source.cameras))
+    footage.close()
+    changed = dataclasses.replace(source, frame_count=count, cameras=tuple(cameras))
+    write_manifest(session.path, msgspec.structs.replace(manifest, footage=changed))
+
+
+def learn_walk(place: Path, seed: int = 0) -> Path:
+    """What the footage's person does, forth and back, as a behaviour model in the file `place`."""
+    body = load_body("human25")
+    recording = recipe_recording(RECIPE, body)
+    sources = [recording.poses, np.ascontiguousarray(recording.poses[::-1])]
+    rng = np.random.default_rng(seed)
+    model = learn_model(sources, body, recording.fps, LearningSettings(), rng, sources=(RECIPE, RECIPE))
+    write_model(model, place)
+    return place

@@ -1,0 +1,61 @@
+"""A live run tracked in this process, for commands and scripts; Ctrl-C ends it and keeps what is done."""
+
+from collections.abc import Callable
+
+from studio.runs.live_replay import Comparison, compare, replay
+from studio.runs.live_summary import LiveStanding, LiveSummary, summary_of
+from studio.runs.problem_source import ProblemSource
+from studio.runs.run_footage import footage_of
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.worker.open_live_run import OpenLiveRun
+
+# Called with a step in words, frames that came and frames in all.
+Report = Callable[[str, int, int], None]
+
+
+def track_live(session: Session, run: StoredRun, report: Report) -> LiveSummary:
+    """Track a prepared or interrupted live run until its last frame has come.
+
+    Raises StudioError; KeyboardInterrupt is passed on after the run was marked as cancelled.
+    """
+    record = run.record
+    opened = OpenLiveRun(str(session.path), str(run.folder))
+    try:
+        opened.tracking.mark_going_on()
+        report("getting ready", 0, record.frame_count)
+        opened.warm_up()
+        while not opened.live.finished:
+            stepped = opened.step_layer()
+            if stepped is not None and stepped.result is not None:
+                came = opened.live.next_frame - record.first
+                report(in_words(opened.live.standing), came, record.frame_count)
+    except KeyboardInterrupt:
+        opened.tracking.mark_cancelled()
+        raise
+    finally:
+        opened.close()
+    return summary_of(run)
+
+
+def replay_live(session: Session, run: StoredRun, into: StoredRun, report: Report) -> Comparison:
+    """Track the frames of a live run again, into a run made by `live_replay.prepare_replay`, and compare the two."""
+    problems = ProblemSource(session, into.body(), into.cameras(), footage=footage_of(session, into))
+    with run.results() as results:
+        total = results.done()
+    try:
+        for done, frame in enumerate(replay(run, into, problems), 1):
+            report(f"frame {frame} again", done, total)
+    finally:
+        problems.close()
+    return compare(run, into)
+
+
+def in_words(standing: LiveStanding) -> str:
+    """How a live run keeps up, as a status line says it."""
+    parts = ["live"]
+    if standing.frames_per_second == standing.frames_per_second:
+        parts.append(f"{standing.frames_per_second:.1f} fps")
+    if standing.latency_ms == standing.latency_ms:
+        parts.append(f"latency {standing.latency_ms:.0f} ms")
+    return " · ".join([*parts, f"{standing.dropped} dropped"])
