@@ -24,6 +24,11 @@ COMMANDS = {
     "compare": ("comparison_commands", "compare", "Compare trackers fairly on a session with a truth."),
     "learn": ("behaviour_commands", "learn_command", "Learn what a body tends to do from recorded motion."),
     "models": ("behaviour_commands", "models_command", "List the behaviour models."),
+    "export": (
+        "export_commands",
+        "export_command",
+        "Write a run's motion to BVH, C3D, TRC, GLB, video and more.",
+    ),
     "synthesize": ("synthesis_commands", "synthesize_command", "Render footage with exact truth."),
     "reproduce": (
         "reproduction_commands",

@@ -108,6 +108,14 @@ FORMATS = _named(
         what="scene",
     ),
     ExportFormat(
+        "html",
+        "Scene page",
+        "Opens in any browser, nothing installed: the same scene as one page, played and turned with the mouse.",
+        ("track", "first", "last", "lost"),
+        what="scene",
+        media_type="text/html; charset=utf-8",
+    ),
+    ExportFormat(
         "toml",
         "Calibration (TOML)",
         "Opens in Pose2Sim, anipose, FreeMoCap and Caliscope; the cameras of the run.",

@@ -45,9 +45,11 @@ class JointTree:
 def joint_tree(body: BodyModel) -> JointTree:
     """The tree of a body."""
     roots = sum(joint.parent < 0 for joint in body.joints)
-    names, parents, moving, whole, steps = [], [], [], [], []
-    if roots > 1:
-        names, parents, moving, steps = [BASE], [-1], [True], [((), ())]
+    names: list[str] = [BASE] if roots > 1 else []
+    parents: list[int] = [-1] * len(names)
+    moving: list[bool] = [True] * len(names)
+    steps: list[tuple[tuple[Step, ...], tuple[Step, ...]]] = [((), ()) for _ in names]
+    whole: list[int] = []
     for joint in body.joints:
         parent = whole[joint.parent] if joint.parent >= 0 else (0 if roots > 1 else -1)
         pieces = _pieces(joint.steps)

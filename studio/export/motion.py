@@ -106,7 +106,7 @@ def _filled(body: BodyModel, fps: float, track: Track, rows: NDArray[np.int64], 
 def _at_rate(motion: Motion, fps: float) -> Motion:
     """The same motion at another frame rate; a pose is known where both its neighbours are."""
     length = float(motion.times[-1])
-    count = int(math.floor(length * fps + 1e-6)) + 1
+    count = math.floor(length * fps + 1e-6) + 1
     times = np.arange(count) / fps
     places = np.clip(times * motion.fps, 0.0, len(motion.times) - 1.0)
     places = np.where(np.abs(places - np.round(places)) < 1e-6, np.round(places), places)

@@ -41,7 +41,7 @@ class NameMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Points:
-    """M points fixed to a body's joints. joints (M,), offsets (M, 3) mm in the joints' frames. note : what is missing."""
+    """M points fixed to joints. joints (M,), offsets (M, 3) mm in the joints' frames. note : what is missing."""
 
     names: tuple[str, ...]
     joints: NDArray[np.int64]

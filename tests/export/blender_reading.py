@@ -20,7 +20,7 @@ bpy.context.scene.render.fps = round(float(fps))
 if source.endswith(".bvh"):
     bpy.ops.import_anim.bvh(filepath=source, use_fps_scale=False, update_scene_duration=True)
 else:
-    # Its default shading fails there on any mesh (numpy has no "np.bool" any more); this is the importer's other choice.
+    # Its default shading fails there on any mesh (numpy dropped "np.bool"); this is another of the importer's choices.
     bpy.ops.import_scene.gltf(filepath=source, import_shading="SMOOTH")
 armature = next(entry for entry in bpy.data.objects if entry.type == "ARMATURE")
 action = armature.animation_data.action
