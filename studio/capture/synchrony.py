@@ -2,8 +2,9 @@
 
 A movement begins and ends in all views at once, so the motion energy (mean absolute difference of successive pictures,
 reduced and grey) rises and falls together. For each two cameras the correlation of both courses is taken at every lag;
-the peak against the next best one says how far to trust it. Cameras are then put in order along the most trusted pairs,
-and other trusted pairs must agree. An estimate is shown to a person; nothing here applies it.
+the peak against the next best one says how far to trust it, its breadth how exact it is: a slow movement looks fastest
+at different moments from different sides. Cameras are then put in order along the most trusted pairs, and other trusted
+pairs must agree. An estimate is shown to a person; nothing here applies it.
 """
 
 import itertools
@@ -28,7 +29,9 @@ FEWEST_FRAMES = 12
 FLAT_GREY_LEVELS = 0.03
 """Courses whose spread (5 to 95 %) is below this are of sensor noise or a still picture."""
 LEAST_OVERLAP = 0.5
-SURE_PEAK, SURE_RATIO = 0.5, 1.2
+SURE_PEAK, SURE_RATIO, SURE_WITHIN = 0.5, 1.2, 2
+STILL_PEAK = 0.85
+"""Lags around the best one whose correlation is above this share of its own may be the right ones."""
 MOST_RATIO = 99.0
 AGREE = 1
 
@@ -37,7 +40,8 @@ AGREE = 1
 class PairLag:
     """How two cameras lie in time: frame f of `first` was taken with frame f + lag of `second`.
 
-    peak : correlation at that lag, -1 to 1. ratio : peak over the next best one (99 where there is none).
+    peak : correlation at that lag, -1 to 1. ratio : peak over the next best one (99 where there is none). within : so
+    many frames to either side are nearly as good.
     """
 
     first: str
@@ -45,29 +49,33 @@ class PairLag:
     lag: int
     peak: float
     ratio: float
+    within: int
 
     @property
     def sure(self) -> bool:
-        """Whether the peak stands out."""
-        return self.peak >= SURE_PEAK and self.ratio >= SURE_RATIO
+        """Whether the peak stands out and is narrow."""
+        return self.peak >= SURE_PEAK and self.ratio >= SURE_RATIO and self.within <= SURE_WITHIN
 
 
 @dataclass(frozen=True, slots=True)
 class Synchrony:
     """An estimate. offsets : each camera's frame that belongs to frame 0, the smallest being 0.
 
-    confidence : peak over second peak on the weakest link that a camera's offset rests on. sure : whether every link
-    stands out and no trusted pair contradicts. notes : doubts, sentences.
+    confidence : peak over second peak on the weakest link that a camera's offset rests on. within : how many frames
+    off it may be. sure : whether every link stands out and no trusted pair contradicts. notes : doubts, sentences.
     """
 
     offsets: dict[str, int]
     confidence: dict[str, float]
+    within: dict[str, int]
     pairs: tuple[PairLag, ...]
     sure: bool
     notes: tuple[str, ...]
 
 
-def motion_energy(read: Callable[[int], NDArray[np.uint8]], count: int, tell: Callable[[int], None] | None = None) -> Array:
+def motion_energy(
+    read: Callable[[int], NDArray[np.uint8]], count: int, tell: Callable[[int], None] | None = None
+) -> Array:
     """(count - 1,) mean absolute difference of each picture to the one before it, grey levels.
 
     read(k) : (H, W, 3) uint8 BGR of frame k; tell : called with the frames done.
@@ -86,20 +94,24 @@ def motion_energy(read: Callable[[int], NDArray[np.uint8]], count: int, tell: Ca
     return energy
 
 
-def estimate_offsets(energies: Mapping[str, Array], fps: float, most_seconds: float = MOST_SECONDS) -> Synchrony:
+def estimate_offsets(
+    energies: Mapping[str, Array], fps: float, most_seconds: float = MOST_SECONDS
+) -> Synchrony:
     """Offsets from the motion energies of cameras with the same frame rate.
 
     most_seconds : the largest offset that is looked for. Raises FootageError naming a camera that shows too few frames
     or no motion.
     """
     if len(energies) < 2:
-        raise FootageError("One camera alone has nothing to be synchronised with.", "Give two cameras or more.")
+        raise FootageError(
+            "One camera alone has nothing to be synchronised with.", "Give two cameras or more."
+        )
     courses = {name: _course(name, energy) for name, energy in energies.items()}
     pairs = tuple(
         pair_lag(first, second, courses[first], courses[second], round(most_seconds * fps))
         for first, second in itertools.combinations(courses, 2)
     )
-    placed, confidence, links = _along_best_pairs(tuple(courses), pairs)
+    placed, confidence, within, links = _along_best_pairs(tuple(courses), pairs)
     least = min(placed.values())
     offsets = {name: placed[name] - least for name in courses}
     against = [
@@ -114,7 +126,14 @@ def estimate_offsets(energies: Mapping[str, Array], fps: float, most_seconds: fl
             for pair in against
         ),
     )
-    return Synchrony(offsets, {name: confidence[name] for name in courses}, pairs, not (weak or against), notes)
+    return Synchrony(
+        offsets,
+        {name: confidence[name] for name in courses},
+        {name: within[name] for name in courses},
+        pairs,
+        not (weak or against),
+        notes,
+    )
 
 
 def pair_lag(first: str, second: str, a: Array, b: Array, most: int) -> PairLag:
@@ -132,7 +151,9 @@ def pair_lag(first: str, second: str, a: Array, b: Array, most: int) -> PairLag:
     second_peak = float(others.max()) if len(others) else 0.0
     peak = float(scores[best])
     ratio = min(MOST_RATIO, peak / second_peak) if second_peak > 0.0 else MOST_RATIO
-    return PairLag(first, second, lags[best], peak, ratio if peak > 0.0 else 0.0)
+    alike = np.flatnonzero(scores[left : right + 1] > STILL_PEAK * peak) + left
+    within = int(np.abs(alike - best).max()) if peak > 0.0 else most
+    return PairLag(first, second, lags[best], peak, ratio if peak > 0.0 else 0.0, within)
 
 
 def estimate_synchrony(
@@ -159,20 +180,25 @@ def estimate_synchrony(
 
 
 def _course(name: str, energy: Array) -> Array:
-    """The energy's logarithm above its own quiet level. Raises FootageError if nothing can be told from it."""
+    """The energy's logarithm above its own quiet level, without the single spikes that a codec's key frames make.
+
+    Raises FootageError if nothing can be told from it.
+    """
     if len(energy) < FEWEST_FRAMES - 1:
         raise FootageError(
             f"Camera {name} has {len(energy) + 1} frames, too few to see when things move.",
             f"Give at least {FEWEST_FRAMES} frames, or the offsets by hand.",
         )
-    low, high = np.percentile(energy, [5.0, 95.0])
+    padded = np.pad(energy, 1, mode="edge")
+    calm = np.median([padded[:-2], energy, padded[2:]], axis=0)
+    low, high = np.percentile(calm, [5.0, 95.0])
     if high - low < FLAT_GREY_LEVELS:
         raise FootageError(
             f"What moves in camera {name} stays the same all the time (from {low:.2f} to {high:.2f} grey levels), so"
             " its pictures do not tell when they were taken.",
             "Give the offsets by hand, or footage in which movements begin and end.",
         )
-    return np.log(np.maximum(energy, 0.5 * low) + 0.1 * (high - low))
+    return np.log(np.maximum(calm, 0.5 * low) + 0.1 * (high - low))
 
 
 def _overlap(a: int, b: int, lag: int) -> int:
@@ -190,10 +216,13 @@ def _correlation(a: Array, b: Array, lag: int) -> float:
 
 def _along_best_pairs(
     names: tuple[str, ...], pairs: tuple[PairLag, ...]
-) -> tuple[dict[str, int], dict[str, float], list[PairLag]]:
-    """Places in time, the weakest ratio on each camera's way, and the pairs used: the most trusted spanning tree."""
+) -> tuple[dict[str, int], dict[str, float], dict[str, int], list[PairLag]]:
+    """Places in time, the weakest ratio and widest breadth on each camera's way, and the pairs used: the most trusted
+    spanning tree.
+    """
     ranked = sorted(pairs, key=lambda pair: (pair.sure, pair.peak * min(pair.ratio, 3.0)), reverse=True)
-    placed, confidence = {ranked[0].first: 0}, {ranked[0].first: ranked[0].ratio}
+    root = ranked[0]
+    placed, confidence, within = {root.first: 0}, {root.first: root.ratio}, {root.first: root.within}
     links: list[PairLag] = []
     while len(placed) < len(names):
         link = next(pair for pair in ranked if (pair.first in placed) != (pair.second in placed))
@@ -203,14 +232,16 @@ def _along_best_pairs(
             known, new, step = link.second, link.first, -link.lag
         placed[new] = placed[known] + step
         confidence[new] = min(link.ratio, confidence[known])
+        within[new] = max(link.within, within[known])
         links.append(link)
-    return placed, confidence, links
+    return placed, confidence, within, links
 
 
 def in_words(found: Synchrony) -> str:
     """One line a camera: its offset and how far to trust it; then the doubts."""
     lines = [
-        f"{name}: {offset:+d} frames (peak {found.confidence[name]:.2f} times the next best)"
+        f"{name}: {offset:+d} frames, give or take {found.within[name]}"
+        f" (peak {found.confidence[name]:.2f} times the next best)"
         for name, offset in found.offsets.items()
     ]
     if not found.sure:
