@@ -55,7 +55,7 @@ def smoothed(
 def dense(
     places: dict[int, float], noise: dict[int, float], count: int, frequency: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The most likely places of all frames and their variances, by one big least-squares problem without any recursion."""
+    """The most likely places of all frames and their variances, by one big least-squares problem."""
     process = np.linalg.inv((2.0 * math.pi * frequency / FPS) ** 6 * JERK)
     matrix, right = np.zeros((3 * count, 3 * count)), np.zeros(3 * count)
     matrix[:3, :3] += np.eye(3) / DIFFUSE
