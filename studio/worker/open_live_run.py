@@ -39,6 +39,11 @@ class OpenLiveRun(OpenRun):
             self._storing.shutdown()
             raise
 
+    @property
+    def warmed_as(self) -> str:
+        """Each live run by itself: it has no time for backgrounds and files either."""
+        return str(self.stored.folder)
+
     def warm_up(self) -> None:
         """Learn the backgrounds, compile and load everything, so that the first frames do not wait for it."""
         self.live.rehearse()

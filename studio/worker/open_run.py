@@ -59,8 +59,8 @@ class OpenRun:
         return self.stored.name
 
     @property
-    def weighting(self) -> str:
-        """Name of the weighting, whose kernels compile when they are first used."""
+    def warmed_as(self) -> str:
+        """What is warmed up once in a process: the weighting, whose kernels compile when they are first used."""
         return self.stored.record.weighting
 
     @property

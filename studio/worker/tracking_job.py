@@ -113,7 +113,7 @@ class TrackingJob:
 
     def _warm_up(self, run: OpenRun) -> None:
         """Say that kernels are compiled, the first time that a weighting is used in this process."""
-        if run.weighting in self._compiled:
+        if run.warmed_as in self._compiled:
             return
         state = self._say.state_name
         self._state(COMPILING)
@@ -121,7 +121,7 @@ class TrackingJob:
             run.warm_up()
         finally:
             self._state(state)
-        self._compiled.add(run.weighting)
+        self._compiled.add(run.warmed_as)
 
     def _advance_tracking(self, run: OpenRun) -> None:
         self._pace.begin()
