@@ -16,8 +16,8 @@ AXES = "XYZ"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BvhFile:
-    """Joints in the order of the file. offsets (J, 3); moves (N, J, 3), turns (N, J, 3, 3) in the parent's frame, in the
-    file's unit and axes. step : seconds a frame.
+    """Joints in the order of the file. moves (N, J, 3), turns (N, J, 3, 3) in the parent's frame, in the file's unit
+    and axes. step : seconds a frame.
     """
 
     names: tuple[str, ...]

@@ -35,10 +35,12 @@ def write_bvh(task: ExportTask) -> Written:
     with task.place.open("w", encoding="ascii", errors="replace", newline="\n") as stream:
         stream.write("\n".join(_hierarchy(skeleton, names, axes, order)))
         stream.write(f"\nMOTION\nFrames: {len(moves)}\nFrame Time: {1.0 / motion.fps:.9f}\n")
-        for row, values in enumerate(_rows(skeleton, axes.points(moves), angles)):
+        ordered = _depth_first(skeleton.tree.parents)
+        still = [not skeleton.tree.moving[joint] for joint in ordered]
+        for row, places in enumerate(axes.points(moves)):
             if row % ROWS_A_STEP == 0:
                 task.step("writing", row, len(moves))
-            stream.write(" ".join(values(axes.unit)) + "\n")
+            stream.write(_row(ordered, still, places, angles[row], DECIMALS[axes.unit]) + "\n")
     task.step("reading back", len(moves), len(moves))
     checked = _read_back(task, skeleton, follow(skeleton, moves, turns))
     notes = [
@@ -120,20 +122,14 @@ def _depth_first(parents: tuple[int, ...]) -> list[int]:
     return ordered
 
 
-def _rows(skeleton: Skeleton, moves: Array, angles: Array):  # noqa: ANN202 - a generator of row writers
-    """For each frame what writes its numbers, positions with a unit's decimals."""
-    ordered = _depth_first(skeleton.tree.parents)
-    for row in range(len(moves)):
-
-        def values(unit: str, row: int = row) -> list[str]:
-            words: list[str] = []
-            for joint in ordered:
-                if skeleton.tree.moving[joint]:
-                    words += [f"{value:.{DECIMALS[unit]}f}" for value in moves[row, joint] + 0.0]
-                words += [f"{value:.6f}" for value in angles[row, joint] + 0.0]
-            return words
-
-        yield values
+def _row(ordered: list[int], still: list[bool], places: Array, angles: Array, decimals: int) -> str:
+    """One frame's numbers: of each joint in the file's order its positions, if it moves, and its angles."""
+    words: list[str] = []
+    for joint, stays in zip(ordered, still, strict=True):
+        if not stays:
+            words += [f"{value:.{decimals}f}" for value in places[joint] + 0.0]
+        words += [f"{value:.6f}" for value in angles[joint] + 0.0]
+    return " ".join(words)
 
 
 def _read_back(task: ExportTask, skeleton: Skeleton, wanted: tuple[Array, Array]) -> str:

@@ -10,8 +10,10 @@ from dataclasses import fields
 import numpy as np
 
 from studio.errors import SettingsError
+from studio.export.task import ExportTask, Written
 from studio.scene.director import Director
 from studio.scene.guarded_server import GuardedServer
+from studio.scene.recording import record_scene
 from studio.scene.view_options import Shown, ViewOptions
 from studio.scene.wishes import Control
 from studio.sessions.workspace import Workspace
@@ -116,6 +118,10 @@ class SceneStage:
         """Play stored frames, or stop."""
         if self._director is not None:
             self._director.set_playback(playing=playing)
+
+    def record_scene(self, task: ExportTask) -> Written:
+        """Write a run's scene as a recording, beside the one that is shown. Raises ExportError."""
+        return record_scene(task)
 
     def _moved(self, shown: Shown) -> None:
         for callback in self._watchers:

@@ -12,6 +12,7 @@ import uvicorn
 from fastapi import FastAPI
 
 from studio.errors import RunError
+from studio.export.task import ExportTask, Written
 from studio.scene.view_options import Shown
 from studio.sessions.workspace import Workspace
 from studio.worker.commands import Command
@@ -119,6 +120,11 @@ class RecordingStage:
 
     def play(self, playing: bool) -> None:
         self.calls.append(("play", playing))
+
+    def record_scene(self, task: ExportTask) -> Written:
+        self.calls.append(("record", task.run.name))
+        task.place.write_bytes(b"scene")
+        return Written((task.place,), "read back")
 
 
 @dataclass

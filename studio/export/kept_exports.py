@@ -1,0 +1,128 @@
+"""The exports that lie in a run's folder: `exports/<file>`, each with what was said of it when it was written."""
+
+import datetime
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import msgspec
+
+from studio.errors import NotFoundError
+from studio.export.exporting import ExportReport, Progress, export_run
+from studio.export.formats import ExportFormat
+from studio.export.options import ExportOptions
+from studio.export.task import Writer
+from studio.sessions.atomic_files import write_bytes
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.typed_decoding import decode_json
+
+FOLDER = "exports"
+SAID = ".said.json"
+
+
+class KeptExport(msgspec.Struct, frozen=True):
+    """One export. file : its name in the folder. made : UTC, ISO 8601. checked, notes : as in `ExportReport`."""
+
+    file: str
+    format: str
+    made: str
+    bytes: int
+    frames: int
+    fps: float
+    checked: str
+    notes: tuple[str, ...]
+    options: dict[str, str | int | float | bool]
+
+
+def export_into_run(
+    session: Session,
+    run: StoredRun,
+    form: ExportFormat,
+    asked: Mapping[str, str | int | float | bool],
+    *,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+    record_scene: Writer | None = None,
+) -> KeptExport:
+    """Export a run into its own folder; several files become one zip. The same wish writes over its file.
+
+    Raises what `exporting.export_run` raises.
+    """
+    folder = run.folder / FOLDER
+    folder.mkdir(exist_ok=True)
+    report = export_run(
+        session,
+        run,
+        form,
+        asked,
+        folder / f"{_stem(session, run, asked)}.{form.name}",
+        progress=progress,
+        cancelled=cancelled,
+        record_scene=record_scene,
+        pack=True,
+    )
+    kept = _said(report, asked)
+    write_bytes(folder / f"{kept.file}{SAID}", msgspec.json.encode(kept))
+    return kept
+
+
+def kept_exports(run: StoredRun) -> tuple[KeptExport, ...]:
+    """The run's exports, newest first; a file of which nothing is known is left out."""
+    found = []
+    for path in (run.folder / FOLDER).glob(f"*{SAID}"):
+        try:
+            kept = decode_json(path.read_bytes(), KeptExport)
+        except (OSError, msgspec.DecodeError, UnicodeDecodeError):
+            continue
+        if f"{kept.file}{SAID}" == path.name and (path.parent / kept.file).is_file():
+            found.append(kept)
+    return tuple(sorted(found, key=lambda kept: kept.made, reverse=True))
+
+
+def kept_file(run: StoredRun, name: str) -> Path:
+    """The path of an export by its file's name, which must be one of the list. Raises NotFoundError."""
+    known = {kept.file for kept in kept_exports(run)}
+    if name not in known:
+        raise NotFoundError(f"Run '{run.name}' has no export '{name[:80]}'.", "Export it again.")
+    return run.folder / FOLDER / name
+
+
+def discard_export(run: StoredRun, name: str) -> None:
+    """Delete an export; the run can always make it again. Raises NotFoundError."""
+    path = kept_file(run, name)
+    path.unlink()
+    (path.parent / f"{name}{SAID}").unlink(missing_ok=True)
+
+
+def _stem(session: Session, run: StoredRun, asked: Mapping[str, str | int | float | bool]) -> str:
+    """A file name that says what is in it: session, run, and what differs from the usual."""
+    usual = ExportOptions()
+    parts = [session.name, run.name]
+    for name, value in sorted(asked.items()):
+        if name != "last" and getattr(usual, name, value) != value:
+            parts.append(
+                ""
+                if value is False
+                else name
+                if value is True
+                else f"{name}{value}"
+                if _counts(value)
+                else str(value)
+            )
+    if asked.get("last"):
+        parts.append(f"to{asked['last']}")
+    return "-".join(
+        "".join(sign if sign.isalnum() or sign in "_." else "_" for sign in part) for part in parts if part
+    )
+
+
+def _counts(value: str | float) -> bool:
+    return not isinstance(value, str)
+
+
+def _said(report: ExportReport, asked: Mapping[str, str | int | float | bool]) -> KeptExport:
+    made = datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
+    size, file = report.size, report.files[0].name
+    return KeptExport(
+        file, report.format, made, size, report.frames, report.fps, report.checked, report.notes, dict(asked)
+    )

@@ -1,0 +1,76 @@
+"""Exports of runs, as OpenAPI shows them."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from studio.web.schemas import Answer, Request, Value
+from studio.web.setting_schemas import KnobView
+
+
+class FormatView(Answer):
+    """A format. opens: what opens it. takes: names of the options that mean something here. unit, up: what auto is."""
+
+    name: str
+    title: str
+    opens: str
+    takes: list[str]
+    unit: str
+    up: str
+    what: str = Field(description="motion, video, scene or cameras.")
+
+
+class ExportChoices(Answer):
+    """What a run can be exported to, and how. calibrations: writers by the ending of their files."""
+
+    formats: list[FormatView]
+    options: list[KnobView]
+    calibrations: dict[str, list[str]]
+
+
+class ExportRequest(Request):
+    """A format's name, and options by name where they are not the usual ones."""
+
+    format: str = Field(max_length=20)
+    options: dict[str, Value] = Field(default_factory=dict)
+
+
+class ExportLine(Answer):
+    """A finished export. checked: what reading the file back showed. notes: on gaps, names and axes."""
+
+    file: str
+    format: str
+    made: str
+    bytes: int
+    frames: int
+    fps: float
+    checked: str
+    notes: list[str]
+    options: dict[str, Value]
+
+
+class ExportState(Answer):
+    """How an export stands; code, message and hint say why it failed. result: of one that is done."""
+
+    identifier: str
+    session: str
+    run: str
+    format: str
+    state: Literal["running", "done", "failed", "cancelled"]
+    step: str = ""
+    done: int = 0
+    total: int = 0
+    seconds_left: float | None = None
+    code: str = ""
+    message: str = ""
+    hint: str = ""
+    result: ExportLine | None = None
+
+
+class ExportList(Answer):
+    """A run's exports, newest first, those under way, and its tracks and cameras to choose among."""
+
+    exports: list[ExportLine]
+    running: list[ExportState]
+    tracks: list[str]
+    cameras: list[str]
