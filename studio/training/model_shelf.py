@@ -7,10 +7,11 @@ from pathlib import Path
 
 from studio.behaviour.model import BehaviourModel
 from studio.behaviour.model_file import read_model, write_model
-from studio.errors import BehaviourError
+from studio.errors import BehaviourError, NotFoundError
 from studio.runs.behaviour_models import SUFFIX, models_folder, models_in
-from studio.sessions.names import checked_name
-from studio.sessions.workspace import Workspace
+from studio.sessions import atomic_files
+from studio.sessions.names import checked_name, free_name, inside
+from studio.sessions.workspace import TRASH_NAME, Workspace
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +58,56 @@ def place_for_model(name_or_path: str, workspace: Workspace, *, replace: bool = 
 def keep_model(model: BehaviourModel, path: Path) -> None:
     """Write the model where `place_for_model` said, whole or not at all."""
     write_model(model, path)
+
+
+def stored_model(workspace: Workspace, name: str) -> Path:
+    """The file of a model of the workspace. Raises NameRefused, NotFoundError."""
+    path = models_folder(workspace.root) / f"{checked_name(name, 'model')}{SUFFIX}"
+    if not path.is_file():
+        raise NotFoundError(f"There is no behaviour model '{name}'.", "List them with 'studio models'.")
+    return path
+
+
+def rename_model(workspace: Workspace, name: str, new_name: str) -> Path:
+    """Give a model another name; runs keep the copy that they were made with. Raises BehaviourError if it is taken."""
+    path = stored_model(workspace, name)
+    place = path.with_name(f"{checked_name(new_name, 'model')}{SUFFIX}")
+    taken = {entry.stem.lower() for entry in path.parent.glob(f"*{SUFFIX}") if entry != path}
+    if new_name.lower() in taken:
+        raise BehaviourError(f"There is a model '{new_name}' already.", "Choose another name.")
+    os.rename(path, place)
+    atomic_files.sync_folder(place.parent)
+    return place
+
+
+def throw_away_model(workspace: Workspace, name: str) -> Path:
+    """Move a model to the workspace's trash; the folder there that holds it."""
+    path = stored_model(workspace, name)
+    folder = atomic_files.new_folder_beside(path)
+    os.rename(path, folder / path.name)
+    return workspace.to_trash(folder, name)
+
+
+def thrown_model(place: Path) -> str:
+    """The name of the model that lies in a folder of the trash, "" for anything else there."""
+    found = sorted(place.glob(f"*{SUFFIX}")) if place.is_dir() else []
+    return found[0].stem if len(found) == 1 else ""
+
+
+def bring_back_model(workspace: Workspace, trashed_name: str) -> Path:
+    """Bring a model back under its own name, or one like it if that is taken. Raises NotFoundError."""
+    place = inside(workspace.root / TRASH_NAME, trashed_name)
+    name = thrown_model(place)
+    if not name:
+        raise NotFoundError(
+            f"There is no model '{trashed_name}' in the trash.", "List what lies there first."
+        )
+    folder = models_folder(workspace.root)
+    folder.mkdir(parents=True, exist_ok=True)
+    free = free_name(name, {entry.stem for entry in folder.glob(f"*{SUFFIX}")})
+    os.rename(place / f"{name}{SUFFIX}", folder / f"{free}{SUFFIX}")
+    place.rmdir()
+    return folder / f"{free}{SUFFIX}"
 
 
 def list_models(workspace: Workspace) -> tuple[ModelSummary, ...]:

@@ -15,10 +15,12 @@ from starlette.staticfiles import StaticFiles
 from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.workspace import Workspace
 from studio.web import (
+    behaviour_learning_routes,
     behaviour_routes,
     comparison_routes,
     document_pages,
     event_stream,
+    export_routes,
     guide_routes,
     import_routes,
     initialisation_routes,
@@ -58,9 +60,11 @@ ROUTERS = (
     run_routes.router,
     settings_routes.router,
     result_routes.router,
+    export_routes.router,
     picture_routes.router,
     comparison_routes.router,
     behaviour_routes.router,
+    behaviour_learning_routes.router,
     document_pages.router,
     report_routes.router,
     scene_routes.router,
@@ -123,6 +127,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         doors.scene_port = 0
         await import_routes.end_imports(doors)
         await asyncio.to_thread(doors.desk.close)
+        await asyncio.to_thread(doors.learning.close)
         await doors.events.stop()
         await asyncio.to_thread(forget_composers)
         ends = (asyncio.to_thread(doors.stage.stop), asyncio.to_thread(doors.control.close))

@@ -1,4 +1,7 @@
-"""Behaviour models of the workspace: what they learnt, and movement made from them. Learning is `studio learn`."""
+"""Behaviour models of the workspace: what they learnt, movement made from them, their names, and the way to the trash.
+
+Learning one is in `behaviour_learning_routes`.
+"""
 
 from functools import lru_cache
 from pathlib import Path
@@ -10,13 +13,19 @@ from studio.behaviour.model import BehaviourModel
 from studio.behaviour.model_file import read_model
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
-from studio.errors import NotFoundError
-from studio.runs.behaviour_models import SUFFIX, models_folder
-from studio.sessions.names import checked_name
-from studio.training.model_shelf import list_models, summary_of
-from studio.web.behaviour_schemas import BehaviourDetail, BehaviourList, Entropies, GeneratedWalk
-from studio.web.behaviour_views import detail_of, entropies_of, line_of, walk_of
+from studio.errors import BehaviourError, BodyError
+from studio.training.model_shelf import (
+    list_models,
+    rename_model,
+    stored_model,
+    summary_of,
+    throw_away_model,
+)
+from studio.web.behaviour_schemas import BehaviourDetail, BehaviourList, Entropies, GeneratedWalk, ModelName
+from studio.web.behaviour_views import bodiless_detail, detail_of, entropies_of, line_of, walk_of
 from studio.web.doors import Doors, doors_of
+from studio.web.schemas import TrashEntry
+from studio.web.session_routes import trash_entry
 
 router = APIRouter(prefix="/api/behaviours", tags=["behaviours"])
 
@@ -28,10 +37,7 @@ Door = Annotated[Doors, Depends(doors_of)]
 
 def model_path(behaviour: str, doors: Door) -> Path:
     """The file of the model that an address names, as a dependency. Raises NameRefused, NotFoundError."""
-    path = models_folder(doors.workspace.root) / f"{checked_name(behaviour, 'model')}{SUFFIX}"
-    if not path.is_file():
-        raise NotFoundError(f"There is no behaviour model '{behaviour}'.", "List them with 'studio models'.")
-    return path
+    return stored_model(doors.workspace, behaviour)
 
 
 Named = Annotated[Path, Depends(model_path)]
@@ -45,14 +51,33 @@ def behaviours(doors: Door) -> BehaviourList:
 
 @router.get("/{behaviour}")
 def behaviour_detail(path: Named) -> BehaviourDetail:
-    """Clusters as poses, which follows which, the automaton's states by the length of their history."""
-    return detail_of(summary_of(path), *_opened(path))
+    """Clusters as poses, which follows which, the automaton's states by the length of their history.
+
+    Of a model whose body is gone or another one by now, `problem` says so; it has no poses to show then.
+    """
+    summary, model = summary_of(path), _model(path, path.stat().st_mtime_ns)
+    try:
+        return detail_of(summary, model, _body_of(model))
+    except BehaviourError as problem:
+        return bodiless_detail(summary, model, str(problem))
+
+
+@router.patch("/{behaviour}")
+def rename(behaviour: str, wish: ModelName, doors: Door) -> ModelName:
+    """Give it another name. Runs keep the copy that they were made with."""
+    return ModelName(name=rename_model(doors.workspace, behaviour, wish.name).stem)
+
+
+@router.delete("/{behaviour}")
+def delete(behaviour: str, doors: Door) -> TrashEntry:
+    """Move it to the trash. Runs keep the copy that they were made with."""
+    return trash_entry(throw_away_model(doors.workspace, behaviour))
 
 
 @router.get("/{behaviour}/entropies")
 def behaviour_entropies(path: Named) -> Entropies:
     """Entropies over memory, for choosing memory and ε by; takes some seconds for large models."""
-    return entropies_of(_opened(path)[0])
+    return entropies_of(_model(path, path.stat().st_mtime_ns))
 
 
 @router.get("/{behaviour}/walk")
@@ -62,17 +87,29 @@ def behaviour_walk(
     seed: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
 ) -> GeneratedWalk:
     """A walk through the automaton, as movement."""
-    return walk_of(*_opened(path), frames, seed)
-
-
-def _opened(path: Path) -> tuple[BehaviourModel, BodyModel]:
-    """The model and a body of its kind. Raises BehaviourError, BodyError."""
-    return _kept(path, path.stat().st_mtime_ns)
+    model = _model(path, path.stat().st_mtime_ns)
+    return walk_of(model, _body_of(model), frames, seed)
 
 
 @lru_cache(maxsize=KEPT_MODELS)
-def _kept(path: Path, _changed: int) -> tuple[BehaviourModel, BodyModel]:
-    model = read_model(path)
-    body = load_body(model.space.body)
-    model.space.check_body(body)
-    return model, body
+def _model(path: Path, _changed: int) -> BehaviourModel:
+    return read_model(path)
+
+
+def _body_of(model: BehaviourModel) -> BodyModel:
+    """A body of the model's kind. Raises BehaviourError saying that there is none any more."""
+    name = model.space.body
+    try:
+        body = load_body(name)
+        model.space.check_body(body)
+    except BodyError as problem:
+        raise BehaviourError(
+            f"The model's body '{name}' is not here any more, so its movements cannot be drawn.",
+            f"Put the body back or learn the model anew on another one. ({problem.message})",
+        ) from None
+    except BehaviourError as problem:
+        raise BehaviourError(
+            f"The body '{name}' has changed since the model was learnt: {problem.message}",
+            "Put the old body back or learn the model anew.",
+        ) from None
+    return body

@@ -2,9 +2,15 @@
 
 from pydantic import Field
 
-from studio.web.schemas import Answer
+from studio.web.schemas import Answer, Request, RunName
 
 Limbs = list[list[list[float]]]
+
+
+class ModelName(Request):
+    """Another name for a model."""
+
+    name: RunName
 
 
 class BehaviourLine(Answer):
@@ -67,10 +73,11 @@ class Transition(Answer):
 class BehaviourDetail(Answer):
     """A model. clusters: most frequent first. transitions: between different clusters, memory left aside.
     context_lengths: states of the automaton by the length of their history, 0 first; kept_lengths: those of them that
-    passed the ε test.
+    passed the ε test. problem: why no poses can be shown, "" if they can.
     """
 
     model: BehaviourLine
+    problem: str = ""
     limbs: list[LimbShape]
     arrow_seconds: float
     clusters: list[ClusterPicture]

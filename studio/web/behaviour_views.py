@@ -46,19 +46,31 @@ def line_of(summary: ModelSummary) -> BehaviourLine:
 def detail_of(summary: ModelSummary, model: BehaviourModel, body: BodyModel) -> BehaviourDetail:
     """Everything about a model but its entropies and walks. body : of the model's parameters."""
     counts = _transition_counts(model)
+    return bodiless_detail(summary, model).model_copy(
+        update={
+            "limbs": [
+                LimbShape(
+                    name=limb.name, side=limb.side, radius_start=limb.radius_start, radius_end=limb.radius_end
+                )
+                for limb in body.drawn
+            ],
+            "clusters": _clusters(model, body),
+            "transitions": _transitions(counts),
+        }
+    )
+
+
+def bodiless_detail(summary: ModelSummary, model: BehaviourModel, problem: str = "") -> BehaviourDetail:
+    """What can be said of a model without its body. problem : why there is none."""
     lengths = np.array([len(context) for context in model.automaton.contexts])
     most = int(lengths.max()) + 1
     return BehaviourDetail(
         model=line_of(summary),
-        limbs=[
-            LimbShape(
-                name=limb.name, side=limb.side, radius_start=limb.radius_start, radius_end=limb.radius_end
-            )
-            for limb in body.drawn
-        ],
+        problem=problem,
+        limbs=[],
         arrow_seconds=ARROW_SECONDS,
-        clusters=_clusters(model, body),
-        transitions=_transitions(counts),
+        clusters=[],
+        transitions=[],
         context_lengths=np.bincount(lengths, minlength=most).tolist(),
         kept_lengths=np.bincount(lengths[model.automaton.kept], minlength=most).tolist(),
     )

@@ -15,15 +15,18 @@ from typing import Protocol
 
 from fastapi import Request
 
+from studio.export.task import ExportTask, Written
 from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.workspace import Workspace
 from studio.web.event_stream import EventStream
+from studio.web.export_schemas import ExportState
 from studio.web.import_schemas import ImportState
 from studio.web.initialisation_schemas import InitialisationState
 from studio.web.presets import Preset
 from studio.worker.commands import Close, Command
 from studio.worker.comparison_desk import ComparisonDesk, ComparisonState
 from studio.worker.events import StateChanged
+from studio.worker.learning_desk import LearningDesk, LearningState
 from studio.worker.watchers import Subscription
 
 Value = bool | int | float | str
@@ -148,6 +151,10 @@ class Stage(Protocol):
         """Play stored frames, or stop."""
         ...
 
+    def record_scene(self, task: ExportTask) -> Written:
+        """Write a run's scene as a recording, beside the one that is shown. Raises ExportError."""
+        ...
+
 
 @dataclass(slots=True)
 class Doors:
@@ -155,7 +162,8 @@ class Doors:
 
     scene_port : of the inner viser server, 0 while it is not running. footage_roots : folders that may be
     imported from. presets : the studio's own. log_path : the server's log file. imports,
-    initialisations, uploads : those under way, by their identifiers. desk : where comparisons are worked at.
+    initialisations, exports, uploads : those under way, by their identifiers. desk : where comparisons are worked at,
+    learning : where behaviour models are learnt.
     """
 
     workspace: Workspace
@@ -168,14 +176,17 @@ class Doors:
     scene_port: int = 0
     imports: dict[str, ImportState] = field(default_factory=dict)
     initialisations: dict[str, InitialisationState] = field(default_factory=dict)
+    exports: dict[str, ExportState] = field(default_factory=dict)
     uploads: dict[str, dict[str, int]] = field(default_factory=dict)
     stops: dict[str, threading.Event] = field(default_factory=dict)
     jobs: set[asyncio.Task[None]] = field(default_factory=set)
     desk: ComparisonDesk = field(init=False)
+    learning: LearningDesk = field(init=False)
 
     def __post_init__(self) -> None:
-        """Give comparisons their desk, which tells all watchers how far they are."""
+        """Give comparisons and learning their desks, which tell all watchers how far they are."""
         self.desk = ComparisonDesk(self._tell_comparison)
+        self.learning = LearningDesk(self._tell_learning)
 
     @property
     def state_folder(self) -> Path:
@@ -184,6 +195,10 @@ class Doors:
 
     def _tell_comparison(self, state: ComparisonState) -> None:
         self.events.publish({"type": "comparison", "run": "", **dataclasses.asdict(state)})
+
+    def _tell_learning(self, state: LearningState) -> None:
+        told = {name: value for name, value in dataclasses.asdict(state).items() if name != "learnt"}
+        self.events.publish({"type": "learning", "session": "", "run": "", **told})
 
 
 def doors_of(request: Request) -> Doors:

@@ -21,10 +21,10 @@ from studio.sessions.importers.catalogue import import_source
 from studio.web.archives import unpack_zip
 from studio.web.doors import Doors, doors_of
 from studio.web.error_responses import UnforeseenError, log
-from studio.web.import_schemas import FolderView, ImportRequest, ImportState
+from studio.web.import_schemas import FolderView, ImportRequest, ImportState, SampleRequest
 from studio.web.safe_paths import PathRefused, folder_to_import, relative_path
 from studio.web.samples import install_sample
-from studio.web.schemas import CameraMatching, NewName, SampleRequest
+from studio.web.schemas import CameraMatching, NewName
 from studio.web.upload_routes import forget, upload_folder
 
 router = APIRouter(prefix="/api", tags=["importing"])

@@ -58,3 +58,9 @@ class FolderView(Answer):
     path: str
     parent: str | None
     folders: list[str]
+
+
+class SampleRequest(Request):
+    """A session that travels with the studio."""
+
+    name: Literal["walk"] = "walk"

@@ -192,18 +192,12 @@ class NewName(Request):
     name: RunName | None = None
 
 
-class SampleRequest(Request):
-    """A session that travels with the studio."""
-
-    name: Literal["walk"] = "walk"
-
-
 class TrashEntry(Answer):
     """Something in the trash. name: what it was called; what is "other" cannot be restored."""
 
     id: str
     name: str
-    kind: Literal["session", "run", "comparison", "other"]
+    kind: Literal["session", "run", "comparison", "model", "other"]
     restorable: bool = True
 
 
@@ -214,11 +208,12 @@ class TrashList(Answer):
 
 
 class Restored(Answer):
-    """Where something came back to. name: the session; run, comparison: "" where it is none."""
+    """Where something came back to. name: the session, "" for a model; run, comparison, model: "" where it is none."""
 
     name: str
     run: str = ""
     comparison: str = ""
+    model: str = ""
 
 
 class TrashChoice(Request):

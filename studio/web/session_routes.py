@@ -15,6 +15,7 @@ from studio.sessions.run_record import FILE_NAME as RUN_FILE_NAME
 from studio.sessions.run_record import read_run_record
 from studio.sessions.session import Session
 from studio.sessions.workspace import TRASH_NAME, SessionSummary
+from studio.training.model_shelf import bring_back_model, thrown_model
 from studio.web.doors import Doors, doors_of, let_go
 from studio.web.schemas import (
     NewName,
@@ -99,7 +100,7 @@ def trash(doors: Door) -> TrashList:
 
 @router.post("/trash/restore")
 def restore(choice: TrashChoice, doors: Door) -> Restored:
-    """Bring a session, or a run or comparison into its session, back under its own name or one like it."""
+    """Bring a session, a model, or a run or comparison into its session, back under its own name or one like it."""
     if (inside(doors.workspace.root / TRASH_NAME, choice.entry) / RUN_FILE_NAME).is_file():
         run = doors.workspace.restore_run(choice.entry)
         session = run.folder.parent.parent.name
@@ -109,6 +110,10 @@ def restore(choice: TrashChoice, doors: Door) -> Restored:
         owner, kept = bring_back(doors.workspace, choice.entry)
         _changed(doors, owner.name)
         return Restored(name=owner.name, comparison=kept.name)
+    if thrown_model(inside(doors.workspace.root / TRASH_NAME, choice.entry)):
+        model = bring_back_model(doors.workspace, choice.entry).stem
+        doors.events.publish({"type": "sessions", "session": "", "run": ""})
+        return Restored(name="", model=model)
     session = doors.workspace.restore(choice.entry).name
     _changed(doors, session)
     return Restored(name=session)
@@ -125,6 +130,8 @@ def trash_entry(place: Path) -> TrashEntry:
         if (place / COMPARISON_FILE_NAME).is_file():
             asked = KeptComparison(place).record()
             return TrashEntry(id=place.name, name=f"{asked.plan.session} / {asked.name}", kind="comparison")
+        if model := thrown_model(place):
+            return TrashEntry(id=place.name, name=model, kind="model")
     except StudioError:
         pass
     return TrashEntry(id=place.name, name=place.name, kind="other", restorable=False)

@@ -8,10 +8,11 @@ from studio.web.setting_schemas import KnobView, SettingsChange, SettingsInUse
 
 def knob_views(settings: RunSettings) -> list[KnobView]:
     """The knobs of settings, group after group."""
-    return [_knob_view(entry) for entry in all_knobs(settings)]
+    return [knob_view(entry) for entry in all_knobs(settings)]
 
 
-def _knob_view(entry: Knob) -> KnobView:
+def knob_view(entry: Knob) -> KnobView:
+    """One declaration as the API shows it."""
     return KnobView(
         name=entry.name,
         label=entry.label,

@@ -1,0 +1,135 @@
+"""Learning a behaviour model from runs and uploaded motion, in the background, with progress as `learning` events."""
+
+import asyncio
+import dataclasses
+import math
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, Depends
+
+from studio.behaviour.settings import LearningSettings
+from studio.body.catalogue import list_bodies, load_body
+from studio.errors import BehaviourError, NotFoundError
+from studio.knobs import knobs_of
+from studio.sessions.names import checked_name
+from studio.synthesis.recipe_file import recipe_names
+from studio.training.model_shelf import place_for_model
+from studio.training.oversampling import OversamplingSettings
+from studio.training.sources import FPS, MOTION_FILES
+from studio.web.archives import unpack_zip
+from studio.web.behaviour_learning_schemas import LearningChoices, LearningProgress, LearningRequest
+from studio.web.doors import Doors, doors_of
+from studio.web.setting_views import knob_view
+from studio.web.upload_routes import forget, upload_folder
+from studio.worker.learning_desk import LearningState
+from studio.worker.learning_process import LearningOrder
+
+router = APIRouter(prefix="/api/learning", tags=["behaviours"])
+
+DEFAULT_BODY = "human25"
+SKELETON, ARCHIVE, UNPACKED = ".asf", ".zip", "unpacked"
+
+Door = Annotated[Doors, Depends(doors_of)]
+
+
+@router.get("")
+def choices(doors: Door) -> LearningChoices:
+    """What can be learnt from and with, and what is being learnt."""
+    knobs = [entry for kind in (LearningSettings, OversamplingSettings) for entry in knobs_of(kind)]
+    state = doors.learning.state
+    return LearningChoices(
+        knobs=[knob_view(entry) for entry in knobs],
+        bodies=list(list_bodies()),
+        default_body=DEFAULT_BODY,
+        fps=FPS,
+        endings=[*MOTION_FILES, SKELETON, ARCHIVE],
+        recipes=list(recipe_names()),
+        progress=None if state is None else progress_of(state),
+    )
+
+
+@router.post("", status_code=202)
+async def begin(wish: LearningRequest, doors: Door) -> LearningProgress:
+    """Begin to learn a model; its name must be free. 409 while another one is learnt."""
+    order = await asyncio.to_thread(_order, wish, doors)
+
+    def ended() -> None:
+        if wish.upload:
+            forget(doors, wish.upload)
+
+    return progress_of(doors.learning.start(order, ended))
+
+
+@router.delete("", status_code=202)
+def cancel(doors: Door) -> LearningProgress:
+    """Stop; nothing of the model is kept."""
+    state = doors.learning.state
+    if state is None:
+        raise NotFoundError("Nothing is being learnt.", "Begin with a form or 'POST /api/learning'.")
+    doors.learning.cancel()
+    return progress_of(state)
+
+
+def progress_of(state: LearningState) -> LearningProgress:
+    """A state as the API tells it."""
+    told = dataclasses.asdict(state)
+    told["learnt"] = {
+        name: None if isinstance(value, float) and math.isnan(value) else value
+        for name, value in state.learnt.items()
+    }
+    return LearningProgress.model_validate(told)
+
+
+def _order(wish: LearningRequest, doors: Doors) -> LearningOrder:
+    """The wish, checked. Raises StudioError for a name that is taken, sources that are not there, wrong knobs."""
+    doors.learning.check_free()
+    workspace = doors.workspace
+    place_for_model(checked_name(wish.name, "model"), workspace)
+    load_body(wish.body)
+    for source in (*wish.sources, *wish.tests):
+        _check(source, doors)
+    files = _motion_in(upload_folder(doors, wish.upload)) if wish.upload else ()
+    sources = (*wish.sources, *files)
+    if not sources:
+        raise BehaviourError("There is nothing to learn from.", "Choose runs, or motion files to upload.")
+    order = LearningOrder(
+        workspace.root,
+        wish.name,
+        wish.body,
+        sources,
+        tuple(wish.tests),
+        wish.fps,
+        wish.seed,
+        dict(wish.settings),
+    )
+    order.settings()
+    return order
+
+
+def _check(source: str, doors: Doors) -> None:
+    """A run of the workspace or a bundled recipe, never a path. Raises NotFoundError, NameRefused."""
+    if source in recipe_names():
+        return
+    session, slash, run = source.partition("/")
+    if not slash:
+        raise NotFoundError(
+            f"There is no source '{source[:80]}'.", "Name a run as SESSION/RUN, or upload motion files."
+        )
+    doors.workspace.session(session).run(run)
+
+
+def _motion_in(folder: Path) -> tuple[str, ...]:
+    """The motion files of an upload, out of its archive if it is one. Raises BehaviourError where there are none."""
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    if len(files) == 1 and files[0].suffix.lower() == ARCHIVE:
+        unpacked = folder / UNPACKED
+        unpacked.mkdir()
+        unpack_zip(files[0], unpacked)
+        files = [path for path in unpacked.rglob("*") if path.is_file()]
+    found = sorted(str(path) for path in files if path.suffix.lower() in MOTION_FILES)
+    if not found:
+        raise BehaviourError(
+            "The uploaded files hold no motion.", f"Motion files end in {', '.join(MOTION_FILES)}."
+        )
+    return tuple(found)

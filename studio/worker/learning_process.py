@@ -1,0 +1,105 @@
+"""A process that learns one behaviour model: sources in, the model's file and its numbers out."""
+
+import dataclasses
+import logging
+import os
+import signal
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from studio.behaviour.settings import LearningSettings
+from studio.body.catalogue import load_body
+from studio.errors import StudioError
+from studio.knobs import Value, changed, knobs_of
+from studio.sessions.workspace import Workspace
+from studio.training.learning import learn, read_sources
+from studio.training.model_shelf import keep_model, place_for_model
+from studio.training.oversampling import OversamplingSettings
+from studio.training.sources import FPS
+
+READING = "reading motion"
+PARTS = 1000
+NICENESS = 5
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class LearningOrder:
+    """What is to be learnt. root : of the workspace. name : of the model. sources, tests : motion files, runs as
+    SESSION/RUN, bundled recipes; without tests the last fifth of each source is the test. knobs : of LearningSettings
+    and OversamplingSettings, those that were changed.
+    """
+
+    root: Path
+    name: str
+    body: str
+    sources: tuple[str, ...]
+    tests: tuple[str, ...] = ()
+    fps: float = FPS
+    seed: int = 0
+    knobs: Mapping[str, Value] = field(default_factory=dict)
+
+    def settings(self) -> tuple[LearningSettings, OversamplingSettings]:
+        """The knobs as settings. Raises SettingsError for one that there is not, or a value outside its range."""
+        material = {entry.name for entry in knobs_of(OversamplingSettings)}
+        # A name that is neither's is refused with the others of learning.
+        learning = {name: value for name, value in self.knobs.items() if name not in material}
+        others = {name: value for name, value in self.knobs.items() if name in material}
+        return changed(LearningSettings(), learning), changed(OversamplingSettings(), others)
+
+
+def learn_to_order(order: LearningOrder, outbox: Connection) -> None:
+    """The process's whole life: tells ("step", words, done, total) as it goes on, then ("done", numbers) or
+    ("failed", message, hint). Nothing is written before the model is whole.
+    """
+    # Ctrl-C in the terminal reaches all processes; the one that asked decides.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(os, "nice"):
+        os.nice(NICENESS)
+
+    def tell(*words: object) -> None:
+        outbox.send(words)
+
+    with suppress(BrokenPipeError, ConnectionResetError):
+        try:
+            tell("done", _learnt(order, lambda step, done, total: tell("step", step, done, total)))
+        except StudioError as problem:
+            tell("failed", problem.message, problem.hint)
+        except Exception as problem:
+            logger.exception("learning '%s' failed", order.name)
+            tell("failed", f"Learning failed: {type(problem).__name__}: {problem}.", "See the log.")
+
+
+def _learnt(order: LearningOrder, tell: Callable[[str, int, int], None]) -> dict[str, object]:
+    """Learn and keep the model; its numbers."""
+    workspace, body = Workspace(order.root), load_body(order.body)
+    place_for_model(order.name, workspace)
+    learning, material = order.settings()
+    total = len(order.sources) + len(order.tests)
+    heard: list[str] = []
+
+    def reading(words: str, done: int, parts: int) -> None:
+        if not heard or heard[-1] != words:
+            heard.append(words)
+        share = (len(heard) - 1 + done / max(1, parts)) / total
+        tell(READING, min(PARTS - 1, round(PARTS * share)), PARTS)
+
+    tell(READING, 0, PARTS)
+    read = [
+        read_sources([source], body, fps=order.fps, workspace=workspace, progress=_named(reading, number))
+        for number, source in enumerate((*order.sources, *order.tests))
+    ]
+    training = [one for group in read[: len(order.sources)] for one in group]
+    tests = [one for group in read[len(order.sources) :] for one in group]
+    model, numbers = learn(training, body, learning, material, tests or None, seed=order.seed, progress=tell)
+    keep_model(model, place_for_model(order.name, workspace))
+    bad = {one.name: len(one.bad_frames) for one in (*training, *tests) if one.bad_frames}
+    told: dict[str, object] = dataclasses.asdict(numbers)
+    return told | {"bad_frames": bad}
+
+
+def _named(reading: Callable[[str, int, int], None], number: int) -> Callable[[str, int, int], None]:
+    return lambda words, done, parts: reading(f"{number} {words}", done, parts)
