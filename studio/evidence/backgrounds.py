@@ -19,14 +19,16 @@ from studio.capture.video import VideoReader, measure_video
 from studio.errors import FootageError
 from studio.evidence.background import (
     BackgroundModel,
+    GaussianBackground,
     SubtractorBackground,
     gaussian_from_frames,
     gaussian_from_median,
 )
+from studio.evidence.combined_background import combine
 from studio.evidence.yuv_background import YuvBackground, independent_background, learn_background
 
 Bytes = NDArray[np.uint8]
-FittedKind = Literal["gaussian", "median", "mog2", "knn"]
+FittedKind = Literal["gaussian", "median", "combined", "mog2", "knn"]
 
 CLIP_FRAMES = 60
 MEDIAN_FRAMES, FEWEST_FRAMES = 31, 3
@@ -57,6 +59,13 @@ class Backgrounds:
                 self._fitted[camera, kind] = found
             return found
 
+    def combined(self, camera: str) -> tuple[GaussianBackground, NDArray[np.bool_]]:
+        """Plate (or clip) and footage combined, and where (H, W) that is doubtful; without a plate everywhere."""
+        path, frames = self._footage.background_path(camera), self._spread(camera, MEDIAN_FRAMES)
+        if path is None:
+            return gaussian_from_median(frames), np.ones(frames[0].shape[:2], np.bool_)
+        return combine(self._empty_room(camera, path), frames)
+
     def yuv(self, camera: str, least_noise: float) -> YuvBackground:
         """Full Gaussians in YUV of the plate or empty clip, else about the footage's median; least_noise : grey levels.
 
@@ -79,7 +88,9 @@ class Backgrounds:
 
     def _fit(self, camera: str, kind: FittedKind) -> BackgroundModel:
         path = self._footage.background_path(camera)
-        if kind == "median" or (kind == "gaussian" and path is None):
+        if kind == "combined" and path is not None:
+            return self.combined(camera)[0]
+        if kind in ("median", "combined") or (kind == "gaussian" and path is None):
             return gaussian_from_median(self._spread(camera, MEDIAN_FRAMES))
         if kind == "gaussian" and path is not None:
             return gaussian_from_frames(self._plate(camera, path, CLIP_FRAMES))
@@ -100,16 +111,26 @@ class Backgrounds:
         chosen = np.unique(np.linspace(0, count - 1, most).round().astype(int))
         return [self._footage.picture(camera, int(frame)) for frame in chosen]
 
+    def _empty_room(self, camera: str, path: Path) -> Bytes:
+        """The plate picture, or the empty clip's mean."""
+        pictures = self._plate(camera, path, CLIP_FRAMES)
+        if len(pictures) == 1:
+            return pictures[0]
+        return np.rint(gaussian_from_frames(pictures).mean).astype(np.uint8)
+
     def _plate(self, camera: str, path: Path, most: int) -> list[Bytes]:
         """The plate picture, or up to `most` frames of the empty clip, of the footage's size."""
         frame = self._footage.picture(camera, 0)
         if is_picture(path):
-            return [fitted_plate(read_picture(path), frame, path.name)]
+            return [fitted_plate(self._footage.turned_background(camera, read_picture(path)), frame, path.name)]
         count = measure_video(path).frame_count
         reader = VideoReader(path, count)
         try:
             chosen = np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))
-            return [fitted_plate(reader.read(int(number)), frame, path.name) for number in chosen]
+            return [
+                fitted_plate(self._footage.turned_background(camera, reader.read(int(number))), frame, path.name)
+                for number in chosen
+            ]
         finally:
             reader.close()
 

@@ -87,7 +87,7 @@ class EvidenceMaker:
             mask = self._footage.mask(camera, frame)
             if mask is not None:
                 return cleaned(mask, self.settings) if self.settings.mask_clean_given else mask
-        kind: FittedKind = choice if choice in ("median", "mog2", "knn") else "gaussian"
+        kind: FittedKind = "gaussian" if choice in ("auto", "mask") else choice
         model = self._backgrounds.model(camera, kind)
         return cleaned(model.foreground(picture, self.settings), self.settings)
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from studio.evidence.yuv_background import LEAST_NOISE
 from studio.knobs import knob
 
-BACKGROUND_MODELS = ("auto", "mask", "gaussian", "median", "mog2", "knn")
+BACKGROUND_MODELS = ("auto", "mask", "gaussian", "median", "combined", "mog2", "knn")
 HULL_EVIDENCE = ("auto", "pixels", "masks")
 NEXT_FRAME = "next frame"
 
@@ -22,8 +22,9 @@ class EvidenceSettings:
         choices=BACKGROUND_MODELS,
         takes_effect=NEXT_FRAME,
         help="mask: the masks that came with the footage; gaussian: difference from the plate or empty clip,"
-        " else from the footage's median; median: from the footage's median; mog2, knn: OpenCV's models,"
-        " trained on the empty clip, else on the footage; auto: masks that came with it, else gaussian.",
+        " else from the footage's median; median: from the footage's median; combined: the plate where the footage"
+        " confirms it, what the footage shows most often where people stood in the plate; mog2, knn: OpenCV's"
+        " models, trained on the empty clip, else on the footage; auto: masks that came with it, else gaussian.",
     )
     mask_threshold: float = knob(
         4.0,

@@ -1,5 +1,7 @@
 """Projected outlines of a body's limbs for many poses: the typed door of the outline kernel."""
 
+import copy
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,7 +10,7 @@ from studio.body.tables import kinematic_tables
 from studio.errors import BodyError
 from studio.geometry.camera import Camera
 from studio.weighting.block_threads import run_blocks
-from studio.weighting.kinematic_program import compile_program
+from studio.weighting.kinematic_program import KinematicProgram, compile_program
 from studio.weighting.outline_kernels import LANES, ROWS, SEEN_ROW, all_outlines, chunk_outlines
 
 Array = NDArray[np.float64]
@@ -33,6 +35,12 @@ class OutlineProjector:
     def of_body(cls, body: BodyModel, cameras: tuple[Camera, ...]) -> "OutlineProjector":
         """The projector of a body's drawn limbs."""
         return cls(kinematic_tables(body), cameras)
+
+    def with_program(self, program: KinematicProgram) -> "OutlineProjector":
+        """The projector of another body of the same tree into the same cameras."""
+        other = copy.copy(self)
+        other.program = program
+        return other
 
     @property
     def limb_count(self) -> int:

@@ -1,0 +1,140 @@
+"""A body's size as a few numbers: what a fit of the subject searches besides the poses.
+
+Dimensions of a body file that set a joint's place or a limb's length are *lengths*, those that are a cone's radius are
+*radii*; nothing here knows a body by name. Dimensions that a person has alike (left and right; the radii of one limb)
+make a group, whose one number is the logarithm of a common factor: 0 is the body as it is, 0.1 is 10.5 % more, and no
+value is impossible.
+"""
+
+import dataclasses
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.definition import BodyDefinition, split_sign
+from studio.body.dimensions import with_dimensions
+from studio.body.model import BodyModel
+from studio.errors import BodyError
+
+Array = NDArray[np.float64]
+
+SIDE = re.compile(r"(^|_)(left|right)(_|$)")
+RADIUS_END = re.compile(r"_radius_(start|end)$")
+SMALL = ("foot_heel", "foot_drop", "ankle_height")
+"""Offsets within a foot: they follow from the height, silhouettes do not tell them."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShapeGroup:
+    """Dimensions with a common factor. name : for people, such as "thigh_length". kind : what they are."""
+
+    name: str
+    kind: Literal["length", "radius"]
+    dimensions: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShapeSpace:
+    """Groups of a body's dimensions, S of them. body : the one whose shape is 0."""
+
+    body: BodyModel
+    groups: tuple[ShapeGroup, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """(S,) of the groups."""
+        return tuple(group.name for group in self.groups)
+
+    def dimensions(self, shape: Array) -> dict[str, float]:
+        """The dimensions of a shape (S,): name to mm."""
+        return {
+            name: self.body.dimensions[name] * float(np.exp(value))
+            for group, value in zip(self.groups, shape, strict=True)
+            for name in group.dimensions
+        }
+
+    def body_of(self, shape: Array) -> BodyModel:
+        """The body of a shape (S,)."""
+        return with_dimensions(self.body, self.dimensions(shape))
+
+    def sizes(self, shape: Array) -> Array:
+        """(S,) mm: the mean of each group's dimensions."""
+        own = [np.mean([self.body.dimensions[name] for name in group.dimensions]) for group in self.groups]
+        return np.asarray(own, dtype=np.float64) * np.exp(shape)
+
+
+def shape_space(
+    body: BodyModel, *, symmetric: bool = True, lengths: bool = True, radii: bool = True
+) -> ShapeSpace:
+    """The shape space of a body read from a file.
+
+    symmetric : left and right are one group. lengths, radii : what may change. Dimensions that are zero (limbs that
+    are not there) stay so. Raises BodyError where nothing can change.
+    """
+    kinds = dimension_kinds(body.definition) if body.definition else {}
+    wanted = {"length": lengths, "radius": radii}
+    found: dict[tuple[str, str], list[str]] = {}
+    for name, kind in kinds.items():
+        if wanted[kind] and body.dimensions[name] > 0.0 and name not in SMALL:
+            found.setdefault((_group_name(name, kind, symmetric), kind), []).append(name)
+    if not found:
+        raise BodyError(
+            f"Body '{body.name}' has no dimensions that could be fitted.",
+            "Give its lengths and radii in the body file as named dimensions.",
+        )
+    groups = tuple(
+        ShapeGroup(name, "length" if kind == "length" else "radius", tuple(dimensions))
+        for (name, kind), dimensions in found.items()
+    )
+    return ShapeSpace(body, groups)
+
+
+def dimension_kinds(definition: BodyDefinition) -> dict[str, str]:
+    """The dimensions that are a "length" (of a limb, or a joint's way from its parent) or a "radius", in order."""
+    lengths: set[str] = set()
+    radii: set[str] = set()
+    for joint in definition.joints:
+        lengths |= {_name(step.by) for step in joint.sequence if step.move}
+    for limb in definition.limbs:
+        lengths.add(_name(limb.length))
+        radii |= {_name(limb.radius_start), _name(limb.radius_end)}
+    return {
+        name: "radius" if name in radii else "length"
+        for name in definition.dimensions
+        if name in radii or name in lengths
+    }
+
+
+def _name(value: float | str) -> str:
+    return split_sign(value)[1] if isinstance(value, str) else ""
+
+
+def _group_name(name: str, kind: str, symmetric: bool) -> str:
+    """The group of a dimension: without its side where both sides are alike, and without its end of a cone."""
+    if symmetric:
+        name = SIDE.sub(r"\1", name)
+    return RADIUS_END.sub("_radius", name) if kind == "radius" else name
+
+
+def mean_sides(space: ShapeSpace, dimensions: Mapping[str, float]) -> dict[str, float]:
+    """The dimensions with the mean over each group that has a left and a right in it, else as they are."""
+    levelled = dict(dimensions)
+    for group in space.groups:
+        pairs: dict[str, list[str]] = {}
+        for name in group.dimensions:
+            pairs.setdefault(SIDE.sub(r"\1", name), []).append(name)
+        for names in pairs.values():
+            mean = float(np.mean([dimensions[name] for name in names]))
+            levelled.update(dict.fromkeys(names, mean))
+    return levelled
+
+
+def levelled(space: ShapeSpace) -> ShapeSpace:
+    """The same groups of a body whose left and right are equal, as far as they are in one group."""
+    return dataclasses.replace(
+        space, body=with_dimensions(space.body, mean_sides(space, space.body.dimensions))
+    )

@@ -1,0 +1,217 @@
+"""A background from two imperfect ones: a plate with things in it that are gone, and footage with a person in it.
+
+A plate shows the room behind a person who never leaves the place, but also whoever stood about when it was taken; the
+footage's own frames show the bystanders that are there now, but may never show what the person hides. Pixel by pixel:
+
+1. The plate is fitted to the footage, colour by colour (`colour_fit`).
+2. Where some frames agree with the plate, it is right there: the background is these frames' own mean and deviation,
+   which know the footage's exposure and noise better than a plate does.
+3. Elsewhere nothing agrees with the plate: either it shows something that is gone, or a person hides the place all the
+   time. The footage's answer is its mode, the mean of the frames that most others agree with, where a frame counts as
+   much as the known places around show background in it: a person who stands there is seen to stand beside it too.
+4. Which of the two is right is decided region by region: the right one goes on, across the region's border, as what is
+   known outside; the wrong one ends there in an edge. In doubt it is the footage: what never moves is no one.
+
+One camera alone cannot tell a person from the same person in the plate; `runs.clean_plates` asks the other cameras.
+The method is this project's own, made of usual parts: the mode over time as background, and edges along the border of
+a still region telling what was left there from what was taken away.
+"""
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from studio.evidence.background import GaussianBackground
+from studio.evidence.colour_fit import fit_colours
+
+Bytes = NDArray[np.uint8]
+Floats = NDArray[np.float32]
+
+AGREES = 16.0
+"""Grey levels in any colour: a frame this near to the plate shows the same thing."""
+LEAST_SHARE, LEAST_FRAMES = 0.08, 2
+"""Of the frames that must agree with the plate: fewer may be a sleeve of the wall's colour that passes by."""
+STRIDE = 4
+REACHES = (8, 16, 32)
+"""Times STRIDE pixels: half sides of the squares that are a place's surroundings."""
+ENOUGH_KNOWN = 0.15
+"""Share of the surroundings that must be known."""
+VOTE = 8
+SMALLEST_REGION = 400
+"""Pixels: smaller regions are specks along edges, where the footage is always taken."""
+RIM = 5
+"""Pixels: how far inside and outside a region's border is compared."""
+PLATE_MUST_BEAT = 0.75
+"""The plate's edge along the border must be this much weaker than the footage's."""
+MOST_EDGE = 60.0
+"""Grey levels: no stronger edge counts for more."""
+DOUBT = 40
+"""Pixels around what is gone from the plate: the same skin or shirt in plate and footage hides its true extent."""
+MOST_DEVIATION = 6.0
+"""Grey levels: what varies more is no noise but people who passed by."""
+
+
+def combine(plate: Bytes, frames: Sequence[Bytes]) -> tuple[GaussianBackground, NDArray[np.bool_]]:
+    """The combined background, and where (H, W) it is doubtful: on and around what the plate shows that is gone."""
+    stack = np.stack(frames)
+    fitted = fit_colours(plate, stack)
+    square = np.ones((3, 3), np.uint8)
+    low = np.asarray(cv2.erode(fitted, square), dtype=np.float32) - np.float32(AGREES)
+    high = np.asarray(cv2.dilate(fitted, square), dtype=np.float32) + np.float32(AGREES)
+    fewest = max(LEAST_FRAMES, round(LEAST_SHARE * len(stack)))
+    mean, deviation, count = agreeing_frames(stack, low, high)
+    unsure = np.where(count >= fewest, np.uint8(0), np.uint8(1))
+    fill_from_most_alike(stack, unsure, background_nearby(stack, mean, unsure), mean, deviation)
+    gone = np.zeros_like(unsure)
+    for region in _regions(unsure):
+        if not _goes_on_better(fitted, mean, region, unsure):
+            y, x, inside = region
+            gone[y, x][inside] = 1
+        else:
+            y, x, inside = region
+            mean[y, x][inside] = fitted[y, x][inside]
+            deviation[y, x][inside] = 0.0
+    around = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * DOUBT + 1, 2 * DOUBT + 1))
+    doubtful = np.asarray(cv2.dilate(gone, around)) > 0
+    return GaussianBackground(mean, np.minimum(deviation, MOST_DEVIATION)), doubtful
+
+
+Region = tuple[slice, slice, NDArray[np.bool_]]
+"""Rows and columns of a rectangle and which of its pixels belong to the region."""
+
+
+def _regions(unsure: Bytes) -> list[Region]:
+    """The connected regions of a map that are worth a decision, each in a rectangle with a rim around it."""
+    opened = cv2.morphologyEx(
+        unsure, cv2.MORPH_OPEN, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
+    )
+    count, labels, boxes, _ = cv2.connectedComponentsWithStats(opened)
+    found: list[Region] = []
+    for label in range(1, count):
+        left, top, width, height, area = (int(value) for value in boxes[label])
+        if area >= SMALLEST_REGION:
+            y = slice(max(0, top - 2 * RIM), top + height + 2 * RIM)
+            x = slice(max(0, left - 2 * RIM), left + width + 2 * RIM)
+            found.append((y, x, np.asarray(labels[y, x] == label)))
+    return found
+
+
+def _goes_on_better(plate: Floats, footage: Floats, region: Region, unsure: Bytes) -> bool:
+    """Whether the plate continues what is known around a region clearly better than the footage does."""
+    y, x, inside = region
+    known = (unsure[y, x] == 0).astype(np.float32)
+    window = (2 * RIM + 1, 2 * RIM + 1)
+    near = cv2.boxFilter(known, -1, window)
+    around = cv2.boxFilter(footage[y, x] * known[..., None], -1, window) / np.maximum(near, 1e-6)[..., None]
+    core = cv2.erode(inside.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    rim = inside & ~core & (near > 0.1)
+    if not rim.any():
+        return False
+    edges = [
+        float(np.minimum(np.abs(picture[y, x][rim] - around[rim]).max(axis=1), MOST_EDGE).mean())
+        for picture in (plate, footage)
+    ]
+    return edges[0] < PLATE_MUST_BEAT * edges[1]
+
+
+def background_nearby(frames: Bytes, mean: Floats, unsure: Bytes) -> Floats:
+    """(K, h, w) how much of the known surroundings is background in each frame, 0 to 1, at every STRIDE-th pixel.
+
+    frames : (K, H, W, 3). mean : (H, W, 3), right where unsure (H, W) is 0. The surroundings are the smallest of
+    REACHES in which enough is known.
+    """
+    known = (unsure[::STRIDE, ::STRIDE] == 0).astype(np.float32)
+    small = mean[::STRIDE, ::STRIDE]
+    shares = np.empty((len(frames), *known.shape), np.float32)
+    for frame, share in zip(frames, shares, strict=True):
+        away = np.abs(frame[::STRIDE, ::STRIDE] - small).max(axis=2)
+        empty = known * (away <= AGREES)
+        share[:] = 0.5
+        for reach in reversed(REACHES):
+            window = (2 * reach + 1, 2 * reach + 1)
+            near = cv2.boxFilter(known, -1, window)
+            found = cv2.boxFilter(empty, -1, window) / np.maximum(near, 1e-6)
+            np.copyto(share, found, where=near > ENOUGH_KNOWN)
+    return shares
+
+
+@njit(cache=True, nogil=True)
+def agreeing_frames(frames, low, high):
+    """Mean and deviation (H, W, 3) float32 over the frames between low and high, and their number (H, W).
+
+    frames : (K, H, W, 3) uint8. Zeros where none agrees.
+    """
+    count, height, width = frames.shape[:3]
+    mean = np.zeros((height, width, 3), np.float32)
+    deviation = np.zeros((height, width, 3), np.float32)
+    agreeing = np.zeros((height, width), np.int32)
+    total, squares = np.empty(3), np.empty(3)
+    for y in range(height):
+        for x in range(width):
+            found = 0
+            total[:] = 0.0
+            squares[:] = 0.0
+            for k in range(count):
+                agrees = True
+                for c in range(3):
+                    agrees &= low[y, x, c] <= frames[k, y, x, c] <= high[y, x, c]
+                if agrees:
+                    found += 1
+                    for c in range(3):
+                        value = float(frames[k, y, x, c])
+                        total[c] += value
+                        squares[c] += value * value
+            agreeing[y, x] = found
+            for c in range(3 if found else 0):
+                middle = total[c] / found
+                mean[y, x, c] = middle
+                deviation[y, x, c] = np.sqrt(max(squares[c] / found - middle * middle, 0.0))
+    return mean, deviation, agreeing
+
+
+@njit(cache=True, nogil=True)
+def fill_from_most_alike(frames, unsure, shares, mean, deviation):
+    """Fill mean and deviation (H, W, 3) where unsure (H, W) from the frames that agree with the best one.
+
+    frames : (K, H, W, 3) uint8. shares : (K, h, w) of `background_nearby`; a frame's vote is its VOTE-th power: few
+    frames of an empty place outvote many in which a person stands next to it. The best frame is the one that the most votes agree with.
+    """
+    count, height, width = frames.shape[:3]
+    values, votes = np.empty((count, 3)), np.empty(count)
+    for y in range(height):
+        for x in range(width):
+            if not unsure[y, x]:
+                continue
+            for k in range(count):
+                votes[k] = shares[k, y // STRIDE, x // STRIDE] **VOTE + 1e-4
+                for c in range(3):
+                    values[k, c] = frames[k, y, x, c]
+            most, best = 0.0, 0
+            for k in range(count):
+                alike = 0.0
+                for j in range(count):
+                    if is_near(values, k, j):
+                        alike += votes[j]
+                if alike > most:
+                    most, best = alike, k
+            for c in range(3):
+                total, squares = 0.0, 0.0
+                for j in range(count):
+                    if is_near(values, best, j):
+                        total += votes[j] * values[j, c]
+                        squares += votes[j] * values[j, c] ** 2
+                mean[y, x, c] = total / most
+                deviation[y, x, c] = np.sqrt(max(squares / most - (total / most) ** 2, 0.0))
+
+
+@njit(cache=True, nogil=True, inline="always")
+def is_near(values, k, j):
+    """Whether rows k and j of values (K, 3) differ by at most AGREES in each colour."""
+    return (
+        abs(values[k, 0] - values[j, 0]) <= AGREES
+        and abs(values[k, 1] - values[j, 1]) <= AGREES
+        and abs(values[k, 2] - values[j, 2]) <= AGREES
+    )

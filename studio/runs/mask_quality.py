@@ -1,0 +1,226 @@
+"""How good the masks are, camera by camera, told without truth: by how far the views agree in the visual hull.
+
+A hull is what every view allows. Where a mask holds something that is no one (a bystander, a reflection), the other
+views carve it away, and the hull's silhouette leaves that part of the mask uncovered. Where a mask has a hole, its own
+camera carves the person, and it is the *other* masks that stay uncovered: so for each camera the hull is carved once
+more without it, and what of the other masks comes back is what this camera alone denies.
+"""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.errors import RunError
+from studio.evidence.backgrounds import Backgrounds
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.evidence.pipeline import EvidenceMaker
+from studio.evidence.settings import EvidenceSettings
+from studio.geometry.camera import Camera
+from studio.sessions.session import Session
+from studio.volume.hull import Hull
+from studio.volume.hull_pieces import chosen_voxels, piece_numbers
+from studio.volume.hull_settings import HullSettings
+from studio.volume.hull_silhouette import silhouette
+from studio.volume.reconstruction import Reconstructor
+from studio.volume.tracking_space import Box, box_of
+
+Bytes = NDArray[np.uint8]
+
+FRAMES = 5
+COARSE = HullSettings(hull_depth=6)
+FINE = HullSettings(hull_depth=8, hull_edge_share=0.5, hull_least_views=2)
+MARGIN = 120.0
+"""mm around the coarse hull in which the fine one is carved."""
+LEAST_PIECE = 0.05
+"""Of the largest piece's volume."""
+USABLE = 0.9
+"""Agreement from which on masks are called usable (issue 5)."""
+BLAMED = 0.05
+"""Share of the other masks that one camera may deny before it is named."""
+
+
+@dataclass(frozen=True, slots=True)
+class ViewQuality:
+    """One camera's masks against the hull, pixels of all frames together.
+
+    covered : share of the mask that the hull's silhouette covers. inside : share of the silhouette that lies in the
+    mask. denied : share of the other cameras' masks that only this camera's mask keeps out of the hull. frames :
+    (covered, inside) of each frame; NaN where there is nothing.
+    """
+
+    camera: str
+    covered: float
+    inside: float
+    denied: float
+    frames: tuple[tuple[float, float], ...]
+
+    @property
+    def agreement(self) -> float:
+        """The smaller of covered and inside."""
+        return min(self.covered, self.inside)
+
+    @property
+    def usable(self) -> bool:
+        """Whether the masks agree well enough with the other views."""
+        return self.agreement >= USABLE
+
+    def in_words(self) -> str:
+        """What a person should look for, "" if the masks are good."""
+        if np.isnan(self.agreement):
+            return "The mask, or the hull that all views allow, is empty: look at the masks of all cameras."
+        said = []
+        if self.denied > BLAMED:
+            share = f"{100.0 * self.denied:.0f} %"
+            said.append(f"The mask has holes: it alone denies {share} of what the other cameras see.")
+        if self.covered < USABLE:
+            share = f"{100.0 * (1.0 - self.covered):.0f} %"
+            said.append(
+                f"{share} of the mask is seen by no other camera: exclude what is no one, or see who has holes."
+            )
+        if self.inside < USABLE:
+            said.append("The mask lacks parts of what the other cameras see.")
+        return " ".join(said)
+
+
+@dataclass(frozen=True, slots=True)
+class MaskQuality:
+    """All cameras' masks in some frames. hull_litres : the hull's volume in each."""
+
+    frames: tuple[int, ...]
+    views: tuple[ViewQuality, ...]
+    hull_litres: tuple[float, ...]
+
+    @property
+    def usable(self) -> bool:
+        """Whether every camera's masks are."""
+        return all(view.usable for view in self.views)
+
+
+def mask_quality(
+    session: Session,
+    settings: EvidenceSettings,
+    frames: Sequence[int] = (),
+    *,
+    backgrounds: Backgrounds | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> MaskQuality:
+    """The quality of a session's masks in some frames (default: five, evenly spread).
+
+    backgrounds : already fitted, of this session's footage. Raises RunError for a single camera, FootageError,
+    NotFoundError.
+    """
+    cameras = session.cameras()
+    if len(cameras) < 2:
+        raise RunError(
+            f"Session '{session.name}' has one camera: masks cannot be compared between views.",
+            "Look at its masks instead.",
+        )
+    footage = session.footage()
+    try:
+        chosen = tuple(frames) or spread_frames(footage.frame_count, FRAMES)
+        maker = EvidenceMaker(cameras, footage, backgrounds or Backgrounds(footage), settings, "none")
+        counted = []
+        for done, frame in enumerate(chosen):
+            if progress is not None:
+                progress("comparing masks", done, len(chosen))
+            counted.append(count_frame(maker.evidence(frame), cameras))
+    finally:
+        footage.close()
+    names = tuple(camera.name for camera in cameras)
+    return _summed(chosen, names, counted)
+
+
+def spread_frames(count: int, wanted: int) -> tuple[int, ...]:
+    """Up to `wanted` frames in the middle of as many equal parts of the footage."""
+    parts = min(count, wanted)
+    return tuple(int((part + 0.5) * count / parts) for part in range(parts))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameCounts:
+    """Pixels of one frame, (V,) each: of mask, silhouette, both; denied[v]: of the other masks, uncovered only by v."""
+
+    mask: NDArray[np.int64]
+    hull: NDArray[np.int64]
+    both: NDArray[np.int64]
+    denied: NDArray[np.int64]
+    litres: float
+
+
+def count_frame(evidence: FrameEvidence, cameras: tuple[Camera, ...]) -> FrameCounts:
+    """The pixels that `ViewQuality`'s shares are made of."""
+    masks = [view.mask for view in evidence.views]
+    whole, box = _fine_hull(evidence, cameras)
+    mask = np.array([np.count_nonzero(one) for one in masks])
+    covers = [_silhouette(whole, camera) for camera in cameras]
+    both = np.array([np.count_nonzero(one & cover) for one, cover in zip(masks, covers, strict=True)])
+    denied = np.zeros(len(cameras), dtype=np.int64)
+    for left_out in range(len(cameras) if len(cameras) > 2 and box is not None else 0):
+        without = _fine_hull(_without(evidence, left_out), cameras, box)[0]
+        for other, camera in enumerate(cameras):
+            if other != left_out:
+                back = masks[other] & ~covers[other] & _silhouette(without, camera)
+                denied[left_out] += np.count_nonzero(back)
+    hull = np.array([np.count_nonzero(cover) for cover in covers])
+    return FrameCounts(mask, hull, both, denied, 0.0 if whole is None else whole.volume() * 1e-6)
+
+
+def _fine_hull(
+    evidence: FrameEvidence, cameras: tuple[Camera, ...], box: Box | None = None
+) -> tuple[Hull | None, Box | None]:
+    """The large pieces, finely carved where a coarse hull found one; None where there is nothing."""
+    if box is None:
+        space = box_of(cameras)
+        coarse = Reconstructor(cameras, space, COARSE).hull(evidence)
+        if coarse.empty:
+            return None, None
+        coarse = _large_pieces(coarse)
+        reach = 0.5 * coarse.edges[:, None] + MARGIN
+        box = Box((coarse.centres - reach).min(axis=0), (coarse.centres + reach).max(axis=0))
+    found = Reconstructor(cameras, box, FINE).hull(evidence)
+    return (None if found.empty else _large_pieces(found)), box
+
+
+def _large_pieces(hull: Hull) -> Hull:
+    """The hull without crumbs and ghosts: a wrong mask may cut a person in two, both of which stay."""
+    numbers, volumes = piece_numbers(hull)
+    return chosen_voxels(hull, volumes[numbers] >= LEAST_PIECE * volumes[0])
+
+
+def _without(evidence: FrameEvidence, left_out: int) -> FrameEvidence:
+    """The evidence with one camera denying nothing."""
+    views = list(evidence.views)
+    views[left_out] = dataclasses.replace(views[left_out], mask=np.full_like(views[left_out].mask, 255))
+    return dataclasses.replace(evidence, views=tuple(views))
+
+
+def _silhouette(hull: Hull | None, camera: Camera) -> Bytes:
+    if hull is None:
+        return np.zeros((camera.height, camera.width), np.uint8)
+    return silhouette(hull, camera)
+
+
+def _summed(frames: tuple[int, ...], names: tuple[str, ...], counted: Sequence[FrameCounts]) -> MaskQuality:
+    mask, hull = np.stack([one.mask for one in counted]), np.stack([one.hull for one in counted])
+    both, denied = np.stack([one.both for one in counted]), np.stack([one.denied for one in counted])
+    covered, inside = _share(both, mask), _share(both, hull)
+    everything = mask.sum()
+    views = tuple(
+        ViewQuality(
+            camera=name,
+            covered=float(_share(both[:, v].sum(), mask[:, v].sum())),
+            inside=float(_share(both[:, v].sum(), hull[:, v].sum())),
+            denied=float(_share(denied[:, v].sum(), everything - mask[:, v].sum())),
+            frames=tuple((float(c), float(i)) for c, i in zip(covered[:, v], inside[:, v], strict=True)),
+        )
+        for v, name in enumerate(names)
+    )
+    return MaskQuality(frames, views, tuple(one.litres for one in counted))
+
+
+def _share(part: NDArray[np.int64], whole: NDArray[np.int64]) -> NDArray[np.float64]:
+    """part / whole, NaN where the whole is nothing."""
+    return np.where(whole > 0, part / np.maximum(whole, 1), np.nan)

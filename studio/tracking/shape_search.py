@@ -1,0 +1,281 @@
+"""A body's size and its poses in a few frames, found together by annealing a population on the frames' silhouettes.
+
+A particle is a shape (a few logarithms, `body.shape_space`) and a pose in every frame. All frames together in one state
+would be hundreds of dimensions, but given the shape the frames do not depend on each other, so each layer
+
+1. moves the shapes (noise in proportion to the survivors' own spread, Deutscher & Reid 2005, Eq. 18, in full
+   covariance), and with each shape its poses, so that joints stay where they were as well as they can (`carried`):
+   a longer thigh bends the knee instead of pushing the foot through the floor;
+2. tries in each frame fifteen changes of the pose, each of one limb's parameters or of all, and keeps the best of these
+   and the pose as it was; some are the same limb as another particle has it in that frame (crossover);
+3. weighs each particle by the sum over the frames, with the prior of the shapes, at a sharpness that leaves the wanted
+   share of particles alive (Eqs. 11, 12), and draws the next ones, the best one always among them.
+
+The answer is the mean shape of the last layers' survivors, the uncertainty their standard deviation: how far a shape can
+go at full sharpness without being worse, given that poses follow.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.forward_kinematics import limb_ends
+from studio.body.shape_space import ShapeSpace
+from studio.weighting.shape_silhouettes import POSES, ShapeSilhouettes
+
+Array = NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+SHARPNESS = 400.0
+"""Log weight of one frame's f_s from 0 to 1: a hundredth more in each of five frames makes a shape e^20 as likely."""
+RIDGE = 0.02
+"""How dear a move of a pose parameter is when poses are carried along, as a share of the Jacobian's size."""
+KEPT = 0.25
+"""Share of the layers, the last ones, that make the answer."""
+STEP = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class ShapeSearchSettings:
+    """How much is searched. particles : M. layers : in all. survival : share of particles that survive a layer.
+
+    length_spread, radius_spread : the prior's standard deviations, as shares. height_spread : mm. pose_steps : how
+    often the poses of a layer are improved.
+    """
+
+    particles: int = 24
+    layers: int = 60
+    survival: float = 0.4
+    length_spread: float = 0.06
+    radius_spread: float = 0.15
+    height_spread: float = 15.0
+    pose_steps: int = 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundShape:
+    """shape, deviation : (S,) logarithms. poses : (F, D) that go with the shape. fitness, before : (F,) f_s of them
+    and of the first shape and poses. evaluations : poses weighed.
+    """
+
+    shape: Array
+    deviation: Array
+    poses: Array
+    fitness: Array
+    before: Array
+    evaluations: int
+
+
+@dataclass(slots=True, eq=False)
+class _Population:
+    """shapes (M, S), poses (M, F, D), fitness (M, F)."""
+
+    shapes: Array
+    poses: Array
+    fitness: Array = field(default_factory=lambda: np.empty(0))
+
+
+class ShapeSearch:
+    """One search.
+
+    silhouettes : the frames. limits : (2, D) of the poses. spread : (D,) how far poses may be off at first (radians,
+    mm). limb_of : (D,) number of the limb that each parameter belongs to. height : mm, of the standing body, where it
+    is known.
+    """
+
+    def __init__(
+        self,
+        silhouettes: ShapeSilhouettes,
+        limits: Array,
+        spread: Array,
+        limb_of: NDArray[np.int64],
+        *,
+        height: float | None = None,
+        settings: ShapeSearchSettings | None = None,
+        seed: int = 0,
+        progress: Progress | None = None,
+    ) -> None:
+        self._silhouettes, self._limits, self._spread = silhouettes, limits, spread
+        self._limbs = [np.flatnonzero(limb_of == limb) for limb in np.unique(limb_of)]
+        self._settings = settings or ShapeSearchSettings()
+        self._rng = np.random.default_rng(np.random.SeedSequence((seed, 0x5AB)))
+        self._progress = progress
+        self._space: ShapeSpace = silhouettes.programs.space
+        self._sigma = np.array(
+            [
+                self._settings.length_spread if group.kind == "length" else self._settings.radius_spread
+                for group in self._space.groups
+            ]
+        )
+        self._height = height
+        self._own_height, self._height_slope = _height_of(self._space)
+        self.evaluations = 0
+
+    def run(self, poses: Array) -> FoundShape:
+        """The shape and the poses, from poses (F, D) of the space's own body."""
+        rules, rng = self._settings, self._rng
+        count = rules.particles
+        first = _Population(np.zeros((count, len(self._sigma))), np.repeat(poses[None], count, axis=0))
+        before = self._fitness(first.shapes[:1], poses[None, :, None])[0, :, 0]
+        first.poses = self._settled(first, 0)
+        now = first
+        kept: list[tuple[Array, Array]] = []
+        for layer in range(rules.layers):
+            if self._progress is not None:
+                self._progress(layer, rules.layers)
+            heat = 1.0 - layer / rules.layers
+            moved = self._moved(now, layer, heat)
+            for _ in range(rules.pose_steps):
+                self._improve(moved, heat)
+            total = SHARPNESS * moved.fitness.sum(axis=1) + self.log_prior(moved.shapes)
+            weights = tempered(total, rules.survival)
+            if layer >= round((1.0 - KEPT) * rules.layers):
+                kept.append((weights, moved.shapes))
+            chosen = rng.choice(count, count, p=weights)
+            chosen[0] = int(np.argmax(total))
+            now = _Population(moved.shapes[chosen], moved.poses[chosen], moved.fitness[chosen])
+        return self._answer(now, kept, before)
+
+    def log_prior(self, shapes: Array) -> Array:
+        """(M,) of shapes (M, S): published proportions, and the height where it is known."""
+        found = -0.5 * np.square(shapes / self._sigma).sum(axis=1)
+        if self._height is not None:
+            height = self._own_height + shapes @ self._height_slope
+            found -= 0.5 * np.square((height - self._height) / self._settings.height_spread)
+        return found
+
+    def _moved(self, now: _Population, layer: int, heat: float) -> _Population:
+        """New shapes around the population's, with poses carried along."""
+        rng = self._rng
+        if layer == 0:
+            steps = rng.normal(size=now.shapes.shape) * self._sigma
+        else:
+            away = now.shapes - now.shapes.mean(axis=0)
+            floor = np.diag(np.square(self._sigma * (0.02 + 0.08 * heat)))
+            covariance = 0.3 * away.T @ away / len(away) + floor
+            steps = rng.multivariate_normal(np.zeros(len(covariance)), covariance, len(away))
+        steps[0] = 0.0
+        moved = _Population(now.shapes + steps, np.empty_like(now.poses))
+        middle = now.shapes.mean(axis=0)
+        for k in range(now.poses.shape[1]):
+            follow = self.carried(middle, now.poses[0, k])
+            moved.poses[:, k] = self._within(now.poses[:, k] + steps @ follow.T)
+        return moved
+
+    def carried(self, shape: Array, pose: Array) -> Array:
+        """(D, S) how a pose follows a change of shape so that the ends of limbs stay as near as they can."""
+        body, scale = self._space.body_of(shape), self._spread
+        nudged = pose + np.vstack([np.zeros(len(pose)), np.diag(STEP * scale)])
+        ends = limb_ends(body, nudged).reshape(len(nudged), -1)
+        by_pose = (ends[1:] - ends[0]).T / STEP
+        by_shape = np.stack(
+            [
+                (limb_ends(self._space.body_of(shape + STEP * unit), pose[None]).ravel() - ends[0]) / STEP
+                for unit in np.eye(len(shape))
+            ],
+            axis=1,
+        )
+        ridge = RIDGE * np.linalg.norm(by_pose) / np.sqrt(len(pose)) * np.eye(len(pose))
+        stacked = np.vstack([by_pose, ridge])
+        wanted = np.vstack([-by_shape, np.zeros((len(pose), len(shape)))])
+        return scale[:, None] * np.linalg.lstsq(stacked, wanted, rcond=None)[0]
+
+    def _improve(self, now: _Population, heat: float) -> None:
+        """Replace each pose by the best of sixteen around it."""
+        rng = self._rng
+        count, frames, size = now.poses.shape
+        tried = np.repeat(now.poses[:, :, None], POSES, axis=2)
+        scale = 10.0 ** rng.uniform(-1.7, -0.7 + 0.7 * heat, (count, frames, POSES, 1))
+        noise = rng.normal(size=tried.shape) * self._spread * scale
+        limb = rng.integers(-1, len(self._limbs), (count, frames, POSES))
+        other = rng.integers(0, count, (count, frames, POSES))
+        borrowed = rng.random((count, frames, POSES)) < 0.25
+        for number, own in enumerate(self._limbs):
+            chosen = (limb == number) | (limb < 0)
+            chosen[:, :, 0] = False
+            fresh = chosen & ~borrowed
+            m, k, n = np.nonzero(fresh)
+            tried[m[:, None], k[:, None], n[:, None], own] += noise[m[:, None], k[:, None], n[:, None], own]
+            m, k, n = np.nonzero((limb == number) & chosen & borrowed)
+            tried[m[:, None], k[:, None], n[:, None], own] = now.poses[
+                other[m, k, n][:, None], k[:, None], own
+            ]
+        tried = self._within(tried)
+        fitness = self._fitness(now.shapes, tried)
+        best = np.argmax(fitness, axis=2)
+        now.poses = np.take_along_axis(tried, best[..., None, None], axis=2)[:, :, 0]
+        now.fitness = np.take_along_axis(fitness, best[..., None], axis=2)[..., 0]
+
+    def _settled(self, now: _Population, steps: int) -> Array:
+        """The population's poses after some improvements of the poses alone."""
+        for _ in range(steps):
+            self._improve(now, 1.0)
+        return now.poses
+
+    def _fitness(self, shapes: Array, poses: Array) -> Array:
+        """(M, F, K) of poses (M, F, K, D), K at most sixteen."""
+        wanted = poses.shape[2]
+        if wanted < POSES:
+            poses = np.repeat(poses[:, :, :1], POSES, axis=2)
+        self.evaluations += poses.shape[0] * poses.shape[1] * wanted
+        return self._silhouettes.fitness(shapes, poses)[:, :, :wanted]
+
+    def _within(self, poses: Array) -> Array:
+        return np.clip(poses, *self._limits)
+
+    def _answer(self, now: _Population, kept: list[tuple[Array, Array]], before: Array) -> FoundShape:
+        """The mean of what survived the last layers, and poses that go with it."""
+        weights = np.concatenate([one for one, _ in kept]) / len(kept)
+        shapes = np.concatenate([one for _, one in kept])
+        shape = weights @ shapes
+        deviation = np.sqrt(weights @ np.square(shapes - shape))
+        poses = np.empty_like(now.poses)
+        for k in range(poses.shape[1]):
+            poses[:, k] = self._within(now.poses[:, k] + (shape - now.shapes) @ self.carried(shape, now.poses[0, k]).T)
+        last = _Population(np.repeat(shape[None], len(poses), axis=0), poses)
+        for _ in range(2 * self._settings.pose_steps + 2):
+            self._improve(last, 0.0)
+        best = np.argmax(last.fitness, axis=0)
+        frames = np.arange(poses.shape[1])
+        if self._progress is not None:
+            self._progress(self._settings.layers, self._settings.layers)
+        return FoundShape(
+            shape, deviation, last.poses[best, frames], last.fitness[best, frames], before, self.evaluations
+        )
+
+
+def tempered(log_weights: Array, survival: float) -> Array:
+    """(M,) normalised weights w^β with β in 0..1 such that the survival rate 1 / (M Σ w²) is the wanted one, where β
+    ≤ 1 reaches it (Deutscher & Reid 2005, Eqs. 11, 12).
+    """
+    low, high = 0.0, 1.0
+    best = _normalised(log_weights)
+    if 1.0 / (len(best) * np.square(best).sum()) >= survival:
+        return best
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        best = _normalised(middle * log_weights)
+        if 1.0 / (len(best) * np.square(best).sum()) > survival:
+            low = middle
+        else:
+            high = middle
+    return best
+
+
+def _normalised(log_weights: Array) -> Array:
+    weights = np.exp(log_weights - log_weights.max())
+    return weights / weights.sum()
+
+
+def _height_of(space: ShapeSpace) -> tuple[float, Array]:
+    """The standing body's height, mm, and its slope (S,) over the shape."""
+
+    def height(shape: Array) -> float:
+        body = space.body_of(shape)
+        return float(np.ptp(limb_ends(body, body.neutral)[0, ..., 2]))
+
+    size = len(space.groups)
+    own = height(np.zeros(size))
+    return own, np.array([(height(STEP * unit) - own) / STEP for unit in np.eye(size)])

@@ -1,0 +1,56 @@
+"""A hull as a camera would see it: its silhouette."""
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from studio.geometry.camera import Camera
+from studio.volume.hull import Hull
+from studio.volume.hull_cameras import camera_rows
+from studio.volume.hull_projection import AXES, BOUND_X, BOUND_Y, PLACE, U, V, place_voxel
+
+
+def silhouette(hull: Hull, camera: Camera) -> NDArray[np.uint8]:
+    """(H, W) uint8, 255 where a voxel lies behind the pixel's centre, or a voxel's own centre is in the pixel."""
+    picture = np.zeros((camera.height, camera.width), dtype=np.uint8)
+    draw_voxels(camera_rows((camera,)), hull.centres, hull.edges, picture)
+    return picture
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def draw_voxels(cameras, centres, edges, picture):
+    """Set the pixels of each voxel's hexagon to 255. cameras : one row of `camera_rows`. picture : (H, W) uint8.
+
+    A hexagon is all sums of its three half axes a times -1 to 1: a pixel at d from the centre is inside when for the
+    normal n of each axis |n d| is at most the sum of |n a|.
+    """
+    height, width = picture.shape
+    place = np.empty(PLACE)
+    for k in range(len(centres)):
+        if not place_voxel(cameras, 0, centres[k, 0], centres[k, 1], centres[k, 2], 0.5 * edges[k], place):
+            continue
+        u, v = place[U], place[V]
+        column, row = math.floor(u + 0.5), math.floor(v + 0.5)
+        if 0 <= column < width and 0 <= row < height:
+            picture[row, column] = 255
+        for y in range(max(0, math.ceil(v - place[BOUND_Y])), min(height, math.floor(v + place[BOUND_Y]) + 1)):
+            for x in range(
+                max(0, math.ceil(u - place[BOUND_X])), min(width, math.floor(u + place[BOUND_X]) + 1)
+            ):
+                if picture[y, x] == 0 and in_hexagon(place, x - u, y - v):
+                    picture[y, x] = 255
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def in_hexagon(place, dx, dy):
+    """Whether a pixel at (dx, dy) from a voxel's centre lies in its projection."""
+    for axis in range(3):
+        normal_x, normal_y = -place[AXES + 2 * axis + 1], place[AXES + 2 * axis]
+        reach = 0.0
+        for other in range(3):
+            reach += abs(normal_x * place[AXES + 2 * other] + normal_y * place[AXES + 2 * other + 1])
+        if abs(normal_x * dx + normal_y * dy) > reach:
+            return False
+    return True

@@ -1,0 +1,103 @@
+"""How well many bodies of different sizes meet the silhouettes of some frames, each body in poses of its own.
+
+A weighting is prepared for one body, and preparing it costs more than weighing a pose. Here the body is a variable:
+the fixed motions between a body's joints and its cones' sizes are linear in its dimensions (a `KinematicProgram` folds
+constant turns and moves, only the moves have dimensions in them), so a body's program is the first body's plus a sum,
+and sixteen poses of each body are one block of the outline kernel. The fit is the exact bidirectional silhouette
+measure f_s of Fleischmann et al. 2012 (`silhouette_areas`).
+"""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.dimensions import with_dimensions
+from studio.body.shape_space import ShapeSpace
+from studio.body.tables import kinematic_tables
+from studio.errors import BodyError
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.geometry.camera import Camera
+from studio.weighting.evidence_check import check_views
+from studio.weighting.kinematic_program import KinematicProgram, compile_program
+from studio.weighting.outlines import OutlineProjector
+from studio.weighting.silhouette_areas import HALF, Silhouettes
+
+Array = NDArray[np.float64]
+
+POSES = 16
+"""Of a body, weighed at once."""
+STEP = 10.0
+"""mm by which a dimension is changed to see what it moves; the change is linear, so any step does."""
+
+
+class ShapePrograms:
+    """The kinematic programs of all shapes of a space."""
+
+    def __init__(self, space: ShapeSpace) -> None:
+        """Raises BodyError for a space of dimensions that do not all move something."""
+        self.space = space
+        body = space.body
+        self._first = compile_program(kinematic_tables(body))
+        names = [name for group in space.groups for name in group.dimensions]
+        self._group = np.repeat(np.arange(len(space.groups)), [len(g.dimensions) for g in space.groups])
+        self._own = np.array([body.dimensions[name] for name in names])
+        fixed, limbs = [], []
+        for name in names:
+            other = compile_program(
+                kinematic_tables(with_dimensions(body, {name: body.dimensions[name] + STEP}))
+            )
+            if other.fixed.shape != self._first.fixed.shape:
+                raise BodyError(f"Dimension '{name}' changes the body's structure.", "Leave it out of the fit.")
+            fixed.append((other.fixed.astype(np.float64) - self._first.fixed) / STEP)
+            limbs.append((other.limb_shape.astype(np.float64) - self._first.limb_shape) / STEP)
+        self._fixed, self._limbs = np.array(fixed), np.array(limbs)
+
+    def program(self, shape: Array) -> KinematicProgram:
+        """The program of a shape (S,)."""
+        more = self._own * np.expm1(shape[self._group])
+        return dataclasses.replace(
+            self._first,
+            fixed=(self._first.fixed + np.tensordot(more, self._fixed, 1)).astype(np.float32),
+            limb_shape=np.ascontiguousarray(
+                self._first.limb_shape + np.tensordot(more, self._limbs, 1), dtype=np.float32
+            ),
+        )
+
+
+class ShapeSilhouettes:
+    """Some frames as a function of shapes and poses."""
+
+    def __init__(
+        self, space: ShapeSpace, cameras: tuple[Camera, ...], frames: Sequence[FrameEvidence]
+    ) -> None:
+        """Raises FootageError where masks do not fit the cameras."""
+        for evidence in frames:
+            check_views(cameras, evidence, edges=False)
+        self.programs = ShapePrograms(space)
+        self._projector = OutlineProjector.of_body(space.body, cameras)
+        self._frames = tuple(Silhouettes(evidence, HALF) for evidence in frames)
+        self.seen = np.array([[np.count_nonzero(v.mask) > 0 for v in evidence.views] for evidence in frames])
+
+    @property
+    def frame_count(self) -> int:
+        """How many frames there are, F."""
+        return len(self._frames)
+
+    def fitness(self, shapes: Array, poses: Array) -> Array:
+        """(M, F, 16) the mean of f_s over the views that see something.
+
+        shapes : (M, S). poses : (M, F, 16, D), sixteen of each shape in each frame.
+        """
+        count, frames = poses.shape[:2]
+        found = np.empty((count, frames, POSES))
+        projectors = [self._projector.with_program(self.programs.program(shape)) for shape in shapes]
+        for k, silhouettes in enumerate(self._frames):
+            outlines = np.concatenate(
+                [one.blocks(poses[m, k]) for m, one in enumerate(projectors)]
+            )
+            fits = silhouettes.areas(outlines, count * POSES).fitness()
+            weights = self.seen[k] / max(1, np.count_nonzero(self.seen[k]))
+            found[:, k] = (fits @ weights).reshape(count, POSES)
+        return found
