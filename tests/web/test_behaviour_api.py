@@ -12,7 +12,9 @@ from studio.behaviour.model import BehaviourModel
 from studio.behaviour.model_file import write_model
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends
+from studio.errors import BodyError
 from studio.runs.behaviour_models import SUFFIX, models_folder
+from studio.web import behaviour_routes
 from studio.web.document_pages import PAGES
 
 
@@ -124,6 +126,65 @@ def test_what_is_not_there_is_told(learnt: Studio, path: str, status: int) -> No
     answer = learnt.client.get(f"/api/behaviours/{path}")
     assert answer.status_code == status
     assert answer.json()["message"]
+
+
+def test_a_model_is_renamed_and_keeps_what_it_holds(learnt: Studio) -> None:
+    before = learnt.client.get("/api/behaviours/wave").json()["clusters"]
+    assert learnt.client.patch("/api/behaviours/wave", json={"name": "greeting"}).json() == {
+        "name": "greeting"
+    }
+    assert learnt.client.get("/api/behaviours/wave").status_code == 404
+    told = learnt.client.get("/api/behaviours/greeting").json()
+    assert told["model"]["name"] == "greeting"
+    assert told["clusters"] == before
+
+
+@pytest.mark.parametrize("name", ["../out", "", "a b", None])
+def test_a_model_is_not_renamed_to_what_is_no_name(learnt: Studio, name: str | None) -> None:
+    assert learnt.client.patch("/api/behaviours/wave", json={"name": name}).status_code in (400, 422)
+    assert learnt.client.get("/api/behaviours/wave").status_code == 200
+
+
+def test_a_model_never_takes_the_place_of_another(learnt: Studio, model: BehaviourModel) -> None:
+    folder = models_folder(learnt.workspace.root)
+    write_model(model, folder / f"other{SUFFIX}")
+    content = (folder / f"other{SUFFIX}").read_bytes()
+    answer = learnt.client.patch("/api/behaviours/wave", json={"name": "OTHER"})
+    assert answer.status_code == 422
+    assert "already" in answer.json()["message"]
+    assert (folder / f"other{SUFFIX}").read_bytes() == content
+
+
+def test_what_is_thrown_away_comes_back_from_the_trash(learnt: Studio, model: BehaviourModel) -> None:
+    folder = models_folder(learnt.workspace.root)
+    content = (folder / f"wave{SUFFIX}").read_bytes()
+    thrown = learnt.client.delete("/api/behaviours/wave").json()
+    assert (thrown["name"], thrown["kind"], thrown["restorable"]) == ("wave", "model", True)
+    assert learnt.client.get("/api/behaviours").json()["models"] == []
+    assert learnt.client.get("/api/trash").json()["entries"] == [thrown]
+    write_model(model, folder / f"wave{SUFFIX}")
+    back = learnt.client.post("/api/trash/restore", json={"entry": thrown["id"]}).json()
+    assert back["model"] == "wave-2"
+    assert (folder / f"wave-2{SUFFIX}").read_bytes() == content
+    assert learnt.client.get("/api/trash").json()["entries"] == []
+    assert [path.name for path in folder.iterdir() if path.name.startswith(".")] == []
+
+
+def test_a_model_without_its_body_tells_its_numbers_and_says_why(
+    learnt: Studio, model: BehaviourModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gone(name: str) -> None:
+        raise BodyError(f"There is no body '{name}'.", "Known: human25.")
+
+    monkeypatch.setattr(behaviour_routes, "load_body", gone)
+    told = learnt.client.get("/api/behaviours/wave").json()
+    assert "body 'planar_arm4' is not here any more" in told["problem"]
+    assert told["clusters"] == told["limbs"] == []
+    assert told["model"]["states"] == model.states == sum(told["context_lengths"])
+    assert learnt.client.get("/api/behaviours/wave/entropies").json()["lines"]
+    walk = learnt.client.get("/api/behaviours/wave/walk?frames=5")
+    assert walk.status_code == 422
+    assert "not here any more" in walk.json()["message"]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
