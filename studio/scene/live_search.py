@@ -32,6 +32,11 @@ class LiveSearch:
             return self.result.estimate.pose
         return self.records[-1].mean if self.records else None
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether the result is there, and every layer of it."""
+        return self.result is not None and len(self.records) == self.result.layers
+
     def after(self, event: Event) -> "LiveSearch":
         """The search after an event; others than layers and frames change nothing.
 

@@ -40,6 +40,10 @@ def moment_of(
     truth = None if frame is None else opened.truth_at(frame)
     if edited is not None:
         return Moment(frame, edited, None, (), 0, truth)
+    if frame is not None and frame == live.frame and live.is_whole and not live.reannealed:
+        # Heard whole, so it need not be read.
+        assert live.result is not None
+        return Moment(frame, live.pose, None, live.records, live.result.layers, truth)
     stored = None if frame is None else opened.result(frame)
     if frame is not None and live.frame == frame and (live.reannealed or stored is None):
         beside = stored.estimate.pose if stored is not None and live.reannealed else None

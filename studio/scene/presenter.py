@@ -18,7 +18,8 @@ from studio.worker.events import Event
 from studio.worker.watchers import Subscription
 
 REDRAW_SECONDS = 1.0 / 30.0
-PICTURE_SECONDS = 1.0 / 10.0
+PICTURE_SECONDS, LIVE_PICTURE_SECONDS = 1.0 / 10.0, 1.0 / 2.0
+"""Composing pictures costs a third of a core at ten times a second: a live run needs that itself."""
 _LOG = logging.getLogger(__name__)
 _WAKE = Event("", "")
 
@@ -63,6 +64,10 @@ class Presenter:
         """Do something in the drawing thread soon, then redraw. Thread-safe; returns at once."""
         self._posts.append(action)
         self._events.put(_WAKE)
+
+    def yield_to_live(self, tracking: bool) -> None:
+        """Hang pictures less often while a live run is tracked (in the drawing thread)."""
+        self._drawings[1].pause = LIVE_PICTURE_SECONDS if tracking else PICTURE_SECONDS
 
     def redraw(self, *, pictures: bool = True) -> None:
         """Ask for a redraw (in the drawing thread)."""
@@ -122,15 +127,15 @@ class _Due:
     """A drawing that is wanted or not, at most once in `pause` seconds."""
 
     def __init__(self, draw: Callable[[], None], pause: float) -> None:
-        self.draw, self._pause = draw, pause
+        self.draw, self.pause = draw, pause
         self._last = float("-inf")
         self.wanted = False
 
     def due(self, now: float) -> bool:
-        return self.wanted and now - self._last >= self._pause
+        return self.wanted and now - self._last >= self.pause
 
     def waits(self, now: float) -> float:
-        return max(0.0, self._last + self._pause - now)
+        return max(0.0, self._last + self.pause - now)
 
     def done(self, now: float) -> None:
         self._last, self.wanted = now, False

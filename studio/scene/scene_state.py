@@ -177,6 +177,7 @@ class SceneState:
             if answer[1] is not None:
                 self._refused(answer[1])
         if isinstance(event, StateChanged):
+            self._presenter.yield_to_live(event.live is not None and event.state == "tracking")
             self._show_state()
             if event.run and not self.shown.session and self.shown.follow:
                 self._open(event.session, event.run)
