@@ -98,7 +98,8 @@ class Footage:
         """A background picture of a camera (H, W, 3), turned as its footage is, unless it was turned already."""
         source = self._by_name[camera]
         height, width = picture.shape[:2]
-        return turned_picture(picture, background_turn(source, width, height))
+        turn = background_turn(source.turned, (source.width, source.height), (width, height))
+        return turned_picture(picture, turn)
 
     def close(self) -> None:
         """Close all files."""
@@ -144,15 +145,14 @@ def turned_picture(picture: Bytes, degrees: int) -> Bytes:
     return np.ascontiguousarray(np.rot90(picture, -degrees // 90)) if degrees else picture
 
 
-def background_turn(source: CameraSource, width: int, height: int) -> int:
-    """Degrees clockwise by which a background of width x height is to be turned to lie as the footage does.
+def background_turn(turned: int, footage: tuple[int, int], background: tuple[int, int]) -> int:
+    """Degrees clockwise by which a background is to be turned to lie as the footage does.
 
-    One that lies as the turned footage already, where that can be seen from its shape, stays as it is.
+    turned : of the footage; sizes as (width, height), the footage's once turned. A background that lies as the turned
+    footage already, where that can be seen from its shape, stays as it is.
     """
-    sideways = source.turned in (90, 270) and source.width != source.height
-    if sideways and (width - height) * (source.width - source.height) > 0:
-        return 0
-    return source.turned
+    (width, height), (wide, tall) = footage, background
+    return 0 if turned in (90, 270) and (wide - tall) * (width - height) > 0 else turned
 
 
 def colour_as_it_is(picture: Bytes) -> Bytes:

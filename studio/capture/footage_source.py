@@ -7,6 +7,9 @@ that opening a session needs no probing and a file that changed afterwards is no
 from dataclasses import dataclass
 from typing import Literal
 
+Turn = Literal[0, 90, 180, 270]
+TURNS: tuple[Turn, ...] = (0, 90, 180, 270)
+
 
 @dataclass(frozen=True, slots=True)
 class CameraSource:
@@ -30,7 +33,7 @@ class CameraSource:
     masks: str = ""
     background: str = ""
     offset: int = 0
-    turned: Literal[0, 90, 180, 270] = 0
+    turned: Turn = 0
 
     @property
     def last(self) -> int:

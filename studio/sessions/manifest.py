@@ -32,7 +32,9 @@ class SessionManifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
     body : the body its subject is fitted to. tracker, weighting : what runs of this session use unless told
     otherwise, "" for the studio's own default. footage : see `FootageSource`; paths relative to the session
     folder. calibration_source : name of the imported file or files. assumptions : what was taken for granted
-    to make footage and calibration fit (a crop, a unit, a frame rate). matching : footage to cameras.
+    to make footage and calibration fit (a crop, a unit, a frame rate). matching : footage to cameras. layout :
+    whose folder layout the source was taken for. footage_changed : when offsets or turns were last changed (UTC, ISO
+    8601, to the microsecond), "" if never; runs made before count the frames as they were then.
     """
 
     schema: int = SCHEMA_VERSION
@@ -49,6 +51,8 @@ class SessionManifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     matching: tuple[CameraMatch, ...] = ()
+    layout: str = ""
+    footage_changed: str = ""
 
     @property
     def fps(self) -> float:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from studio.capture.calibration_files import Calibration
 from studio.capture.calibration_parts import AssumedCrop
+from studio.capture.footage_source import Turn
 from studio.capture.naming import listed
 from studio.capture.pictures import PicturesMeasure
 from studio.capture.video import VideoMeasure
@@ -21,7 +22,8 @@ class MeasuredCamera:
     """One camera's parts, measured.
 
     camera : as fitted to the footage. footage, masks, background : source paths. found : what decoding the
-    footage found. crop : what had to be assumed to make it fit, if anything.
+    footage found, before turning. crop : what had to be assumed to make it fit, if anything. turned : degrees
+    clockwise. offset : the file's frame that is frame 0 of all cameras.
     """
 
     camera: Camera
@@ -30,6 +32,14 @@ class MeasuredCamera:
     crop: AssumedCrop | None
     masks: Path | None
     background: Path | None
+    turned: Turn = 0
+    offset: int = 0
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) of the pictures once they are turned, px."""
+        found = self.found
+        return (found.height, found.width) if self.turned in (90, 270) else (found.width, found.height)
 
 
 def crop_warnings(calibration: Calibration, measured: tuple[MeasuredCamera, ...]) -> list[str]:
@@ -37,20 +47,20 @@ def crop_warnings(calibration: Calibration, measured: tuple[MeasuredCamera, ...]
     sizes = {camera.name: (camera.width, camera.height) for camera in calibration.cameras}
     warnings: list[str] = []
     for entry in measured:
-        name, found = entry.camera.name, entry.found
+        name, (width, height) = entry.camera.name, entry.size
         wide, tall = sizes[name]
-        if entry.crop is None or not calibration.sizes_known or (found.width, found.height) == (wide, tall):
+        if entry.crop is None or not calibration.sizes_known or (width, height) == (wide, tall):
             continue
         differences = [
             f"{abs(change)} pixels {smaller if change < 0 else larger}"
             for change, smaller, larger in (
-                (found.width - wide, "narrower", "wider"),
-                (found.height - tall, "lower", "higher"),
+                (width - wide, "narrower", "wider"),
+                (height - tall, "lower", "higher"),
             )
             if change
         ]
         warnings.append(
-            f"{entry.footage.name} is {found.width}x{found.height}, {' and '.join(differences)} than its"
+            f"{entry.footage.name} is {width}x{height}, {' and '.join(differences)} than its"
             f" calibration ({wide}x{tall}). {entry.crop.words(name)}"
         )
     return warnings
@@ -78,17 +88,28 @@ def gap_warnings(measured: tuple[MeasuredCamera, ...]) -> list[str]:
     ]
 
 
-def common_frame_count(measured: tuple[MeasuredCamera, ...], warnings: list[str]) -> int:
-    """The frames that all cameras have."""
-    counts = {entry.footage.name: entry.found.frame_count for entry in measured}
+def common_frame_count(
+    measured: tuple[MeasuredCamera, ...], warnings: list[str], aligned: bool = False
+) -> int:
+    """The frames that all cameras have after their offsets. aligned : the offsets are known, so that footage may end
+    at different moments.
+    """
+    counts = {entry.footage.name: entry.found.frame_count - entry.offset for entry in measured}
     shortest, longest = min(counts.values()), max(counts.values())
     if shortest == longest:
         return shortest
     words = ", ".join(f"{name}: {count}" for name, count in counts.items())
+    if shortest < 1:
+        raise FootageError(
+            f"With these offsets no frame is left that all cameras have ({words} frames).",
+            "Correct the offsets, or give footage of the same take.",
+        )
+    if aligned:
+        return shortest
     if longest - shortest > max(1.0, TRIMMED_SHARE * longest):
         raise FootageError(
             f"The cameras' frame counts differ ({words}).",
-            "Give footage of the same take, cut to the same first and last frame.",
+            "Give footage of the same take, cut to the same first and last frame, or the cameras' offsets.",
         )
     warnings.append(
         f"The cameras' frame counts differ ({words}): only the first {shortest} frames are used; check that"
@@ -129,5 +150,8 @@ def common_rate(
         )
     if found[-1] / found[0] - 1.0 > SAME_RATE:
         words = ", ".join(f"{name}: {rate:g}" for name, rate in rates.items())
-        raise FootageError(f"The videos' frame rates differ ({words}).", "Give the right one with --fps.")
+        raise FootageError(
+            f"The videos' frame rates differ ({words}), so frames with one number were taken at different moments.",
+            "Resample them to one rate, or give the right one with --fps if the files are wrong.",
+        )
     return found[0]

@@ -49,6 +49,7 @@ def plan_bodytrack(source: Path, calibration: Path | str | None) -> SourcePlan:
         start_pose=read_numbers(source / START, count),
         sigma=None if sigma is None else sigma[:count],
         sigma_fps=RATE,
+        layout="folder of PARSEC's bodytrack benchmark",
         notes=(
             "A bodytrack folder: 60 frames per second are taken for granted unless --fps says otherwise.",
         ),

@@ -1,8 +1,8 @@
 """Importing: any source that one of the importers knows, checked as a whole, becomes a session or nothing."""
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from studio.capture.calibration_files import read_calibration
@@ -21,12 +21,15 @@ FASTEST = 10_000.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImportReport:
-    """What became of a source. matching : footage to cameras, shown to the user. warnings : what to check."""
+    """What became of a source. layout : whose layout it was taken for. matching : footage to cameras, shown to the
+    user. warnings : what to check.
+    """
 
     session: Session
     matching: tuple[CameraMatch, ...]
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
+    layout: str = ""
 
     @property
     def matches(self) -> tuple[CameraMatch, ...]:
@@ -41,13 +44,19 @@ def import_source(
     calibration: Path | str | None = None,
     fps: float | None = None,
     copy: bool = True,
+    trial: str | None = None,
+    offsets: Mapping[str, int] | None = None,
+    rotations: Mapping[str, int] | None = None,
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> ImportReport:
-    """Make a session at `into` from a source folder; `folder_layout` and `bodytrack` say what is understood.
+    """Make a session at `into` from a source folder; `known_layouts`, `folder_layout` and `bodytrack` say what is
+    understood.
 
     calibration : which one to take where there are several. fps : frame rate, before any other. copy : False
-    refers to the footage where it lies. cancelled : asked often; True stops the import with ImportCancelled.
+    refers to the footage where it lies. trial : which one of several. offsets : by camera (or its footage's name), the
+    file's frame that was taken with the others' frame 0; rotations : degrees clockwise by which its pictures are
+    turned; both go before what the source says. cancelled : asked often; True stops the import with ImportCancelled.
     All is checked before anything is written; whatever fails, nothing is left and nothing that was stored is
     touched. Raises StudioError.
     """
@@ -55,7 +64,9 @@ def import_source(
     _check_request(source, into, fps)
     source = source.resolve()
     try:
-        plan = _plan(source, calibration)
+        plan = _plan(source, calibration, trial)
+        plan = replace(plan, offsets={**plan.offsets, **(offsets or {})})
+        plan = replace(plan, rotations={**plan.rotations, **(rotations or {})})
         read = read_calibration(plan.calibration)
         person = check_person(plan)
         if copy:
@@ -76,12 +87,14 @@ def import_source(
         raise SessionError(
             f"The import into '{into.name}' failed: {problem}.", "Check the disk's room and permissions."
         ) from None
-    return ImportReport(Session(into), manifest.matching, manifest.notes, manifest.warnings)
+    return ImportReport(Session(into), manifest.matching, manifest.notes, manifest.warnings, plan.layout)
 
 
-def _plan(source: Path, calibration: Path | str | None) -> SourcePlan:
+def _plan(source: Path, calibration: Path | str | None, trial: str | None) -> SourcePlan:
     """The parts of the source, by the importer that knows its layout."""
-    return plan_bodytrack(source, calibration) if is_bodytrack(source) else plan_folder(source, calibration)
+    if is_bodytrack(source) and trial is None:
+        return plan_bodytrack(source, calibration)
+    return plan_folder(source, calibration, trial)
 
 
 def _check_request(source: Path, into: Path, fps: float | None) -> None:

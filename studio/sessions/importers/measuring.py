@@ -5,7 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from studio.capture.calibration_files import Calibration
+from studio.capture.footage import background_turn, turned_picture
 from studio.capture.footage_fit import Margins, black_margins, fit_camera
+from studio.capture.footage_source import Turn
 from studio.capture.naming import NameMatch, listed, match_names
 from studio.capture.pictures import (
     PictureReader,
@@ -25,6 +27,7 @@ from studio.sessions.importers.agreement import (
     crop_warnings,
     gap_warnings,
 )
+from studio.sessions.importers.alignment import turns_asked, with_offsets
 from studio.sessions.importers.plan import Progress, SourcePlan
 
 NO_BARS, BAR_FRAMES = (0, 0, 0, 0), 4
@@ -34,13 +37,16 @@ CENTRAL = (0.35, 0.65)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredSource:
-    """All cameras that have footage, in the calibration's order. fps, frame_count : common to all."""
+    """All cameras that have footage, in the calibration's order. fps, frame_count : common to all. notes : sentences
+    on how they were put in step.
+    """
 
     cameras: tuple[MeasuredCamera, ...]
     fps: float
     frame_count: int
     matching: tuple[NameMatch, ...]
     warnings: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
 
 def measure_source(
@@ -58,31 +64,36 @@ def measure_source(
     used = [camera for camera in calibration.cameras if camera.name in by_camera]
     masks = _matched(plan.masks, used, "masks")
     backgrounds = _matched(plan.backgrounds, used, "backgrounds")
+    turns = turns_asked(plan, by_camera)
     measured = tuple(
         _measure_camera(
             calibration,
             camera,
             by_camera[camera.name],
+            turns.get(camera.name, 0),
             masks.get(camera.name),
             backgrounds.get(camera.name),
             progress,
         )
         for camera in used
     )
+    aligning: list[str] = []
+    measured, notes, aligned = with_offsets(plan, measured, names, aligning)
     warnings = [
+        *aligning,
         *_without_footage(names, by_camera),
         *crop_warnings(calibration, measured),
         *gap_warnings(measured),
         *_without_background(measured),
     ]
-    count = common_frame_count(measured, warnings)
+    count = common_frame_count(measured, warnings, aligned)
     rate = common_rate(measured, fps, plan.fps, warnings)
     for entry in measured:
         if entry.masks is not None:
             _check_masks(entry, entry.masks, count, progress)
         if entry.background is not None:
             _check_background(entry, entry.background)
-    return MeasuredSource(measured, rate, count, matching, tuple(warnings))
+    return MeasuredSource(measured, rate, count, matching, tuple(warnings), notes)
 
 
 def part_name(path: Path) -> str:
@@ -94,21 +105,19 @@ def _measure_camera(
     calibration: Calibration,
     camera: Camera,
     footage: Path,
+    turned: Turn,
     masks: Path | None,
     background: Path | None,
     progress: Progress,
 ) -> MeasuredCamera:
     """Decode one camera's footage and fit its calibration to it."""
     found = _measure(footage, f"reading {footage.name}", progress)
-    if calibration.sizes_known:
-        bars = (
-            _bars(footage, found) if (found.width, found.height) != (camera.width, camera.height) else NO_BARS
-        )
-        fitted, crop = fit_camera(camera, found.width, found.height, bars)
-        crop = crop or calibration.crops.get(camera.name)
-    else:
-        fitted, crop = _sized(camera, found.width, found.height), None
-    return MeasuredCamera(fitted, footage, found, crop, masks, background)
+    entry = MeasuredCamera(camera, footage, found, None, masks, background, turned)
+    if not calibration.sizes_known:
+        return dataclasses.replace(entry, camera=_sized(camera, *entry.size))
+    bars = _bars(entry) if entry.size != (camera.width, camera.height) else NO_BARS
+    fitted, crop = fit_camera(camera, *entry.size, bars)
+    return dataclasses.replace(entry, camera=fitted, crop=crop or calibration.crops.get(camera.name))
 
 
 def _measure(path: Path, step: str, progress: Progress) -> VideoMeasure | PicturesMeasure:
@@ -118,12 +127,13 @@ def _measure(path: Path, step: str, progress: Progress) -> VideoMeasure | Pictur
     return measure_pictures(path, told) if path.is_dir() else measure_video(path, told)
 
 
-def _bars(footage: Path, found: VideoMeasure | PicturesMeasure) -> Margins:
-    """The black margins of the footage, seen in a few frames spread over it."""
-    count = found.frame_count
+def _bars(entry: MeasuredCamera) -> Margins:
+    """The black margins of the turned footage, seen in a few frames spread over it."""
+    footage, count = entry.footage, entry.found.frame_count
     reader = PictureReader(footage, count) if footage.is_dir() else VideoReader(footage, count)
     try:
-        return black_margins([reader.read(count * k // BAR_FRAMES) for k in range(BAR_FRAMES)])
+        pictures = [reader.read(count * k // BAR_FRAMES) for k in range(BAR_FRAMES)]
+        return black_margins([turned_picture(picture, entry.turned) for picture in pictures])
     finally:
         reader.close()
 
@@ -172,9 +182,9 @@ def _check_masks(entry: MeasuredCamera, masks: Path, count: int, progress: Progr
             f" {entry.found.width}x{entry.found.height}.",
             "Give masks of the footage's size.",
         )
-    if found.frame_count < count:
+    if found.frame_count < entry.offset + count:
         raise FootageError(
-            f"The masks '{masks.name}' have {found.frame_count} frames, the footage {count}.",
+            f"The masks '{masks.name}' have {found.frame_count} frames, the footage {entry.offset + count}.",
             "Give one mask for every frame.",
         )
 
@@ -186,4 +196,5 @@ def _check_background(entry: MeasuredCamera, background: Path) -> None:
     else:
         found = measure_video(background)
         width, height = found.width, found.height
-    check_plate_size((width, height), (entry.found.width, entry.found.height), background.name)
+    turned = background_turn(entry.turned, entry.size, (width, height)) in (90, 270)
+    check_plate_size((height, width) if turned else (width, height), entry.size, background.name)

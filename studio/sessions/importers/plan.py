@@ -1,7 +1,7 @@
 """What was found in a source, before anything of it is opened or copied."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +29,8 @@ class SourcePlan:
     pictures. backgrounds : pictures and clips. fps : known frame rate or None. subject, start_pose, sigma :
     values where the layout gives them in a form of its own; the files of the same names otherwise.
     sigma_fps : the rate at which sigma was measured. tracker, weighting : what runs of the session use unless
-    told otherwise, "" for the default.
+    told otherwise, "" for the default. layout : whose folder layout it was taken for, in words. timestamps : a
+    recorder's times of the frames. offsets, rotations : asked for by hand, by the name of a camera or its footage.
     """
 
     source: Path
@@ -50,3 +51,7 @@ class SourcePlan:
     tracker: str = ""
     weighting: str = ""
     notes: tuple[str, ...] = ()
+    layout: str = ""
+    timestamps: Path | None = None
+    offsets: Mapping[str, int] = field(default_factory=dict)
+    rotations: Mapping[str, int] = field(default_factory=dict)

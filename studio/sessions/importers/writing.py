@@ -94,7 +94,8 @@ def write_session(
         calibration_source=calibration.label,
         imported_from=str(plan.source),
         assumptions=(calibration.unit_note, *crops),
-        notes=(calibration.unit_note, *calibration.notes, *plan.notes, *person.notes),
+        notes=(calibration.unit_note, *calibration.notes, *plan.notes, *measured.notes, *person.notes),
+        layout=plan.layout,
         warnings=(*measured.warnings, *sanity_notes(cameras)),
         matching=tuple(CameraMatch(match.footage, match.camera, match.how) for match in measured.matching),
     )
@@ -123,11 +124,12 @@ def _write_footage(folder: Path, measured: MeasuredSource, copy: bool, progress:
                 entry.camera.name,
                 "pictures" if is_folder else "video",
                 _put(entry.footage, folder, place, copy, progress),
-                entry.found.width,
-                entry.found.height,
+                *entry.size,
                 entry.found.frame_count,
                 masks,
                 background,
+                entry.offset,
+                entry.turned,
             )
         )
     return FootageSource(measured.fps, measured.frame_count, tuple(sources))

@@ -1,0 +1,154 @@
+"""When each frame was taken, as recorders write it beside their videos: Caliscope's `timestamps.csv` and its like.
+
+A line a frame: the camera (`cam_id`, formerly `port`), its time in seconds (`frame_time`) and perhaps the frame's
+number in the video (`frame_index`); without it, lines of a camera are counted in the order of their times. From them
+follow each camera's offset and how far apart pictures of one frame really are.
+"""
+
+import csv
+import itertools
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.capture.naming import listed, natural_key
+from studio.errors import FootageError
+
+Array = NDArray[np.float64]
+
+TIMESTAMP_NAMES = ("timestamps.csv", "frame_timestamps.csv", "frame_time_history.csv")
+CAMERA_COLUMNS, TIME_COLUMNS, INDEX_COLUMNS = (
+    ("cam_id", "port", "camera"),
+    ("frame_time", "timestamp"),
+    ("frame_index",),
+)
+LARGEST_FILE = 200_000_000
+APART = 0.5
+"""Pictures more than this share of a frame's duration apart are said."""
+
+
+@dataclass(frozen=True, slots=True)
+class TimedOffsets:
+    """What times say. offsets : each camera's frame that belongs to frame 0, the smallest being 0.
+
+    fps : frames per second. apart : largest distance of pictures with one number, in frames. notes : what a person
+    should know, sentences.
+    """
+
+    offsets: dict[str, int]
+    fps: float
+    apart: float
+    notes: tuple[str, ...]
+
+
+def read_timestamps(path: Path) -> dict[str, Array]:
+    """Times of every camera's frames by the camera's number or name, seconds; frames without a line are filled in
+    between their neighbours. Frames before the first line count back at an even rate.
+
+    Raises FootageError naming file and line.
+    """
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise FootageError(
+                f"'{path.name}' is larger than {LARGEST_FILE // 1_000_000} MB.", "Check the file."
+            )
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            rows = csv.DictReader(file)
+            columns = [
+                _column(path, rows.fieldnames or (), names) for names in (CAMERA_COLUMNS, TIME_COLUMNS)
+            ]
+            index_column = next((name for name in INDEX_COLUMNS if name in (rows.fieldnames or ())), "")
+            found: dict[str, list[tuple[int, float]]] = {}
+            for number, row in enumerate(rows, 2):
+                camera = (row[columns[0]] or "").strip()
+                moment = _number(path, number, row[columns[1]])
+                index = round(_number(path, number, row[index_column])) if index_column else -1
+                found.setdefault(camera, []).append((index, moment))
+    except (OSError, UnicodeDecodeError, csv.Error) as problem:
+        raise FootageError(f"'{path.name}' cannot be read ({problem}).", "Copy it again.") from None
+    if not found:
+        raise FootageError(f"'{path.name}' holds no times.", "Copy it again, or give the offsets by hand.")
+    return {name: _times(path, name, found[name]) for name in sorted(found, key=natural_key)}
+
+
+def offsets_from_times(times: dict[str, Array]) -> TimedOffsets:
+    """Offsets of cameras whose frames were taken at these times, seconds. Raises FootageError if they never overlap
+    or their rates differ.
+    """
+    rates = {name: 1.0 / float(np.median(np.diff(moments))) for name, moments in times.items()}
+    fps = float(np.median(list(rates.values())))
+    different = {name: rate for name, rate in rates.items() if abs(rate / fps - 1.0) > 0.02}
+    if different:
+        words = ", ".join(f"{name}: {rate:.2f}" for name, rate in rates.items())
+        raise FootageError(
+            f"The times say that cameras have different frame rates ({words}).",
+            "Resample the footage to one rate, so that frames belong together.",
+        )
+    start = max(float(moments[0]) for moments in times.values())
+    if any(moments[-1] <= start for moments in times.values()):
+        raise FootageError("The times of the cameras do not overlap.", "Give footage of the same take.")
+    offsets = {name: int(np.argmin(np.abs(moments - start))) for name, moments in times.items()}
+    least = min(offsets.values())
+    offsets = {name: offset - least for name, offset in offsets.items()}
+    apart = _apart(times, offsets) * fps
+    notes: list[str] = []
+    if apart > APART:
+        notes.append(
+            f"Pictures of one frame were taken up to {apart:.1f} frames apart by the recorded times: cameras drift or"
+            " frames were lost."
+        )
+    return TimedOffsets(offsets, fps, apart, tuple(notes))
+
+
+def _apart(times: dict[str, Array], offsets: dict[str, int]) -> float:
+    """The largest distance between two cameras' pictures with one number, seconds."""
+    count = min(len(times[name]) - offsets[name] for name in times)
+    cut = [times[name][offset : offset + count] for name, offset in offsets.items()]
+    return max((float(np.abs(a - b).max()) for a, b in itertools.combinations(cut, 2)), default=0.0)
+
+
+def _column(path: Path, given: object, names: tuple[str, ...]) -> str:
+    columns = list(given) if isinstance(given, list | tuple) else []
+    found = next((name for name in names if name in columns), "")
+    if not found:
+        raise FootageError(
+            f"'{path.name}' has no column '{names[0]}' but {listed(map(str, columns))}.",
+            "Caliscope writes the columns cam_id and frame_time.",
+        )
+    return found
+
+
+def _number(path: Path, line: int, text: str | None) -> float:
+    try:
+        value = float(text or "")
+    except ValueError:
+        value = float("nan")
+    if not np.isfinite(value):
+        raise FootageError(
+            f"'{path.name}' line {line} holds '{(text or '')[:40]}' where a number should be.",
+            "Correct the line.",
+        )
+    return value
+
+
+def _times(path: Path, camera: str, lines: list[tuple[int, float]]) -> Array:
+    """(F,) seconds of a camera's frames 0 … F-1. Raises FootageError if they do not rise."""
+    if lines[0][0] < 0:
+        lines = [(index, moment) for index, moment in enumerate(sorted(moment for _, moment in lines))]
+    lines = sorted(lines)
+    numbers, moments = np.array([n for n, _ in lines]), np.array([moment for _, moment in lines])
+    if len(lines) < 2 or np.any(np.diff(numbers) <= 0) or np.any(np.diff(moments) <= 0.0) or numbers[0] < 0:
+        raise FootageError(
+            f"The times of camera {camera} in '{path.name}' do not rise from frame to frame.",
+            "Copy the file again, or give the offsets by hand.",
+        )
+    if numbers[-1] > 100 * len(lines):
+        raise FootageError(
+            f"Camera {camera} in '{path.name}' has {len(lines)} times for {numbers[-1] + 1} frames.",
+            "Copy the file again, or give the offsets by hand.",
+        )
+    step = float(np.median(np.diff(moments) / np.diff(numbers)))
+    before = moments[0] - step * np.arange(numbers[0], 0, -1)
+    return np.concatenate([before, np.interp(np.arange(numbers[0], numbers[-1] + 1), numbers, moments)])
