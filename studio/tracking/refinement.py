@@ -38,6 +38,8 @@ MM_PER_RADIAN = 300.0
 DAMPING, EASED, TIGHTENED, MOST_DAMPING = 1e-2, 0.3, 8.0, 1e4
 SETTLED = 2e-4
 """A step below this (radians, or mm / MM_PER_RADIAN) ends the search."""
+FEWEST_PIXELS = 3.0
+"""The robust loss is at least this wide: below, it is the mask's pixels that are rough."""
 HALFWAY = 0.5
 
 
@@ -192,7 +194,7 @@ class Refiner:
             prepared.views,
             prepared.border,
             prepared.mm,
-            self.settings.refinement_scale,
+            np.maximum(self.settings.refinement_scale, FEWEST_PIXELS * prepared.mm),
             OUTLINE_PART,
             matrix,
             gradient,

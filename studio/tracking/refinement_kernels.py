@@ -163,12 +163,13 @@ def add_outline(values, view, quads, slopes, usable, turns, ends, mm, scale, par
 
 
 @njit(**OPTIONS)
-def normal_equations(quads, slopes, ends, maps, views, border, mm, scale, part, matrix, gradient):
+def normal_equations(quads, slopes, ends, maps, views, border, mm, scales, part, matrix, gradient):
     """Fill matrix (D, D) and gradient (D,) of half the squared loss; returns the loss.
 
     quads : (V, L, 4, 2) pixels, NaN for limbs that are not seen. slopes : (V, L, 4, 2, D) per unit of each parameter.
     ends : (L,) whether a limb's far end may be border. maps : flat signed distances. views : (V, 5) where each begins,
-    its width and height, its first and last border point. border : (K, 4). mm : (V,) mm per pixel.
+    its width and height, its first and last border point. border : (K, 4). mm : (V,) mm per pixel. scales :
+    (V,) c of the loss, mm.
     """
     limbs, size = quads.shape[1], slopes.shape[4]
     row, usable, turns = np.zeros(size), np.zeros(limbs, np.bool_), np.zeros(limbs)
@@ -181,7 +182,7 @@ def normal_equations(quads, slopes, ends, maps, views, border, mm, scale, part, 
             turns[limb] = turning(quads[v, limb])
         seen = border[views[v, 3] : views[v, 4]]
         loss += add_border(
-            seen, quads[v], slopes[v], usable, turns, ends, mm[v], scale, row, matrix, gradient
+            seen, quads[v], slopes[v], usable, turns, ends, mm[v], scales[v], row, matrix, gradient
         )
         loss += add_outline(
             maps,
@@ -192,7 +193,7 @@ def normal_equations(quads, slopes, ends, maps, views, border, mm, scale, part, 
             turns,
             ends,
             mm[v],
-            scale,
+            scales[v],
             part,
             row,
             matrix,

@@ -1,0 +1,219 @@
+"""What is made of a run after the search: refined on the silhouettes, smoothed in time; each a track of its own.
+
+A track says in `made_by` what it was made from and how, so that it can be made again.
+"""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.forward_kinematics import marker_points
+from studio.errors import RunError
+from studio.evidence.distance_maps import silhouette_distances
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.runs.problem_source import ProblemSource
+from studio.runs.search_space import search_space
+from studio.runs.tracks import RAW, Track, read_track, track_names, write_track
+from studio.sessions.names import checked_name
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.settings import RunSettings, SettingsHistory, default_settings, settings_from_values
+from studio.tracking.loss_detection import Onlooker
+from studio.tracking.refinement import RefinementSettings, Refiner
+from studio.tracking.smoothing import Smoothed, SmoothingSettings, rms_second_difference, smooth
+from studio.tracking.tracker import NO_EVIDENCE, FrameProblem
+from studio.weighting.catalogue import WEIGHTINGS
+
+Array = NDArray[np.float64]
+
+REFINED, SMOOTHED = "refined", "smoothed"
+JUDGE = "edge-region-silhouette"
+"""Judges where the run's own weighting reads pictures instead of masks (blobs must be told what is expected)."""
+
+Progress = Callable[[str, int, int], None]
+
+
+class MakingCancelledError(RunError):
+    """Refining or smoothing was cancelled."""
+
+    code = "cancelled"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MadeTrack:
+    """A track that was made. moved : frames whose pose changed (refine). gain : mean rise of their log-weight.
+    filled, left_out : frames (smooth). jitter_before, jitter_after : root mean square second difference of the body's
+    markers, mm a frame², over frames that follow each other.
+    """
+
+    track: Track
+    moved: int = 0
+    gain: float = 0.0
+    filled: tuple[int, ...] = ()
+    left_out: tuple[int, ...] = ()
+    jitter_before: float = 0.0
+    jitter_after: float = 0.0
+
+
+def refine_run(
+    session: Session,
+    run: StoredRun,
+    *,
+    source: str = RAW,
+    into: str = REFINED,
+    settings: RefinementSettings | None = None,
+    replace: bool = False,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> MadeTrack:
+    """Refine every frame of a track and keep the result as another.
+
+    A frame is never worse in the eyes of the run's own weighting, with the settings that it was tracked with. progress
+    : told after each frame. cancelled : asked before each; True ends it with MakingCancelledError, nothing is kept.
+    Raises SessionError where `into` is taken, RunError for a run without frames, and what reading the footage raises.
+    """
+    knobs = settings or RefinementSettings()
+    track = _begun(run, source, into, replace)
+    maker = _FrameRefiner(session, run, knobs)
+    poses, confidence, gains = track.poses.copy(), track.confidence.copy(), []
+    try:
+        for at, frame in enumerate(track.frames.tolist()):
+            _ask(cancelled)
+            if track.states[at] != NO_EVIDENCE:
+                poses[at], confidence[at], gain = maker.refined(frame, track.poses[at])
+                gains += [] if gain is None else [gain]
+            if progress is not None:
+                progress(f"refining {run.name}", at + 1, len(track.frames))
+    finally:
+        maker.close()
+    made_by = {"verb": "refine", "from": source, **asdict(knobs), "moved": len(gains)}
+    made = Track(into, track.frames, poses, confidence, track.states, made_by)
+    write_track(run, made, replace=replace)
+    gain = float(np.mean(gains)) if gains else 0.0
+    return MadeTrack(made, len(gains), gain, jitter_before=jitter(run, track), jitter_after=jitter(run, made))
+
+
+def smooth_run(
+    run: StoredRun,
+    *,
+    source: str = "",
+    into: str = SMOOTHED,
+    settings: SmoothingSettings | None = None,
+    replace: bool = False,
+) -> MadeTrack:
+    """Smooth a track and keep the result as another. source : "" for the refined one, else the raw.
+
+    Frames that were filled keep their state ("" where the run has none) and have confidence 0. Raises SessionError,
+    RunError, SettingsError where no frame may be believed.
+    """
+    knobs = settings or SmoothingSettings()
+    chosen = source or (REFINED if REFINED in track_names(run) and into != REFINED else RAW)
+    track = _begun(run, chosen, into, replace)
+    body, record = run.body(), run.record
+    angles = np.array([entry.kind == "angle" for entry in body.parameters])
+    found = smooth(
+        track.frames,
+        track.poses,
+        track.confidence,
+        track.states,
+        search_space(body, np.array(record.sigma)),
+        angles,
+        record.fps,
+        knobs,
+    )
+    filled = tuple(found.frames[found.filled].tolist())
+    left_out = tuple(found.left_out.tolist())
+    made_by = {"verb": "smooth", "from": chosen, **asdict(knobs), "filled": filled, "left_out": left_out}
+    made = Track(into, found.frames, found.poses, *_standing(track, found), made_by)
+    write_track(run, made, replace=replace)
+    before, after = jitter(run, track), jitter(run, made)
+    return MadeTrack(made, 0, 0.0, filled, left_out, before, after)
+
+
+def jitter(run: StoredRun, track: Track) -> float:
+    """Root mean square second difference of the body's markers, mm a frame²; 0 where no three frames follow."""
+    body = run.body()
+    if not body.markers or len(track.frames) < 3:
+        return 0.0
+    points = marker_points(body, track.poses)
+    together = np.flatnonzero(track.frames[2:] - track.frames[:-2] == 2)
+    squares = [rms_second_difference(points[at : at + 3]) ** 2 for at in together]
+    return float(np.sqrt(np.mean(squares))) if squares else 0.0
+
+
+class _FrameRefiner:
+    """Refines frames of one run: its cameras, body and settings as they were."""
+
+    def __init__(self, session: Session, run: StoredRun, knobs: RefinementSettings) -> None:
+        self._body, self._cameras = run.body(), run.cameras()
+        with run.results() as results:
+            self._history = SettingsHistory(tuple(results.settings_history()))
+        self._record = run.record
+        self._refiner = Refiner(self._body, self._cameras, knobs)
+        self._onlooker = Onlooker(self._body, self._cameras)
+        self._problems = ProblemSource(session, self._body, self._cameras)
+
+    def close(self) -> None:
+        self._problems.close()
+
+    def refined(self, frame: int, pose: Array) -> tuple[Array, float, float | None]:
+        """Pose, overlap of the silhouettes and gain of the log-weight (None where the pose was kept)."""
+        evidence, problem = self._seen(frame)
+        found = self._refiner.refine(pose, silhouette_distances(evidence), problem)
+        overlap = self._onlooker.sight(evidence, found.pose).overlap
+        return found.pose, overlap, found.gain if found.moved else None
+
+    def _seen(self, frame: int) -> tuple[FrameEvidence, FrameProblem]:
+        entry = self._history.in_use(frame, 0)
+        values = self._record.settings if entry is None else entry.values
+        settings: RunSettings = settings_from_values(self._record.tracker, self._record.weighting, values)
+        if WEIGHTINGS[settings.weighting_name].reads_pictures:
+            judge = default_settings(settings.tracker_name, JUDGE)
+            settings = RunSettings(
+                settings.tracker_name,
+                JUDGE,
+                settings.tracker,
+                judge.weighting,
+                settings.evidence,
+                settings.recovery,
+                settings.recording,
+            )
+        return self._problems.evidence(frame, settings), self._problems.problem(frame, settings)
+
+
+def _begun(run: StoredRun, source: str, into: str, replace: bool) -> Track:
+    """The track to start from, once it is known that the result may be kept."""
+    if checked_name(into, "track").lower() == RAW or into == source:
+        raise RunError(
+            f"Track '{into}' cannot be written over by what is made from it.", "Choose another --into."
+        )
+    if into in track_names(run) and not replace:
+        raise RunError(
+            f"Run '{run.name}' has a track '{into}' already.", "Choose another name, or replace it."
+        )
+    if run.record.to_and_fro:
+        raise RunError(
+            f"Run '{run.name}' goes to and fro over its footage.", "Track the footage once instead."
+        )
+    track = read_track(run, source)
+    if not len(track.frames):
+        raise RunError(f"Run '{run.name}' has no finished frame.", "Track it first.")
+    return track
+
+
+def _standing(track: Track, found: Smoothed) -> tuple[Array, tuple[str, ...]]:
+    """Confidence and states of the smoothed frames: their own, 0 where they were filled."""
+    own = {frame: at for at, frame in enumerate(track.frames.tolist())}
+    rows = [own.get(frame, -1) for frame in found.frames.tolist()]
+    confidence = np.array([track.confidence[at] if at >= 0 else 0.0 for at in rows])
+    states = tuple(track.states[at] if at >= 0 else "" for at in rows)
+    return np.where(found.filled, 0.0, confidence), states
+
+
+def _ask(cancelled: Callable[[], bool] | None) -> None:
+    if cancelled is not None and cancelled():
+        raise MakingCancelledError(
+            "Refining was cancelled, nothing was kept.", "Start it again when you like."
+        )

@@ -1,0 +1,62 @@
+"""`studio refine`, `studio smooth` and `studio evaluate --track`."""
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from studio.cli.main import main
+from studio.sessions.session import Session
+
+
+@pytest.fixture
+def runner(session_on_disk: Session) -> CliRunner:
+    runner = CliRunner()
+    words = [
+        "track",
+        "toy",
+        "--particles",
+        "20",
+        "--layers",
+        "3",
+        "--set",
+        "constraints=clamp",
+        "--name",
+        "one",
+    ]
+    told = runner.invoke(main, words)
+    assert told.exit_code == 0, told.output
+    return runner
+
+
+def test_refine_then_smooth(runner: CliRunner) -> None:
+    refined = json.loads(
+        runner.invoke(main, ["refine", "toy", "one", "--refinement-steps", "5", "--json"]).stdout
+    )
+    assert (refined["track"], refined["frames"]) == ("refined", 8)
+    assert refined["made_by"]["refinement_steps"] == 5
+    assert 0 <= refined["moved"] <= 8
+    smoothed = runner.invoke(main, ["smooth", "toy", "one", "--smoothing-frequency", "4", "--json"])
+    told = json.loads(smoothed.stdout)
+    assert told["made_by"]["from"] == "refined"
+    assert told["jitter_after_mm"] <= told["jitter_before_mm"]
+    assert told["filled"] == []
+    again = runner.invoke(main, ["smooth", "toy", "one"])
+    assert again.exit_code == 2
+    assert "already" in again.stderr
+    assert runner.invoke(main, ["smooth", "toy", "one", "--replace"]).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "cause"),
+    [
+        (["refine", "toy", "none"], "no run 'none'"),
+        (["refine", "toy", "one", "--refinement-steps", "0"], "'refinement_steps' cannot be"),
+        (["smooth", "toy", "one", "--from", "nothing"], "no track 'nothing'"),
+        (["evaluate", "toy", "one", "--track", "refined"], "has no truth"),
+    ],
+)
+def test_refusals(runner: CliRunner, words: list[str], cause: str) -> None:
+    told = runner.invoke(main, words)
+    assert told.exit_code == 2
+    assert cause in " ".join(told.stderr.split())

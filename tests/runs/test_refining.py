@@ -1,0 +1,152 @@
+"""Tracks made of a run: refined and smoothed beside what was found, refused where they would write over it."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from toy_session import true_poses
+
+from studio.errors import NotFoundError, RunError, SettingsError
+from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.problem_source import ProblemSource
+from studio.runs.refining import MakingCancelledError, jitter, refine_run, smooth_run
+from studio.runs.tracking_run import TrackingRun
+from studio.runs.tracks import Track, read_track, track_names, write_track
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.tracking.refinement import RefinementSettings
+from studio.tracking.smoothing import SmoothingSettings
+from studio.tracking.tracker import LOST
+
+
+@pytest.fixture
+def run(session_on_disk: Session) -> StoredRun:
+    request = RunRequest(start_pose=true_poses()[0] + 0.02, changes={"particles": 20, "layers": 3})
+    stored = prepare_run(session_on_disk, request)
+    problems = ProblemSource(session_on_disk, stored.body(), stored.cameras())
+    tracking = TrackingRun(stored, problems)
+    while not tracking.finished:
+        tracking.step_layer()
+    tracking.close()
+    problems.close()
+    return stored
+
+
+def test_refining_comes_nearer_and_the_weighting_agrees(session_on_disk: Session, run: StoredRun) -> None:
+    rng = np.random.default_rng(1)
+    raw = read_track(run)
+    shaken = dataclasses.replace(raw, name="shaken", poses=true_poses() + 0.15 * rng.standard_normal((8, 4)))
+    write_track(run, shaken)
+    told: list[tuple[int, int]] = []
+    made = refine_run(
+        session_on_disk, run, source="shaken", progress=lambda _step, done, total: told.append((done, total))
+    )
+    assert told == [(done, 8) for done in range(1, 9)]
+    before = np.abs(shaken.poses - true_poses()).mean()
+    assert np.abs(made.track.poses - true_poses()).mean() < 0.6 * before
+    settings = TrackingSettings.of(session_on_disk, run)
+    for frame in range(8):
+        problem = settings.problem(frame)
+        old, new = problem.weigh(np.stack([shaken.poses[frame], made.track.poses[frame]]))
+        assert new >= old
+    settings.close()
+    back = read_track(run, "refined")
+    assert np.array_equal(back.poses, made.track.poses)
+    assert back.made_by["verb"] == "refine"
+    assert back.made_by["from"] == "shaken"
+    assert back.made_by["refinement_steps"] == RefinementSettings().refinement_steps
+    assert np.array_equal(read_track(run).poses, raw.poses)
+
+
+class TrackingSettings:
+    """The run's own problems, opened anew."""
+
+    def __init__(self, source: ProblemSource, tracking: TrackingRun) -> None:
+        self.source, self.tracking = source, tracking
+
+    @classmethod
+    def of(cls, session: Session, run: StoredRun) -> "TrackingSettings":
+        source = ProblemSource(session, run.body(), run.cameras())
+        return cls(source, TrackingRun(run, source))
+
+    def problem(self, frame: int):
+        return self.source.problem(frame, self.tracking.latest_settings()[1])
+
+    def close(self) -> None:
+        self.tracking.close()
+        self.source.close()
+
+
+def test_smoothing_takes_the_refined_track_else_the_raw(session_on_disk: Session, run: StoredRun) -> None:
+    assert smooth_run(run, into="first").track.made_by["from"] == "raw"
+    refine_run(session_on_disk, run)
+    made = smooth_run(run)
+    assert made.track.made_by["from"] == "refined"
+    assert track_names(run) == ("raw", "first", "refined", "smoothed")
+    assert made.jitter_after < made.jitter_before
+    assert made.jitter_after == pytest.approx(jitter(run, read_track(run, "smoothed")))
+
+
+def test_filled_frames_are_marked_and_long_gaps_stay(run: StoredRun) -> None:
+    raw = read_track(run)
+    states = list(raw.states)
+    states[2] = LOST
+    kept = [0, 1, 2, 3, 4, 6, 7]
+    holed = Track(
+        "holed",
+        raw.frames[kept],
+        raw.poses[kept],
+        raw.confidence[kept],
+        tuple(states[at] for at in kept),
+        {"verb": "test"},
+    )
+    write_track(run, holed)
+    made = smooth_run(run, source="holed")
+    assert made.filled == (2, 5)
+    assert made.track.made_by["filled"] == (2, 5)
+    assert made.track.frames.tolist() == list(range(8))
+    assert made.track.states[2] == LOST
+    assert made.track.states[5] == ""
+    assert made.track.confidence[[2, 5]].tolist() == [0.0, 0.0]
+    assert made.track.confidence[0] == raw.confidence[0]
+    open_gaps = smooth_run(run, source="holed", into="open", settings=SmoothingSettings(longest_gap=0.0))
+    assert open_gaps.track.frames.tolist() == [0, 1, 3, 4, 6, 7]
+    assert open_gaps.left_out == (2,)
+
+
+def test_refusals_keep_what_is_there(session_on_disk: Session, run: StoredRun) -> None:
+    smooth_run(run)
+    for refused in (
+        lambda: smooth_run(run),
+        lambda: smooth_run(run, source="smoothed"),
+        lambda: smooth_run(run, into="raw"),
+        lambda: refine_run(session_on_disk, run, into="smoothed"),
+    ):
+        with pytest.raises(RunError):
+            refused()
+    with pytest.raises(NotFoundError, match="no track 'nothing'"):
+        smooth_run(run, source="nothing", into="other")
+    with pytest.raises(SettingsError, match="None of the track's 8 frames"):
+        smooth_run(run, into="other", settings=SmoothingSettings(least_confidence=1.0))
+    assert track_names(run) == ("raw", "smoothed")
+    assert (
+        smooth_run(run, replace=True, settings=SmoothingSettings(smoothing_frequency=3.0)).jitter_after > 0.0
+    )
+
+
+def test_a_cancelled_refinement_keeps_nothing(session_on_disk: Session, run: StoredRun) -> None:
+    asked: list[int] = []
+
+    def cancelled() -> bool:
+        asked.append(1)
+        return len(asked) > 3
+
+    with pytest.raises(MakingCancelledError):
+        refine_run(session_on_disk, run, cancelled=cancelled)
+    assert track_names(run) == ("raw",)
+
+
+def test_a_run_without_frames_is_refused(session_on_disk: Session) -> None:
+    empty = prepare_run(session_on_disk, RunRequest(start_pose=true_poses()[0]))
+    with pytest.raises(RunError, match="no finished frame"):
+        refine_run(session_on_disk, empty)
