@@ -32,7 +32,7 @@ class DocumentPage:
 
 PAGES = (
     DocumentPage("comparisons", "Comparisons", rail=True, new=True),
-    DocumentPage("behaviours", "Behaviours", rail=True),
+    DocumentPage("behaviours", "Behaviours", rail=True, new=True),
     DocumentPage("reports", "Reports"),
 )
 PLACES = (("/", "Studio"), *((f"/{page.name}", page.title) for page in PAGES), ("/guide", "Guide"))

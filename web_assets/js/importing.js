@@ -4,6 +4,7 @@ import { fetchJson, post } from "./api.js";
 import { openForm } from "./dialogs.js";
 import { say } from "./messages.js";
 import { openSession, refreshSessions } from "./rail.js";
+import { uploadFiles } from "./uploading.js";
 
 const POLL_MILLISECONDS = 400;
 
@@ -16,24 +17,6 @@ async function watchImport(identifier, report) {
     report(told.total ? `${told.step} ${Math.round((100 * told.done) / told.total)} %` : told.step || "Importing…");
     await new Promise((resolve) => setTimeout(resolve, POLL_MILLISECONDS));
   }
-}
-
-/** Send files one by one, each in one streamed request; returns the upload's identifier. */
-async function upload(files, report) {
-  const { identifier } = await post("/api/uploads");
-  const total = [...files].reduce((sum, file) => sum + file.size, 0) || 1;
-  let sent = 0;
-  for (const file of files) {
-    const path = file.webkitRelativePath || file.name;
-    const answer = await fetch(`/api/uploads/${identifier}/files?path=${encodeURIComponent(path)}`, { method: "PUT", body: file });
-    if (!answer.ok) {
-      const told = await answer.json().catch(() => ({}));
-      throw Object.assign(new Error(told.message ?? `The upload of ${path} failed.`), { hint: told.hint ?? "" });
-    }
-    sent += file.size;
-    report(`Uploading ${Math.round((100 * sent) / total)} %`);
-  }
-  return identifier;
 }
 
 /** Open the form. */
@@ -50,7 +33,7 @@ export function importForm() {
     ],
     send: async (values, report) => {
       const body = { name: values.name, fps: values.fps ? Number(values.fps) : null, copy: !values.refer };
-      if (values.files.length) body.upload = await upload(values.files, report);
+      if (values.files.length) body.upload = await uploadFiles(values.files, report);
       else body.source = values.source;
       const { identifier } = await post("/api/imports", body);
       const told = await watchImport(identifier, report);

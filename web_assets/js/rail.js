@@ -8,6 +8,7 @@ import { complain, say } from "./messages.js";
 import { newRunForm } from "./new_run.js";
 import { startPoseForm } from "./start_pose.js";
 import { get, set, watch } from "./state.js";
+import { showPanel } from "./tabs.js";
 
 const list = document.getElementById("sessions");
 
@@ -91,6 +92,7 @@ function runMenu(button, entry, run) {
   const path = runPath(entry.name, run.name);
   const open = get("session") === entry.name && get("run") === run.name;
   openMenu(button, [
+    ["Export…", () => { openSession(entry.name, run.name); showPanel("export"); }],
     ["Poses as CSV", () => { location.href = `${path}/poses.csv`; }],
     ["New run like this…", () => newRunForm(entry, run)],
     ["Rename…", () => renameForm("run", path, run.name, open, async (name) => { await refreshSessions(); openSession(entry.name, name); })],
@@ -190,7 +192,8 @@ async function drawTrash() {
     try {
       const told = await post("/api/trash/restore", { entry: entry.id });
       await refreshSessions();
-      if (told.comparison) location.href = `/comparisons?session=${encodeURIComponent(told.name)}&name=${encodeURIComponent(told.comparison)}`;
+      if (told.model) location.href = `/behaviours?name=${encodeURIComponent(told.model)}`;
+      else if (told.comparison) location.href = `/comparisons?session=${encodeURIComponent(told.name)}&name=${encodeURIComponent(told.comparison)}`;
       else openSession(told.name, told.run || undefined);
     } catch (error) { complain(error); }
   }]));
