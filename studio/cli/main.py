@@ -14,6 +14,11 @@ COMMANDS = {
     ),
     "serve": ("serving_commands", "serve", "Open the studio on a workspace: prints the address to open."),
     "import": ("session_commands", "import_command", "Make a session from footage and calibration."),
+    "synchronise": (
+        "footage_commands",
+        "synchronise",
+        "Put a session's cameras in step and turn them: estimated, by hand, by times.",
+    ),
     "initialise": (
         "initialisation_commands",
         "initialise_command",

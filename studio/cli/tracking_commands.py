@@ -27,7 +27,7 @@ from studio.worker.batch import BatchResult, track_to_end
 OPTION_KNOBS = ("particles", "layers", "survival", "crossover")
 
 
-def _knob_options(function: Callable[..., object]) -> Callable[..., object]:
+def knob_options(function: Callable[..., object]) -> Callable[..., object]:
     """The options of the knobs that have one of their own, made from their declarations."""
     declared = {entry.name: entry for entry in reversed(knob_table())}
     for name in reversed(OPTION_KNOBS):
@@ -62,7 +62,7 @@ def _knob_options(function: Callable[..., object]) -> Callable[..., object]:
     metavar="MODEL",
     help="Behaviour model, by name or file, for tracker behaviour or --set prediction=behaviour.",
 )
-@_knob_options
+@knob_options
 @click.option("--frames", metavar="A:B", default=":", help="Half open, from 0; default: all.")
 @click.option("--seed", type=int, default=0, show_default=True, help="The same seed gives the same run.")
 @click.option(
@@ -107,7 +107,8 @@ def track(
             first=first,
             last=last,
             seed=seed,
-            changes=_changes(changes) | {key: value for key, value in knobs.items() if value is not None},
+            changes=chosen_changes(changes)
+            | {key: value for key, value in knobs.items() if value is not None},
             name=name,
             behaviour=behaviour,
         )
@@ -194,7 +195,7 @@ def _told(run: StoredRun, result: BatchResult) -> dict[str, object]:
     return told
 
 
-def _changes(assignments: tuple[str, ...]) -> dict[str, str]:
+def chosen_changes(assignments: tuple[str, ...]) -> dict[str, str]:
     """KNOB=VALUE pairs. Raises SettingsError where there is no '='."""
     changes: dict[str, str] = {}
     for assignment in assignments:

@@ -1,0 +1,134 @@
+"""`studio live`."""
+
+import click
+
+from studio.cli.output import command, note, progress
+from studio.cli.tracking_commands import chosen_changes, knob_options
+from studio.errors import RunError
+from studio.runs.live_replay import prepare_replay
+from studio.runs.live_request import last_of
+from studio.runs.live_summary import LiveSummary, in_words, summary_of
+from studio.runs.new_run import RunRequest, prepare_run
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.sessions.workspace import Workspace
+from studio.tracking.catalogue import TRACKERS
+from studio.weighting.catalogue import WEIGHTINGS
+from studio.worker.live_tracking import replay_live, track_live
+
+
+@click.command()
+@click.argument("session")
+@click.option("--tracker", type=click.Choice(sorted(TRACKERS)), default="behaviour", show_default=True)
+@click.option("--weighting", type=click.Choice(sorted(WEIGHTINGS)), default="blobs", show_default=True)
+@click.option("--body", default="", metavar="NAME", help="Kinematic tree; the session's subject scales it.")
+@click.option("--behaviour", default="", metavar="MODEL", help="Behaviour model, by name or file.")
+@knob_options
+@click.option("--from", "first", type=int, default=0, show_default=True, help="The frame that comes first.")
+@click.option("--seconds", type=float, help="Track for so long; default: to the footage's end.")
+@click.option("--repeat", is_flag=True, help="Go forth and back through the footage; needs --seconds.")
+@click.option("--seed", type=int, default=0, show_default=True)
+@click.option("--set", "changes", multiple=True, metavar="KNOB=VALUE", help="Any other knob.")
+@click.option("--name", default="", help="Name of the run; default: numbered.")
+@click.option("--resume", metavar="RUN", help="Go on with a live run that was ended.")
+@click.option(
+    "--replay", metavar="RUN", help="Track a live run's frames again, without the clock, and compare."
+)
+@command
+def live(
+    session: str,
+    first: int,
+    seconds: float | None,
+    repeat: bool,
+    resume: str | None,
+    replay: str | None,
+    changes: tuple[str, ...],
+    **asked: str | None,
+) -> dict[str, object]:
+    """Track a SESSION as its pictures come: at the footage's own rate, dropping frames rather than falling behind.
+
+    Ctrl-C ends it and keeps what was tracked.
+    """
+    opened = Workspace().resolve(session)
+    if replay:
+        return _replayed(opened, opened.run(replay), asked["name"] or "")
+    if repeat and seconds is None and not resume:
+        raise RunError("Footage that repeats has no end.", "Say how long with --seconds.")
+    if resume:
+        run = opened.run(resume)
+    else:
+        named = ("tracker", "weighting", "body", "behaviour", "seed", "name")
+        knobs = {key: value for key, value in asked.items() if value is not None and key not in named}
+        request = RunRequest(
+            **{key: asked[key] for key in named},  # pyright: ignore[reportArgumentType]
+            first=first,
+            last=last_of(opened, first, seconds, repeat),
+            changes=chosen_changes(changes) | knobs,
+            live=True,
+            to_and_fro=repeat,
+        )
+        with progress(f"{opened.name}: getting ready") as report:
+            run = prepare_run(opened, request, report)
+    for line in run.record.notes:
+        note(line)
+    try:
+        with progress(f"{opened.name} / {run.name}") as report:
+            found = track_live(opened, run, report)
+    except KeyboardInterrupt:
+        note(f"{opened.name} / {run.name}: {_in_words(summary_of(run))}")
+        raise
+    return {**_told(run, found), "text": f"{opened.name} / {run.name}: {_in_words(found)}"}
+
+
+def _replayed(session: Session, run: StoredRun, name: str) -> dict[str, object]:
+    made = prepare_replay(session, run, name)
+    with progress(f"{session.name} / {made.name}") as report:
+        found = replay_live(session, run, made, report)
+    verdict = (
+        f"all {found.frames} frames of '{run.name}' again, bit for bit"
+        if not found.different
+        else f"{len(found.different)} of {found.frames} frames of '{run.name}' came out otherwise"
+    )
+    return {
+        "session": session.name,
+        "run": made.name,
+        "replayed": run.name,
+        "frames": found.frames,
+        "different": list(found.different),
+        "text": f"{session.name} / {made.name}: {verdict}",
+    }
+
+
+def _told(run: StoredRun, found: LiveSummary) -> dict[str, object]:
+    """What `--json` prints of a live run."""
+    record = run.record
+    return {
+        "session": run.session_name,
+        "run": run.name,
+        "tracker": record.tracker,
+        "weighting": record.weighting,
+        "body": record.body,
+        "seed": record.seed,
+        "frames": len(found.tracked),
+        "dropped": list(found.dropped),
+        "dropped_share": round(found.dropped_share, 4),
+        "frames_per_second": round(found.frames_per_second, 2),
+        "footage_frames_per_second": record.fps,
+        "latency_ms": {
+            name: round(found.latency(share), 1)
+            for name, share in (("median", 0.5), ("p95", 0.95), ("worst", 1.0))
+        },
+    }
+
+
+def _in_words(found: LiveSummary) -> str:
+    """How a live run went, for a person."""
+    if not found.tracked:
+        return "nothing was tracked."
+    words = f"{len(found.tracked)} frames tracked, {found.frames_per_second:.1f} a second"
+    if found.dropped:
+        words += f"; {len(found.dropped)} dropped ({found.dropped_share:.1%}): {in_words(found.dropped)}"
+    else:
+        words += "; none dropped"
+    latency = " / ".join(f"{found.latency(share):.0f}" for share in (0.5, 0.95, 1.0))
+    return f"{words}; picture to pose {latency} ms (median / 95 % / worst)"
