@@ -112,7 +112,8 @@ def _checked(task: ExportTask, recording: Recording) -> str:
     """Compare where the limbs are in each frame of the file with where they were."""
     motion = task.motion
     places = {f"{BODY}/{limb.name}": index for index, limb in enumerate(motion.body.drawn)}
-    moved: dict[int, list[tuple[float, Array]]] = {index: [] for index in places.values()}
+    # A limb stands at the origin until it is moved; what does not change is not said again.
+    moved: dict[int, list[tuple[float, Array]]] = {index: [(-1.0, np.zeros(3))] for index in places.values()}
     for at, message in recording.messages:
         if message.get("type") == "SetPositionMessage" and message.get("name") in places:
             moved[places[message["name"]]].append((at, np.array(message["position"])))
@@ -122,8 +123,6 @@ def _checked(task: ExportTask, recording: Recording) -> str:
         times = np.array([at for at, _ in steps])
         # What stands in a frame is the last that was said by its time; half a frame absorbs rounding.
         rows = np.searchsorted(times, motion.times + 0.5 / motion.fps) - 1
-        if not steps or rows[motion.known].min() < 0:
-            return agreed(task.place, float("inf"))
-        shown = np.array([place for _, place in steps])[np.maximum(rows, 0)]
+        shown = np.array([place for _, place in steps])[rows]
         worst = max(worst, float(np.linalg.norm(shown - wanted[:, index], axis=1)[motion.known].max()))
     return agreed(task.place, worst / METRES_PER_MM)

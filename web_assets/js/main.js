@@ -3,6 +3,7 @@
 import { startCameras } from "./cameras.js";
 import { startCurtain } from "./curtain.js";
 import { startData } from "./data.js";
+import { startExporting } from "./exporting.js";
 import { startHeader } from "./header.js";
 import { startKeys } from "./keys.js";
 import { startLive } from "./live.js";
@@ -32,6 +33,7 @@ async function start() {
   startWeights();
   startCameras();
   startLog();
+  startExporting();
   startTabs();
   startKeys();
   startCurtain();

@@ -32,6 +32,11 @@ function fold(folded) {
   button.setAttribute("aria-label", button.title);
 }
 
+/** Show a panel, from elsewhere on the page. */
+export function showPanel(name) {
+  document.querySelector(`[role=tab][data-panel="${name}"]`)?.click();
+}
+
 /** Wire tabs, tools and the fold. */
 export function startTabs() {
   const tabs = [...document.querySelectorAll("[role=tab]")];

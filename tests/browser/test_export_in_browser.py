@@ -1,0 +1,130 @@
+"""The Export panel as a person uses it: choose a format, options, export, download; what fails is said in words."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page
+from store_records import layer_of, record_of, result_of
+from studio_page import StudioPage
+from studio_server import StudioServer
+from toy_session import make_session
+
+from studio.sessions.results_store import ResultsWriter
+from studio.sessions.workspace import Workspace
+
+pytestmark = pytest.mark.browser
+
+FRAMES = 6
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
+    """`studio serve` on a workspace with one tracked run."""
+    root = tmp_path_factory.mktemp("exports") / "workspace"
+    session = make_session(Workspace(root).place_for("toy"))
+    run = session.new_run(record_of(session, "first"))
+    with ResultsWriter(run.folder) as writer:
+        writer.write_settings(1, 0, 0, run.record.settings)
+        for frame in range(FRAMES):
+            writer.write_frame(result_of(frame), [layer_of(frame, layer) for layer in range(3)], 2000)
+    made = StudioServer("serve", root)
+    yield made
+    made.stop()
+
+
+@pytest.fixture(scope="module")
+def window(browser: Browser, studio: StudioServer) -> Iterator[StudioPage]:
+    """One window with the Export panel open."""
+    opened = StudioPage(browser, studio, with_scene=False)
+    opened.until("get('run') === 'first'")
+    opened.page.get_by_role("tab", name="Export").click()
+    opened.page.get_by_role("radio", name=".bvh").wait_for()
+    yield opened
+    opened.close()
+
+
+def choose(page: Page, ending: str) -> None:
+    page.get_by_role("radio", name=f".{ending}").click()
+
+
+def export(page: Page) -> None:
+    page.get_by_role("button", name="Export", exact=True).click()
+
+
+def test_a_file_is_made_and_downloaded(window: StudioPage, artefacts: Path, tmp_path: Path) -> None:
+    page = window.page
+    choose(page, "bvh")
+    assert "Blender" in page.locator(".export-form > .hint").inner_text()
+    page.get_by_label("Unit", exact=True).select_option("cm")
+    export(page)
+    link = page.get_by_role("link", name="toy-first-cm.bvh")
+    link.wait_for()
+    assert "read back within" in page.locator(".export-files").inner_text()
+    with page.expect_download() as caught:
+        link.click()
+    caught.value.save_as(tmp_path / "got.bvh")
+    text = (tmp_path / "got.bvh").read_text()
+    assert text.startswith("HIERARCHY")
+    assert f"Frames: {FRAMES}" in text
+    window.shoot(artefacts / "export-dark.png")
+
+
+def test_options_belong_to_the_format(window: StudioPage) -> None:
+    page = window.page
+    choose(page, "csv")
+    assert page.get_by_label("Angles").is_visible()
+    choose(page, "glb")
+    assert page.get_by_label("Angles").count() == 0
+    assert page.get_by_label("Rest pose").is_visible()
+    choose(page, "mp4")
+    assert page.get_by_label("Camera").locator("option").all_inner_texts() == ["all cameras", "front"]
+
+
+def test_what_cannot_be_exported_is_said(window: StudioPage) -> None:
+    page = window.page
+    choose(page, "trc")
+    page.get_by_label("From frame").fill("4000")
+    page.get_by_label("From frame").press("Tab")
+    export(page)
+    wrong = page.get_by_role("alert").filter(has_text="no frame from 4000")
+    wrong.wait_for()
+    assert "Choose frames that were tracked" in wrong.inner_text()
+    page.get_by_label("From frame").fill("")
+    page.get_by_label("From frame").press("Tab")
+    page.get_by_label("Unit", exact=True).select_option("mm")
+    export(page)
+    page.get_by_role("link", name="toy-first-mm.trc").wait_for()
+
+
+def test_a_video_and_a_recording_of_the_scene(window: StudioPage, artefacts: Path) -> None:
+    page = window.page
+    for ending in ("mp4", "viser", "toml"):
+        choose(page, ending)
+        export(page)
+        page.get_by_role("link", name=f"toy-first.{ending}").wait_for()
+    page.locator("#theme").click()
+    page.wait_for_function("document.documentElement.dataset.theme === 'light'")
+    window.shoot(artefacts / "export-light.png")
+    page.set_viewport_size({"width": 720, "height": 900})
+    window.shoot(artefacts / "export-narrow.png")
+    page.set_viewport_size({"width": 1280, "height": 800})
+
+
+def test_a_file_is_deleted_and_the_run_stays(window: StudioPage, studio: StudioServer) -> None:
+    page = window.page
+    row = page.locator(".export-files li").filter(has_text="toy-first.toml")
+    row.get_by_role("button", name="Delete toy-first.toml").click()
+    row.wait_for(state="detached")
+    names = {entry["file"] for entry in studio.get("/api/sessions/toy/runs/first/exports")["exports"]}
+    assert "toy-first.mp4" in names
+    assert "toy-first.toml" not in names
+
+
+def test_the_menu_of_a_run_leads_here(window: StudioPage) -> None:
+    page = window.page
+    page.get_by_role("tab", name="Log").click()
+    row = page.locator('.run[data-key="toy/first"]')
+    row.hover()
+    window.choose(row.get_by_role("button", name="More for first"), "Export…")
+    assert page.get_by_role("tab", name="Export").get_attribute("aria-selected") == "true"
