@@ -1,6 +1,8 @@
 """Arguments that several commands understand alike."""
 
-from studio.errors import RunError
+from collections.abc import Sequence
+
+from studio.errors import FootageError, RunError
 
 
 def frame_range(text: str) -> tuple[int, int | None]:
@@ -12,3 +14,24 @@ def frame_range(text: str) -> tuple[int, int | None]:
         raise RunError(
             f"Frames '{text}' cannot be understood.", "Write A:B, half open from 0, like 0:150."
         ) from None
+
+
+def camera_numbers(words: Sequence[str], option: str) -> dict[str, int]:
+    """CAMERA=NUMBER words by camera. Raises FootageError."""
+    found: dict[str, int] = {}
+    for word in words:
+        camera, equals, number = word.rpartition("=")
+        try:
+            value = int(number)
+        except ValueError:
+            equals = ""
+            value = 0
+        if not equals or not camera:
+            raise FootageError(
+                f"'{option} {word}' cannot be understood.",
+                f"Write the camera and a whole number: {option} cam1=3.",
+            )
+        if camera in found:
+            raise FootageError(f"'{option}' names camera '{camera}' twice.", "Give one number a camera.")
+        found[camera] = value
+    return found

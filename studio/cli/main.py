@@ -45,7 +45,7 @@ COMMANDS = {
     ),
     "bodies": ("session_commands", "bodies", "List the bodies."),
     "runs": ("session_commands", "runs", "List the runs."),
-    "bench": ("evaluation_commands", "bench", "Measure the weighting kernels."),
+    "bench": ("bench_commands", "bench", "Measure kernels, hulls, a slider's answer and live tracking."),
 }
 
 

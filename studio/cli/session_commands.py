@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from studio.body.catalogue import list_bodies, load_body
+from studio.cli.arguments import camera_numbers
 from studio.cli.output import command, note, progress
 from studio.sessions.importers.catalogue import import_source
 from studio.sessions.workspace import Workspace
@@ -19,21 +20,57 @@ INTO_HELP = "Name of the new session in the workspace, or a path."
     "--calibration", type=click.Path(path_type=Path), help="The file to take where there are several."
 )
 @click.option("--fps", type=float, help="Frames per second, where the footage does not say (pictures).")
+@click.option("--trial", metavar="NAME", help="Which trial, where a folder holds several.")
+@click.option(
+    "--offset",
+    "offsets",
+    multiple=True,
+    metavar="CAMERA=FRAMES",
+    help="The frame of this camera's footage that was taken with frame 0 of the others (repeatable).",
+)
+@click.option(
+    "--rotate",
+    "rotations",
+    multiple=True,
+    metavar="CAMERA=DEGREES",
+    help="Turn this camera's pictures clockwise by 90, 180 or 270 degrees (repeatable).",
+)
 @click.option(
     "--copy/--reference", default=True, help="Copy the footage (default), or refer to it where it lies."
 )
 @command
 def import_command(
-    source: Path, into: str, calibration: Path | None, fps: float | None, copy: bool
+    source: Path,
+    into: str,
+    calibration: Path | None,
+    fps: float | None,
+    trial: str | None,
+    offsets: tuple[str, ...],
+    rotations: tuple[str, ...],
+    copy: bool,
 ) -> dict[str, object]:
-    """Make a session from a folder of footage and calibration, checking one against the other."""
+    """Make a session from a folder of footage and calibration, checking one against the other.
+
+    Folders of Pose2Sim, FreeMoCap, Caliscope, anipose, EasyMocap and PARSEC are recognised.
+    """
     place = Workspace().place_for(into)
     with progress("Importing") as report:
-        told = import_source(source, place, calibration=calibration, fps=fps, copy=copy, progress=report)
+        told = import_source(
+            source,
+            place,
+            calibration=calibration,
+            fps=fps,
+            copy=copy,
+            trial=trial,
+            offsets=camera_numbers(offsets, "--offset"),
+            rotations=camera_numbers(rotations, "--rotate"),
+            progress=report,
+        )
     for line in (*told.notes, *(f"Warning: {warning}" for warning in told.warnings)):
         note(line)
     return {
         "session": str(place),
+        "layout": told.layout,
         "cameras": [f"{match.footage} → {match.camera} ({match.how})" for match in told.matches],
         "notes": list(told.notes),
         "warnings": list(told.warnings),

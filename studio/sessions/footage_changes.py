@@ -1,0 +1,168 @@
+"""Offsets and turns of a session's cameras, changed after the import.
+
+The footage's files stay as they are; only the manifest says otherwise from which frame and how turned they are read.
+Runs keep their own numbers, which then count frames as they were: `stale_runs` names them, computed from when they were
+made.
+"""
+
+import dataclasses
+import datetime
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from studio.capture.footage import camera_reader
+from studio.capture.footage_source import TURNS, CameraSource, FootageSource
+from studio.capture.naming import listed, match_names
+from studio.capture.synchrony import MOST_SECONDS, Progress, Synchrony, estimate_synchrony
+from studio.capture.timestamps import TimedOffsets, offsets_from_times, read_timestamps
+from studio.errors import FootageError, SessionError
+from studio.sessions.run_record import FILE_NAME as RUN_FILE_NAME
+from studio.sessions.session import START_POSE_NAME, THUMBNAIL_NAME, Session, described_anew
+
+MOST_OFFSET = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class FootageChange:
+    """A change that was made. session : as it is now. notes : what it means, sentences. stale_runs : names of runs."""
+
+    session: Session
+    notes: tuple[str, ...]
+    stale_runs: tuple[str, ...]
+
+
+def change_footage(
+    session: Session, offsets: Mapping[str, int] | None = None, rotations: Mapping[str, int] | None = None
+) -> FootageChange:
+    """Give cameras other offsets (the file's frame that was taken with the others' frame 0) and turns (degrees
+    clockwise); cameras that are not named keep theirs. Frame 0 becomes the first one that all cameras have.
+
+    Raises FootageError where no common frame is left, masks are too few, or a turned picture is not of the calibrated
+    size; SessionError while a run is being tracked.
+    """
+    for run in session.runs():
+        if run.summary().status == "tracking":
+            raise SessionError(
+                f"Run '{run.name}' of session '{session.name}' is being tracked.",
+                "Stop it first, or wait for it.",
+            )
+    before = session.manifest.footage
+    after = _changed(session, before, dict(offsets or {}), dict(rotations or {}))
+    if after == before:
+        return FootageChange(session, ("Nothing changes.",), stale_runs(session))
+    manifest = msgspec.structs.replace(
+        session.manifest, footage=after, footage_changed=datetime.datetime.now(datetime.UTC).isoformat()
+    )
+    (session.path / THUMBNAIL_NAME).unlink(missing_ok=True)
+    changed = described_anew(session, manifest)
+    stale = stale_runs(changed)
+    return FootageChange(changed, tuple(_consequences(changed, before, after, stale)), stale)
+
+
+def stale_runs(session: Session) -> tuple[str, ...]:
+    """Names of the runs that were made before the footage's offsets or turns were last changed."""
+    if not session.manifest.footage_changed:
+        return ()
+    moment = datetime.datetime.fromisoformat(session.manifest.footage_changed).timestamp()
+    return tuple(run.name for run in session.runs() if (run.folder / RUN_FILE_NAME).stat().st_mtime < moment)
+
+
+def synchrony_of(
+    session: Session, progress: Progress | None = None, most_seconds: float = MOST_SECONDS
+) -> Synchrony:
+    """Offsets of a session's cameras estimated from what moves in them; changes nothing. Raises FootageError."""
+    source = session.manifest.footage
+    readers = [camera_reader(camera, session.path) for camera in source.cameras]
+    try:
+        return estimate_synchrony(source, lambda index: readers[index].read, progress, most_seconds)
+    finally:
+        for reader in readers:
+            reader.close()
+
+
+def recorded_offsets(session: Session, path: Path) -> TimedOffsets:
+    """Offsets of a session's cameras by a recorder's times; changes nothing. Raises FootageError."""
+    times = read_timestamps(path)
+    names = [camera.name for camera in session.manifest.footage.cameras]
+    matches = match_names(list(times), names, f"cameras of {path.name}", FootageError)
+    if len(matches) < len(names):
+        raise FootageError(
+            f"'{path.name}' has times of {len(matches)} of the {len(names)} cameras.",
+            "Give the offsets by hand.",
+        )
+    return offsets_from_times({match.camera: times[match.footage] for match in matches})
+
+
+def _changed(
+    session: Session, source: FootageSource, offsets: dict[str, int], rotations: dict[str, int]
+) -> FootageSource:
+    """The footage's description with the change. Raises FootageError."""
+    names = [camera.name for camera in source.cameras]
+    unknown = sorted({*offsets, *rotations} - set(names))
+    if unknown:
+        raise FootageError(f"There is no camera '{unknown[0]}'.", f"The cameras are {listed(names)}.")
+    placed = {camera.name: offsets.get(camera.name, camera.offset) for camera in source.cameras}
+    far = [name for name, offset in placed.items() if abs(offset) > MOST_OFFSET]
+    if far:
+        raise FootageError(
+            f"Camera {far[0]} cannot be {placed[far[0]]} frames off.", "Give its offset in frames."
+        )
+    least = min(placed.values())
+    sizes = {camera.name: (camera.width, camera.height) for camera in session.cameras()}
+    cameras = tuple(
+        dataclasses.replace(
+            _turned(camera, rotations.get(camera.name, camera.turned), sizes[camera.name]),
+            offset=placed[camera.name] - least,
+        )
+        for camera in source.cameras
+    )
+    count = min(camera.last for camera in cameras)
+    if count < 1:
+        words = ", ".join(
+            f"{camera.name}: {camera.frame_count} from {camera.offset} on" for camera in cameras
+        )
+        raise FootageError(
+            f"With these offsets no frame is left that all cameras have ({words}).", "Correct them."
+        )
+    return dataclasses.replace(source, cameras=cameras, frame_count=count)
+
+
+def _turned(camera: CameraSource, degrees: int, calibrated: tuple[int, int]) -> CameraSource:
+    """A camera's footage at another turn. Raises FootageError."""
+    turn = next((turn for turn in TURNS if turn == degrees % 360), None)
+    if turn is None:
+        raise FootageError(
+            f"Camera {camera.name} cannot be turned by {degrees} degrees.",
+            "Turn it by 90, 180 or 270 degrees.",
+        )
+    width, height = camera.width, camera.height
+    if (turn - camera.turned) % 180:
+        width, height = height, width
+    if (width, height) != calibrated:
+        raise FootageError(
+            f"Turned by {turn} degrees, the pictures of camera {camera.name} are {width}x{height}, and its calibration"
+            f" is for {calibrated[0]}x{calibrated[1]}.",
+            "Turn it the other way round, or import the session again with a calibration of the turned pictures.",
+        )
+    return dataclasses.replace(camera, turned=turn, width=width, height=height)
+
+
+def _consequences(
+    session: Session, before: FootageSource, after: FootageSource, stale: tuple[str, ...]
+) -> list[str]:
+    """What the change means for what is there."""
+    notes = [f"{after.frame_count} frames are in all cameras (there were {before.frame_count})."]
+    moved = any(a.offset != b.offset for a, b in zip(before.cameras, after.cameras, strict=True))
+    if stale:
+        notes.append(
+            f"Run {listed(stale)} was tracked on the footage as it was: its poses stay, but pictures and overlays now"
+            " show other ones. Track again."
+        )
+    if moved and (session.path / START_POSE_NAME).exists():
+        notes.append("The start pose belongs to frame 0 as it was: find it again with 'studio initialise'.")
+    if moved and session.truth_path is not None:
+        notes.append("The truth counts its time from frame 0 as it was: check it before you evaluate.")
+    return notes
