@@ -8,19 +8,22 @@ from studio.runs.problem_source import ProblemSource
 from studio.runs.run_footage import footage_of
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.worker.open_live_run import OpenLiveRun
+from studio.worker.open_live_run import MakeSource, OpenLiveRun
 
 # Called with a step in words, frames that came and frames in all.
 Report = Callable[[str, int, int], None]
 
 
-def track_live(session: Session, run: StoredRun, report: Report) -> LiveSummary:
+def track_live(
+    session: Session, run: StoredRun, report: Report, make_source: MakeSource | None = None
+) -> LiveSummary:
     """Track a prepared or interrupted live run until its last frame has come.
 
-    Raises StudioError; KeyboardInterrupt is passed on after the run was marked as cancelled.
+    make_source : of its sets; None: its footage at its own rate. Raises StudioError; KeyboardInterrupt is passed on
+    after the run was marked as cancelled.
     """
     record = run.record
-    opened = OpenLiveRun(str(session.path), str(run.folder))
+    opened = OpenLiveRun(str(session.path), str(run.folder), make_source)
     try:
         opened.tracking.mark_going_on()
         report("getting ready", 0, record.frame_count)
