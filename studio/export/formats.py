@@ -117,7 +117,7 @@ FORMATS = _named(
     ),
     ExportFormat(
         "toml",
-        "Calibration (TOML)",
+        "Calibration TOML",
         "Opens in Pose2Sim, anipose, FreeMoCap and Caliscope; the cameras of the run.",
         ("calibration",),
         what="cameras",
@@ -125,7 +125,7 @@ FORMATS = _named(
     ),
     ExportFormat(
         "yml",
-        "Calibration (OpenCV YAML)",
+        "OpenCV calibration",
         "Opens with OpenCV's FileStorage; the cameras of the run.",
         ("calibration",),
         what="cameras",
