@@ -1,20 +1,19 @@
 """The checks that a reprojection error cannot make, together."""
 
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
+from studio.calibration.board_checks import board_findings
 from studio.calibration.boards import Board
 from studio.calibration.findings import Finding, Severity, blocking
 from studio.calibration.rig_checks import rig_findings, size_findings
+from studio.calibration.scale_checks import distance_findings
 from studio.calibration.sightings import Sighting
+from studio.calibration.silhouette_checks import Masks, silhouette_findings
 from studio.geometry.camera import Camera
 
 __all__ = ["Finding", "Masks", "Severity", "blocking", "check_calibration"]
 
-Masks: TypeAlias = Mapping[int, Mapping[str, NDArray[np.uint8]]]
+FIRST_CAUSES = frozenset(("resolution", "rotation", "handedness", "transposed-rotation"))
 
 
 def check_calibration(
@@ -33,5 +32,14 @@ def check_calibration(
     cameras. masks : silhouettes of one person, frame → camera → (H, W), nonzero = person. height_mm : the person's.
     distances_mm : measured distances between two cameras' lenses. Give what there is; each adds checks.
     """
-    found = [*size_findings(cameras, footage_sizes or {}), *rig_findings(cameras)]
+    sizes = {sighting.camera: sighting.size for sighting in sightings} | dict(footage_sizes or {})
+    found = [*size_findings(cameras, sizes), *rig_findings(cameras)]
+    # Where sizes or rotations are wrong, views disagree for that reason; nothing more is to be learnt from them.
+    if not any(finding.code in FIRST_CAUSES for finding in found):
+        if board is not None and sightings:
+            found += board_findings(cameras, board, sightings)
+        if masks and not blocking(found):
+            found += silhouette_findings(cameras, masks, height_mm, board)
+        if not any(finding.code in ("scale", "square-size") for finding in found):
+            found += distance_findings(cameras, distances_mm or {}, board)
     return tuple(sorted(found, key=lambda finding: finding.severity != "blocks"))

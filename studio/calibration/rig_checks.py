@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.calibration.fault_hypotheses import inverted, transposed
 from studio.calibration.findings import Finding
 from studio.capture.sanity import FAR_FROM_AXES, LARGEST_RIG_MM, SMALLEST_RIG_MM, common_target
 from studio.geometry.camera import Camera
@@ -27,6 +28,9 @@ def rig_findings(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
     wrong = _rotations(cameras)
     if wrong:
         return wrong
+    turned = _transposed(cameras)
+    if turned:
+        return (*turned, *_principal(cameras))
     return (*_up_axis(cameras), *_floor(cameras), *_unit(cameras), *_place(cameras), *_principal(cameras))
 
 
@@ -87,6 +91,39 @@ def _rotations(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
             remedy = "Check that the nine numbers are complete, or export the calibration again."
             found.append(Finding("rotation", "blocks", message, remedy, (camera.name,)))
     return tuple(found)
+
+
+def _sound(cameras: Sequence[Camera]) -> bool:
+    """Whether cameras look at one place, stand upright and stay above the floor, as a room's do."""
+    return (
+        common_target(tuple(cameras)) is not None
+        and not looks_at_one_place(cameras)
+        and upright_about(cameras, np.array(AXES["Z"]))
+        and all(camera.centre[2] > 0.0 for camera in cameras)
+    )
+
+
+def _transposed(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
+    """Rotations that make a sound rig only once rows and columns are exchanged, or the pose is inverted."""
+    if len(cameras) < 2 or _sound(cameras):
+        return ()
+    for change, remedy in (
+        (transposed, "Export the rotation in row order, or transpose it."),
+        (inverted, "The poses are world from camera: export camera from world, or invert them."),
+    ):
+        everything = tuple(change(camera) for camera in cameras)
+        tries = [(everything, tuple(camera.name for camera in cameras))]
+        for number, camera in enumerate(cameras):
+            single = (*cameras[:number], everything[number], *cameras[number + 1 :])
+            tries.append((single, (camera.name,)))
+        for changed, names in tries:
+            if _sound(changed):
+                message = (
+                    f"The rotation of camera {', '.join(names)} is transposed: the cameras look at one place, upright"
+                    " and above the floor, only once it is read the other way."
+                )
+                return (Finding("transposed-rotation", "blocks", message, remedy, names),)
+    return ()
 
 
 def _up_axis(cameras: Sequence[Camera]) -> tuple[Finding, ...]:

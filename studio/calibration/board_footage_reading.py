@@ -1,0 +1,175 @@
+"""Board footage of several cameras: one video, or one folder of pictures, or one picture a camera."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.calibration.detection import BoardFinder, sharpness
+from studio.calibration.sightings import Sighting
+from studio.capture.naming import match_names, natural_key
+from studio.capture.pictures import is_picture, list_pictures, read_picture
+from studio.capture.video import VIDEO_SUFFIXES, VideoReader, measure_video
+from studio.errors import CalibrationError
+
+Bytes = NDArray[np.uint8]
+Progress = Callable[[str, int, int], None]
+
+LENS_FRAMES, RIG_FRAMES = 60, 120
+LENS_PICTURES = 30
+BLURRED = 0.5
+"""Pictures less sharp than this share of the median are passed over where there are many."""
+
+
+@dataclass(frozen=True, slots=True)
+class BoardFootage:
+    """One camera's. name : of the file or folder. video : a video file, or None. pictures : picture files, or ()."""
+
+    name: str
+    video: Path | None
+    pictures: tuple[Path, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """A sighting and how sharp its picture is."""
+
+    sighting: Sighting
+    sharpness: float
+
+
+def list_footage(folder: Path) -> tuple[BoardFootage, ...]:
+    """The footage in a folder: its videos, its folders of pictures, or its pictures (one a camera).
+
+    Raises CalibrationError if there is none.
+    """
+    if not folder.is_dir():
+        raise CalibrationError(
+            f"There is no folder '{folder}'.", "Name the folder with the board's videos or pictures."
+        )
+    entries = sorted((path for path in folder.iterdir() if not path.name.startswith(".")), key=_natural)
+    videos = [path for path in entries if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()]
+    if videos:
+        return tuple(BoardFootage(path.stem, path, ()) for path in videos)
+    folders = [(path, list_pictures(path)) for path in entries if path.is_dir()]
+    found = [BoardFootage(path.name, None, pictures) for path, pictures in folders if pictures]
+    if found:
+        return tuple(found)
+    single = [path for path in entries if path.is_file() and is_picture(path)]
+    if not single:
+        raise CalibrationError(
+            f"'{folder.name}' holds no videos and no folders of pictures.",
+            "Put one video or one folder of pictures of the board a camera in it, named after the cameras.",
+        )
+    return tuple(BoardFootage(path.stem, None, (path,)) for path in single)
+
+
+def by_camera(footage: Sequence[BoardFootage], names: Sequence[str]) -> dict[str, BoardFootage]:
+    """Camera name → its footage. Raises CalibrationError if names cannot be matched one to one."""
+    matches = match_names([entry.name for entry in footage], names, "board recordings", CalibrationError)
+    found = {match.camera: entry for match, entry in zip(matches, footage, strict=True)}
+    return {name: found[name] for name in names if name in found}
+
+
+def look_for_lens(
+    finder: BoardFinder, camera: str, footage: BoardFootage, progress: Progress | None = None
+) -> list[Seen]:
+    """The board in one camera's pictures, or in up to 60 frames of its video spread over all of it."""
+    count = frame_count(footage)
+    frames = np.arange(count) if footage.video is None else frames_in_step([count], LENS_FRAMES)
+    return _looked(finder, camera, footage, count, frames, progress)
+
+
+def look_together(
+    finder: BoardFinder, footage: dict[str, BoardFootage], progress: Progress | None = None
+) -> list[Seen]:
+    """The board in up to 120 moments of all cameras; frames (or pictures in their order) of equal number belong
+    together, as far as the shortest recording goes.
+    """
+    counts = {camera: frame_count(entry) for camera, entry in footage.items()}
+    frames = frames_in_step(list(counts.values()), RIG_FRAMES)
+    found: list[Seen] = []
+    for camera, entry in footage.items():
+        found += _looked(finder, camera, entry, counts[camera], frames, progress)
+    return found
+
+
+def frame_count(footage: BoardFootage) -> int:
+    """Frames or pictures; a video is decoded whole for it, so that damage is told. Raises FootageError."""
+    return len(footage.pictures) if footage.video is None else measure_video(footage.video).frame_count
+
+
+def frames_in_step(counts: Sequence[int], most: int) -> NDArray[np.int64]:
+    """Frame numbers to look at, the same for all cameras of these frame counts."""
+    least = min(counts)
+    step = max(1, -(-least // most))
+    return np.arange(0, least, step)
+
+
+def chosen_for_lens(seen: Sequence[Seen], most: int = LENS_PICTURES) -> tuple[list[Sighting], int]:
+    """Sharp ones that together cover the picture, most telling first, in order of frames; and how many were blurred."""
+    if len(seen) <= most // 2:
+        return [entry.sighting for entry in seen], 0
+    usual = float(np.median([entry.sharpness for entry in seen]))
+    sharp = [entry for entry in seen if entry.sharpness >= BLURRED * usual]
+    cells = [_cells(entry.sighting) for entry in sharp]
+    covered: dict[int, int] = {}
+    left, chosen = list(range(len(sharp))), list[Sighting]()
+    while left and len(chosen) < most:
+        gains = [
+            sum(0.5 ** covered.get(cell, 0) for cell in cells[k]) * min(sharp[k].sharpness / usual, 1.2)
+            for k in left
+        ]
+        best = left.pop(int(np.argmax(gains)))
+        for cell in cells[best]:
+            covered[cell] = covered.get(cell, 0) + 1
+        chosen.append(sharp[best].sighting)
+    return sorted(chosen, key=lambda sighting: sighting.frame), len(seen) - len(sharp)
+
+
+def _cells(sighting: Sighting) -> set[int]:
+    """Cells of an 8 by 8 grid that a sighting's corners lie in, told apart by how the board is tilted."""
+    places = np.clip(8 * sighting.pixels / np.array(sighting.size), 0, 7).astype(int)
+    first, last = sighting.pixels[0], sighting.pixels[-1]
+    lean = int(np.degrees(np.arctan2(last[1] - first[1], last[0] - first[0])) // 20) % 18
+    return {int(place) + 64 * lean for place in 8 * places[:, 1] + places[:, 0]}
+
+
+def _looked(
+    finder: BoardFinder,
+    camera: str,
+    footage: BoardFootage,
+    count: int,
+    frames: NDArray[np.int64],
+    progress: Progress | None,
+) -> list[Seen]:
+    found: list[Seen] = []
+    for done, (frame, name, picture) in enumerate(_pictures(footage, count, frames)):
+        if progress is not None:
+            progress(f"Looking for the board, camera {camera}", done, len(frames))
+        sighting = finder.find(picture, camera, frame, name)
+        if sighting is not None:
+            found.append(Seen(sighting, sharpness(picture, sighting)))
+    return found
+
+
+def _pictures(
+    footage: BoardFootage, count: int, frames: NDArray[np.int64]
+) -> Iterator[tuple[int, str, Bytes]]:
+    """Frame number, name and picture."""
+    if footage.video is None:
+        for frame in frames.tolist():
+            yield frame, footage.pictures[frame].name, read_picture(footage.pictures[frame])
+        return
+    reader = VideoReader(footage.video, count)
+    try:
+        for frame in frames.tolist():
+            yield frame, f"frame {frame}", reader.read(frame)
+    finally:
+        reader.close()
+
+
+def _natural(path: Path) -> tuple[tuple[int, int, str], ...]:
+    return natural_key(path.name)

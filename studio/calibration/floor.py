@@ -1,0 +1,154 @@
+"""Where the floor is and where the axes point: from a board lying on it, or from points that a person clicked.
+
+Z is up, the floor is z = 0. The frame of solved cameras (`extrinsics.Rig`) is arbitrary until then.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.calibration.board_poses import view_of
+from studio.calibration.boards import Board
+from studio.calibration.extrinsics import Rig
+from studio.calibration.intrinsics import Lens
+from studio.calibration.sightings import Sighting
+from studio.errors import CalibrationError
+from studio.geometry.camera import Camera
+from studio.geometry.rigid import best_fit, compose, inverse, rigid, transform
+
+Array = NDArray[np.float64]
+
+FEWEST_POINTS = 3
+STRETCHED = 1e-2
+"""Three points lie on a line if the second extent is less than this share of the first."""
+FAR_OFF = 0.05
+"""Clicked points may miss their known places by this share of their extent."""
+
+
+def floor_from_board(pose: Array, thickness_mm: float = 0.0) -> Array:
+    """(3, 4) new_from_old of a world on a board that lies on the floor, face up.
+
+    pose : (3, 4) old_from_board. Origin below the board's first corner, X along its rows, Z up.
+    """
+    axes = pose[:, :3] @ np.diag([1.0, -1.0, -1.0])
+    floor = pose[:, 3] - thickness_mm * axes[:, 2]
+    return inverse(rigid(axes, floor))
+
+
+def board_on_floor(
+    rig: Rig, board: Board, sightings: Sequence[Sighting], lenses: Mapping[str, Lens]
+) -> Array:
+    """(3, 4) world_from_board of a still board that several cameras saw, or one: the pose that fits all best.
+
+    Raises CalibrationError if none of the rig's cameras saw it.
+    """
+    cameras = {camera.name: camera for camera in rig.cameras}
+    seen = [sighting for sighting in sightings if sighting.camera in cameras]
+    best, least = None, np.inf
+    for sighting in seen:
+        view = view_of(board, sighting, lenses[sighting.camera])
+        camera = cameras[sighting.camera]
+        for pose in view.poses[~view.turned] if view is not None else ():
+            candidate = compose(inverse(rigid(camera.rotation, camera.translation)), pose)
+            cost = sum(_off(board, cameras[other.camera], candidate, other) for other in seen)
+            if cost < least:
+                best, least = candidate, cost
+    if best is None:
+        raise CalibrationError(
+            "No camera sees the board on the floor.",
+            "Lay it where the cameras look, face up, and light it evenly.",
+        )
+    return best
+
+
+def triangulated(cameras: Sequence[Camera], clicks: Mapping[str, Array]) -> Array:
+    """(N, 3) points seen at (N, 2) pixels by two cameras or more; NaN pixels where a camera does not see a point.
+
+    Raises CalibrationError for an unknown camera or a point that fewer than two cameras see.
+    """
+    known = {camera.name: camera for camera in cameras}
+    for name in clicks:
+        if name not in known:
+            raise CalibrationError(
+                f"Points were given in '{name}', which is no camera.", "Name a calibrated camera."
+            )
+    points = []
+    for number in range(len(next(iter(clicks.values()), np.zeros((0, 2))))):
+        rows = [
+            _lines(known[name], pixels[number])
+            for name, pixels in clicks.items()
+            if np.isfinite(pixels[number]).all()
+        ]
+        if len(rows) < 2:
+            raise CalibrationError(
+                f"Point {number + 1} is given in fewer than two cameras.",
+                "Click each point in two cameras or more.",
+            )
+        solved = np.linalg.svd(np.concatenate(rows))[2][-1]
+        points.append(solved[:3] / solved[3])
+    return np.array(points, dtype=np.float64)
+
+
+def floor_from_points(points: Array, cameras: Sequence[Camera]) -> Array:
+    """(3, 4) new_from_old of a world on the plane through three or more floor points: origin at the first, X towards
+    the second, Z to the side of the cameras. Raises CalibrationError for points on a line.
+    """
+    if len(points) < FEWEST_POINTS:
+        raise CalibrationError(f"{len(points)} floor points are too few.", "Give three or more, far apart.")
+    middle = points.mean(axis=0)
+    _, extents, axes = np.linalg.svd(points - middle)
+    if extents[1] < STRETCHED * extents[0]:
+        raise CalibrationError("The floor points lie on a line.", "Click points that span a triangle.")
+    up = axes[2]
+    above = np.mean([(camera.centre - middle) @ up for camera in cameras])
+    up = up if above > 0.0 else -up
+    origin = points[0] - ((points[0] - middle) @ up) * up
+    along = points[1] - points[0]
+    x = along - (along @ up) * up
+    if np.linalg.norm(x) < 1e-9:
+        raise CalibrationError("The first two floor points are the same.", "Click two that lie apart.")
+    x = x / np.linalg.norm(x)
+    return inverse(rigid(np.stack([x, np.cross(up, x), up], axis=1), origin))
+
+
+def world_from_points(points: Array, world: Array) -> tuple[Array, float]:
+    """(3, 4) new_from_old that puts points where they are known to lie, and their ratio of lengths, old over new.
+
+    points, world : (N, 3), three or more, not on a line. Raises CalibrationError if they do not fit one another.
+    """
+    if len(points) < FEWEST_POINTS:
+        raise CalibrationError(
+            f"{len(points)} known points are too few.", "Give three or more, not on a line."
+        )
+    spread = np.linalg.svd(world - world.mean(axis=0), compute_uv=False)
+    if spread[1] < STRETCHED * spread[0]:
+        raise CalibrationError("The known points lie on a line.", "Give points that span a triangle.")
+    ratio = float(np.linalg.norm(points - points.mean(axis=0)) / np.linalg.norm(world - world.mean(axis=0)))
+    new_from_old = best_fit(points / ratio, world)
+    off = np.linalg.norm(transform(new_from_old, points / ratio) - world, axis=1)
+    if off.max() > FAR_OFF * spread[0]:
+        raise CalibrationError(
+            f"Point {int(np.argmax(off)) + 1} lies {off.max():.0f} mm from where it should.",
+            "Check the clicks and the coordinates (mm, Z up, right-handed).",
+        )
+    return best_fit(points, world), ratio
+
+
+def _off(board: Board, camera: Camera, pose: Array, sighting: Sighting) -> float:
+    """Root mean square pixels between a board's pose and a sighting (either end of a board that looks alike)."""
+    world = transform(pose, board.points)
+    local = world @ camera.rotation.T + camera.translation
+    if np.any(local[:, 2] <= 0.0):
+        return 1e6
+    pixels = cv2.projectPoints(local, np.zeros(3), np.zeros(3), camera.matrix, camera.distortion)[0][:, 0]
+    ends = (sighting.ids, len(board.points) - 1 - sighting.ids) if board.turn_symmetric else (sighting.ids,)
+    return min(float(np.sqrt(((pixels[ids] - sighting.pixels) ** 2).sum(axis=1).mean())) for ids in ends)
+
+
+def _lines(camera: Camera, pixel: Array) -> Array:
+    """(2, 4) equations of a point on a pixel's ray."""
+    flat = cv2.undistortPoints(pixel.reshape(1, 1, 2).astype(float), camera.matrix, camera.distortion)[0, 0]
+    pose = np.column_stack([camera.rotation, camera.translation])
+    return np.stack([flat[0] * pose[2] - pose[0], flat[1] * pose[2] - pose[1]])

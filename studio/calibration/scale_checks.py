@@ -1,0 +1,67 @@
+"""Lengths that are known, against what the calibration makes of them."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from studio.calibration.boards import Board
+from studio.calibration.findings import Finding
+from studio.geometry.camera import Camera
+
+TOLERANCE = 0.05
+UNITS = {
+    1e-3: ("metres were taken for millimetres", "Multiply the translations by 1000, or name the unit (m)."),
+    1e-2: ("decimetres were taken for millimetres", "Multiply the translations by 100."),
+    1e-1: (
+        "centimetres were taken for millimetres",
+        "Multiply the translations by 10, or name the unit (cm).",
+    ),
+    1e3: ("millimetres were taken for metres", "Divide the translations by 1000, or name the unit (mm)."),
+    1.0 / 25.4: ("inches were taken for millimetres", "Multiply the translations by 25.4."),
+}
+UNIT_TOLERANCE = 0.25
+
+
+def scale_finding(ratio: float, known: str, board: Board | None = None) -> Finding:
+    """What a wrong length says. ratio : measured by the calibration over known. known : the length, in words."""
+    for factor, (said, remedy) in UNITS.items():
+        if abs(np.log(ratio / factor)) < np.log(1.0 + UNIT_TOLERANCE):
+            return Finding(
+                "scale",
+                "blocks",
+                f"By the calibration {known} is {ratio:.4g} times what it is: {said}.",
+                remedy,
+            )
+    side = (
+        f" ({board.square_mm / ratio:.4g} mm instead of {board.square_mm:.4g} mm)"
+        if board is not None
+        else ""
+    )
+    return Finding(
+        "square-size",
+        "blocks",
+        f"By the calibration {known} is {ratio:.3f} times what it is: its board's squares were not of the size told.",
+        f"Measure the printed squares and calibrate again with their true size{side}; or divide lengths by"
+        f" {ratio:.3f}.",
+    )
+
+
+def distance_findings(
+    cameras: Sequence[Camera], distances_mm: Mapping[tuple[str, str], float], board: Board | None = None
+) -> tuple[Finding, ...]:
+    """Distances between lenses that were measured in the room, against the calibration's; names that are not there are
+    passed over.
+    """
+    centres = {camera.name: camera.centre for camera in cameras}
+    ratios = {
+        pair: float(np.linalg.norm(centres[pair[0]] - centres[pair[1]])) / length
+        for pair, length in distances_mm.items()
+        if pair[0] in centres and pair[1] in centres and length > 0.0
+    }
+    if not ratios:
+        return ()
+    ratio = float(np.median(list(ratios.values())))
+    if abs(ratio - 1.0) <= TOLERANCE or ratio <= 0.0:
+        return ()
+    pair = next(iter(ratios))
+    return (scale_finding(ratio, f"the distance from camera {pair[0]} to {pair[1]}", board),)

@@ -1,0 +1,239 @@
+"""Cameras from board footage, from folders to a calibration file with its report."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from studio.calibration.board_checks import mirrored_cameras, mirrored_sightings, pair_findings
+from studio.calibration.board_footage_reading import (
+    by_camera,
+    chosen_for_lens,
+    list_footage,
+    look_for_lens,
+    look_together,
+)
+from studio.calibration.boards import Board
+from studio.calibration.checks import check_calibration
+from studio.calibration.detection import BoardFinder
+from studio.calibration.extrinsics import Rig, moved, solve_rig
+from studio.calibration.findings import Finding, blocking
+from studio.calibration.floor import board_on_floor, floor_from_board
+from studio.calibration.floor_clicks import floor_from_clicks, read_clicks
+from studio.calibration.intrinsics import FEWEST_PICTURES, Lens, solve_lens
+from studio.calibration.lens_verdict import lens_findings
+from studio.calibration.sightings import Sighting, of_camera
+from studio.capture.naming import listed, natural_key
+from studio.capture.sanity import common_target, quarter_turns
+from studio.errors import CalibrationError
+from studio.geometry.rigid import rigid
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibrated:
+    """What came of it.
+
+    lenses : camera → lens. rig : the placed cameras, None if only lenses were asked for. sightings : camera → those that
+    its lens came from. findings : what blocks first. floor : how the floor was set, in words; "" if it was not.
+    """
+
+    board: Board
+    lenses: Mapping[str, Lens]
+    rig: Rig | None
+    sightings: Mapping[str, tuple[Sighting, ...]]
+    findings: tuple[Finding, ...]
+    floor: str = ""
+
+
+def calibrate(
+    board: Board,
+    *,
+    intrinsics: Path | None = None,
+    extrinsics: Path | None = None,
+    floor: str | None = None,
+    lenses: Mapping[str, Lens] | None = None,
+    names: Sequence[str] = (),
+    footage_sizes: Mapping[str, tuple[int, int]] | None = None,
+    distances_mm: Mapping[tuple[str, str], float] | None = None,
+    refine_lenses: bool = False,
+    progress: Progress | None = None,
+) -> Calibrated:
+    """Solve the cameras from a folder of board footage for the lenses, and one of footage of all cameras at once.
+
+    Without `intrinsics` (and `lenses`) the lenses come from the extrinsic footage too. floor : "frame:N" of the extrinsic
+    footage in which the board lies on the floor, a folder with pictures of it lying there, or a .json of clicked points.
+    names : the cameras' names (default: the footage's). footage_sizes : of what is to be tracked, to compare.
+    progress(step, done, total) may raise to stop; nothing is written here. Raises CalibrationError, FootageError.
+    """
+    if intrinsics is None and extrinsics is None:
+        raise CalibrationError("There is no board footage to calibrate from.", "Give a folder of it.")
+    names = tuple(names) or _names(extrinsics or intrinsics)
+    together = _together(board, extrinsics, names, progress)
+    used: dict[str, tuple[Sighting, ...]] = {}
+    if lenses is None:
+        used = _lens_sightings(board, intrinsics, names, together, progress)
+        lenses = _lenses(board, used, progress)
+    findings = [finding for lens in lenses.values() for finding in lens_findings(lens)]
+    everything = [*together, *(sighting for group in used.values() for sighting in group)]
+    findings += mirrored_sightings(everything)
+    if extrinsics is None:
+        return Calibrated(board, lenses, None, used, _sorted(findings))
+    missing = [name for name in names if name not in lenses]
+    if missing:
+        raise CalibrationError(f"Camera {listed(missing)} has no lens.", "Add its pictures of the board.")
+    solved, floor_words, more = _placed(board, together, lenses, floor, refine_lenses, progress)
+    findings += more
+    findings += check_calibration(
+        solved.cameras, footage_sizes=footage_sizes, distances_mm=distances_mm, board=board
+    )
+    return Calibrated(board, lenses, solved, used, _sorted(findings), floor_words)
+
+
+def _names(folder: Path | None) -> tuple[str, ...]:
+    if folder is None:
+        return ()
+    return tuple(sorted((entry.name for entry in list_footage(folder)), key=natural_key))
+
+
+def _together(
+    board: Board, folder: Path | None, names: Sequence[str], progress: Progress | None
+) -> list[Sighting]:
+    if folder is None:
+        return []
+    footage = by_camera(list_footage(folder), names)
+    return [entry.sighting for entry in look_together(BoardFinder(board, thorough=False), footage, progress)]
+
+
+def _lens_sightings(
+    board: Board,
+    folder: Path | None,
+    names: Sequence[str],
+    together: Sequence[Sighting],
+    progress: Progress | None,
+) -> dict[str, tuple[Sighting, ...]]:
+    """Camera → what its lens is solved from; cameras without any are left out only if their footage is missing."""
+    if folder is None:
+        return {name: of_camera(together, name) for name in names}
+    found: dict[str, tuple[Sighting, ...]] = {}
+    for name, entry in by_camera(list_footage(folder), names).items():
+        finder = BoardFinder(board, thorough=entry.video is None)
+        seen = look_for_lens(finder, name, entry, progress)
+        if len(seen) < FEWEST_PICTURES:
+            raise CalibrationError(
+                f"The board {board.spelling} is found in {len(seen)} pictures of camera {name}.",
+                "Check the board's kind and numbers (inner corners for a chessboard), light and sharpness.",
+            )
+        found[name] = tuple(chosen_for_lens(seen)[0])
+    return found
+
+
+def _lenses(
+    board: Board, used: Mapping[str, tuple[Sighting, ...]], progress: Progress | None
+) -> dict[str, Lens]:
+    found: dict[str, Lens] = {}
+    for number, (name, sightings) in enumerate(used.items()):
+        if progress is not None:
+            progress(f"Solving the lens of camera {name}", number, len(used))
+        if not sightings:
+            raise CalibrationError(
+                f"The board {board.spelling} is found in no picture of camera {name}.",
+                "Check the board's kind and numbers, or show it to this camera.",
+            )
+        found[name] = solve_lens(board, sightings)
+    return found
+
+
+def _placed(
+    board: Board,
+    together: Sequence[Sighting],
+    lenses: Mapping[str, Lens],
+    floor: str | None,
+    refine: bool,
+    progress: Progress | None,
+) -> tuple[Rig, str, list[Finding]]:
+    """The rig on its floor, how the floor was set, and what the pairs say. What is mirrored is told before it misleads."""
+    names = sorted({sighting.camera for sighting in together}, key=natural_key)
+    silent = [name for name in lenses if name not in names]
+    if silent:
+        raise CalibrationError(
+            f"The board is found in no picture of camera {listed(silent)} in the common footage.",
+            "Carry the board through what this camera sees.",
+        )
+    for sighting in together:
+        if sighting.size != lenses[sighting.camera].size:
+            (a, b), (c, d) = sighting.size, lenses[sighting.camera].size
+            raise CalibrationError(
+                f"Camera {sighting.camera} recorded {a}x{b} pixels, its lens was calibrated at {c}x{d}.",
+                "Record both with one mode of the camera.",
+            )
+    backwards = mirrored_cameras(board, together, lenses, names) if board.kind == "chessboard" else ()
+    if backwards:
+        raise CalibrationError(backwards[0].message, backwards[0].remedy)
+    rig = solve_rig(board, together, lenses, refine_lenses=refine, progress=progress)
+    findings = list(pair_findings(rig))
+    new_from_old, words = _floor(board, rig, lenses, floor, progress)
+    rig = moved(rig, new_from_old)
+    upright = tuple(replace(camera, quarter_turns=quarter_turns(camera)) for camera in rig.cameras)
+    if not words:
+        findings.append(
+            Finding(
+                "no-floor",
+                "warns",
+                "The floor was not set: up is what the cameras' pictures call up, and z = 0 is a guess.",
+                "Lay the board on the floor in one frame and name it (--floor frame:N), or click points of the floor.",
+            )
+        )
+    return replace(rig, cameras=upright), words, findings
+
+
+def _floor(
+    board: Board, rig: Rig, lenses: Mapping[str, Lens], floor: str | None, progress: Progress | None
+) -> tuple[np.ndarray, str]:
+    if floor is None:
+        return _guessed_floor(rig), ""
+    if floor.startswith("frame:"):
+        number = floor.removeprefix("frame:")
+        if not number.isdigit() or int(number) not in rig.boards:
+            near = ", ".join(str(frame) for frame in sorted(rig.boards)[:12])
+            raise CalibrationError(
+                f"Frame '{number}' is none in which two cameras saw the board.",
+                f"Frames there are: {near} ...",
+            )
+        return floor_from_board(
+            rig.boards[int(number)], board.thickness_mm
+        ), f"board on the floor in frame {number}"
+    path = Path(floor)
+    if path.suffix.lower() == ".json":
+        return floor_from_clicks(read_clicks(path), rig), f"points of {path.name}"
+    footage = by_camera(list_footage(path), [camera.name for camera in rig.cameras])
+    finder = BoardFinder(board)
+    seen = []
+    for name, entry in footage.items():
+        found = look_for_lens(finder, name, entry, progress)
+        seen += [max(found, key=lambda each: each.sharpness).sighting] if found else []
+    pose = board_on_floor(rig, board, seen, lenses)
+    return floor_from_board(
+        pose, board.thickness_mm
+    ), f"board on the floor in '{path.name}', {len(seen)} cameras"
+
+
+def _guessed_floor(rig: Rig) -> np.ndarray:
+    """Up as the pictures have it, the floor 1 m under what the cameras look at."""
+    up = -np.mean([camera.rotation[1] for camera in rig.cameras], axis=0)
+    up = up / np.linalg.norm(up)
+    target = common_target(rig.cameras)
+    middle = np.mean([camera.centre for camera in rig.cameras], axis=0) if target is None else target
+    ahead = rig.cameras[0].rotation[2] - (rig.cameras[0].rotation[2] @ up) * up
+    x = ahead / np.linalg.norm(ahead) if np.linalg.norm(ahead) > 1e-6 else rig.cameras[0].rotation[0]
+    turn = np.stack([x, np.cross(up, x), up])
+    return rigid(turn, -turn @ (middle - 1000.0 * up))
+
+
+def _sorted(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """What blocks first, each once."""
+    unique = list(dict.fromkeys(findings))
+    stops = blocking(unique)
+    return (*stops, *(finding for finding in unique if finding.severity != "blocks"))
