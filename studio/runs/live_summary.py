@@ -28,6 +28,16 @@ class LiveStanding:
     latency_ms: float
     frames_per_second: float
 
+    @property
+    def in_words(self) -> str:
+        """As a status line says it."""
+        parts = ["live"]
+        if self.frames_per_second == self.frames_per_second:
+            parts.append(f"{self.frames_per_second:.1f} fps")
+        if self.latency_ms == self.latency_ms:
+            parts.append(f"latency {self.latency_ms:.0f} ms")
+        return " · ".join([*parts, f"{self.dropped} dropped"])
+
 
 class LiveMeter:
     """Measures a live run as it goes."""

@@ -14,7 +14,6 @@ from studio.sessions.workspace import Workspace
 from studio.worker import commands
 from studio.worker.control import StudioControl
 from studio.worker.events import StateChanged
-from studio.worker.live_tracking import in_words
 from studio.worker.watchers import Subscription
 
 # Called with a step in words, frames that came and frames in all.
@@ -73,6 +72,6 @@ def _until(events: Subscription, is_reached: Callable[[StateChanged], bool], rep
         if event.state in ("failed", "lost"):
             raise RunError(event.message, event.hint)
         if event.live is not None:
-            report(in_words(event.live), event.frame - event.first, event.last - event.first)
+            report(event.live.in_words, event.frame - event.first, event.last - event.first)
         if is_reached(event):
             return

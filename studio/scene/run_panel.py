@@ -7,14 +7,21 @@ from typing import Protocol
 import viser
 
 from studio.errors import StudioError
+from studio.runs.colour_tokens import ColourTokens
 from studio.scene.playback import SPEEDS, Playback
 from studio.scene.wishes import Wishes
+from studio.tracking.tracker import LOST, NO_EVIDENCE, RECOVERED
 from studio.worker.events import StateChanged
 from studio.worker.search_pace import in_words, offered
 
 _TRACK = ("▶ track", "pause", "cancel")
 _STEP = ("layer", "frame", "re-anneal")
 _MOVE = ("|◀", "◀", "play", "▶", "▶|")
+MARKS = {
+    LOST: ("bad", "the tracker is off the body and searches for it"),
+    NO_EVIDENCE: ("text-quiet", "nothing is to be seen, the pose is held"),
+    RECOVERED: ("good", "the body was found again"),
+}
 _STATE_WORDS = {"reannealing": "annealing again", "lost": "worker lost", "compiling": "compiling, once"}
 
 
@@ -64,6 +71,7 @@ class RunPanel:
         self._playing = False
         self._pace = 0.0
         self.status = gui.add_html(status_html(None), order=0.0)
+        self.mark = gui.add_html("", visible=False, order=0.05)
         self.progress = gui.add_progress_bar(0.0, visible=False, order=0.1)
         with folder:
             self.track = gui.add_button_group(
@@ -102,6 +110,14 @@ class RunPanel:
         self.progress.visible = bool(state and state.state in ("tracking", "paused", "compiling"))
         self.progress.animated = bool(state and state.state in ("tracking", "compiling"))
         self.progress.value = min(100.0, 100.0 * state.done / total) if state else 0.0
+
+    def show_mark(self, tracking: str, tokens: ColourTokens) -> None:
+        """Say how the shown frame went, where it did not simply go on."""
+        content = mark_html(tracking, tokens) if tracking in MARKS else ""
+        if self.mark.content != content:
+            self.mark.content = content
+        if self.mark.visible != bool(content):
+            self.mark.visible = bool(content)
 
     def show_pace(self, seconds_a_layer: float) -> None:
         """Show how slowly the search goes, without asking for it again."""
@@ -207,6 +223,11 @@ def status_html(state: StateChanged | None) -> str:
         return _two_lines("No run is open", "Open one in the list on the left.")
     words = _STATE_WORDS.get(state.state, state.state)
     parts = [f"frame {state.frame}", f"{state.done} of {state.last - state.first} done"]
+    if state.live is not None:
+        return _two_lines(
+            f"{state.session} / {state.run} — {words}",
+            " · ".join(part for part in (state.message, state.hint) if part) or state.live.in_words,
+        )
     if state.state == "tracking" and state.frames_per_second == state.frames_per_second:
         parts.append(f"{state.frames_per_second:.3g} fps")
     if state.state == "tracking" and state.seconds_left == state.seconds_left:
@@ -214,6 +235,17 @@ def status_html(state: StateChanged | None) -> str:
     if state.message:
         parts = [state.message, state.hint]
     return _two_lines(f"{state.session} / {state.run} — {words}", " · ".join(part for part in parts if part))
+
+
+def mark_html(tracking: str, tokens: ColourTokens) -> str:
+    """How a frame went, in the colour of its mark on the timeline."""
+    token, words = MARKS[tracking]
+    colour = "#{:02x}{:02x}{:02x}".format(*tokens[token])
+    return (
+        '<div style="padding:0 10px 4px;font-size:12px;display:flex;gap:6px;align-items:baseline">'
+        f'<span style="flex:none;width:9px;height:9px;border-radius:50%;background:{colour}"></span>'
+        f"<span><b>{escape(tracking)}</b>: {escape(words)}</span></div>"
+    )
 
 
 def clock(seconds: float) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from fastapi import APIRouter, Depends, Query, Response
 
 from studio.errors import NotFoundError, StudioError
+from studio.runs.live_summary import summary_of
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.tracking.tracker import LayerRecord
@@ -22,6 +23,7 @@ from studio.web.result_schemas import (
     FrameLine,
     FramesSummary,
     LayerView,
+    LiveView,
     ParticlesView,
 )
 from studio.web.run_errors import evaluation_of
@@ -70,6 +72,22 @@ def frames(session: OpenSession, run: OpenRun) -> FramesSummary:
         mean_milliseconds=float(times.mean()) if len(times) else None,
     )
     return _with_errors(summary, session, run)
+
+
+@router.get(RUN + "/live")
+def live_figures(run: OpenRun) -> LiveView:
+    """How a live run kept up, so far. Refused (404) for others."""
+    found = summary_of(run)
+    return LiveView(
+        tracked=len(found.tracked),
+        dropped=list(found.dropped),
+        dropped_share=found.dropped_share,
+        frames_per_second=found.frames_per_second,
+        latency_median_ms=found.latency(0.5),
+        latency_p95_ms=found.latency(0.95),
+        latency_worst_ms=found.latency(1.0),
+        latencies_ms=found.latencies.tolist(),
+    )
 
 
 @router.get(RUN + "/frames/{frame}")

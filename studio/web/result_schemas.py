@@ -22,6 +22,21 @@ class FrameLine(Answer):
     tracking: str = Field("tracked", description="tracked, lost, no evidence or recovered.")
 
 
+class LiveView(Answer):
+    """How a live run went. dropped: frames that came and were not tracked. latencies_ms: from the last picture of a set
+    to its pose, of the tracked frames in order.
+    """
+
+    tracked: int
+    dropped: list[int]
+    dropped_share: float
+    frames_per_second: Number
+    latency_median_ms: Number
+    latency_p95_ms: Number
+    latency_worst_ms: Number
+    latencies_ms: Numbers
+
+
 class FramesSummary(Answer):
     """A run's frames. first, last: half open. truth_problem: why the error cannot be measured though there
     is a truth.

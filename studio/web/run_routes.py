@@ -16,11 +16,10 @@ from studio.sessions.run_log import read_log
 from studio.sessions.stored_run import StoredRun
 from studio.web.doors import Doors, doors_of, let_go
 from studio.web.event_encoding import message_of, plain
+from studio.web.log_schemas import LogEntry, LogLines
 from studio.web.pace_schemas import PaceRequest, PaceView, SpeedView
 from studio.web.schemas import (
     Frame,
-    LogEntry,
-    LogLines,
     NewName,
     Posted,
     ReannealRequest,
@@ -73,6 +72,8 @@ def make_run(session: OpenSession, wish: RunRequest, doors: Door) -> RunLine:
         changes=wish.settings,
         name=wish.name or "",
         behaviour=wish.behaviour or "",
+        live=wish.live,
+        to_and_fro=wish.to_and_fro,
     )
     made = prepare_run(session, request)
     doors.events.publish({"type": "sessions", "session": session.name, "run": made.name})
@@ -94,6 +95,7 @@ def run_detail(session: OpenSession, run: OpenRun) -> RunDetail:
         fps=record.fps,
         notes=list(record.notes),
         behaviour=record.behaviour,
+        live=record.live,
     )
 
 

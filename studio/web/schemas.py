@@ -238,6 +238,12 @@ class RunRequest(Request):
     behaviour: RunName | None = Field(
         None, description="A model of the workspace; null: the only one, if needed."
     )
+    live: bool = Field(
+        False, description="Track at the footage's rate, dropping frames rather than falling behind."
+    )
+    to_and_fro: bool = Field(
+        False, description="A live run goes forth and back; last may lie behind the end."
+    )
 
 
 class Frame(Request):
@@ -279,17 +285,4 @@ class RunDetail(Answer):
     fps: float
     notes: list[str]
     behaviour: str = ""
-
-
-class LogEntry(Answer):
-    """One line of a run's log. time: seconds since the epoch."""
-
-    level: str
-    time: float
-    text: str
-
-
-class LogLines(Answer):
-    """What the tracking process said, oldest first."""
-
-    lines: list[LogEntry]
+    live: bool = False

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from studio.runs.live_replay import Comparison, compare, replay
-from studio.runs.live_summary import LiveStanding, LiveSummary, summary_of
+from studio.runs.live_summary import LiveSummary, summary_of
 from studio.runs.problem_source import ProblemSource
 from studio.runs.run_footage import footage_of
 from studio.sessions.session import Session
@@ -32,7 +32,7 @@ def track_live(
             stepped = opened.step_layer()
             if stepped is not None and stepped.result is not None:
                 came = opened.live.next_frame - record.first
-                report(in_words(opened.live.standing), came, record.frame_count)
+                report(opened.live.standing.in_words, came, record.frame_count)
     except KeyboardInterrupt:
         opened.tracking.mark_cancelled()
         raise
@@ -52,13 +52,3 @@ def replay_live(session: Session, run: StoredRun, into: StoredRun, report: Repor
     finally:
         problems.close()
     return compare(run, into)
-
-
-def in_words(standing: LiveStanding) -> str:
-    """How a live run keeps up, as a status line says it."""
-    parts = ["live"]
-    if standing.frames_per_second == standing.frames_per_second:
-        parts.append(f"{standing.frames_per_second:.1f} fps")
-    if standing.latency_ms == standing.latency_ms:
-        parts.append(f"latency {standing.latency_ms:.0f} ms")
-    return " · ".join([*parts, f"{standing.dropped} dropped"])

@@ -17,10 +17,20 @@ function clock(seconds) {
   return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")}`;
 }
 
+/** How a live run keeps up, in one line. */
+function liveLine(work, word) {
+  const { dropped, latency_ms: latency, frames_per_second: rate } = work.live;
+  const parts = [work.state === "tracking" ? "live" : `${word} (live)`];
+  if (work.state === "tracking" && rate) parts.push(`${rate.toFixed(1)} fps`);
+  if (work.state === "tracking" && latency !== null) parts.push(`latency ${latency.toFixed(0)} ms`);
+  return [...parts, `${dropped} dropped`].join(" · ");
+}
+
 /** What the worker does, in one line. */
 export function stateLine(work) {
   if (!work) return "idle";
   const parts = [WORDS[work.state] ?? work.state];
+  if (work.live) return liveLine(work, parts[0]);
   if (work.state === "tracking" && work.frames_per_second) parts[0] += ` ${work.frames_per_second.toPrecision(2)} fps`;
   if (["tracking", "paused", "reannealing", "lost"].includes(work.state)) parts.push(`frame ${work.frame}/${work.last - 1}`);
   if (work.state === "paused" && work.layer > 0) parts.push(`layer ${work.layer}`);
@@ -38,14 +48,14 @@ function drawState() {
   const bar = byId("run-progress");
   bar.hidden = !here || !["tracking", "paused", "compiling"].includes(work.state);
   bar.classList.toggle("unknown", work?.state === "compiling");
-  if (work && work.last > work.first) bar.firstElementChild.style.width = `${(100 * work.done) / (work.last - work.first)}%`;
+  if (work && work.last > work.first) bar.firstElementChild.style.width = `${(100 * (work.live ? work.frame - work.first : work.done)) / (work.last - work.first)}%`;
   drawButtons(work, here);
 }
 
 function drawButtons(work, here) {
   const run = Boolean(get("run"));
   const busy = here && ["tracking", "compiling", "reannealing"].includes(work.state);
-  const complete = get("summary") && get("summary").frames.length >= get("summary").last - get("summary").first;
+  const complete = get("summary") && (get("summary").frames.length >= get("summary").last - get("summary").first || (here && work.state === "finished"));
   const toggle = byId("track-toggle");
   toggle.textContent = here && work.state === "tracking" ? "Pause" : here && work.state === "lost" ? "Resume" : get("summary")?.frames.length ? (complete ? "Tracked" : "Track on") : "Track";
   toggle.classList.toggle("primary", !(complete && !busy));

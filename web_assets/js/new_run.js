@@ -56,6 +56,7 @@ export async function newRunForm(entry, like = null) {
       [{ name: "seed", label: "Seed", kind: "number", min: 0, value: like ? like.seed + 1 : 0, hint: "The same seed gives the same run." },
         { name: "name", label: "Name", value: "", placeholder: "numbered", pattern: "[A-Za-z0-9_\\-]{0,64}" }],
       [{ name: "find", kind: "check", label: "find the start pose in the first frame", value: needsPose }],
+      [{ name: "live", kind: "check", label: "live: drops frames rather than falls behind", value: false }],
     ],
     // A tracker brings its usual weighting along, unless the session or the person wants another.
     changed: async (name, form) => {
@@ -79,7 +80,7 @@ export async function newRunForm(entry, like = null) {
       const made = await post(`${sessionPath(entry.name)}/runs`, {
         name: values.name || null, tracker: values.tracker, weighting: values.weighting, body: values.body || null, seed: Number(values.seed),
         first: Number(values.first), last: Number(values.last) + 1, settings: { ...preset?.values, ...guided },
-        behaviour: values.behaviour || null,
+        behaviour: values.behaviour || null, live: values.live,
         ...(found ? { start_pose: found.pose, start_source: found.source } : {}),
       });
       await refreshSessions();
