@@ -17,7 +17,7 @@ Array = NDArray[float64]
 class Moment:
     """frame : None while there is nothing. pose : (D,) drawn as the body. beside : (D,) the stored answer
     while a re-annealed one is shown. records : the layers whose clouds are drawn. layer_count : how many
-    layers the frame takes. truth : (M, 3) mm.
+    layers the frame takes. truth : (M, 3) mm. tracking : how a stored frame went, "" unknown.
     """
 
     frame: int | None
@@ -26,6 +26,7 @@ class Moment:
     records: Sequence[LayerRecord]
     layer_count: int
     truth: Array | None
+    tracking: str = ""
 
 
 def moment_of(
@@ -51,9 +52,8 @@ def moment_of(
         return Moment(frame, live.pose, beside, live.records, max(count, _layers_in(live.records)), truth)
     if frame is not None and stored is not None:
         records = opened.layers(frame)
-        return Moment(
-            frame, stored.estimate.pose, None, records, max(stored.layers, _layers_in(records)), truth
-        )
+        count = max(stored.layers, _layers_in(records))
+        return Moment(frame, stored.estimate.pose, None, records, count, truth, stored.tracking)
     records = [] if frame is None else opened.layers(frame)
     pose = records[-1].mean if records else opened.start_pose()
     return Moment(frame, pose, None, records, max(layers, _layers_in(records)), truth)

@@ -21,12 +21,16 @@ from studio.scene.stick_figure import TruthView
 from studio.scene.trail_view import TrailView
 from studio.scene.view_options import ViewOptions
 from studio.scene.volume_view import VolumeView
+from studio.tracking.tracker import LOST, NO_EVIDENCE
 
 Bytes = NDArray[np.uint8]
 
+AWAY = (LOST, NO_EVIDENCE)
 _VIEW_ELEVATION = 0.34
 _LEAST_DISTANCE, _MOST_DISTANCE = 2.6, 9.0
 _FIELD_OF_VIEW = 0.85
+_DOUBTFUL = 0.35
+"""Opacity of a body that is held where it was last seen, or that the tracker knows to be elsewhere."""
 _LOOK_HIGHER = np.array([0.0, 0.0, 0.2])
 
 
@@ -62,7 +66,10 @@ class SceneDrawing:
             self.recolour(options.dark)
         tokens = colour_tokens(options.dark)
         with self._server.atomic():
-            self.body.show(moment.pose if options.body else None, options.body_opacity)
+            opacity = (
+                min(options.body_opacity, _DOUBTFUL) if moment.tracking in AWAY else options.body_opacity
+            )
+            self.body.show(moment.pose if options.body else None, opacity)
             self.beside.show(moment.beside if options.stored else None, 0.35)
             if self.truth is not None:
                 self.truth.show(moment.truth if options.truth else None)

@@ -242,6 +242,7 @@ class SceneState:
         moment = self.run.moment(self.shown.frame, self.live, self._edited)
         self.run.draw(moment, self.options, self.shown.layer)
         tokens = colour_tokens(self.options.dark)
+        self._panel.run.show_mark(moment.tracking, tokens)
         self._panel.show.show_legend(tokens, max(1, moment.layer_count), moment.truth is not None)
 
     def draw_pictures(self) -> None:

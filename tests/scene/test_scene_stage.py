@@ -305,3 +305,19 @@ def test_a_kept_answer_takes_the_place_of_the_stored_one_and_of_what_followed(
     control.say(FrameFinished("swaying", "run-1", kept))
     until(lambda: stage._director.state.run.frames == (0, 1, 2))  # pyright: ignore[reportOptionalMemberAccess]
     until(lambda: body_stands_at(stage, human, kept.estimate.pose))
+
+
+@pytest.mark.parametrize(("tracking", "faint"), [("lost", True), ("no evidence", True), ("recovered", False)])
+def test_a_frame_that_did_not_simply_go_on_says_so(
+    stage: SceneStage, workspace: Workspace, human: BodyModel, tracking: str, faint: bool
+) -> None:
+    with ResultsWriter(workspace.session("swaying").run("run-1").folder) as writer:
+        layers = [cloud_record(human, FRAMES - 1, layer) for layer in range(LAYERS)]
+        result = dataclasses.replace(frame_result(human, FRAMES - 1), tracking=tracking)
+        writer.write_frame(result, layers)
+    open_run(stage)
+    mark = stage._director.state._panel.run.mark  # pyright: ignore[reportOptionalMemberAccess]
+    until(lambda: mark.visible and f"<b>{tracking}</b>" in mark.content)
+    until(lambda: (drawing(stage).body.handles[0].opacity < 0.5) == faint)
+    stage.show_frame(1)
+    until(lambda: not mark.visible and drawing(stage).body.handles[0].opacity > 0.5)

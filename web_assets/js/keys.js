@@ -5,7 +5,7 @@ import { openList } from "./dialogs.js";
 import { reanneal } from "./header.js";
 import { togglePlay, toggleLoop } from "./playback.js";
 import { get } from "./state.js";
-import { goTo, stepLayer } from "./timeline.js";
+import { goTo, goToMark, stepLayer } from "./timeline.js";
 
 const KEYS = [
   ["Space", "play or pause what is stored", (event) => event.key === " ", togglePlay],
@@ -15,6 +15,8 @@ const KEYS = [
   ["Shift →", "next layer", (event) => event.key === "ArrowRight" && event.shiftKey, () => stepLayer(1)],
   ["Home", "first frame", (event) => event.key === "Home", () => goTo(-Infinity)],
   ["End", "last frame", (event) => event.key === "End", () => goTo(Infinity)],
+  ["n", "next mark: lost, no evidence, recovered", (event) => event.key === "n", () => goToMark(1)],
+  ["p", "mark before", (event) => event.key === "p", () => goToMark(-1)],
   ["1 – 9", "look through a camera", (event) => /^[1-9]$/.test(event.key), (event) => lookThrough(Number(event.key) - 1)],
   ["0", "free view", (event) => event.key === "0", () => lookThrough(null)],
   ["r", "anneal this frame again", (event) => event.key === "r", reanneal],

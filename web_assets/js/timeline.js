@@ -1,6 +1,7 @@
 // The timeline: what is tracked, weight and error over the frames, lost spans, settings changes, the cursor.
 
 import { drawSoon } from "./drawing.js";
+import { say } from "./messages.js";
 import { get, set, watch } from "./state.js";
 import { onTheme, token } from "./theme.js";
 
@@ -28,6 +29,21 @@ export function goTo(frame) {
   if (!frames?.length) return;
   const wish = Math.max(frames[0].frame, Math.min(frames[frames.length - 1].frame, Math.round(frame)));
   set({ frame: wish, follow: wish === frames[frames.length - 1].frame && get("work")?.state === "tracking", whatIf: null });
+}
+
+/** Where the marks of the run begin: frames of which something is to be said that is not said of the one before. */
+export function marks(frames) {
+  return frames.filter((entry, at) => STATES[entry.tracking] && frames[at - 1]?.tracking !== entry.tracking).map((entry) => entry.frame);
+}
+
+/** Show the next mark, or (by < 0) the one before. */
+export function goToMark(by) {
+  const summary = get("summary");
+  const known = marks(summary?.frames ?? []);
+  const at = get("frame") ?? -Infinity;
+  const found = by > 0 ? known.find((frame) => frame > at) : known.findLast((frame) => frame < at);
+  if (found === undefined) return say(known.length ? `No mark ${by > 0 ? "after" : "before"} this frame.` : "The tracker was never lost: the timeline has no marks.");
+  goTo(found);
 }
 
 function position(frame, width) {
@@ -111,9 +127,9 @@ function explain(pen, frames) {
   pen.strokeStyle = token("accent-soft");
   let left = PADDING + 4;
   for (const [word, colour] of legend(frames)) {
-    pen.strokeText(word, left, 4);
+    pen.strokeText(word, left, BAND + 3);
     pen.fillStyle = token(colour);
-    pen.fillText(word, left, 4);
+    pen.fillText(word, left, BAND + 3);
     left += pen.measureText(word).width + 8;
   }
 }
