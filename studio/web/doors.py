@@ -20,6 +20,7 @@ from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.workspace import Workspace
 from studio.web.event_stream import EventStream
 from studio.web.export_schemas import ExportState
+from studio.web.footage_schemas import SynchronyState
 from studio.web.import_schemas import ImportState
 from studio.web.initialisation_schemas import InitialisationState
 from studio.web.presets import Preset
@@ -162,7 +163,8 @@ class Doors:
 
     scene_port : of the inner viser server, 0 while it is not running. footage_roots : folders that may be
     imported from. presets : the studio's own. log_path : the server's log file. imports,
-    initialisations, exports, uploads : those under way, by their identifiers. desk : where comparisons are worked at,
+    initialisations, exports, uploads : those under way, by their identifiers; synchronies : estimates
+    of offsets, by session. desk : where comparisons are worked at,
     learning : where behaviour models are learnt.
     """
 
@@ -176,6 +178,7 @@ class Doors:
     scene_port: int = 0
     imports: dict[str, ImportState] = field(default_factory=dict)
     initialisations: dict[str, InitialisationState] = field(default_factory=dict)
+    synchronies: dict[str, SynchronyState] = field(default_factory=dict)
     exports: dict[str, ExportState] = field(default_factory=dict)
     uploads: dict[str, dict[str, int]] = field(default_factory=dict)
     stops: dict[str, threading.Event] = field(default_factory=dict)

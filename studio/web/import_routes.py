@@ -128,6 +128,9 @@ def _import(doors: Doors, identifier: str, wish: ImportRequest, source: Path, in
             calibration=wish.calibration,
             fps=wish.fps,
             copy=wish.copy_footage or wish.upload is not None,
+            trial=wish.trial,
+            offsets=wish.offsets,
+            rotations=wish.rotations,
             progress=lambda step, done, total: tell(step=step, done=done, total=total),
             cancelled=stop.is_set,
         )
@@ -147,6 +150,7 @@ def _import(doors: Doors, identifier: str, wish: ImportRequest, source: Path, in
         state="done",
         notes=list(report.notes),
         warnings=list(report.warnings),
+        layout=report.layout,
         matching=[CameraMatching.model_validate(match) for match in report.matching],
     )
     doors.events.publish({"type": "sessions", "session": wish.name, "run": ""})

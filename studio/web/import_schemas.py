@@ -15,11 +15,20 @@ class ImportRequest(Request):
     upload: RunName | None = Field(None, description="Identifier of a finished upload.")
     calibration: str | None = Field(None, max_length=4096, description="Which file, if there are several.")
     fps: float | None = Field(None, gt=0, le=10_000)
+    trial: str | None = Field(None, max_length=4096, description="Which trial, where a folder holds several.")
+    offsets: dict[str, int] = Field(
+        default_factory=dict,
+        max_length=64,
+        description="By camera: its frame taken with the others' frame 0.",
+    )
+    rotations: dict[str, Literal[0, 90, 180, 270]] = Field(
+        default_factory=dict, max_length=64, description="By camera: degrees clockwise to turn its pictures."
+    )
     copy_footage: bool = Field(True, alias="copy", description="False: refer to it where it lies.")
 
 
 class ImportState(Answer):
-    """How an import stands; code, message and hint say why it failed."""
+    """How an import stands; code, message and hint say why it failed. layout: whose the source was taken for."""
 
     identifier: str
     name: str
@@ -33,6 +42,7 @@ class ImportState(Answer):
     notes: list[str] = Field(default_factory=list)
     warnings: list[str] = Field(default_factory=list)
     matching: list[CameraMatching] = Field(default_factory=list)
+    layout: str = ""
 
 
 class UploadState(Answer):

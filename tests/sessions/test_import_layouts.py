@@ -308,7 +308,7 @@ def test_the_balancing_man_is_a_folder_whose_toml_goes_before_the_qualisys_file(
     other = import_source(
         real_data / "pose2sim-balance", tmp_path / "other", copy=False, calibration="Calib.qca.txt"
     )
-    kept = (other.session.path / "calibration" / "original.txt").read_bytes()
+    kept = (other.session.path / "calibration" / "original.qca.txt").read_bytes()
     assert kept == (real_data / "pose2sim-balance" / "calibration" / "Calib.qca.txt").read_bytes()
     for a, b in zip(report.session.cameras(), other.session.cameras(), strict=True):
         np.testing.assert_allclose(a.centre, b.centre, atol=0.01)

@@ -174,7 +174,8 @@ def _write_calibration(folder: Path, calibration: Calibration, measured: Measure
         if (sources[0].parent / "original").is_dir():
             sources = tuple(sorted((sources[0].parent / "original").iterdir()))
     if len(sources) == 1:
-        shutil.copyfile(sources[0], place / f"original{sources[0].suffix}")
+        ending = ".qca.txt" if sources[0].name.lower().endswith(".qca.txt") else sources[0].suffix
+        shutil.copyfile(sources[0], place / f"original{ending}")
     else:
         (place / "original").mkdir()
         for path in sources:
