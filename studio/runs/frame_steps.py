@@ -56,15 +56,23 @@ class HandedOn:
         self._recent = (*self._recent[-1:], result.frame)
 
     def is_first(self, frame: int) -> bool:
-        """Whether no frame before this one was tracked."""
-        return self._before(frame)[0] is None
+        """Whether the search begins here: no frame before this one was tracked, or its start was corrected."""
+        return frame == self._record.corrected or self._before(frame)[0] is None
 
     def steps_to(self, frame: int) -> int:
         """Frames that passed since the one tracked before this one."""
+        if self._record.is_anew(frame):
+            return 1
         return steps_between(self._before(frame)[0], frame, self._record.fps)
 
     def into(self, frame: int) -> Carried:
-        """What a frame starts from: the end of the frame tracked before, in a run's first frame its start pose."""
+        """What a frame starts from: the end of the frame tracked before, in a run's first frame its start pose, in a
+        corrected one what it was corrected to; where that was tracked backwards, the end of the frame after.
+        """
+        if frame == self._record.corrected:
+            return start_of(self._record.corrected_pose)
+        if self._record.is_anew(frame) and self._results.last_before(frame + 2) == frame + 1:
+            return self._results.result(frame + 1).carried
         before, second = self._before(frame)
         if before is None:
             return start_of(self._record.start_pose)

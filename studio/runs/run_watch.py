@@ -78,7 +78,9 @@ class Standing:
 
 
 class RunWatch:
-    """The watch over one run. settings_in : of a frame, as its first layer has them."""
+    """The watch over one run. settings_in : of a frame, as its first layer has them. anew : frames that a correction
+    started: nobody looks for the body there, and what went before is not held against them.
+    """
 
     def __init__(
         self,
@@ -89,13 +91,14 @@ class RunWatch:
         seed: int,
         first: int,
         fps: float,
+        anew: Callable[[int], bool] = lambda frame: False,
     ) -> None:
         self._problems = problems if isinstance(problems, Sightings) else None
         self._onlooker = (
             Onlooker(problems.body, problems.cameras) if isinstance(problems, Sightings) else None
         )
         self._results, self._settings_in = results, settings_in
-        self._seed, self._first, self._fps = seed, first, fps
+        self._seed, self._first, self._fps, self._anew = seed, first, fps, anew
         self._known: tuple[int, Standing] | None = None
         self._sought: tuple[object, ParticleSet] | None = None
 
@@ -138,6 +141,8 @@ class RunWatch:
         evidence = self._problems.evidence(result.frame, settings)
         sight = self._onlooker.sight(evidence, result.estimate.pose, problem)
         before = self._standing(result.frame)
+        if self._anew(result.frame):
+            before = dataclasses.replace(before, state=TRACKED, doubts=0)
         if not sight.seen:
             return _held(result, carried)
         watch = before.watch if before.weighed == _weighed(settings) else WeightWatch(settings.weighting_name)
@@ -197,9 +202,9 @@ class RunWatch:
 
     def _is_due(self, frame: int, settings: RunSettings) -> bool:
         """Whether the body is looked for: at once when lost, then at intervals; and after a time without evidence."""
-        before = self._standing(frame)
-        if frame == self._first:
+        if frame == self._first or self._anew(frame):
             return False
+        before = self._standing(frame)
         if before.state == NO_EVIDENCE:
             return before.streak > SHORT_GAP_S * self._fps
         return before.state == LOST and (before.streak - 1) % settings.recovery.recovery_interval == 0

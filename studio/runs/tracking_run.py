@@ -54,8 +54,7 @@ class Stepped:
 
 
 class TrackingRun:
-    """The one who tracks a stored run; a second one for the same run is refused with RunError. Close it when
-    done."""
+    """The one who tracks a stored run; a second one for it is refused with RunError. Close it when done."""
 
     def __init__(self, run: StoredRun, problems: Problems) -> None:
         self.run, self.record, self.problems = run, run.record, problems
@@ -69,6 +68,7 @@ class TrackingRun:
             seed=self.record.seed,
             first=self.record.first,
             fps=self.record.fps,
+            anew=self.record.is_anew,
         )
         self._writer = ResultsWriter(run.folder)
         self._pace = Pace()
@@ -131,8 +131,7 @@ class TrackingRun:
         return self._search.state.layers_done if self._search else 0
 
     def step_layer(self) -> Stepped:
-        """Do one layer of the next frame; with its last layer the frame is stored. Raises RunError when
-        finished."""
+        """Do one layer of the next frame; with its last layer the frame is stored. Raises RunError when finished."""
         if self.finished:
             raise RunError(f"Run '{self.run.name}' has no frame left.", "Start a new run.")
         began = time.perf_counter()
@@ -172,8 +171,7 @@ class TrackingRun:
             self._behaviour.keep()
 
     def save(self) -> None:
-        """Store where the search stands inside a frame, whole, so that another process can go on from
-        there."""
+        """Store where the search stands inside a frame, whole, so that another process can go on from there."""
         if self._search is None or self._saved or self._search.state.particles is None:
             return
         state = self._search.state
@@ -267,7 +265,7 @@ class TrackingRun:
         )
 
     def carried_into(self, frame: int) -> Carried:
-        """What a frame starts from: the end of the frame tracked before, in the run's first frame its start pose."""
+        """What a frame starts from (`frame_steps.HandedOn.into`)."""
         return self._handed.into(frame)
 
     def search_again(self, frame: int) -> FrameSearch:
@@ -282,11 +280,15 @@ class TrackingRun:
             )
         return self._new_search(frame)
 
+    def put_back(self, result: FrameResult, layers: list[LayerRecord], settings: RunSettings) -> None:
+        """Store a frame searched again in the place of the old one; all others stay, none followed from it."""
+        self._writer.write_frame(result, layers, settings.recording.record_particles)
+        self._watch.forget()
+
     def keep(
         self, result: FrameResult, layers: list[LayerRecord], version: int, settings: RunSettings
     ) -> None:
-        """Make a frame annealed again the run's own; later frames, which followed from the old one, are
-        dropped."""
+        """Make a frame annealed again the run's own; later frames, which followed from the old one, are dropped."""
         self._writer.forget_from(result.frame)
         self._writer.write_settings(version, result.frame, 0, values(settings))
         self._writer.write_frame(result, layers, settings.recording.record_particles)

@@ -69,6 +69,33 @@ def create_store(run_folder: Path) -> None:
         connection.close()
 
 
+def copy_frames(source: Path, into: Path, last: int | None = None) -> None:
+    """Copy the frames before `last` (None: all) of a run's store into an empty one, with all their layers and the
+    settings that they were tracked with. source, into : the runs' folders.
+    """
+    end = last if last is not None else 2**62
+    connection = sqlite3.connect(into / FILE_NAME, isolation_level=None, timeout=30.0)
+    try:
+        connection.execute("ATTACH DATABASE ? AS old", (str((source / FILE_NAME).resolve()),))
+        known = {
+            row[0] for row in connection.execute("SELECT name FROM old.sqlite_master WHERE type = 'table'")
+        }
+        connection.execute("BEGIN IMMEDIATE")
+        for table in ("settings", "frames", "layers", "tracking", "arrivals"):
+            if table in known:
+                connection.execute(
+                    f"INSERT INTO main.{table} SELECT * FROM old.{table} WHERE frame < ?", (end,)
+                )
+        connection.execute("COMMIT")
+    except sqlite3.DatabaseError as error:
+        raise SessionError(
+            f"The results in '{source / FILE_NAME}' cannot be copied ({error}).",
+            "Check the free disk space, or track the run again.",
+        ) from None
+    finally:
+        connection.close()
+
+
 class ResultsWriter:
     """The one writer of a run's store; a second one, in this process or another, is refused with RunError.
 
