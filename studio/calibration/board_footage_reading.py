@@ -83,13 +83,18 @@ def look_for_lens(
 
 
 def look_together(
-    finder: BoardFinder, footage: dict[str, BoardFootage], progress: Progress | None = None
+    finder: BoardFinder,
+    footage: dict[str, BoardFootage],
+    progress: Progress | None = None,
+    also: Sequence[int] = (),
 ) -> list[Seen]:
     """The board in up to 120 moments of all cameras; frames (or pictures in their order) of equal number belong
-    together, as far as the shortest recording goes.
+    together, as far as the shortest recording goes. also : frames to look at in any case.
     """
     counts = {camera: frame_count(entry) for camera, entry in footage.items()}
-    frames = frames_in_step(list(counts.values()), RIG_FRAMES)
+    least = min(counts.values())
+    frames = frames_in_step([least], RIG_FRAMES)
+    frames = np.union1d(frames, [frame for frame in also if frame < least]).astype(np.int64)
     found: list[Seen] = []
     for camera, entry in footage.items():
         found += _looked(finder, camera, entry, counts[camera], frames, progress)

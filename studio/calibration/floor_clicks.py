@@ -45,7 +45,7 @@ def read_clicks(path: Path) -> Clicks:
 
 
 def floor_from_clicks(clicks: Clicks, rig: Rig) -> Array:
-    """(3, 4) new_from_old of the clicked floor. Raises CalibrationError; also where known lengths contradict the board's."""
+    """(3, 4) new_from_old of the clicked floor. Raises CalibrationError, also where known lengths contradict."""
     cameras = sorted({name for click in clicks.points for name in click.pixels})
     pixels = {
         name: np.array([click.pixels.get(name, (np.nan, np.nan)) for click in clicks.points])

@@ -36,8 +36,8 @@ Progress = Callable[[str, int, int], None]
 class Calibrated:
     """What came of it.
 
-    lenses : camera → lens. rig : the placed cameras, None if only lenses were asked for. sightings : camera → those that
-    its lens came from. findings : what blocks first. floor : how the floor was set, in words; "" if it was not.
+    lenses : camera → lens. rig : the placed cameras, None if only lenses were asked for. sightings : camera → those
+    that its lens came from. findings : what blocks first. floor : how it was set, in words; "" if it was not.
     """
 
     board: Board
@@ -63,15 +63,16 @@ def calibrate(
 ) -> Calibrated:
     """Solve the cameras from a folder of board footage for the lenses, and one of footage of all cameras at once.
 
-    Without `intrinsics` (and `lenses`) the lenses come from the extrinsic footage too. floor : "frame:N" of the extrinsic
-    footage in which the board lies on the floor, a folder with pictures of it lying there, or a .json of clicked points.
+    Without `intrinsics` (and `lenses`) the lenses come from the extrinsic footage too. floor : "frame:N" of the
+    extrinsic footage in which the board lies on the floor, a folder with pictures of it lying there, or a .json of
+    clicked points.
     names : the cameras' names (default: the footage's). footage_sizes : of what is to be tracked, to compare.
     progress(step, done, total) may raise to stop; nothing is written here. Raises CalibrationError, FootageError.
     """
     if intrinsics is None and extrinsics is None:
         raise CalibrationError("There is no board footage to calibrate from.", "Give a folder of it.")
     names = tuple(names) or _names(extrinsics or intrinsics)
-    together = _together(board, extrinsics, names, progress)
+    together = _together(board, extrinsics, names, _floor_frame(floor), progress)
     used: dict[str, tuple[Sighting, ...]] = {}
     if lenses is None:
         used = _lens_sightings(board, intrinsics, names, together, progress)
@@ -98,13 +99,28 @@ def _names(folder: Path | None) -> tuple[str, ...]:
     return tuple(sorted((entry.name for entry in list_footage(folder)), key=natural_key))
 
 
+def _floor_frame(floor: str | None) -> int | None:
+    """The N of "frame:N", None for other ways to set the floor. Raises CalibrationError if N is no number."""
+    if floor is None or not floor.startswith("frame:"):
+        return None
+    number = floor.removeprefix("frame:")
+    if not number.isdigit():
+        raise CalibrationError(
+            f"The floor's frame '{number}' is no number.", "Write frame:120, counted from 0."
+        )
+    return int(number)
+
+
 def _together(
-    board: Board, folder: Path | None, names: Sequence[str], progress: Progress | None
+    board: Board, folder: Path | None, names: Sequence[str], floor: int | None, progress: Progress | None
 ) -> list[Sighting]:
     if folder is None:
         return []
     footage = by_camera(list_footage(folder), names)
-    return [entry.sighting for entry in look_together(BoardFinder(board, thorough=False), footage, progress)]
+    pictures = all(entry.video is None for entry in footage.values())
+    finder = BoardFinder(board, thorough=pictures)
+    seen = look_together(finder, footage, progress, () if floor is None else (floor,))
+    return [entry.sighting for entry in seen]
 
 
 def _lens_sightings(
@@ -154,7 +170,7 @@ def _placed(
     refine: bool,
     progress: Progress | None,
 ) -> tuple[Rig, str, list[Finding]]:
-    """The rig on its floor, how the floor was set, and what the pairs say. What is mirrored is told before it misleads."""
+    """The rig on its floor, how that was set, and what the pairs say. Raises CalibrationError for mirrored ones."""
     names = sorted({sighting.camera for sighting in together}, key=natural_key)
     silent = [name for name in lenses if name not in names]
     if silent:
@@ -174,7 +190,7 @@ def _placed(
         raise CalibrationError(backwards[0].message, backwards[0].remedy)
     rig = solve_rig(board, together, lenses, refine_lenses=refine, progress=progress)
     findings = list(pair_findings(rig))
-    new_from_old, words = _floor(board, rig, lenses, floor, progress)
+    new_from_old, words = _floor(board, rig, together, lenses, floor, progress)
     rig = moved(rig, new_from_old)
     upright = tuple(replace(camera, quarter_turns=quarter_turns(camera)) for camera in rig.cameras)
     if not words:
@@ -190,21 +206,24 @@ def _placed(
 
 
 def _floor(
-    board: Board, rig: Rig, lenses: Mapping[str, Lens], floor: str | None, progress: Progress | None
+    board: Board,
+    rig: Rig,
+    together: Sequence[Sighting],
+    lenses: Mapping[str, Lens],
+    floor: str | None,
+    progress: Progress | None,
 ) -> tuple[np.ndarray, str]:
+    number = _floor_frame(floor)
     if floor is None:
         return _guessed_floor(rig), ""
-    if floor.startswith("frame:"):
-        number = floor.removeprefix("frame:")
-        if not number.isdigit() or int(number) not in rig.boards:
-            near = ", ".join(str(frame) for frame in sorted(rig.boards)[:12])
+    if number is not None:
+        lying = [sighting for sighting in together if sighting.frame == number]
+        if not lying:
             raise CalibrationError(
-                f"Frame '{number}' is none in which two cameras saw the board.",
-                f"Frames there are: {near} ...",
+                f"No camera sees the board in frame {number}.", "Name a frame in which one does."
             )
-        return floor_from_board(
-            rig.boards[int(number)], board.thickness_mm
-        ), f"board on the floor in frame {number}"
+        pose = rig.boards[number] if number in rig.boards else board_on_floor(rig, board, lying, lenses)
+        return floor_from_board(pose, board.thickness_mm), f"board on the floor in frame {number}"
     path = Path(floor)
     if path.suffix.lower() == ".json":
         return floor_from_clicks(read_clicks(path), rig), f"points of {path.name}"

@@ -19,6 +19,12 @@ COMMANDS = {
         "synchronise",
         "Put a session's cameras in step and turn them: estimated, by hand, by times.",
     ),
+    "calibrate": (
+        "calibration_commands",
+        "calibrate_command",
+        "Solve cameras from footage of a printed board.",
+    ),
+    "board": ("calibration_commands", "board_command", "Make a calibration board to print, as PDF."),
     "initialise": (
         "initialisation_commands",
         "initialise_command",

@@ -1,0 +1,82 @@
+"""Boards to print, as PDF pages of true size."""
+
+from pathlib import Path
+
+from fpdf import FPDF
+
+from studio.calibration.board_pattern import pattern_of
+from studio.calibration.boards import DEFAULT_DICTIONARY, Board
+from studio.errors import CalibrationError
+
+PAGES = {"a4": (297.0, 210.0), "a3": (420.0, 297.0), "letter": (279.4, 215.9)}
+"""Long and short side, mm."""
+MARGIN, FOOT = 8.0, 16.0
+"""mm that stay white around the board (printers do not reach the edge), and that text and check bar take below it."""
+CHECK_BAR = 100.0
+MARKER_SHARE = 0.75
+USUAL_SQUARES = {"charuco": (7, 5), "chessboard": (10, 7)}
+
+
+def usual_board(kind: str, page: str = "a4") -> Board:
+    """A board that fills a page, its squares whole millimetres. Raises CalibrationError for an unknown page."""
+    columns, rows = USUAL_SQUARES["charuco" if kind == "charuco" else "chessboard"]
+    wide, high = _room(page, landscape=True)
+    side = float(int(min(wide / columns, high / rows)))
+    if kind == "charuco":
+        return Board("charuco", columns, rows, side, round(MARKER_SHARE * side, 1), DEFAULT_DICTIONARY)
+    return Board("chessboard", columns - 1, rows - 1, side)
+
+
+def write_board_pdf(board: Board, path: Path, page: str = "a4") -> None:
+    """One page with the board in true size, its measures in words, and a bar of 100 mm to check the print by.
+
+    page : "a4", "a3" or "letter"; laid out upright or across as the board fits. Raises CalibrationError if it does not.
+    """
+    pattern = pattern_of(board)
+    landscape = pattern.width >= pattern.height
+    room = _room(page, landscape)
+    if pattern.width > room[0] or pattern.height > room[1]:
+        fits = min(room[0] / board.squares[0], room[1] / board.squares[1])
+        raise CalibrationError(
+            f"A board of {pattern.width:.0f}x{pattern.height:.0f} mm does not fit on {page.upper()} paper.",
+            f"Use squares of {int(fits)} mm at most, fewer squares, or larger paper.",
+        )
+    long, short = PAGES[page]
+    width, height = (long, short) if landscape else (short, long)
+    document = FPDF(orientation="landscape" if landscape else "portrait", unit="mm", format=(short, long))
+    document.set_auto_page_break(False)
+    document.set_title(f"Calibration board {board.spelling}")
+    document.add_page()
+    document.set_fill_color(0, 0, 0)
+    left, top = (width - pattern.width) / 2.0, MARGIN + (room[1] - pattern.height) / 2.0
+    for x, y, across, down in pattern.black.tolist():
+        document.rect(left + x, top + y, across, down, style="F")
+    foot = height - MARGIN - FOOT + 6.0
+    document.rect(MARGIN, foot, CHECK_BAR, 1.2, style="F")
+    document.set_font("Helvetica", size=8)
+    document.text(
+        MARGIN,
+        foot + 5.0,
+        "This bar is 100 mm long: print at 100 %, not fitted to the page, and measure it.",
+    )
+    document.text(MARGIN, foot + 9.0, _words(board))
+    path.write_bytes(bytes(document.output()))
+
+
+def _words(board: Board) -> str:
+    sizes = f"squares of {board.square_mm:g} mm"
+    if board.kind == "chessboard":
+        return f"Chessboard, {board.columns} x {board.rows} inner corners, {sizes}.  studio: {board.spelling}"
+    return (
+        f"ChArUco board, {board.columns} x {board.rows} {sizes}, markers of {board.marker_mm:g} mm, {board.dictionary}."
+        f"  studio: {board.spelling}"
+    )
+
+
+def _room(page: str, landscape: bool) -> tuple[float, float]:
+    """Width and height that a board may take, mm."""
+    if page not in PAGES:
+        raise CalibrationError(f"There is no paper '{page}' here.", f"Choose one of {', '.join(PAGES)}.")
+    long, short = PAGES[page]
+    width, height = (long, short) if landscape else (short, long)
+    return width - 2.0 * MARGIN, height - 2.0 * MARGIN - FOOT
