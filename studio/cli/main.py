@@ -35,6 +35,11 @@ COMMANDS = {
     "evaluate": ("evaluation_commands", "evaluate_command", "Measure a run against the true markers."),
     "refine": ("refine_commands", "refine", "Refine a run's poses on the silhouettes, kept beside them."),
     "smooth": ("refine_commands", "smooth_command", "Smooth a run's poses in time, fill short gaps."),
+    "correct": (
+        "correction_commands",
+        "correct",
+        "Give a run the right pose in a frame and track on from it.",
+    ),
     "compare": ("comparison_commands", "compare", "Compare trackers fairly on a session with a truth."),
     "learn": ("behaviour_commands", "learn_command", "Learn what a body tends to do from recorded motion."),
     "models": ("behaviour_commands", "models_command", "List the behaviour models."),

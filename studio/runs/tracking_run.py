@@ -64,7 +64,7 @@ class TrackingRun:
         self._watch = RunWatch(
             problems,
             self._reader,
-            lambda frame: self._settings_at(frame, 0)[1],
+            lambda frame: self.settings_at(frame)[1],
             seed=self.record.seed,
             first=self.record.first,
             fps=self.record.fps,
@@ -103,7 +103,7 @@ class TrackingRun:
         if partial is None or partial.frame != self.next_frame:
             return
         numbers = partial.state["search_numbers"]
-        held = self._settings_at(partial.frame, 0)[1].tracker
+        held = self.settings_at(partial.frame)[1].tracker
         particles = particles_from(partial.state)
         state = SearchState(
             layers_done=partial.next_layer,
@@ -215,15 +215,16 @@ class TrackingRun:
         if version > self.history.entries[-1].version:
             self._apply(version, settings, frame, layer)
             return version, settings, True
-        return *self._settings_at(frame, layer), False
+        return *self.settings_at(frame, layer), False
 
-    def _settings_at(self, frame: int, layer: int) -> tuple[int, RunSettings]:
+    def settings_at(self, frame: int, layer: int = 0) -> tuple[int, RunSettings]:
+        """The settings that a frame's layer was, or is to be, searched with, and their version."""
         entry = self.history.in_use(frame, layer) or self.history.entries[0]
         return entry.version, self._read(entry)
 
     def _held_in(self, frame: int, settings: RunSettings) -> RunSettings:
         """The settings with what cannot change inside a frame as it was at its first layer."""
-        held = self._settings_at(frame, 0)[1]
+        held = self.settings_at(frame)[1]
         return dataclasses.replace(
             settings,
             weighting=held_over(settings.weighting, held.weighting),
@@ -253,7 +254,7 @@ class TrackingRun:
             carried = Carried(None, memory=carried.memory)
         repeats = 1
         if self._handed.is_first(frame) or sought:
-            repeats = self._settings_at(frame, 0)[1].tracker.start_repeats
+            repeats = self.settings_at(frame)[1].tracker.start_repeats
         return FrameSearch(
             self.tracker,
             carried,

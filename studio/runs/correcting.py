@@ -1,0 +1,175 @@
+"""A run corrected in the middle: the pose of one frame is given, and the run goes on from it, forwards or backwards.
+
+What was tracked stays: the corrected run is a new one that keeps the old one's body, cameras, behaviour model and the
+frames that the correction does not reach, and whose record names the old run, the frame and the pose. The given pose
+is to the frame what a start pose is to a run's first: the search begins there (as many times as `start_repeats` says).
+
+Forwards, the frames before the corrected one are copied; it and all after it are tracked like those of any run, which
+may be stopped and resumed. Backwards, all frames are copied; the corrected one is searched, then the one before it
+from what that ended with, and so on down; each takes the old one's place when it is done, so that a cancelled
+correction keeps what it reached.
+"""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.branches import within_limits
+from studio.errors import RunError, SessionError
+from studio.runs.new_run import software_version
+from studio.runs.problem_source import ProblemSource
+from studio.runs.tracking_run import TrackingRun
+from studio.sessions import atomic_files
+from studio.sessions.manifest import now
+from studio.sessions.names import checked_name
+from studio.sessions.results_store import copy_frames, create_store
+from studio.sessions.run_record import BEHAVIOUR_NAME, CAMERAS_NAME, RunRecord, write_run_record
+from studio.sessions.session import Session, free_run_name
+from studio.sessions.stored_run import BODY_FOLDER, StoredRun
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+
+def prepare_correction(
+    session: Session,
+    run: StoredRun,
+    frame: int,
+    pose: Array,
+    *,
+    source: str = "given",
+    backwards_to: int | None = None,
+    name: str = "",
+) -> StoredRun:
+    """Make the corrected run's folder; then track it (`worker.batch.track_to_end`), or call `track_backwards`.
+
+    frame : one that the run has, or (forwards) the one after its last. pose : (D,) radians and mm, in that frame.
+    source : where it came from, in words. backwards_to : the last frame that is to be tracked backwards; None: forwards
+    to the run's end. Raises RunError, SessionError naming what is wrong; then nothing was made.
+    """
+    record, body = run.record, run.body()
+    given = np.asarray(pose, dtype=np.float64)
+    if given.shape != (len(body.parameters),) or not np.isfinite(given).all():
+        raise RunError(
+            f"A pose of {body.name} has {len(body.parameters)} finite numbers, the given one does not.",
+            "Give radians and mm in the order of the body's parameters.",
+        )
+    _check_frames(run, frame, backwards_to)
+    way = "on" if backwards_to is None else f"backwards to frame {backwards_to}"
+    changed = msgspec.structs.replace(
+        record,
+        name=name or free_run_name(session),
+        session=session.name,
+        created=now(),
+        software=software_version(),
+        live=False,
+        made_from=run.name,
+        corrected=frame,
+        corrected_pose=tuple(within_limits(body, given).tolist()),
+        backwards_to=backwards_to,
+        notes=(
+            *record.notes,
+            f"Run '{run.name}', frame {frame} corrected ({source}) and tracked {way} from it.",
+        ),
+    )
+    return _new_folder(run, changed, frame if backwards_to is None else None)
+
+
+def track_backwards(
+    session: Session,
+    run: StoredRun,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> int:
+    """Track a prepared correction backwards; returns how many frames have new poses. The others are the old run's.
+
+    progress : told after each frame. cancelled : asked before each layer; True ends it and keeps the frames that are
+    done. Raises RunError for a run that was not prepared so, or that another process has open.
+    """
+    record = run.record
+    if record.corrected is None or record.backwards_to is None:
+        raise RunError(f"Run '{run.name}' is not one that is tracked backwards.", "Track it on instead.")
+    total = record.corrected - record.backwards_to + 1
+    problems = ProblemSource(session, run.body(), run.cameras())
+    try:
+        tracking = TrackingRun(run, problems)
+        try:
+            for done, frame in enumerate(range(record.corrected, record.backwards_to - 1, -1)):
+                if not _track_again(tracking, frame, cancelled):
+                    return done
+                if progress is not None:
+                    progress(f"{session.name} / {run.name}, backwards", done + 1, total)
+        finally:
+            tracking.close()
+    finally:
+        problems.close()
+    return total
+
+
+def _track_again(tracking: TrackingRun, frame: int, cancelled: Callable[[], bool] | None) -> bool:
+    """Search a frame with the settings that it had and put it in the old one's place; False if cancelled."""
+    version, settings = tracking.settings_at(frame)
+    search, layers = tracking.search_again(frame), []
+    while not search.finished:
+        if cancelled is not None and cancelled():
+            return False
+        problem = tracking.problems.problem(frame, settings)
+        layers.append(search.step(problem, version, settings.tracker))
+    tracking.put_back(tracking.result_of(search, settings), layers, settings)
+    return True
+
+
+def _check_frames(run: StoredRun, frame: int, backwards_to: int | None) -> None:
+    record = run.record
+    if record.to_and_fro:
+        raise RunError(
+            f"Run '{run.name}' goes to and fro over its footage.", "Track the footage once instead."
+        )
+    with run.results() as results:
+        frames = results.frames()
+    if not frames:
+        raise RunError(f"Run '{run.name}' has no finished frame.", "Track it first, or begin a new run.")
+    latest = frames[-1] if backwards_to is not None else min(frames[-1] + 1, record.last - 1)
+    if not frames[0] <= frame <= latest:
+        raise RunError(
+            f"Frame {frame} of run '{run.name}' cannot be corrected.",
+            f"Choose a frame from {frames[0]} to {latest}.",
+        )
+    if backwards_to is None:
+        return
+    if not record.first <= backwards_to < frame:
+        raise RunError(
+            f"The frames from {frame} back to {backwards_to} are not in run '{run.name}'.",
+            f"Go back to a frame from {record.first} to {frame - 1}.",
+        )
+    missing = sorted(set(range(backwards_to, frame + 1)) - set(frames))
+    if missing:
+        raise RunError(
+            f"Frame {missing[0]} of run '{run.name}' was dropped, so the run cannot be tracked back over it.",
+            "Go back to a later frame, or track the footage again without dropping frames.",
+        )
+
+
+def _new_folder(run: StoredRun, record: RunRecord, last: int | None) -> StoredRun:
+    """The corrected run's folder with the old one's snapshots and its frames before `last`; whole or not at all."""
+    place = run.folder.parent / checked_name(record.name, "run")
+    folder = atomic_files.new_folder_beside(place)
+    try:
+        for part in (CAMERAS_NAME, BEHAVIOUR_NAME):
+            if (run.folder / part).exists():
+                atomic_files.copy_file(run.folder / part, folder / part)
+        if (run.folder / BODY_FOLDER).is_dir():
+            shutil.copytree(run.folder / BODY_FOLDER, folder / BODY_FOLDER)
+        create_store(folder)
+        copy_frames(run.folder, folder, last)
+        write_run_record(folder, record)
+        atomic_files.move_into_place(folder, Path(place))
+    except FileExistsError:
+        raise SessionError(f"Session has a run '{record.name}' already.", "Choose another name.") from None
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+    return StoredRun(place)

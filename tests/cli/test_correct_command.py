@@ -1,0 +1,58 @@
+"""`studio correct`, forwards and backwards."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from toy_session import true_poses
+
+from studio.cli.main import main
+from studio.sessions.named_rows import write_pose
+from studio.sessions.session import Session
+
+
+@pytest.fixture
+def pose(session_on_disk: Session, tmp_path: Path) -> str:
+    """A file with the true pose of frame 4, and a run to be corrected."""
+    file = tmp_path / "pose.csv"
+    write_pose(file, tuple(entry.name for entry in session_on_disk.body().parameters), true_poses()[4])
+    words = ["track", "toy", "--particles", "20", "--layers", "3", "--name", "one", "--start-pose", str(file)]
+    told = CliRunner().invoke(main, words)
+    assert told.exit_code == 0, told.output
+    return str(file)
+
+
+def invoke(*words: str) -> dict[str, object]:
+    told = CliRunner().invoke(main, ["correct", "toy", "one", *words, "--json"])
+    assert told.exit_code == 0, told.output
+    return json.loads(told.stdout)
+
+
+def test_on_and_back(session_on_disk: Session, pose: str) -> None:
+    told = invoke("--at", "4", "--pose", pose, "--name", "on")
+    assert (told["run"], told["made_from"], told["corrected"], told["frames"]) == ("on", "one", 4, 4)
+    assert session_on_disk.run("on").summary().status == "finished"
+    told = invoke("--at", "4", "--from-track", "raw", "--back-to", "1", "--name", "back")
+    assert (told["frames"], told["back_to"]) == (4, 1)
+    record = session_on_disk.run("back").record
+    with session_on_disk.run("one").results() as results:
+        frames, poses = results.poses()
+    assert np.allclose(record.corrected_pose or (), poses[list(frames).index(4)])
+
+
+@pytest.mark.parametrize(
+    ("words", "cause"),
+    [
+        (["--at", "4"], "needs a pose"),
+        (["--at", "4", "--from-track", "smoothed"], "no track 'smoothed'"),
+        (["--at", "44", "--from-track", "raw"], "has no frame 44"),
+        (["--at", "4", "--from-track", "raw", "--back-to", "6"], "frames from 4 back to 6"),
+    ],
+)
+def test_refusals(session_on_disk: Session, pose: str, words: list[str], cause: str) -> None:
+    told = CliRunner().invoke(main, ["correct", "toy", "one", *words])
+    assert told.exit_code == 2
+    assert cause in " ".join(told.stderr.split())
+    assert len(session_on_disk.runs()) == 1
