@@ -16,12 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.capture.footage_source import CameraSource, FootageSource
-from studio.capture.pictures import PictureReader
+from studio.capture.pictures import PictureReader, read_picture
 from studio.capture.video import VideoReader
 from studio.errors import FootageError, NotFoundError
 
 Bytes = NDArray[np.uint8]
 
+EXCLUSIONS = "exclusions"
+"""Folder of a session with a painted picture a camera."""
 KEPT_BYTES = 24_000_000
 """Pictures kept for each camera: eight of 1920x1080/2, twenty-six of 640x480."""
 MASK_LEVEL = 127
@@ -93,6 +95,24 @@ class Footage:
         """The plate picture or empty clip of a camera, if there is one."""
         entry = self._by_name[camera].background
         return self.folder / entry if entry else None
+
+    def exclusion(self, camera: str) -> Bytes | None:
+        """(H, W) uint8, 255 where nothing that a camera sees counts, None where all does: `exclusions/<camera>.png`.
+
+        Raises FootageError for a picture of another size.
+        """
+        path = self.folder / EXCLUSIONS / f"{camera}.png"
+        if not path.exists():
+            return None
+        picture = read_picture(path)
+        source = self._by_name[camera]
+        if picture.shape[:2] != (source.height, source.width):
+            raise FootageError(
+                f"The exclusion of camera {camera} is {picture.shape[1]}x{picture.shape[0]} pixels, the footage"
+                f" {source.width}x{source.height}.",
+                f"Paint it anew, or remove '{EXCLUSIONS}/{path.name}'.",
+            )
+        return thresholded_mask(picture)
 
     def turned_background(self, camera: str, picture: Bytes) -> Bytes:
         """A background picture of a camera (H, W, 3), turned as its footage is, unless it was turned already."""

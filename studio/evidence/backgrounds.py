@@ -45,6 +45,7 @@ class Backgrounds:
         self._footage = footage
         self._fitted: dict[tuple[str, FittedKind], BackgroundModel] = {}
         self._yuv: dict[tuple[str, float], YuvBackground] = {}
+        self._exclusions: dict[str, Bytes | None] = {}
         self._locks = {camera: threading.Lock() for camera in footage.cameras}
 
     def model(self, camera: str, kind: FittedKind) -> BackgroundModel:
@@ -58,6 +59,13 @@ class Backgrounds:
                 found = self._fit(camera, kind)
                 self._fitted[camera, kind] = found
             return found
+
+    def exclusion(self, camera: str) -> Bytes | None:
+        """(H, W) uint8, 255 where evidence does not count, None where all does. Raises FootageError."""
+        with self._locks[camera]:
+            if camera not in self._exclusions:
+                self._exclusions[camera] = self._footage.exclusion(camera)
+            return self._exclusions[camera]
 
     def combined(self, camera: str) -> tuple[GaussianBackground, NDArray[np.bool_]]:
         """Plate (or clip) and footage combined, and where (H, W) that is doubtful; without a plate everywhere."""

@@ -64,6 +64,9 @@ class EvidenceMaker:
             background = self._backgrounds.yuv(camera, self.settings.hull_noise)
             return ViewEvidence(camera, picture, nothing, nothing, background)
         mask = self._mask(camera, frame, picture)
+        excluded = self._backgrounds.exclusion(camera)
+        if excluded is not None:
+            mask = np.where(excluded > 0, np.uint8(0), mask)
         return ViewEvidence(camera, picture, mask, self._edges(picture, mask))
 
     def _from_pixels(self) -> bool:
@@ -71,7 +74,9 @@ class EvidenceMaker:
         if self.settings.hull_evidence != "auto":
             return self.settings.hull_evidence == "pixels"
         return self.settings.background_model in ("auto", "gaussian") and all(
-            self._footage.background_path(camera) is not None and not self._footage.has_masks(camera)
+            self._footage.background_path(camera) is not None
+            and not self._footage.has_masks(camera)
+            and self._backgrounds.exclusion(camera) is None
             for camera in self.cameras
         )
 

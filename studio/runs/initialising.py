@@ -20,10 +20,11 @@ from studio.geometry.camera import Camera
 from studio.runs.behaviour_models import fitting, model_folders, model_path
 from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import parameter_names, search_space, session_sigma
+from studio.runs.session_settings import session_settings
 from studio.sessions.named_rows import write_pose
 from studio.sessions.names import free_name
 from studio.sessions.session import START_POSE_NAME, Session
-from studio.settings import DEFAULT_TRACKER, RunSettings, default_settings
+from studio.settings import DEFAULT_TRACKER, RunSettings
 from studio.tracking.initialisation import PER_FAMILY, THOROUGH, Effort, FoundStart, StartSearch
 from studio.tracking.loss_detection import Onlooker, anything_seen
 from studio.tracking.start_candidates import facing, start_candidates
@@ -103,7 +104,7 @@ def initialise(
     """
     tree = body or session.body()
     tell = _watched(progress, cancelled)
-    settings = default_settings(DEFAULT_TRACKER, weighting)
+    settings = session_settings(session, DEFAULT_TRACKER, weighting)
     prototypes = None
     if behaviour:
         model = read_model(model_path(model_folders(session), behaviour))
@@ -112,7 +113,7 @@ def initialise(
     try:
         tell("looking at the frame", 0, 1)
         evidence = problems.evidence(frame, settings)
-        masks = problems.evidence(frame, default_settings(DEFAULT_TRACKER, WEIGHTING))
+        masks = problems.evidence(frame, session_settings(session, DEFAULT_TRACKER, WEIGHTING))
         cameras = problems.cameras
     finally:
         problems.close()

@@ -21,11 +21,12 @@ from studio.runs.behaviour_models import chosen_model
 from studio.runs.initialising import InitialPose, Progress, initialise
 from studio.runs.live_request import check_live, live_changes
 from studio.runs.search_space import parameter_names, session_sigma
+from studio.runs.session_settings import session_settings
 from studio.sessions.manifest import now
 from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session, free_run_name
 from studio.sessions.stored_run import StoredRun
-from studio.settings import DEFAULT_TRACKER, changed_settings, default_settings, usual_weighting, values
+from studio.settings import DEFAULT_TRACKER, usual_weighting, values
 
 Array = NDArray[np.float64]
 
@@ -72,7 +73,7 @@ def prepare_run(
     tracker = asked.tracker or session.manifest.tracker or DEFAULT_TRACKER
     weighting = asked.weighting or session.manifest.weighting or usual_weighting(tracker)
     changes = live_changes(asked.changes) if asked.live else asked.changes
-    settings = changed_settings(default_settings(tracker, weighting), changes)
+    settings = session_settings(session, tracker, weighting, changes)
     check_live(settings, live=asked.live, to_and_fro=asked.to_and_fro)
     first, last = checked_frames(session, asked.first, asked.last, endless=asked.to_and_fro)
     if not 0 <= asked.seed < 2**63:

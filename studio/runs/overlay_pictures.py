@@ -28,9 +28,10 @@ from studio.geometry.projection import project
 from studio.runs.colour_tokens import colour_tokens
 from studio.runs.marker_lines import marker_links
 from studio.runs.overlay_drawing import NO_MARKS, OVERLAYS, ViewMarks, draw_view, upright
+from studio.runs.session_settings import session_settings
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.settings import RunSettings, default_settings, settings_from_values
+from studio.settings import RunSettings, settings_from_values
 from studio.tracking.tracker import LayerRecord
 from studio.weighting.catalogue import WEIGHTINGS
 from studio.weighting.overlay import overlay_points
@@ -53,7 +54,7 @@ class ViewComposer:
         self.cameras: dict[str, Camera] = {camera.name: camera for camera in session.cameras()}
         self._footage: Footage = session.footage()
         self._backgrounds = Backgrounds(self._footage)
-        self._settings = settings or _settings_of(run)
+        self._settings = settings or _settings_of(session, run)
         self._truth = _truth_of(session)
         self._lock = threading.RLock()
 
@@ -176,7 +177,7 @@ def compose_view(
     the run's, for masks and samples in the making. Raises StudioError for what does not exist.
     """
     composer = _composer(session, run)
-    composer.use(settings or _settings_of(run))
+    composer.use(settings or _settings_of(session, run))
     if camera not in composer.cameras:
         raise NotFoundError(
             f"There is no camera '{camera}' in this session.", f"It has {', '.join(composer.cameras)}."
@@ -216,9 +217,9 @@ def _composer(session: Session, run: StoredRun | None) -> ViewComposer:
         return _composers[key]
 
 
-def _settings_of(run: StoredRun | None) -> RunSettings:
+def _settings_of(session: Session, run: StoredRun | None) -> RunSettings:
     if run is None:
-        return default_settings()
+        return session_settings(session)
     with run.results() as results:
         history = results.settings_history()
     values: Mapping[str, object] = history[-1].values if history else run.record.settings

@@ -28,8 +28,9 @@ from studio.weighting.shape_silhouettes import POSES, ShapeSilhouettes
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
-SHARPNESS = 400.0
-"""Log weight of one frame's f_s from 0 to 1: a hundredth more in each of five frames makes a shape e^20 as likely."""
+SHARPNESS = 250.0
+"""Log weight of one frame's f_s from 0 to 1. A person is no set of cones: a hundredth more in f_s may be a fold of
+cloth, so it may not outweigh what is known of people's proportions (in each of five frames: e^12.5)."""
 RIDGE = 0.02
 """How dear a move of a pose parameter is when poses are carried along, as a share of the Jacobian's size."""
 KEPT = 0.25
@@ -48,7 +49,7 @@ class ShapeSearchSettings:
     particles: int = 24
     layers: int = 60
     survival: float = 0.4
-    length_spread: float = 0.06
+    length_spread: float = 0.08
     radius_spread: float = 0.15
     height_spread: float = 15.0
     pose_steps: int = 2
@@ -103,12 +104,7 @@ class ShapeSearch:
         self._rng = np.random.default_rng(np.random.SeedSequence((seed, 0x5AB)))
         self._progress = progress
         self._space: ShapeSpace = silhouettes.programs.space
-        self._sigma = np.array(
-            [
-                self._settings.length_spread if group.kind == "length" else self._settings.radius_spread
-                for group in self._space.groups
-            ]
-        )
+        self._sigma = prior_spread(self._space, self._settings)
         self._height = height
         self._own_height, self._height_slope = _height_of(self._space)
         self.evaluations = 0
@@ -185,7 +181,7 @@ class ShapeSearch:
     def _improve(self, now: _Population, heat: float) -> None:
         """Replace each pose by the best of sixteen around it."""
         rng = self._rng
-        count, frames, size = now.poses.shape
+        count, frames, _ = now.poses.shape
         tried = np.repeat(now.poses[:, :, None], POSES, axis=2)
         scale = 10.0 ** rng.uniform(-1.7, -0.7 + 0.7 * heat, (count, frames, POSES, 1))
         noise = rng.normal(size=tried.shape) * self._spread * scale
@@ -246,6 +242,12 @@ class ShapeSearch:
         )
 
 
+def prior_spread(space: ShapeSpace, settings: ShapeSearchSettings) -> Array:
+    """(S,) the prior's standard deviations."""
+    spread = {"length": settings.length_spread, "radius": settings.radius_spread}
+    return np.array([spread[group.kind] for group in space.groups])
+
+
 def tempered(log_weights: Array, survival: float) -> Array:
     """(M,) normalised weights w^β with β in 0..1 such that the survival rate 1 / (M Σ w²) is the wanted one, where β
     ≤ 1 reaches it (Deutscher & Reid 2005, Eqs. 11, 12).
@@ -270,11 +272,11 @@ def _normalised(log_weights: Array) -> Array:
 
 
 def _height_of(space: ShapeSpace) -> tuple[float, Array]:
-    """The standing body's height, mm, and its slope (S,) over the shape."""
+    """The height of the rest pose (which stands on the floor), mm, and its slope (S,) over the shape."""
 
     def height(shape: Array) -> float:
         body = space.body_of(shape)
-        return float(np.ptp(limb_ends(body, body.neutral)[0, ..., 2]))
+        return float(limb_ends(body, body.neutral)[0, ..., 2].max())
 
     size = len(space.groups)
     own = height(np.zeros(size))

@@ -2,11 +2,13 @@
 
 from typing import Annotated
 
+import msgspec
 from fastapi import APIRouter, Query, Response
 
-from studio.errors import NotFoundError
+from studio.errors import NotFoundError, SettingsError
 from studio.runs.overlay_drawing import encode_jpeg
 from studio.runs.overlay_pictures import compose_view
+from studio.runs.session_settings import session_settings
 from studio.sessions.session import Session
 from studio.web.run_routes import RUN, OpenRun
 from studio.web.session_routes import OpenSession
@@ -21,14 +23,27 @@ Show = Annotated[
     str, Query(max_length=200, description="outline, truth, mask, edges, samples, particles; with commas.")
 ]
 
+Knobs = Annotated[
+    str, Query(max_length=4000, description='Knobs as a JSON object, such as {"mask_threshold": 6}.')
+]
+
 
 @router.get("/sessions/{session}" + VIEW, response_class=Response)
 def picture(
-    session: OpenSession, frame: int, camera: str, show: Show = "", height: Height = None
+    session: OpenSession,
+    frame: int,
+    camera: str,
+    show: Show = "",
+    height: Height = None,
+    settings: Knobs = "",
 ) -> Response:
-    """What a camera saw in a frame; without a run, masks and edges are made with the default settings."""
+    """What a camera saw in a frame; without a run, masks and edges are made with the session's settings, and with
+    `settings` instead of these where given: a preview that changes nothing.
+    """
     _check_view(session, frame, camera)
-    return _jpeg(encode_jpeg(compose_view(session, None, frame, camera, _layers(show), height=height)))
+    wanted = session_settings(session, changes=knob_changes(settings))
+    picture = compose_view(session, None, frame, camera, _layers(show), height=height, settings=wanted)
+    return _jpeg(encode_jpeg(picture))
 
 
 @router.get(RUN + VIEW, response_class=Response)
@@ -43,6 +58,18 @@ def overlay(
     """What a camera saw in a frame, with the run's answer and evidence over it at choice."""
     _check_view(session, frame, camera)
     return _jpeg(encode_jpeg(compose_view(session, run, frame, camera, _layers(show), height=height)))
+
+
+def knob_changes(text: str) -> dict[str, object]:
+    """The knobs of a JSON object. Raises SettingsError for anything else."""
+    if not text:
+        return {}
+    try:
+        return msgspec.json.decode(text, type=dict[str, bool | int | float | str])
+    except msgspec.DecodeError:
+        raise SettingsError(
+            "The settings are no JSON object of knobs.", 'Write them like {"mask_threshold": 6}.'
+        ) from None
 
 
 def _layers(show: str) -> tuple[str, ...]:

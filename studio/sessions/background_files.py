@@ -1,0 +1,169 @@
+"""What a session knows of its empty room: backgrounds a camera, excluded regions, and how masks are made.
+
+    background/…                 plates and clips; the manifest names the one in use
+    exclusions/<camera>.png      white where nothing counts: a bystander, a monitor
+    evidence.json                knobs of `evidence.settings` that new runs of the session start with, and the backgrounds
+                                 as they were given, where cleaned ones are in use
+"""
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+
+import cv2
+import msgspec
+import numpy as np
+
+from studio.capture.footage import EXCLUSIONS, background_turn
+from studio.capture.footage_source import CameraSource
+from studio.capture.pictures import is_picture, read_picture
+from studio.capture.video import measure_video
+from studio.errors import FootageError, NotFoundError
+from studio.evidence.backgrounds import check_plate_size
+from studio.sessions import atomic_files
+from studio.sessions.record_files import read_record, write_record
+from studio.sessions.session import Session, described_anew
+
+EVIDENCE_NAME, BACKGROUND_NAME = "evidence.json", "background"
+SCHEMA_VERSION = 1
+MOST_BYTES = 40_000_000
+
+Knob = bool | int | float | str
+
+
+class SessionEvidence(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """knobs : by flat name. given : camera to the background as it was given, where a cleaned one is in use."""
+
+    schema: int = SCHEMA_VERSION
+    knobs: dict[str, Knob] = {}
+    given: dict[str, str] = {}
+
+
+def read_evidence(session: Session) -> SessionEvidence:
+    """How masks of a session are made; nothing special where nobody said. Raises SessionError for a damaged file."""
+    if not (session.path / EVIDENCE_NAME).exists():
+        return SessionEvidence()
+    return read_record(
+        session.path / EVIDENCE_NAME,
+        SessionEvidence,
+        SCHEMA_VERSION,
+        missing=(f"Session '{session.name}' has no {EVIDENCE_NAME}.", "Set its background again."),
+    )
+
+
+def write_evidence(session: Session, evidence: SessionEvidence) -> None:
+    """Keep how masks of a session are made."""
+    write_record(session.path / EVIDENCE_NAME, evidence)
+
+
+def set_backgrounds(session: Session, files: Mapping[str, Path]) -> Session:
+    """Take over pictures or clips of the empty room, by camera; they are copied into the session.
+
+    Returns the session with its new manifest. Raises NotFoundError for a camera or file that is not there, FootageError
+    for one of another size.
+    """
+    for camera, path in files.items():
+        source = _source(session, camera)
+        if not path.is_file():
+            raise NotFoundError(f"There is no file '{path}'.", "Give a picture or a video of the empty room.")
+        size = (source.width, source.height)
+        if is_picture(path):
+            picture = read_picture(path)
+            given = (picture.shape[1], picture.shape[0])
+        else:
+            video = measure_video(path)
+            given = (video.width, video.height)
+        if background_turn(source.turned, size, given) % 180:
+            given = given[::-1]
+        check_plate_size(given, size, path.name)
+    folder = session.path / BACKGROUND_NAME
+    folder.mkdir(exist_ok=True)
+    names = {}
+    for camera, path in files.items():
+        place = folder / f"{camera}{path.suffix.lower()}"
+        if place.resolve() != path.resolve():
+            atomic_files.copy_file(path, place)
+        names[camera] = place.relative_to(session.path).as_posix()
+    evidence = read_evidence(session)
+    kept = {camera: name for camera, name in evidence.given.items() if camera not in names}
+    write_evidence(session, msgspec.structs.replace(evidence, given=kept))
+    return use_backgrounds(session, names)
+
+
+def use_backgrounds(session: Session, names: Mapping[str, str]) -> Session:
+    """The session with other backgrounds in its manifest: camera to a path within the session, "" for none."""
+    footage = session.manifest.footage
+    cameras = tuple(
+        dataclasses.replace(source, background=names.get(source.name, source.background))
+        for source in footage.cameras
+    )
+    changed = dataclasses.replace(footage, cameras=cameras)
+    return described_anew(session, msgspec.structs.replace(session.manifest, footage=changed))
+
+
+def set_exclusion(session: Session, camera: str, content: bytes) -> int:
+    """Keep a painted picture (PNG or other) of what does not count; nothing painted removes it. Returns the pixels.
+
+    Raises FootageError for what is no picture, or one of another size than the footage.
+    """
+    source = _source(session, camera)
+    path = session.path / EXCLUSIONS / f"{camera}.png"
+    if not content:
+        path.unlink(missing_ok=True)
+        return 0
+    picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED) if len(content) <= MOST_BYTES else None
+    if picture is None:
+        raise FootageError("The exclusion is no picture that can be read.", "Give a PNG of the footage's size.")
+    painted = _painted(picture)
+    if painted.shape != (source.height, source.width):
+        raise FootageError(
+            f"The exclusion is {painted.shape[1]}x{painted.shape[0]} pixels, camera {camera}"
+            f" {source.width}x{source.height}.",
+            "Give a PNG of the footage's size.",
+        )
+    count = int(np.count_nonzero(painted))
+    if not count:
+        path.unlink(missing_ok=True)
+        return 0
+    path.parent.mkdir(exist_ok=True)
+    written, encoded = cv2.imencode(".png", painted)
+    if not written:
+        raise FootageError("The exclusion could not be written.", "Give it as a PNG of 8 bits.")
+    atomic_files.write_bytes(path, encoded.tobytes())
+    return count
+
+
+def polygon_exclusion(session: Session, camera: str, corners: np.ndarray) -> int:
+    """Add a polygon (K, 2) of pixels to what does not count. Returns the pixels of all. Raises NotFoundError."""
+    source = _source(session, camera)
+    path = session.path / EXCLUSIONS / f"{camera}.png"
+    painted = np.zeros((source.height, source.width), np.uint8)
+    if path.exists():
+        painted = _painted(read_picture(path)).copy()
+    cv2.fillPoly(painted, [np.rint(corners).astype(np.int32)], 255)
+    return set_exclusion(session, camera, cv2.imencode(".png", painted)[1].tobytes())
+
+
+def exclusion_path(session: Session, camera: str) -> Path | None:
+    """The painted picture of a camera, if there is one. Raises NotFoundError for a camera that is not there."""
+    path = session.path / EXCLUSIONS / f"{_source(session, camera).name}.png"
+    return path if path.exists() else None
+
+
+def _painted(picture: np.ndarray) -> np.ndarray:
+    """(H, W) uint8, 255 where something was painted: the alpha where it says anything, else the brightest colour."""
+    if picture.ndim == 3 and picture.shape[2] == 4 and (picture[..., 3] < 255).any():
+        level = picture[..., 3]
+    else:
+        level = picture[..., :3].max(axis=2) if picture.ndim == 3 else picture
+    return np.where(level > 0.5 * np.iinfo(picture.dtype).max, np.uint8(255), np.uint8(0))
+
+
+def _source(session: Session, camera: str) -> CameraSource:
+    """The footage of a camera. Raises NotFoundError."""
+    sources = {source.name: source for source in session.manifest.footage.cameras}
+    if camera not in sources:
+        raise NotFoundError(
+            f"Session '{session.name}' has no camera '{camera[:64]}'.", f"It has {', '.join(sources)}."
+        )
+    return sources[camera]
