@@ -101,7 +101,7 @@ class StoredRun:
         with self.results() as results:
             frames, ended = results.frames(), results.ended()
         done = len(frames)
-        if done >= record.frame_count:
+        if done >= record.frame_count or ended == "finished":
             status = "finished"
         elif self.being_tracked():
             status = "tracking"
