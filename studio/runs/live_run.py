@@ -87,8 +87,10 @@ class LiveRun(TrackingRun):
         self._writer.mark_ended(OVER)
 
     def when_stored(self, action: Callable[[], None]) -> None:
-        """Do something once all that is finished is stored; in the thread that stores."""
+        """Do something once all that is finished is stored: in the thread that stores, at the run's end at once."""
         self._behind.do(action)
+        if self.finished:
+            self._behind.wait()
 
     def save(self) -> None:
         """As `TrackingRun.save`, with everything stored that waits to be."""
