@@ -19,7 +19,9 @@ from studio.sessions.workspace import Workspace
 BOARD_HELP = (
     "charuco:5x7,40,30 (squares, square mm, marker mm[, dictionary]) or chessboard:4x7,60 (inner corners)."
 )
-FLOOR_HELP = "frame:N with the board on the floor, a folder of pictures of it lying there, or a .json of clicked points."
+FLOOR_HELP = (
+    "frame:N with the board on the floor, a folder of pictures of that, or a .json of clicked points."
+)
 TO_HELP = "The calibration to write; default: calibration/cameras.toml in the session or folder."
 
 
@@ -65,8 +67,8 @@ def calibrate_command(
 ) -> dict[str, object]:
     """Solve cameras from footage of a printed board: lenses, places, floor.
 
-    SESSION_OR_FOLDER holds intrinsics/ and extrinsics/ (or they are named by the options): one video or folder of pictures
-    a camera, named after the cameras. Beside the calibration lie its report (JSON) and a coverage picture a camera.
+    SESSION_OR_FOLDER holds intrinsics/ and extrinsics/ (or they are named by the options): one video or folder of
+    pictures a camera, named after the cameras. Beside the calibration lie its report (JSON) and coverage pictures.
     """
     board = board_from_text(board_text, thickness)
     folder, session = _source(source)

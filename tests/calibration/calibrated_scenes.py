@@ -68,7 +68,9 @@ def seen(
     return found
 
 
-def waved(board: Board, cameras: tuple[Camera, ...], each: int = 10, seed: int = 1) -> tuple[Array, list[Sighting]]:
+def waved(
+    board: Board, cameras: tuple[Camera, ...], each: int = 10, seed: int = 1
+) -> tuple[Array, list[Sighting]]:
     """Boards waved about, `each` times the number of cameras, and what was seen."""
     poses = waved_boards(np.random.default_rng(seed), board, cameras, each * len(cameras))
     return poses, seen(board, cameras, poses)
@@ -82,7 +84,9 @@ def true_lens(camera: Camera) -> Lens:
     )
 
 
-def person_masks(cameras: tuple[Camera, ...], frames: int = 6, seed: int = 5) -> dict[int, dict[str, NDArray]]:
+def person_masks(
+    cameras: tuple[Camera, ...], frames: int = 6, seed: int = 5
+) -> dict[int, dict[str, NDArray]]:
     """Silhouettes of a lopsided person of 1800 mm walking about: one arm out, a leg apart."""
     rng = np.random.default_rng(seed)
     limbs = np.array(
