@@ -36,4 +36,8 @@ def write_cameras(task: ExportTask) -> Written:
     apart_mm = max(float(np.linalg.norm(camera.centre - read[camera.name].centre)) for camera in cameras)
     turned = max(turned_apart(camera.rotation[None], read[camera.name].rotation[None]) for camera in cameras)
     checked = agreed(task.place, apart_mm, turned)
-    return Written(tuple(written.files), f"{len(cameras)} {'camera' if len(cameras) == 1 else 'cameras'}, {checked}", tuple(written.notes))
+    return Written(
+        tuple(written.files),
+        f"{len(cameras)} {'camera' if len(cameras) == 1 else 'cameras'}, {checked}",
+        tuple(written.notes),
+    )

@@ -148,8 +148,8 @@ def _between(body: BodyModel, places: Array, poses: Array, wanted: Array) -> tup
 def _gap_notes(missing: int, far: int) -> tuple[str, ...]:
     if not missing:
         return ()
-    plural = "frame has" if missing == 1 else "frames have"
-    note = f"{missing} {plural} no pose of its own (not tracked, or lost)."
+    which = "1 frame has no pose of its" if missing == 1 else f"{missing} frames have no pose of their"
+    note = f"{which} own (not tracked, or lost)."
     return (note, _far_note(far)) if far else (note,)
 
 
