@@ -13,6 +13,7 @@ from studio.knobs import Value
 from studio.scene.panel import Panel, tell
 from studio.scene.playback import stepped
 from studio.scene.presenter import Presenter
+from studio.scene.proposal import Proposal
 from studio.scene.scene_state import SceneState
 from studio.scene.view_options import Shown
 from studio.scene.wishes import Control, Wishes
@@ -124,9 +125,13 @@ class Director:
         self.wishes.make_current(run.opened.session.path, run.opened.run.folder)
         self.wishes.reanneal(frame)
 
-    def edit_pose(self, pose: Array | None, found: str = "") -> None:
-        """Show a start pose under the sliders; None ends it. found : what is said of one that was found."""
-        self._presenter.post(lambda: self.state.edit_pose(pose, found))
+    def edit_pose(self, pose: Array | None) -> None:
+        """Show a start pose under the sliders; None ends it."""
+        self._presenter.post(lambda: self.state.edit_pose(pose))
+
+    def propose(self, proposal: Proposal) -> None:
+        """Show a start pose that was found, in its session and frame."""
+        self._presenter.post(lambda: self.state.propose(proposal))
 
     def save_pose(self, pose: Array) -> None:
         """Store a start pose for the session."""

@@ -111,9 +111,11 @@ class RunPanel:
         self.progress.animated = bool(state and state.state in ("tracking", "compiling"))
         self.progress.value = min(100.0, 100.0 * state.done / total) if state else 0.0
 
-    def show_mark(self, tracking: str, tokens: ColourTokens) -> None:
-        """Say how the shown frame went, where it did not simply go on."""
+    def show_mark(self, tracking: str, tokens: ColourTokens, found: str = "") -> None:
+        """Say how the shown frame went, where it did not simply go on. found : of a start pose shown instead."""
         content = mark_html(tracking, tokens) if tracking in MARKS else ""
+        if found:
+            content = words_html("start pose", found, tokens["good"])
         if self.mark.content != content:
             self.mark.content = content
         if self.mark.visible != bool(content):
@@ -240,11 +242,16 @@ def status_html(state: StateChanged | None) -> str:
 def mark_html(tracking: str, tokens: ColourTokens) -> str:
     """How a frame went, in the colour of its mark on the timeline."""
     token, words = MARKS[tracking]
-    colour = "#{:02x}{:02x}{:02x}".format(*tokens[token])
+    return words_html(tracking, words, tokens[token])
+
+
+def words_html(title: str, words: str, rgb: tuple[int, int, int]) -> str:
+    """A dot in a colour, a title and words."""
+    colour = "#{:02x}{:02x}{:02x}".format(*rgb)
     return (
         '<div style="padding:0 10px 4px;font-size:12px;display:flex;gap:6px;align-items:baseline">'
         f'<span style="flex:none;width:9px;height:9px;border-radius:50%;background:{colour}"></span>'
-        f"<span><b>{escape(tracking)}</b>: {escape(words)}</span></div>"
+        f"<span><b>{escape(title)}</b>: {escape(words)}</span></div>"
     )
 
 

@@ -15,6 +15,7 @@ from studio.scene.panel import Panel, dress, tell
 from studio.scene.playback import nearest
 from studio.scene.player import Player
 from studio.scene.presenter import Presenter
+from studio.scene.proposal import Proposal
 from studio.scene.scene_drawing import SceneDrawing
 from studio.scene.shown_run import ShownRun
 from studio.scene.view_options import Shown, ViewOptions
@@ -48,6 +49,7 @@ class SceneState:
         self.live = LiveSearch()
         self.run: ShownRun | None = None
         self._edited: Array | None = None
+        self._proposal: Proposal | None = None
         self._dress()
 
     def attach(self, panel: Panel, presenter: Presenter) -> None:
@@ -87,6 +89,7 @@ class SceneState:
         self._panel.pose.show_body(opened.body, opened.start_pose())
         self._follow_shown()
         self._show_state()
+        self._show_proposal()
         if opened.truth_problem:
             tell(self._server, "The truth cannot be shown", opened.truth_problem, bad=True)
 
@@ -148,24 +151,41 @@ class SceneState:
             self._dress()
         self._presenter.redraw()
 
-    def edit_pose(self, pose: Array | None, found: str = "") -> None:
-        """Show a start pose being edited; None ends it.
-
-        found : what is said of a pose that was found; it is shown if it is one of the body that is shown.
-        """
-        if found and pose is not None:
-            tell(self._server, "Start pose found", found)
-            if self.run is None or len(self.run.opened.body.parameters) != len(pose):
-                return
-            self._panel.pose.propose(pose)
+    def edit_pose(self, pose: Array | None) -> None:
+        """Show a start pose being edited; None ends it, and what was found is left."""
         self._edited = pose
+        if pose is None:
+            self._proposal = None
         self._presenter.redraw()
+
+    def propose(self, proposal: Proposal) -> None:
+        """Show a start pose that was found, if it is one of the body that is shown. It stays when another run of its
+        session is opened, until a person saves it or ends the editing.
+        """
+        tell(self._server, "Start pose found", proposal.said)
+        self._proposal = proposal
+        if self.shown.session != proposal.session:
+            self._open(proposal.session, "")
+        else:
+            self._show_proposal()
+
+    def _show_proposal(self) -> None:
+        found, run = self._proposal, self.run
+        if found is None or run is None or run.opened.session.name != found.session:
+            self._proposal = None
+            return
+        if len(run.opened.body.parameters) == len(found.pose):
+            self._panel.pose.propose(found.pose)
+            self._edited = found.pose
+            self.show_frame(found.frame, True)
+            self._presenter.redraw()
 
     def save_pose(self, pose: Array) -> None:
         """Store a start pose for the session."""
         if self.run is None:
             return
         self.run.save_start_pose(pose)
+        self._proposal = None
         self._panel.pose.saved()
         tell(self._server, "Start pose saved", "Runs that are started from now on begin with it.")
 
@@ -242,7 +262,8 @@ class SceneState:
         moment = self.run.moment(self.shown.frame, self.live, self._edited)
         self.run.draw(moment, self.options, self.shown.layer)
         tokens = colour_tokens(self.options.dark)
-        self._panel.run.show_mark(moment.tracking, tokens)
+        found = self._proposal.said if self._proposal is not None and self._edited is not None else ""
+        self._panel.run.show_mark(moment.tracking, tokens, found)
         self._panel.show.show_legend(tokens, max(1, moment.layer_count), moment.truth is not None)
 
     def draw_pictures(self) -> None:

@@ -13,6 +13,7 @@ from studio.errors import SettingsError
 from studio.export.task import ExportTask, Written
 from studio.scene.director import Director
 from studio.scene.guarded_server import GuardedServer
+from studio.scene.proposal import Proposal
 from studio.scene.recording import record_scene
 from studio.scene.view_options import Shown, ViewOptions
 from studio.scene.wishes import Control
@@ -75,13 +76,12 @@ class SceneStage:
         if self._director is not None:
             self._director.show_run(session, run, frame, layer)
 
-    def propose_pose(self, session: str, pose: Sequence[float], said: str) -> None:
-        """Show a start pose (D,) that was found for a session; said : how sure it is, for the viewers."""
-        if self._director is None:
-            return
-        if self.shown.session != session:
-            self._director.show_run(session, "", None, None)
-        self._director.edit_pose(np.array(pose, dtype=np.float64), said)
+    def propose_pose(self, session: str, pose: Sequence[float], said: str, frame: int | None = None) -> None:
+        """Show a start pose (D,) that was found for a session. said : how sure it is, for the viewers. frame : that it
+        was found in.
+        """
+        if self._director is not None:
+            self._director.propose(Proposal(session, np.array(pose, dtype=np.float64), said, frame))
 
     def show_frame(self, frame: int) -> None:
         """Show a stored frame; where it is not stored the nearest one."""

@@ -315,9 +315,36 @@ def test_a_frame_that_did_not_simply_go_on_says_so(
         layers = [cloud_record(human, FRAMES - 1, layer) for layer in range(LAYERS)]
         result = dataclasses.replace(frame_result(human, FRAMES - 1), tracking=tracking)
         writer.write_frame(result, layers)
+    # The run that the tracking process has open was opened before there was that frame.
+    stage.show_run("")
+    until(lambda: stage.shown.session == "")
     open_run(stage)
     mark = stage._director.state._panel.run.mark  # pyright: ignore[reportOptionalMemberAccess]
     until(lambda: mark.visible and f"<b>{tracking}</b>" in mark.content)
     until(lambda: (drawing(stage).body.handles[0].opacity < 0.5) == faint)
     stage.show_frame(1)
     until(lambda: not mark.visible and drawing(stage).body.handles[0].opacity > 0.5)
+
+
+def test_a_start_pose_that_was_found_is_shown_with_its_confidence_until_it_is_left(
+    stage: SceneStage, human: BodyModel
+) -> None:
+    found = swaying_pose(human, 5)
+    stage.show_run("")
+    until(lambda: stage.shown.session == "")
+    stage.propose_pose("swaying", found.tolist(), "found in frame 2, confidence 92 %", 2)
+    until(lambda: stage.shown.session == "swaying" and body_stands_at(stage, human, found))
+    state = stage._director.state  # pyright: ignore[reportOptionalMemberAccess]
+    assert stage.shown.run == ""
+    assert stage.shown.frame == 2
+    until(lambda: "confidence 92 %" in state._panel.run.mark.content)
+    # The page opens a run of that session meanwhile: what was found is not lost over it.
+    stage.show_run("swaying", "run-1")
+    until(lambda: stage.shown.run == "run-1" and body_stands_at(stage, human, found))
+    assert stage.shown.frame == 2
+    stage._director.edit_pose(None)  # pyright: ignore[reportOptionalMemberAccess]
+    until(lambda: body_stands_at(stage, human, swaying_pose(human, 2)))
+    until(lambda: not state._panel.run.mark.visible)
+    stage.propose_pose("swaying", [0.0] * 4, "found in frame 1, confidence 50 %", 1)
+    stage.show_frame(3)
+    until(lambda: body_stands_at(stage, human, swaying_pose(human, 3)))

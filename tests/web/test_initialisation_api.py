@@ -84,6 +84,7 @@ def test_what_is_found_is_told_kept_and_shown(studio: Studio, session: Session, 
     assert isinstance(pose, tuple)
     assert np.allclose(pose, neutral + 0.25)
     assert "90 %" in str(shown[0][3])
+    assert shown[0][4] == 2
 
 
 def test_replacing_keeps_the_old_pose_beside_the_new_one(

@@ -100,8 +100,8 @@ class RecordingStage:
     ) -> None:
         self.calls.append(("run", session, run, frame, layer))
 
-    def propose_pose(self, session: str, pose: Sequence[float], said: str) -> None:
-        self.calls.append(("pose", session, tuple(pose), said))
+    def propose_pose(self, session: str, pose: Sequence[float], said: str, frame: int | None = None) -> None:
+        self.calls.append(("pose", session, tuple(pose), said, frame))
 
     def show_frame(self, frame: int) -> None:
         self.calls.append(("frame", frame))

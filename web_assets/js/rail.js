@@ -37,6 +37,12 @@ export function openSession(session, run) {
   document.body.classList.remove("rail-open");
 }
 
+/** Open a session without any of its runs. */
+export function openSessionAlone(session) {
+  set({ session, run: null, summary: null, detail: null, parameters: null, layerCount: null, settings: null, whatIf: null, frame: null, layer: null, follow: true });
+  document.body.classList.remove("rail-open");
+}
+
 function renameForm(what, path, name, open, done) {
   openForm({
     heading: `Rename ${what}`, action: "Rename", rows: [[{ name: "name", label: "Name", value: name, required: true, pattern: "[A-Za-z0-9_\\-]{1,64}", title: "Letters, digits, - and _, up to 64" }]],

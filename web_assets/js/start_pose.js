@@ -3,7 +3,7 @@
 import { fetchJson, post, remove, sessionPath } from "./api.js";
 import { openForm } from "./dialogs.js";
 import { say } from "./messages.js";
-import { openSession, refreshSessions } from "./rail.js";
+import { openSessionAlone, refreshSessions } from "./rail.js";
 
 const POLL_MILLISECONDS = 400;
 const UNSURE = 0.75;
@@ -49,7 +49,8 @@ export function startPoseForm(entry) {
     send: async (values, report) => {
       const found = await findStartPose(entry.name, { frame: Number(values.frame), replace: values.replace }, report);
       await refreshSessions();
-      openSession(entry.name);
+      // A run's frames would be shown over it.
+      openSessionAlone(entry.name);
       tellFound(found);
     },
   });
