@@ -124,7 +124,7 @@ class Stage(Protocol):
         """Show a session, a run of it, a frame, a layer's cloud."""
         ...
 
-    def propose_pose(self, session: str, pose: Sequence[float], said: str) -> None:
+    def propose_pose(self, session: str, pose: Sequence[float], said: str, frame: int | None = None) -> None:
         """Show a start pose that was found for a session, and what is said of it."""
         ...
 
