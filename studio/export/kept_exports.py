@@ -112,7 +112,7 @@ def _stem(session: Session, run: StoredRun, asked: Mapping[str, str | int | floa
     if asked.get("last"):
         parts.append(f"to{asked['last']}")
     return "-".join(
-        "".join(sign if sign.isalnum() or sign in "_." else "_" for sign in part) for part in parts if part
+        "".join(sign if sign.isalnum() or sign in "_.-" else "_" for sign in part) for part in parts if part
     )
 
 

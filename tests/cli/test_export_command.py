@@ -1,0 +1,87 @@
+"""`studio export`: files, JSON, exit codes, causes and remedies."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from store_records import layer_of, record_of, result_of
+
+from studio.cli.main import main
+from studio.runs.tracks import Track, write_track
+from studio.sessions.results_store import ResultsWriter
+from studio.sessions.session import Session
+
+FRAMES = 6
+
+
+@pytest.fixture
+def run(session_on_disk: Session) -> str:
+    """A run of the toy session with six frames, and a derived track of three."""
+    stored = session_on_disk.new_run(record_of(session_on_disk, "first"))
+    with ResultsWriter(stored.folder) as writer:
+        writer.write_settings(1, 0, 0, stored.record.settings)
+        for frame in range(FRAMES):
+            writer.write_frame(result_of(frame), [layer_of(frame, layer) for layer in range(3)], 2000)
+    short = Track("short", np.arange(3), np.zeros((3, 4)), np.full(3, np.nan), ("",) * 3, {"verb": "made"})
+    write_track(stored, short)
+    return "first"
+
+
+def export(*words: str):
+    return CliRunner().invoke(main, ["export", "toy", "first", *words])
+
+
+@pytest.mark.parametrize(
+    "ending", ["bvh", "glb", "trc", "c3d", "csv", "parquet", "npz", "mp4", "viser", "toml", "yml"]
+)
+def test_every_ending_is_written(run: str, tmp_path: Path, ending: str) -> None:
+    place = tmp_path / f"arm.{ending}"
+    done = export("--to", str(place), "--json")
+    assert done.exit_code == 0, done.output
+    told = json.loads(done.stdout)
+    assert told["files"] == [str(place)]
+    assert told["format"] == ending
+    assert told["frames"] == (0 if ending in ("toml", "yml") else FRAMES)
+    assert told["bytes"] == place.stat().st_size > 0
+    assert "read" in told["checked"]
+
+
+def test_options_reach_the_file(run: str, tmp_path: Path) -> None:
+    place = tmp_path / "arm.trc"
+    done = export("--to", str(place), "--unit", "mm", "--track", "short", "--first", "1", "--fps", "120")
+    assert done.exit_code == 0, done.output
+    assert "read back within" in done.stdout
+    header = dict(zip(*(line.split("\t") for line in place.read_text().splitlines()[1:3]), strict=True))
+    assert (header["Units"], header["NumFrames"], header["DataRate"]) == ("mm", "3", "120")
+    assert "Brought from 60 to 120 frames" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "cause"),
+    [
+        (("--to", "arm.fbx"), "There is no export to '.fbx'"),
+        (("--to", "arm.glb", "--unit", "m"), "means nothing to GLB"),
+        (("--to", "arm.bvh", "--track", "smooth"), "has no track 'smooth'"),
+        (("--to", "arm.bvh", "--first", "3", "--last", "2"), "No frame lies from 3"),
+        (("--to", "arm.mp4", "--camera", "left"), "There is no camera 'left'"),
+        (("--to", "arm.bvh", "--euler", "ABC"), "Invalid value for '--euler'"),
+    ],
+)
+def test_what_is_wrong_is_said_with_exit_code_2(
+    run: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], cause: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = export(*words)
+    assert done.exit_code == 2
+    assert cause in done.stderr
+    assert done.stdout == ""
+    assert list(tmp_path.glob("arm*")) == []
+
+
+def test_a_run_that_there_is_not(session_on_disk: Session, tmp_path: Path) -> None:
+    done = export("--to", str(tmp_path / "arm.bvh"))
+    assert done.exit_code == 2
+    assert "first" in done.stderr
+    assert "remedy" in done.stderr
