@@ -183,8 +183,10 @@ class _FrameRefiner:
         return self._problems.evidence(frame, settings), self._problems.problem(frame, settings)
 
 
-def _begun(run: StoredRun, source: str, into: str, replace: bool) -> Track:
-    """The track to start from, once it is known that the result may be kept."""
+def check_making(run: StoredRun, source: str, into: str, replace: bool) -> None:
+    """Refuse, before anything is done, a track that could not be kept. source : "" for the usual one. Raises RunError,
+    SessionError, NotFoundError.
+    """
     if checked_name(into, "track").lower() == RAW or into == source:
         raise RunError(
             f"Track '{into}' cannot be written over by what is made from it.", "Choose another --into."
@@ -197,6 +199,13 @@ def _begun(run: StoredRun, source: str, into: str, replace: bool) -> Track:
         raise RunError(
             f"Run '{run.name}' goes to and fro over its footage.", "Track the footage once instead."
         )
+    if source and source not in track_names(run):
+        read_track(run, source)
+
+
+def _begun(run: StoredRun, source: str, into: str, replace: bool) -> Track:
+    """The track to start from, once it is known that the result may be kept."""
+    check_making(run, source, into, replace)
     track = read_track(run, source)
     if not len(track.frames):
         raise RunError(f"Run '{run.name}' has no finished frame.", "Track it first.")

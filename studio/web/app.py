@@ -34,6 +34,7 @@ from studio.web import (
     scene_routes,
     session_routes,
     settings_routes,
+    track_routes,
     upload_routes,
 )
 from studio.web.access import AccessGuard, HostRule, binding_rule
@@ -62,6 +63,7 @@ ROUTERS = (
     run_routes.router,
     settings_routes.router,
     result_routes.router,
+    track_routes.router,
     export_routes.router,
     picture_routes.router,
     comparison_routes.router,

@@ -24,6 +24,7 @@ from studio.web.footage_schemas import SynchronyState
 from studio.web.import_schemas import ImportState
 from studio.web.initialisation_schemas import InitialisationState
 from studio.web.presets import Preset
+from studio.web.track_schemas import TrackJobState
 from studio.worker.commands import Close, Command
 from studio.worker.comparison_desk import ComparisonDesk, ComparisonState
 from studio.worker.events import StateChanged
@@ -163,7 +164,7 @@ class Doors:
 
     scene_port : of the inner viser server, 0 while it is not running. footage_roots : folders that may be
     imported from. presets : the studio's own. log_path : the server's log file. imports,
-    initialisations, exports, uploads : those under way, by their identifiers; synchronies : estimates
+    initialisations, exports, track_jobs, uploads : those under way, by their identifiers; synchronies : estimates
     of offsets, by session. desk : where comparisons are worked at,
     learning : where behaviour models are learnt.
     """
@@ -180,6 +181,7 @@ class Doors:
     initialisations: dict[str, InitialisationState] = field(default_factory=dict)
     synchronies: dict[str, SynchronyState] = field(default_factory=dict)
     exports: dict[str, ExportState] = field(default_factory=dict)
+    track_jobs: dict[str, TrackJobState] = field(default_factory=dict)
     uploads: dict[str, dict[str, int]] = field(default_factory=dict)
     stops: dict[str, threading.Event] = field(default_factory=dict)
     jobs: set[asyncio.Task[None]] = field(default_factory=set)

@@ -1,0 +1,256 @@
+"""Tracks of a run: listed, made in the background with progress as `track` events, downloaded; runs corrected."""
+
+import asyncio
+import secrets
+import threading
+import time
+from collections.abc import Callable
+from typing import Annotated, Any
+
+import numpy as np
+from fastapi import APIRouter, Depends, Response
+
+from studio.capture.trc import read_trc
+from studio.errors import NotFoundError, SettingsError, StudioError
+from studio.evaluation.errors import evaluate
+from studio.knobs import changed, knobs_of
+from studio.runs.correcting import prepare_correction, track_backwards
+from studio.runs.refining import (
+    REFINED,
+    SMOOTHED,
+    MadeTrack,
+    MakingCancelledError,
+    check_making,
+    jitter,
+    refine_run,
+    smooth_run,
+)
+from studio.runs.tracks import RAW, read_track, track_names
+from studio.sessions.named_rows import poses_csv
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.tracking.refinement import RefinementSettings
+from studio.tracking.smoothing import SmoothingSettings
+from studio.web.doors import Doors, doors_of
+from studio.web.error_responses import UnforeseenError, log
+from studio.web.run_routes import RUN, OpenRun
+from studio.web.session_routes import OpenSession
+from studio.web.setting_views import knob_view
+from studio.web.track_schemas import (
+    CorrectionRequest,
+    MakeTrackRequest,
+    TrackJobState,
+    TrackLine,
+    TrackList,
+)
+
+router = APIRouter(prefix="/api", tags=["tracks"])
+
+Door = Annotated[Doors, Depends(doors_of)]
+Report = Callable[[str, int, int], None]
+Work = Callable[[Report, Callable[[], bool]], dict[str, Any]]
+
+KEPT = 50
+SECONDS_BETWEEN = 0.2
+
+
+@router.get(RUN + "/tracks")
+def tracks(session: OpenSession, run: OpenRun, doors: Door) -> TrackList:
+    """The run's tracks with how much they jitter and, where there is a truth, how far off they are."""
+    lines = [_line(session, run, name) for name in track_names(run)]
+    going = [
+        state
+        for state in doors.track_jobs.values()
+        if (state.session, state.run, state.state) == (session.name, run.name, "running")
+    ]
+    return TrackList(
+        tracks=lines,
+        running=going,
+        refine_settings=[knob_view(entry) for entry in knobs_of(RefinementSettings)],
+        smooth_settings=[knob_view(entry) for entry in knobs_of(SmoothingSettings)],
+    )
+
+
+@router.get(RUN + "/tracks/{track}/poses.csv", response_class=Response)
+def track_csv(session: OpenSession, run: OpenRun, track: str) -> Response:
+    """A track's poses: frame, then one column per parameter in the body's order (radians and mm)."""
+    found = read_track(run, track)
+    name = f"{session.name}-{run.name}-{found.name}-poses.csv"
+    return Response(
+        poses_csv(run.record.parameters, found.frames, found.poses),
+        media_type="text/csv; charset=utf-8",
+        headers={"Content-Disposition": f'attachment; filename="{name}"'},
+    )
+
+
+@router.post(RUN + "/refine", status_code=202)
+async def begin_refining(
+    session: OpenSession, run: OpenRun, wish: MakeTrackRequest, doors: Door
+) -> TrackJobState:
+    """Refine a track on the silhouettes. Ask for the state, or wait for `track` events."""
+    settings = changed(RefinementSettings(), wish.settings)
+    source, into = wish.source or RAW, wish.into or REFINED
+    check_making(run, source, into, wish.replace)
+
+    def work(report: Report, cancelled: Callable[[], bool]) -> dict[str, Any]:
+        return _answer(
+            refine_run(
+                session,
+                run,
+                source=source,
+                into=into,
+                settings=settings,
+                replace=wish.replace,
+                progress=report,
+                cancelled=cancelled,
+            )
+        )
+
+    return _begin(doors, "refine", session, run, work)
+
+
+@router.post(RUN + "/smooth", status_code=202)
+async def begin_smoothing(
+    session: OpenSession, run: OpenRun, wish: MakeTrackRequest, doors: Door
+) -> TrackJobState:
+    """Smooth a track in time."""
+    settings = changed(SmoothingSettings(), wish.settings)
+    source, into = wish.source or "", wish.into or SMOOTHED
+    check_making(run, source, into, wish.replace)
+
+    def work(_report: Report, _cancelled: Callable[[], bool]) -> dict[str, Any]:
+        return _answer(smooth_run(run, source=source, into=into, settings=settings, replace=wish.replace))
+
+    return _begin(doors, "smooth", session, run, work)
+
+
+@router.post(RUN + "/correct", status_code=202)
+async def begin_correction(
+    session: OpenSession, run: OpenRun, wish: CorrectionRequest, doors: Door
+) -> TrackJobState:
+    """Make a run that begins anew in a frame. Forwards it is ready to be started; backwards it is tracked here."""
+    pose, source = _corrected_pose(run, wish)
+    made = await asyncio.to_thread(
+        prepare_correction,
+        session, run, wish.frame, pose,
+        source=source, backwards_to=wish.back_to, name=wish.name or "",
+    )  # fmt: skip
+    doors.events.publish({"type": "sessions", "session": session.name, "run": made.name})
+
+    def work(report: Report, cancelled: Callable[[], bool]) -> dict[str, Any]:
+        if wish.back_to is not None:
+            moved = track_backwards(session, made, report, cancelled)
+            return {"made_run": made.name, "moved": moved, "state": "cancelled" if cancelled() else "done"}
+        return {"made_run": made.name}
+
+    return _begin(doors, "correct", session, run, work)
+
+
+@router.get("/track-jobs/{identifier}")
+def track_job(identifier: str, doors: Door) -> TrackJobState:
+    """How refining, smoothing or correcting stands."""
+    state = doors.track_jobs.get(identifier)
+    if state is None:
+        raise NotFoundError(f"Nothing is being made under '{identifier[:40]}'.", "Begin a new one.")
+    return state
+
+
+@router.delete("/track-jobs/{identifier}", status_code=202)
+def cancel_track_job(identifier: str, doors: Door) -> TrackJobState:
+    """Stop it. Of a refinement nothing is kept, of a way back what it has reached."""
+    state = track_job(identifier, doors)
+    if identifier in doors.stops:
+        doors.stops[identifier].set()
+    return state
+
+
+def _line(session: Session, run: StoredRun, name: str) -> TrackLine:
+    track = read_track(run, name)
+    line = TrackLine(name=name, frames=len(track.frames), made_by=dict(track.made_by))
+    if not len(track.frames):
+        return line
+    line.jitter_mm = jitter(run, track)
+    path = session.truth_path
+    if path is not None:
+        found = evaluate(track.poses, track.frames, run.body(), read_trc(path), run.record.fps)
+        line.mean_mm, line.worst_mm = found.mean_mm, found.worst_mm
+    return line
+
+
+def _corrected_pose(run: StoredRun, wish: CorrectionRequest) -> tuple[Any, str]:
+    """The pose (D,), and in words where it came from. Raises SettingsError unless exactly one was named."""
+    if (wish.pose is None) == (wish.track is None):
+        raise SettingsError("A corrected frame needs a pose.", "Give a pose or the name of a track.")
+    if wish.pose is not None:
+        return np.array(wish.pose), "set in the studio"
+    chosen = read_track(run, wish.track or RAW)
+    at = chosen.frames.tolist()
+    if wish.frame not in at:
+        raise NotFoundError(
+            f"Track '{chosen.name}' of run '{run.name}' has no frame {wish.frame}.", "Choose another frame."
+        )
+    return chosen.poses[at.index(wish.frame)], f"track {chosen.name}"
+
+
+def _answer(made: MadeTrack) -> dict[str, Any]:
+    return {
+        "track": made.track.name,
+        "jitter_before_mm": made.jitter_before,
+        "jitter_after_mm": made.jitter_after,
+        "moved": made.moved,
+        "filled": len(made.filled),
+        "left_out": len(made.left_out),
+    }
+
+
+def _begin(doors: Doors, verb: Any, session: Session, run: StoredRun, work: Work) -> TrackJobState:  # noqa: ANN401
+    state = TrackJobState(
+        identifier=secrets.token_hex(8), verb=verb, session=session.name, run=run.name, state="running"
+    )
+    doors.track_jobs[state.identifier] = state
+    doors.stops[state.identifier] = threading.Event()
+    while len(doors.track_jobs) > KEPT:
+        doors.track_jobs.pop(next(iter(doors.track_jobs)))
+    job = asyncio.create_task(asyncio.to_thread(_make, doors, state, work))
+    doors.jobs.add(job)
+    job.add_done_callback(doors.jobs.discard)
+    return state
+
+
+def _make(doors: Doors, begun: TrackJobState, work: Work) -> None:
+    """Work in this thread, keeping the state up to date; never raises."""
+    stop, began, told = doors.stops[begun.identifier], time.monotonic(), 0.0
+
+    def tell(**changes: object) -> None:
+        state = doors.track_jobs.get(begun.identifier)
+        if state is not None:
+            # Validated, so that numbers that are none become null.
+            entries = {**state.model_dump(), **changes}
+            doors.track_jobs[begun.identifier] = state = TrackJobState.model_validate(entries)
+            doors.events.publish({"type": "track", **state.model_dump()})
+
+    def report(step: str, done: int, total: int) -> None:
+        nonlocal told
+        now = time.monotonic()
+        if now - told < SECONDS_BETWEEN and done < total:
+            return
+        told = now
+        left = (now - began) * (total - done) / done if done else None
+        tell(step=step, done=done, total=total, seconds_left=left)
+
+    try:
+        answer = work(report, stop.is_set)
+    except MakingCancelledError as error:
+        tell(state="cancelled", code=error.code, message=error.message, hint=error.hint)
+        return
+    except StudioError as error:
+        tell(state="failed", code=error.code, message=error.message, hint=error.hint)
+        return
+    except Exception as error:
+        log.exception("%s of '%s' of '%s' failed", begun.verb, begun.run, begun.session)
+        wrong = UnforeseenError(f"It failed: {type(error).__name__}.", f"See '{doors.log_path}'.")
+        tell(state="failed", code=wrong.code, message=wrong.message, hint=wrong.hint)
+        return
+    finally:
+        doors.stops.pop(begun.identifier, None)
+    tell(**{"state": "done", **answer})

@@ -1,0 +1,83 @@
+"""Tracks of a run, refining, smoothing and correcting, as OpenAPI shows them."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from studio.web.schemas import Answer, Number, Request, RunName, Value
+from studio.web.setting_schemas import KnobView
+
+
+class TrackLine(Answer):
+    """A track of a run. made_by: verb, what it was made from, settings, and of a smoothed one the frames that were
+    filled and left out; empty for raw. jitter_mm: root mean square second difference of the markers. mean_mm, worst_mm:
+    against the session's truth.
+    """
+
+    name: str
+    frames: int
+    made_by: dict[str, object] = Field(default_factory=dict)
+    jitter_mm: Number = None
+    mean_mm: Number = None
+    worst_mm: Number = None
+
+
+class TrackList(Answer):
+    """The run's tracks, raw first, those under way, and what refining and smoothing can be told."""
+
+    tracks: list[TrackLine]
+    running: list["TrackJobState"]
+    refine_settings: list[KnobView]
+    smooth_settings: list[KnobView]
+
+
+class MakeTrackRequest(Request):
+    """What a track is made from and how. source: null for the usual one (refine: raw; smooth: refined if there is one).
+
+    into: null for refined or smoothed. replace: write over a derived track of that name.
+    """
+
+    source: RunName | None = None
+    into: RunName | None = None
+    settings: dict[str, Value] = Field(default_factory=dict)
+    replace: bool = False
+
+
+class CorrectionRequest(Request):
+    """The right pose of a frame: radians and mm in the order of the body's parameters, or taken from a track.
+
+    back_to: track backwards to that frame; null: forwards to the run's end, which begins when the new run is started.
+    """
+
+    frame: int = Field(ge=0)
+    pose: list[float] | None = None
+    track: RunName | None = None
+    back_to: int | None = Field(None, ge=0)
+    name: RunName | None = Field(None, description="Of the corrected run; null: numbered.")
+
+
+class TrackJobState(Answer):
+    """How refining, smoothing or correcting stands; code, message and hint say why it failed.
+
+    made_run: the corrected run. track: the track that is made.
+    """
+
+    identifier: str
+    verb: Literal["refine", "smooth", "correct"]
+    session: str
+    run: str
+    state: Literal["running", "done", "failed", "cancelled"]
+    step: str = ""
+    done: int = 0
+    total: int = 0
+    seconds_left: Number = None
+    code: str = ""
+    message: str = ""
+    hint: str = ""
+    track: str = ""
+    made_run: str = ""
+    jitter_before_mm: Number = None
+    jitter_after_mm: Number = None
+    moved: int = 0
+    filled: int = 0
+    left_out: int = 0

@@ -1,0 +1,103 @@
+"""Tracks over the API: listed, made in the background, downloaded; runs corrected. On the toy arm, with no doubles."""
+
+import time
+
+import numpy as np
+import pytest
+from toy_session import make_session, true_poses
+from web_doubles import Studio
+
+from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.problem_source import ProblemSource
+from studio.runs.tracking_run import TrackingRun
+from studio.runs.tracks import read_track
+from studio.sessions.stored_run import StoredRun
+from studio.sessions.workspace import Workspace
+
+RUN = "/api/sessions/toy/runs/one"
+
+
+@pytest.fixture
+def run(studio: Studio, workspace: Workspace) -> StoredRun:
+    """A finished run of the toy arm in the studio's workspace."""
+    session = make_session(workspace.root / "toy")
+    request = RunRequest(
+        name="one", start_pose=true_poses()[0] + 0.05, changes={"particles": 20, "layers": 3}
+    )
+    stored = prepare_run(session, request)
+    problems = ProblemSource(session, stored.body(), stored.cameras())
+    tracking = TrackingRun(stored, problems)
+    while not tracking.finished:
+        tracking.step_layer()
+    tracking.close()
+    problems.close()
+    return stored
+
+
+def begun(studio: Studio, verb: str, wish: dict) -> dict:
+    """The job's state when it has ended."""
+    answer = studio.client.post(f"{RUN}/{verb}", json=wish)
+    assert answer.status_code == 202, answer.text
+    identifier = answer.json()["identifier"]
+    deadline = time.monotonic() + 60.0
+    while time.monotonic() < deadline:
+        told = studio.client.get(f"/api/track-jobs/{identifier}").json()
+        if told["state"] != "running":
+            return told
+    raise AssertionError("it did not end")
+
+
+def test_refined_smoothed_listed_and_downloaded(studio: Studio, run: StoredRun) -> None:
+    told = begun(studio, "refine", {"settings": {"refinement_steps": 4}})
+    assert (told["state"], told["track"], told["done"], told["total"]) == ("done", "refined", 8, 8), told
+    told = begun(studio, "smooth", {})
+    assert told["state"] == "done", told
+    assert told["jitter_after_mm"] <= told["jitter_before_mm"]
+    listed = studio.client.get(f"{RUN}/tracks").json()
+    assert [line["name"] for line in listed["tracks"]] == ["raw", "refined", "smoothed"]
+    assert listed["tracks"][2]["made_by"]["from"] == "refined"
+    assert listed["tracks"][1]["made_by"]["refinement_steps"] == 4
+    assert listed["running"] == []
+    assert "smoothing_frequency" in [knob["name"] for knob in listed["smooth_settings"]]
+    csv = studio.client.get(f"{RUN}/tracks/smoothed/poses.csv")
+    rows = csv.text.splitlines()
+    assert rows[0].split(",")[0] == "frame"
+    assert np.allclose(
+        [float(value) for value in rows[3].split(",")[1:]], read_track(run, "smoothed").poses[2]
+    )
+
+
+@pytest.mark.parametrize(
+    ("verb", "wish", "status"),
+    [
+        ("smooth", {"settings": {"smoothing_frequency": 0.0}}, 422),
+        ("smooth", {"settings": {"no_such": 1}}, 422),
+        ("smooth", {"into": "raw"}, 409),
+        ("smooth", {"source": "nothing"}, 404),
+        ("refine", {"into": "../out"}, 422),
+        ("correct", {"frame": 2}, 422),
+        ("correct", {"frame": 99, "track": "raw"}, 404),
+        ("correct", {"frame": 2, "pose": [0.0]}, 409),
+        ("correct", {"frame": 2, "track": "raw", "back_to": 5}, 409),
+    ],
+)
+def test_refusals(studio: Studio, run: StoredRun, verb: str, wish: dict, status: int) -> None:
+    answer = studio.client.post(f"{RUN}/{verb}", json=wish)
+    assert answer.status_code == status, answer.text
+    assert len(studio.client.get(f"{RUN}/tracks").json()["tracks"]) == 1
+
+
+def test_a_name_that_is_taken_is_refused_at_once(studio: Studio, run: StoredRun) -> None:
+    begun(studio, "smooth", {})
+    assert studio.client.post(f"{RUN}/smooth", json={}).status_code == 409
+    assert begun(studio, "smooth", {"replace": True})["state"] == "done"
+
+
+def test_corrected_on_and_back(studio: Studio, run: StoredRun) -> None:
+    on = begun(studio, "correct", {"frame": 4, "pose": true_poses()[4].tolist(), "name": "on"})
+    assert (on["state"], on["made_run"]) == ("done", "on"), on
+    line = studio.client.get("/api/sessions/toy/runs/on").json()
+    assert "on" in str(line)
+    back = begun(studio, "correct", {"frame": 4, "track": "raw", "back_to": 1, "name": "back"})
+    assert (back["state"], back["made_run"], back["moved"]) == ("done", "back", 4), back
+    assert studio.client.get("/api/track-jobs/none").status_code == 404
