@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.capture.naming import natural_key
-from studio.capture.video import MAX_PIXELS
+from studio.capture.video_probe import MAX_PIXELS
 from studio.errors import FootageError
 
 Bytes = NDArray[np.uint8]

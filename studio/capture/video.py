@@ -18,13 +18,12 @@ import av.video
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.capture.video_probe import MAX_FRAMES, announced_frames, check_turn, open_video, reason
 from studio.errors import FootageError
 
 Bytes = NDArray[np.uint8]
 
 VIDEO_SUFFIXES = frozenset((".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".ts", ".mts"))
-MAX_PIXELS = 64_000_000
-MAX_FRAMES = 2_000_000
 STEADY = 0.6
 """Frames may lie this share of a frame's duration off an even spacing before a frame rate is called
 variable."""
@@ -54,9 +53,9 @@ def measure_video(path: Path, on_frame: Callable[[int, int], None] | None = None
     """
     times: list[float] = []
     width = height = 0
-    with _opened(path) as container:
+    with open_video(path) as container:
         stream = container.streams.video[0]
-        announced = _announced(container, stream)
+        announced = announced_frames(container, stream)
         for frame in _decoded(path, container, stream):
             turned = round(frame.rotation / 90.0) % 2 == 1
             size = (frame.height, frame.width) if turned else (frame.width, frame.height)
@@ -144,7 +143,7 @@ class VideoReader:
         """Open the file afresh at its first frame."""
         if self._container is not None:
             self._container.close()
-        self._container = _opened(self._path)
+        self._container = open_video(self._path)
         self._frames = _decoded(self._path, self._container, self._container.streams.video[0])
         self._next = 0
 
@@ -154,30 +153,6 @@ def upright_array(frame: av.VideoFrame) -> Bytes:
     picture = frame.to_ndarray(format="bgr24").astype(np.uint8, copy=False)
     turns = round(frame.rotation / 90.0) % 4
     return np.ascontiguousarray(np.rot90(picture, turns) if turns else picture)
-
-
-def _opened(path: Path) -> av.container.InputContainer:
-    """The container, its only or first video stream checked and set to stop at damage."""
-    try:
-        container = av.open(str(path), options={"protocol_whitelist": "file"})
-    except (av.error.FFmpegError, OSError) as problem:
-        raise FootageError(
-            f"'{path.name}' cannot be opened as a video at frame 0 ({_reason(problem)}).",
-            "The file is damaged, was cut short or is no video: copy or export it again.",
-        ) from None
-    if not container.streams.video:
-        container.close()
-        raise FootageError(f"'{path.name}' has no pictures in it.", "Give a video file.")
-    stream = container.streams.video[0]
-    if stream.width * stream.height > MAX_PIXELS:
-        container.close()
-        raise FootageError(
-            f"'{path.name}' is {stream.width}x{stream.height} pixels, more than {MAX_PIXELS} in all.",
-            "Scale the video down.",
-        )
-    stream.thread_type = "NONE"
-    stream.codec_context.options = {"err_detect": "explode"}
-    return container
 
 
 def _decoded(
@@ -191,30 +166,15 @@ def _decoded(
                 raise FootageError(
                     f"'{path.name}' is damaged at frame {number}{last}.", "Copy or export the video again."
                 )
-            if round(frame.rotation) % 90:
-                raise FootageError(
-                    f"'{path.name}' asks to be shown turned by {frame.rotation} degrees.",
-                    "Re-encode it without a rotation.",
-                )
+            check_turn(path, frame)
             yield frame
             number += 1
             last = f" after {frame.time:.3f} s" if frame.time is not None else ""
     except (av.error.FFmpegError, OSError) as problem:
         raise FootageError(
-            f"'{path.name}' is damaged or cut at frame {number}{last} ({_reason(problem)}).",
+            f"'{path.name}' is damaged or cut at frame {number}{last} ({reason(problem)}).",
             "Copy or export the video again.",
         ) from None
-
-
-def _announced(container: av.container.InputContainer, stream: av.video.VideoStream) -> int:
-    """The number of frames that the container promises, 0 if it does not."""
-    if stream.frames:
-        return stream.frames
-    if stream.duration and stream.time_base and stream.average_rate:
-        return int(stream.duration * stream.time_base * stream.average_rate)
-    if container.duration and stream.average_rate and len(container.streams) == 1:
-        return int(container.duration / 1_000_000 * stream.average_rate)
-    return 0
 
 
 def _rate(times: NDArray[np.float64], nominal: float) -> tuple[float, int]:
@@ -231,7 +191,7 @@ def _rate(times: NDArray[np.float64], nominal: float) -> tuple[float, int]:
 def _packet_times(path: Path) -> tuple[list[int] | None, list[int]]:
     """Presentation times of all frames in order, and which frames are keyframes, without decoding."""
     shown: list[tuple[int, bool]] = []
-    with _opened(path) as container:
+    with open_video(path) as container:
         try:
             for packet in container.demux(container.streams.video[0]):
                 if packet.size == 0 or packet.is_discard:
@@ -257,8 +217,3 @@ def _cut(path: Path, frame: int, count: int) -> FootageError:
         f"'{path.name}' ends at frame {frame}{had}.",
         "Put the original file back, or import the session again.",
     )
-
-
-def _reason(problem: Exception) -> str:
-    """The decoder's words without file names and numbers."""
-    return str(getattr(problem, "strerror", None) or problem).split(": '")[0].lower()

@@ -4,108 +4,25 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 import tomli_w
-from sources import FRAMES, video_source, write_pose2sim
-from toy_footage import number_of, numbered_frame, rig, write_pictures, write_video
+from other_layouts import (
+    CAMERAS,
+    anipose,
+    caliscope,
+    caliscope_take,
+    easymocap,
+    freemocap,
+    old_freemocap,
+    pose2sim,
+    videos,
+)
+from sources import video_source, write_pose2sim
+from toy_footage import number_of
 
-from studio.capture.calibration_files import export_calibration
-from studio.errors import CalibrationError, FootageError, StudioError
+from studio.errors import CalibrationError, FootageError
 from studio.sessions.importers.catalogue import import_source
-
-CAMERAS = rig(2, "cam_")
-
-
-def videos(
-    folder: Path, names: tuple[str, ...] = ("cam_1.mp4", "cam_2.mp4"), frames: int = FRAMES, first: int = 0
-) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    for index, name in enumerate(names):
-        write_video(folder / name, [numbered_frame(first + k, index) for k in range(frames)], fps=60)
-
-
-def pose2sim(folder: Path) -> Path:
-    videos(folder / "videos")
-    write_pose2sim(folder / "calibration" / "Calib_scene.toml", CAMERAS)
-    (folder / "Config.toml").write_text(tomli_w.dumps({"project": {"frame_rate": "auto"}}))
-    for name in ("pose", "pose-3d", "kinematics"):
-        (folder / name).mkdir()
-    write_pictures(folder / "pose" / "cam_1_img", [numbered_frame(0)])
-    return folder
-
-
-def freemocap(folder: Path) -> Path:
-    videos(folder / "videos" / "synchronized", ("cam_1.mp4", "cam_2.mp4"))
-    videos(folder / "videos" / "annotated", ("cam_1_annotated.mp4", "cam_2_annotated.mp4"))
-    (folder / "output").mkdir()
-    (folder / f"{folder.name}_recording_info.json").write_text("{}")
-    export_calibration(CAMERAS, folder / f"{folder.name}_calibration.toml", "aniposelib")
-    return folder
-
-
-def old_freemocap(folder: Path) -> Path:
-    videos(folder / "synchronized_videos", ("Camera_1_synchronized.mp4", "Camera_2_synchronized.mp4"))
-    videos(folder / "annotated_videos", ("Camera_1_annotated.mp4", "Camera_2_annotated.mp4"))
-    (folder / "output_data").mkdir()
-    export_calibration(CAMERAS, folder / f"{folder.name}_camera_calibration.toml", "aniposelib")
-    return folder
-
-
-def camera_array(path: Path) -> None:
-    """Caliscope's own file: metres, 3x3 rotations, cameras by number."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    tables = {
-        str(k): {
-            "cam_id": k, "rotation_count": 0, "error": 0.2, "size": [camera.width, camera.height],
-            "matrix": camera.matrix.tolist(), "distortions": camera.distortion.tolist(),
-            "translation": (camera.translation / 1000.0).tolist(), "rotation": camera.rotation.tolist(),
-        }
-        for k, camera in enumerate(CAMERAS, 1)
-    }  # fmt: skip
-    path.write_text(tomli_w.dumps({"cameras": tables}))
-
-
-def caliscope(folder: Path) -> Path:
-    videos(folder / "calibration" / "intrinsic", frames=2)
-    videos(folder / "calibration" / "extrinsic", frames=2)
-    camera_array(folder / "calibration" / "extrinsic" / "capture_volume" / "camera_array.toml")
-    videos(folder / "recordings" / "walk")
-    videos(folder / "recordings" / "walk" / "ONNX_pose", ("cam_1_ONNX.mp4", "cam_2_ONNX.mp4"), frames=2)
-    return folder
-
-
-def caliscope_take(folder: Path) -> Path:
-    videos(folder)
-    camera_array(folder / "HOLISTIC" / "camera_array.toml")
-    return folder
-
-
-def anipose(folder: Path) -> Path:
-    videos(folder / "videos-raw", ("walk-cam_1.avi.mp4", "walk-cam_2.avi.mp4"))
-    (folder / "calibration").mkdir()
-    export_calibration(CAMERAS, folder / "calibration" / "calibration.toml", "aniposelib")
-    return folder
-
-
-def easymocap(folder: Path) -> Path:
-    for index in (1, 2):
-        write_pictures(folder / "images" / f"cam_{index}", [numbered_frame(k) for k in range(FRAMES)])
-        mask = np.full((96, 128, 3), 255, np.uint8)
-        write_pictures(folder / "mask" / f"cam_{index}", [mask] * FRAMES)
-    (folder / "annots").mkdir()
-    for name in ("intri", "extri"):
-        storage = cv2.FileStorage(str(folder / f"{name}.yml"), cv2.FILE_STORAGE_WRITE)
-        for camera in CAMERAS:
-            if name == "intri":
-                storage.write(f"K_{camera.name}", camera.matrix)
-                storage.write(f"dist_{camera.name}", camera.distortion[None])
-            else:
-                storage.write(f"R_{camera.name}", cv2.Rodrigues(camera.rotation)[0])
-                storage.write(f"T_{camera.name}", camera.translation[:, None] / 1000.0)
-        storage.release()
-    return folder
 
 
 @pytest.mark.parametrize(
@@ -233,70 +150,6 @@ def test_originals_of_several_files_are_kept_byte_for_byte(tmp_path: Path) -> No
     assert (again.path / "calibration" / "original" / "intri.yml").read_bytes() == (
         source / "intri.yml"
     ).read_bytes()
-
-
-def timed(folder: Path, offsets: dict[int, int], rates: tuple[float, float] = (60.0, 60.0)) -> Path:
-    """A Caliscope take whose cameras began apart, with the times of the frames."""
-    caliscope(folder)
-    rows = ["cam_id,frame_time"]
-    for index, late in offsets.items():
-        begun = [numbered_frame(late + k, index) for k in range(20)]
-        write_video(folder / "recordings" / "walk" / f"cam_{index}.mp4", begun, fps=60)
-        rows += [f"{index},{50.0 + (late + k) / rates[index - 1]}" for k in range(20)]
-    (folder / "recordings" / "walk" / "timestamps.csv").write_text("\n".join(rows))
-    return folder
-
-
-def test_recorded_times_put_cameras_in_step(tmp_path: Path) -> None:
-    report = import_source(timed(tmp_path / "source", {1: 0, 2: 6}), tmp_path / "made")
-    footage = report.session.footage()
-    assert [camera.offset for camera in footage.source.cameras] == [6, 0]
-    assert footage.frame_count == 14
-    for frame in (0, 13):
-        assert [number_of(picture) for picture in footage.pictures(frame).pictures] == [frame + 6, frame + 6]
-    assert any("timestamps.csv" in note for note in report.notes)
-    again = import_source(report.session.path, tmp_path / "again").session
-    assert again.manifest.footage.frame_count == 14
-    assert number_of(again.footage().picture("cam_1", 0)) == 6
-
-
-def test_times_of_unlike_rates_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(FootageError, match="different frame rates"):
-        import_source(timed(tmp_path / "source", {1: 0, 2: 0}, (60.0, 30.0)), tmp_path / "made")
-
-
-def test_offsets_and_turns_by_hand(tmp_path: Path) -> None:
-    source = video_source(tmp_path / "source", frames=20)
-    lying = [cv2.rotate(numbered_frame(4 + k, 1), cv2.ROTATE_90_COUNTERCLOCKWISE) for k in range(20)]
-    write_video(source / "videos" / "cam02.mp4", lying, fps=60)
-    with pytest.raises(CalibrationError, match="one is upright"):
-        import_source(source, tmp_path / "made")
-    report = import_source(source, tmp_path / "made", offsets={"cam_1": 4}, rotations={"cam02": 90})
-    footage = report.session.footage()
-    assert footage.frame_count == 16
-    for frame in (0, 15):
-        assert [number_of(picture) for picture in footage.pictures(frame).pictures] == [frame + 4, frame + 4]
-    assert report.session.manifest.footage.cameras[1].turned == 90
-    assert (footage.source.cameras[1].width, footage.source.cameras[1].height) == (128, 96)
-    assert any("cam_1: 4" in note for note in report.notes)
-
-
-@pytest.mark.parametrize(
-    ("offsets", "rotations", "said"),
-    [
-        ({"cam_9": 3}, {}, "There is no camera 'cam_9'"),
-        ({"cam_1": 12}, {}, "no frame is left"),
-        ({"cam_1": 10**9}, {}, "cannot be 1000000000 frames off"),
-        ({}, {"cam_1": 45}, "cannot be turned by 45 degrees"),
-    ],
-)
-def test_what_cannot_be_asked(
-    tmp_path: Path, offsets: dict[str, int], rotations: dict[str, int], said: str
-) -> None:
-    source = video_source(tmp_path / "source")
-    with pytest.raises(StudioError, match=said):
-        import_source(source, tmp_path / "made", offsets=offsets, rotations=rotations)
-    assert not (tmp_path / "made").exists()
 
 
 @pytest.mark.real_data

@@ -1,5 +1,6 @@
 """Whether the cameras' footage agrees: sizes, frame counts, frame rates, missing pictures."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,10 +10,11 @@ from studio.capture.footage_source import Turn
 from studio.capture.naming import listed
 from studio.capture.pictures import PicturesMeasure
 from studio.capture.video import VideoMeasure
+from studio.capture.video_probe import probe_video
 from studio.errors import FootageError
 from studio.geometry.camera import Camera
 
-SAME_RATE = 0.005
+SAME_RATE, ANNOUNCED_RATE = 0.005, 0.02
 TRIMMED_SHARE = 0.1
 """Frame counts that differ by up to this share are trimmed to the shortest; beyond, it is an error."""
 
@@ -88,6 +90,18 @@ def gap_warnings(measured: tuple[MeasuredCamera, ...]) -> list[str]:
     ]
 
 
+def check_before_decoding(footage: Sequence[Path], fps: float | None) -> None:
+    """Refuse at once what decoding would only find after minutes. fps : None where the videos' own rates count.
+
+    Raises FootageError for videos that are not to be decoded, or whose announced frame rates differ much.
+    """
+    probes = {path.name: probe_video(path) for path in footage if path.is_file()}
+    rates = {name: probe.fps for name, probe in probes.items() if probe.steady}
+    known = sorted(rates.values())
+    if fps is None and known and known[-1] / known[0] - 1.0 > ANNOUNCED_RATE:
+        raise _different_rates(rates)
+
+
 def common_frame_count(
     measured: tuple[MeasuredCamera, ...], warnings: list[str], aligned: bool = False
 ) -> int:
@@ -149,9 +163,13 @@ def common_rate(
             "The footage does not say how many frames a second it has.", "Give the frame rate with --fps."
         )
     if found[-1] / found[0] - 1.0 > SAME_RATE:
-        words = ", ".join(f"{name}: {rate:g}" for name, rate in rates.items())
-        raise FootageError(
-            f"The videos' frame rates differ ({words}), so frames with one number were taken at different moments.",
-            "Resample them to one rate, or give the right one with --fps if the files are wrong.",
-        )
+        raise _different_rates(rates)
     return found[0]
+
+
+def _different_rates(rates: dict[str, float]) -> FootageError:
+    words = ", ".join(f"{name}: {rate:g}" for name, rate in rates.items())
+    return FootageError(
+        f"The videos' frame rates differ ({words}), so frames with one number were taken at different moments.",
+        "Resample them to one rate, or give the right one with --fps if the files are wrong.",
+    )

@@ -22,6 +22,7 @@ from studio.evidence.backgrounds import check_plate_size
 from studio.geometry.camera import Camera
 from studio.sessions.importers.agreement import (
     MeasuredCamera,
+    check_before_decoding,
     common_frame_count,
     common_rate,
     crop_warnings,
@@ -65,6 +66,7 @@ def measure_source(
     masks = _matched(plan.masks, used, "masks")
     backgrounds = _matched(plan.backgrounds, used, "backgrounds")
     turns = turns_asked(plan, by_camera)
+    check_before_decoding([by_camera[camera.name] for camera in used], fps or plan.fps)
     measured = tuple(
         _measure_camera(
             calibration,
