@@ -1,0 +1,90 @@
+"""`studio live`: tracks on the clock, says what was dropped, replays bit for bit."""
+
+import json
+
+import pytest
+from click.testing import CliRunner, Result
+from toy_session import FRAMES, true_poses
+
+from studio.cli.main import main
+from studio.experiments.live_benchmark import in_words, stage_rows
+from studio.sessions.named_rows import write_pose
+from studio.sessions.session import Session
+
+QUICK = ("--tracker", "annealed", "--weighting", "edge-region", "--particles", "30", "--layers", "2")
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(main, list(arguments), catch_exceptions=False)
+
+
+@pytest.fixture
+def started(session_on_disk: Session) -> Session:
+    """The toy session with a start pose."""
+    names = tuple(entry.name for entry in session_on_disk.body().parameters)
+    write_pose(session_on_disk.path / "start_pose.csv", names, true_poses()[0])
+    return session_on_disk
+
+
+def test_a_live_run_and_its_replay(started: Session) -> None:
+    result = run("live", "toy", *QUICK, "--seconds", "0.5", "--repeat", "--json", "--name", "now")
+    assert result.exit_code == 0, result.stderr
+    told = json.loads(result.stdout)
+    assert told["run"] == "now"
+    assert told["frames"] + len(told["dropped"]) == 30
+    assert told["footage_frames_per_second"] == 60.0
+    latency = told["latency_ms"]
+    assert 0.0 < latency["median"] <= latency["p95"] <= latency["worst"]
+    assert started.run("now").record.to_and_fro
+    again = json.loads(run("live", "toy", "--replay", "now", "--json").stdout)
+    assert (again["frames"], again["different"]) == (told["frames"], [])
+
+
+def test_words_for_a_person(started: Session) -> None:
+    result = run("live", "toy", *QUICK, "--from", "2")
+    assert result.exit_code == 0, result.stderr
+    assert "frames tracked" in result.stdout
+    assert "picture to pose" in result.stdout
+    assert started.runs()[-1].record.first == 2
+    assert started.runs()[-1].record.last == FRAMES
+    assert "bit for bit" in run("live", "toy", "--replay", started.runs()[-1].name).stdout
+
+
+@pytest.mark.parametrize(
+    ("wish", "cause"),
+    [
+        (("--repeat",), "has no end"),
+        (("--seconds", "0"), "cannot take 0 seconds"),
+        (("--seconds", "nan"), "cannot take nan seconds"),
+        (("--set", "online_learning=true"), "cannot teach"),
+        (("--from", "8"), "do not lie in the footage"),
+        (("--replay", "nobody"), "nobody"),
+    ],
+)
+def test_refusals(started: Session, wish: tuple[str, ...], cause: str) -> None:
+    result = run("live", "toy", *QUICK, *wish)
+    assert result.exit_code == 2
+    assert cause in result.stderr
+    assert not started.runs()
+
+
+def test_the_benchmarks_table() -> None:
+    found = {
+        "decoding": 2.0,
+        "reconstruction": 6.0,
+        "blob fitting": 1.0,
+        "prediction and evaluation": 4.0,
+        "the rest": 0.1,
+        "whole frame": 13.1,
+    }
+    rows = stage_rows(found)
+    assert [row["paper_ms"] for row in rows] == [None, 28.1, 14.8, 45.3, None, pytest.approx(88.2)]
+    figures = {
+        "frames_per_second": 30.0,
+        "tracked": 598,
+        "dropped": 2,
+        "latency_ms": {"median": 17.0, "p95": 21.0, "worst": 40.0},
+    }
+    words = in_words({"setting": "five views", "stages": rows, "scene_open": figures})
+    assert "28.1" in words
+    assert "with the scene open: 30.0 frames a second, 2 of 600 dropped, picture to pose 17 ms" in words

@@ -1,0 +1,59 @@
+"""Live runs through the API."""
+
+import dataclasses
+
+import pytest
+from web_doubles import Studio
+
+from studio.runs.live_summary import LiveStanding
+from studio.sessions.results_store import ResultsWriter
+from studio.sessions.session import Session
+from studio.tracking.tracker import Carried, Estimate, FrameResult
+from studio.web.event_encoding import message_of, plain
+from studio.worker.control import nothing_open
+
+LIVE = "/api/sessions/take1/runs/now/live"
+
+
+def test_a_live_run_is_made_and_says_how_it_went(studio: Studio, session: Session) -> None:
+    wish = {"name": "now", "live": True, "to_and_fro": True, "last": 50}
+    line = studio.client.post("/api/sessions/take1/runs", json=wish)
+    assert line.status_code == 201, line.text
+    assert studio.client.get("/api/sessions/take1/runs/now").json()["live"] is True
+    run = session.run("now")
+    assert run.record.to_and_fro
+    assert studio.client.get(LIVE).json()["tracked"] == 0
+    pose = run.body().neutral
+    with ResultsWriter(run.folder) as writer:
+        for frame, ready in ((0, 0.02), (3, 0.15)):
+            result = FrameResult(frame, Estimate(pose, pose, pose, -1.0), 1, 10, 1, 5.0, Carried(None, pose))
+            writer.write_frame(result, [], came=(0.04 * frame, ready))
+    told = studio.client.get(LIVE).json()
+    assert told["tracked"] == 2
+    assert told["dropped"] == [1, 2]
+    assert told["dropped_share"] == 0.5
+    assert told["latencies_ms"] == pytest.approx([20.0, 30.0])
+    assert told["latency_median_ms"] == pytest.approx(25.0)
+    assert told["frames_per_second"] == pytest.approx(1 / 0.13)
+
+
+def test_other_runs_have_no_live_figures(studio: Studio) -> None:
+    studio.client.post("/api/sessions/take1/runs", json={"name": "plain"})
+    answer = studio.client.get("/api/sessions/take1/runs/plain/live")
+    assert answer.status_code == 404
+    assert "not tracked live" in answer.json()["message"]
+    refused = studio.client.post("/api/sessions/take1/runs", json={"to_and_fro": True})
+    assert refused.status_code == 409
+
+
+def test_the_state_event_says_how_it_keeps_up() -> None:
+    state = nothing_open()
+    assert plain(message_of(state))["live"] is None
+    live = LiveStanding(3, 0.1, float("nan"), 29.8)
+    told = plain(message_of(dataclasses.replace(state, live=live)))
+    assert told["live"] == {
+        "dropped": 3,
+        "dropped_share": 0.1,
+        "latency_ms": None,
+        "frames_per_second": 29.8,
+    }
