@@ -25,6 +25,17 @@ COMMANDS = {
         "Solve cameras from footage of a printed board.",
     ),
     "board": ("calibration_commands", "board_command", "Make a calibration board to print, as PDF."),
+    "background": (
+        "background_commands",
+        "background",
+        "Choose where a session's masks come from, and see how well its views agree.",
+    ),
+    "subject": ("subject_commands", "subject", "Write down who is in front of the cameras: a height, lengths."),
+    "fit-subject": (
+        "subject_commands",
+        "fit_subject_command",
+        "Find limb lengths and radii on the silhouettes of a few frames.",
+    ),
     "initialise": (
         "initialisation_commands",
         "initialise_command",

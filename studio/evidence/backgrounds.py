@@ -130,13 +130,17 @@ class Backgrounds:
         """The plate picture, or up to `most` frames of the empty clip, of the footage's size."""
         frame = self._footage.picture(camera, 0)
         if is_picture(path):
-            return [fitted_plate(self._footage.turned_background(camera, read_picture(path)), frame, path.name)]
+            return [
+                fitted_plate(self._footage.turned_background(camera, read_picture(path)), frame, path.name)
+            ]
         count = measure_video(path).frame_count
         reader = VideoReader(path, count)
         try:
             chosen = np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))
             return [
-                fitted_plate(self._footage.turned_background(camera, reader.read(int(number))), frame, path.name)
+                fitted_plate(
+                    self._footage.turned_background(camera, reader.read(int(number))), frame, path.name
+                )
                 for number in chosen
             ]
         finally:

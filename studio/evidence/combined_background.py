@@ -85,9 +85,7 @@ Region = tuple[slice, slice, NDArray[np.bool_]]
 
 def _regions(unsure: Bytes) -> list[Region]:
     """The connected regions of a map that are worth a decision, each in a rectangle with a rim around it."""
-    opened = cv2.morphologyEx(
-        unsure, cv2.MORPH_OPEN, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9))
-    )
+    opened = cv2.morphologyEx(unsure, cv2.MORPH_OPEN, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9)))
     count, labels, boxes, _ = cv2.connectedComponentsWithStats(opened)
     found: list[Region] = []
     for label in range(1, count):
@@ -126,7 +124,8 @@ def background_nearby(frames: Bytes, mean: Floats, unsure: Bytes) -> Floats:
     known = (unsure[::STRIDE, ::STRIDE] == 0).astype(np.float32)
     small = mean[::STRIDE, ::STRIDE]
     shares = np.empty((len(frames), *known.shape), np.float32)
-    for frame, share in zip(frames, shares, strict=True):
+    for index, frame in enumerate(frames):
+        share = shares[index]
         away = np.abs(frame[::STRIDE, ::STRIDE] - small).max(axis=2)
         empty = known * (away <= AGREES)
         share[:] = 0.5
@@ -177,7 +176,8 @@ def fill_from_most_alike(frames, unsure, shares, mean, deviation):
     """Fill mean and deviation (H, W, 3) where unsure (H, W) from the frames that agree with the best one.
 
     frames : (K, H, W, 3) uint8. shares : (K, h, w) of `background_nearby`; a frame's vote is its VOTE-th power: few
-    frames of an empty place outvote many in which a person stands next to it. The best frame is the one that the most votes agree with.
+    frames of an empty place outvote many in which a person stands next to it. The best frame is the one that the most
+    votes agree with.
     """
     count, height, width = frames.shape[:3]
     values, votes = np.empty((count, 3)), np.empty(count)
@@ -186,7 +186,7 @@ def fill_from_most_alike(frames, unsure, shares, mean, deviation):
             if not unsure[y, x]:
                 continue
             for k in range(count):
-                votes[k] = shares[k, y // STRIDE, x // STRIDE] **VOTE + 1e-4
+                votes[k] = shares[k, y // STRIDE, x // STRIDE] ** VOTE + 1e-4
                 for c in range(3):
                     values[k, c] = frames[k, y, x, c]
             most, best = 0.0, 0

@@ -25,6 +25,8 @@ Bytes = NDArray[np.uint8]
 
 EDGE_KINDS = ("proximity", "bodytrack", "none", "hull")
 """Maps that a weighting reads; "hull": no map, but what a visual hull is carved from (knob hull_evidence)."""
+KINDS: dict[str, FittedKind] = {"median": "median", "combined": "combined", "mog2": "mog2", "knn": "knn"}
+"""Models by the knob's word; what is not here is a Gaussian."""
 
 
 class EvidenceMaker:
@@ -92,7 +94,7 @@ class EvidenceMaker:
             mask = self._footage.mask(camera, frame)
             if mask is not None:
                 return cleaned(mask, self.settings) if self.settings.mask_clean_given else mask
-        kind: FittedKind = "gaussian" if choice in ("auto", "mask") else choice
+        kind: FittedKind = KINDS.get(choice, "gaussian")
         model = self._backgrounds.model(camera, kind)
         return cleaned(model.foreground(picture, self.settings), self.settings)
 

@@ -11,7 +11,6 @@ made with it are better, so is their hull: two rounds.
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -43,16 +42,23 @@ STRIDE = 4
 REACH = 3
 """Times STRIDE pixels: how far around a silhouette nothing counts as empty."""
 FEWEST_EMPTY = 1
+WIDE_REACH = 12
+"""Times STRIDE pixels: how far beyond all silhouettes a person may get in frames that were not looked at."""
 CLEARED = {"mask_shadow_test": False, "mask_gain_fit": True}
 """Knobs while backgrounds are cleaned: a hole that the shadow test tears costs more than a shadow does."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CleanPlate:
-    """One camera's background. picture : (H, W, 3) uint8 BGR. never_empty : share of pixels that no frame showed empty."""
+    """One camera's background.
+
+    picture : (H, W, 3) uint8 BGR. never_empty : share of pixels that no frame showed empty. never_taken : (H, W) uint8,
+    255 where the others' hull came near in no frame: what moves there is a shadow, a reflection or a bystander.
+    """
 
     picture: Bytes
     never_empty: float
+    never_taken: Bytes
 
 
 def clean_plates(
@@ -140,7 +146,11 @@ class _Cleaning:
         fallback = np.clip(np.rint(self.first[name].mean), 0, 255).astype(np.uint8)
         picture, empty = median_of_empty(stack, taken, fallback)
         never = empty < FEWEST_EMPTY
-        return CleanPlate(_filled_in(picture, never & self.doubtful[name]), float(np.mean(never)))
+        reach = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * WIDE_REACH + 1, 2 * WIDE_REACH + 1))
+        near = cv2.dilate(taken.max(axis=0), reach)
+        unused = cv2.resize(255 * (1 - near), picture.shape[1::-1], interpolation=cv2.INTER_NEAREST)
+        filled = _filled_in(picture, never & self.doubtful[name])
+        return CleanPlate(filled, float(np.mean(never)), np.asarray(unused, dtype=np.uint8))
 
 
 def _filled_in(picture: Bytes, holes: NDArray[np.bool_]) -> Bytes:
@@ -177,19 +187,6 @@ def median_of_empty(frames, taken, fallback):
                 for c in range(3):
                     out[y, x, c] = np.uint8(np.median(values[c, :found]) + 0.5)
     return out, empty
-
-
-def write_plates(session: Session, plates: Mapping[str, CleanPlate]) -> dict[str, Path]:
-    """Keep cleaned backgrounds in the session: `background/<camera>-clean.png`, losslessly. Returns the files."""
-    folder = session.path / "background"
-    folder.mkdir(exist_ok=True)
-    written = {}
-    for name, plate in plates.items():
-        path = folder / f"{name}-clean.png"
-        if not cv2.imwrite(str(path), plate.picture):
-            raise RunError(f"The background '{path.name}' could not be written.", "Is the disk full?")
-        written[name] = path
-    return written
 
 
 def _watched(progress: Progress | None, cancelled: Callable[[], bool] | None) -> Progress:

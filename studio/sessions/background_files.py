@@ -1,19 +1,20 @@
 """What a session knows of its empty room: backgrounds a camera, excluded regions, and how masks are made.
 
-    background/…                 plates and clips; the manifest names the one in use
-    exclusions/<camera>.png      white where nothing counts: a bystander, a monitor
-    evidence.json                knobs of `evidence.settings` that new runs of the session start with, and the backgrounds
-                                 as they were given, where cleaned ones are in use
+background/…                 plates and clips; the manifest names the one in use
+exclusions/<camera>.png      white where nothing counts: a bystander, a monitor
+evidence.json                knobs of `evidence.settings` that new runs of the session start with, and the
+                             backgrounds as they were given, where cleaned ones are in use
 """
 
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 
-import cv2
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
+from studio.capture.exclusions import painted_picture, png_of, with_polygon
 from studio.capture.footage import EXCLUSIONS, background_turn
 from studio.capture.footage_source import CameraSource
 from studio.capture.pictures import is_picture, read_picture
@@ -26,8 +27,8 @@ from studio.sessions.session import Session, described_anew
 
 EVIDENCE_NAME, BACKGROUND_NAME = "evidence.json", "background"
 SCHEMA_VERSION = 1
-MOST_BYTES = 40_000_000
 
+Bytes = NDArray[np.uint8]
 Knob = bool | int | float | str
 
 
@@ -48,7 +49,34 @@ def read_evidence(session: Session) -> SessionEvidence:
         SessionEvidence,
         SCHEMA_VERSION,
         missing=(f"Session '{session.name}' has no {EVIDENCE_NAME}.", "Set its background again."),
+        what="how a session's masks are made",
+        remedy="Remove it, and set the background again.",
     )
+
+
+def given_backgrounds(session: Session) -> Session:
+    """The session with the backgrounds in use that were given, where cleaned ones were."""
+    evidence = read_evidence(session)
+    if not evidence.given:
+        return session
+    write_evidence(session, msgspec.structs.replace(evidence, given={}))
+    return use_backgrounds(session, evidence.given)
+
+
+def use_cleaned(session: Session, contents: Mapping[str, Bytes]) -> Session:
+    """Keep cleaned backgrounds (H, W, 3) by camera as `background/<camera>-clean.png` and use them from now on; what
+    was in use before is remembered as given.
+    """
+    folder = session.path / BACKGROUND_NAME
+    folder.mkdir(exist_ok=True)
+    given = {source.name: source.background for source in session.manifest.footage.cameras}
+    names = {}
+    for camera, picture in contents.items():
+        place = folder / f"{_source(session, camera).name}-clean.png"
+        atomic_files.write_bytes(place, png_of(picture))
+        names[camera] = place.relative_to(session.path).as_posix()
+    write_evidence(session, msgspec.structs.replace(read_evidence(session), given=given))
+    return use_backgrounds(session, names)
 
 
 def write_evidence(session: Session, evidence: SessionEvidence) -> None:
@@ -74,7 +102,7 @@ def set_backgrounds(session: Session, files: Mapping[str, Path]) -> Session:
             video = measure_video(path)
             given = (video.width, video.height)
         if background_turn(source.turned, size, given) % 180:
-            given = given[::-1]
+            given = (given[1], given[0])
         check_plate_size(given, size, path.name)
     folder = session.path / BACKGROUND_NAME
     folder.mkdir(exist_ok=True)
@@ -111,10 +139,7 @@ def set_exclusion(session: Session, camera: str, content: bytes) -> int:
     if not content:
         path.unlink(missing_ok=True)
         return 0
-    picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED) if len(content) <= MOST_BYTES else None
-    if picture is None:
-        raise FootageError("The exclusion is no picture that can be read.", "Give a PNG of the footage's size.")
-    painted = _painted(picture)
+    painted = painted_picture(content)
     if painted.shape != (source.height, source.width):
         raise FootageError(
             f"The exclusion is {painted.shape[1]}x{painted.shape[0]} pixels, camera {camera}"
@@ -126,37 +151,24 @@ def set_exclusion(session: Session, camera: str, content: bytes) -> int:
         path.unlink(missing_ok=True)
         return 0
     path.parent.mkdir(exist_ok=True)
-    written, encoded = cv2.imencode(".png", painted)
-    if not written:
-        raise FootageError("The exclusion could not be written.", "Give it as a PNG of 8 bits.")
-    atomic_files.write_bytes(path, encoded.tobytes())
+    atomic_files.write_bytes(path, png_of(painted))
     return count
 
 
-def polygon_exclusion(session: Session, camera: str, corners: np.ndarray) -> int:
+def polygon_exclusion(session: Session, camera: str, corners: NDArray[np.float64]) -> int:
     """Add a polygon (K, 2) of pixels to what does not count. Returns the pixels of all. Raises NotFoundError."""
     source = _source(session, camera)
     path = session.path / EXCLUSIONS / f"{camera}.png"
     painted = np.zeros((source.height, source.width), np.uint8)
     if path.exists():
-        painted = _painted(read_picture(path)).copy()
-    cv2.fillPoly(painted, [np.rint(corners).astype(np.int32)], 255)
-    return set_exclusion(session, camera, cv2.imencode(".png", painted)[1].tobytes())
+        painted = painted_picture(path.read_bytes())
+    return set_exclusion(session, camera, png_of(with_polygon(painted, corners)))
 
 
 def exclusion_path(session: Session, camera: str) -> Path | None:
     """The painted picture of a camera, if there is one. Raises NotFoundError for a camera that is not there."""
     path = session.path / EXCLUSIONS / f"{_source(session, camera).name}.png"
     return path if path.exists() else None
-
-
-def _painted(picture: np.ndarray) -> np.ndarray:
-    """(H, W) uint8, 255 where something was painted: the alpha where it says anything, else the brightest colour."""
-    if picture.ndim == 3 and picture.shape[2] == 4 and (picture[..., 3] < 255).any():
-        level = picture[..., 3]
-    else:
-        level = picture[..., :3].max(axis=2) if picture.ndim == 3 else picture
-    return np.where(level > 0.5 * np.iinfo(picture.dtype).max, np.uint8(255), np.uint8(0))
 
 
 def _source(session: Session, camera: str) -> CameraSource:

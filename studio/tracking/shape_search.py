@@ -229,7 +229,9 @@ class ShapeSearch:
         deviation = np.sqrt(weights @ np.square(shapes - shape))
         poses = np.empty_like(now.poses)
         for k in range(poses.shape[1]):
-            poses[:, k] = self._within(now.poses[:, k] + (shape - now.shapes) @ self.carried(shape, now.poses[0, k]).T)
+            poses[:, k] = self._within(
+                now.poses[:, k] + (shape - now.shapes) @ self.carried(shape, now.poses[0, k]).T
+            )
         last = _Population(np.repeat(shape[None], len(poses), axis=0), poses)
         for _ in range(2 * self._settings.pose_steps + 2):
             self._improve(last, 0.0)

@@ -35,7 +35,9 @@ def draw_voxels(cameras, centres, edges, picture):
         column, row = math.floor(u + 0.5), math.floor(v + 0.5)
         if 0 <= column < width and 0 <= row < height:
             picture[row, column] = 255
-        for y in range(max(0, math.ceil(v - place[BOUND_Y])), min(height, math.floor(v + place[BOUND_Y]) + 1)):
+        for y in range(
+            max(0, math.ceil(v - place[BOUND_Y])), min(height, math.floor(v + place[BOUND_Y]) + 1)
+        ):
             for x in range(
                 max(0, math.ceil(u - place[BOUND_X])), min(width, math.floor(u + place[BOUND_X]) + 1)
             ):

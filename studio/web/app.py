@@ -15,6 +15,7 @@ from starlette.staticfiles import StaticFiles
 from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.workspace import Workspace
 from studio.web import (
+    background_routes,
     behaviour_learning_routes,
     behaviour_routes,
     comparison_routes,
@@ -34,6 +35,7 @@ from studio.web import (
     scene_routes,
     session_routes,
     settings_routes,
+    subject_routes,
     track_routes,
     upload_routes,
 )
@@ -60,6 +62,8 @@ ROUTERS = (
     upload_routes.router,
     footage_routes.router,
     initialisation_routes.router,
+    background_routes.router,
+    subject_routes.router,
     run_routes.router,
     settings_routes.router,
     result_routes.router,

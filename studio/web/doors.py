@@ -24,6 +24,7 @@ from studio.web.footage_schemas import SynchronyState
 from studio.web.import_schemas import ImportState
 from studio.web.initialisation_schemas import InitialisationState
 from studio.web.presets import Preset
+from studio.web.subject_schemas import FitSubjectState
 from studio.web.track_schemas import TrackJobState
 from studio.worker.commands import Close, Command
 from studio.worker.comparison_desk import ComparisonDesk, ComparisonState
@@ -179,6 +180,7 @@ class Doors:
     scene_port: int = 0
     imports: dict[str, ImportState] = field(default_factory=dict)
     initialisations: dict[str, InitialisationState] = field(default_factory=dict)
+    subject_fits: dict[str, FitSubjectState] = field(default_factory=dict)
     synchronies: dict[str, SynchronyState] = field(default_factory=dict)
     exports: dict[str, ExportState] = field(default_factory=dict)
     track_jobs: dict[str, TrackJobState] = field(default_factory=dict)

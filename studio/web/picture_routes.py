@@ -65,7 +65,7 @@ def knob_changes(text: str) -> dict[str, object]:
     if not text:
         return {}
     try:
-        return msgspec.json.decode(text, type=dict[str, bool | int | float | str])
+        return msgspec.json.decode(text, type=dict[str, object])
     except msgspec.DecodeError:
         raise SettingsError(
             "The settings are no JSON object of knobs.", 'Write them like {"mask_threshold": 6}.'

@@ -49,7 +49,9 @@ class ShapePrograms:
                 kinematic_tables(with_dimensions(body, {name: body.dimensions[name] + STEP}))
             )
             if other.fixed.shape != self._first.fixed.shape:
-                raise BodyError(f"Dimension '{name}' changes the body's structure.", "Leave it out of the fit.")
+                raise BodyError(
+                    f"Dimension '{name}' changes the body's structure.", "Leave it out of the fit."
+                )
             fixed.append((other.fixed.astype(np.float64) - self._first.fixed) / STEP)
             limbs.append((other.limb_shape.astype(np.float64) - self._first.limb_shape) / STEP)
         self._fixed, self._limbs = np.array(fixed), np.array(limbs)
@@ -94,9 +96,7 @@ class ShapeSilhouettes:
         found = np.empty((count, frames, POSES))
         projectors = [self._projector.with_program(self.programs.program(shape)) for shape in shapes]
         for k, silhouettes in enumerate(self._frames):
-            outlines = np.concatenate(
-                [one.blocks(poses[m, k]) for m, one in enumerate(projectors)]
-            )
+            outlines = np.concatenate([one.blocks(poses[m, k]) for m, one in enumerate(projectors)])
             fits = silhouettes.areas(outlines, count * POSES).fitness()
             weights = self.seen[k] / max(1, np.count_nonzero(self.seen[k]))
             found[:, k] = (fits @ weights).reshape(count, POSES)

@@ -1,0 +1,150 @@
+"""How a session's masks are set up: which background, with what knobs, and what does not count.
+
+Sources: "plate" and "clip" (what was given, as it is), "median" (the footage's own), "combined" (plate and footage by
+region, `evidence.combined_background`; with three cameras or more cleaned by the other views, `runs.clean_plates`).
+Knobs that the person did not choose may be chosen by trying: those under which the views agree best in the hull, which
+needs no truth (`runs.mask_quality`).
+"""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import msgspec
+
+from studio.capture.exclusions import png_of
+from studio.capture.pictures import is_picture
+from studio.errors import FootageError
+from studio.evidence.backgrounds import Backgrounds
+from studio.evidence.settings import EvidenceSettings
+from studio.runs.clean_plates import clean_plates
+from studio.runs.mask_quality import MaskQuality, mask_quality, spread_frames
+from studio.runs.session_settings import session_settings
+from studio.sessions.background_files import (
+    Knob,
+    given_backgrounds,
+    read_evidence,
+    set_exclusion,
+    use_cleaned,
+    write_evidence,
+)
+from studio.sessions.session import Session
+from studio.settings import changed_settings
+
+SOURCES = ("plate", "clip", "median", "combined")
+MODEL_OF = {"plate": "gaussian", "clip": "gaussian", "median": "median", "combined": "combined"}
+CLEANING_VIEWS = 3
+TRIED_FRAMES = 3
+TRIALS: tuple[dict[str, Knob], ...] = (
+    {},
+    {"mask_shadow_test": False},
+    {"mask_shadow_darkest": 0.75, "mask_shadow_colour": 0.03},
+    {"mask_shadow_test": False, "mask_threshold": 6.0},
+    {"mask_shadow_test": False, "mask_min_component": 3000},
+    {
+        "mask_shadow_darkest": 0.75,
+        "mask_shadow_colour": 0.03,
+        "mask_threshold": 6.0,
+        "mask_min_component": 3000,
+    },
+)
+"""Knobs that are tried, beside what the session or the person has."""
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, slots=True)
+class BackgroundSetup:
+    """What was set. knobs : of the session's evidence. notes : for a person. quality : of the masks, where measured."""
+
+    source: str
+    knobs: dict[str, Knob]
+    notes: tuple[str, ...]
+    quality: MaskQuality | None
+
+
+def set_up_background(
+    session: Session,
+    source: str,
+    *,
+    knobs: Mapping[str, Knob] | None = None,
+    tune: bool = True,
+    exclude_unused: bool = False,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> BackgroundSetup:
+    """Choose a session's background and keep it. knobs : of masks, as they shall be. tune : try others for the rest.
+
+    exclude_unused : what no hull comes near in any frame does not count (only where backgrounds are cleaned; exclusions
+    that are there stay). Raises FootageError for a source that is not there, SettingsError for a knob.
+    """
+    _check_source(session, source)
+    chosen = dict(knobs or {})
+    session_settings(session, changes=chosen)
+    session = given_backgrounds(session)
+    notes: list[str] = []
+    model = MODEL_OF[source]
+    if source == "combined" and len(session.manifest.footage.cameras) >= CLEANING_VIEWS:
+        settings = _settings(session, {"background_model": "combined", **chosen})
+        plates = clean_plates(session, settings, progress=progress, cancelled=cancelled)
+        session = use_cleaned(session, {name: plate.picture for name, plate in plates.items()})
+        model = "gaussian"
+        for name, plate in plates.items():
+            notes.append(f"{name}: {100.0 * plate.never_empty:.0f} % of the picture was never seen empty.")
+            if exclude_unused and not (session.path / "exclusions" / f"{name}.png").exists():
+                set_exclusion(session, name, png_of(plate.never_taken))
+    own: dict[str, Knob] = {"background_model": model, **chosen}
+    quality = None
+    if tune and len(session.manifest.footage.cameras) > 1:
+        own, quality = _tuned(session, own, progress)
+    write_evidence(session, msgspec.structs.replace(read_evidence(session), knobs=own))
+    return BackgroundSetup(source, own, tuple(notes), quality)
+
+
+def _tuned(
+    session: Session, own: dict[str, Knob], progress: Progress | None
+) -> tuple[dict[str, Knob], MaskQuality]:
+    """The knobs among TRIALS (beside `own`, which stay) whose worst camera agrees best, and the quality."""
+    footage = session.footage()
+    try:
+        backgrounds = Backgrounds(footage)
+        frames = spread_frames(footage.frame_count, TRIED_FRAMES)
+        best: tuple[float, dict[str, Knob], MaskQuality] | None = None
+        for done, trial in enumerate(TRIALS):
+            if progress is not None:
+                progress("trying knobs", done, len(TRIALS))
+            knobs = {**trial, **own}
+            found = mask_quality(session, _settings(session, knobs), frames, backgrounds=backgrounds)
+            worst = min((0.0 if view.agreement != view.agreement else view.agreement) for view in found.views)
+            if best is None or worst > best[0] + 1e-9:
+                best = (worst, knobs, found)
+    finally:
+        footage.close()
+    if best is None:
+        raise RuntimeError("there are trials")
+    return best[1], best[2]
+
+
+def _settings(session: Session, knobs: Mapping[str, Knob]) -> EvidenceSettings:
+    """The studio's evidence settings with some knobs, whatever the session had."""
+    bare = dataclasses.replace(session_settings(session), evidence=EvidenceSettings())
+    return changed_settings(bare, knobs).evidence
+
+
+def _check_source(session: Session, source: str) -> None:
+    if source not in SOURCES:
+        raise FootageError(
+            f"There is no background source '{source}'.", f"Choose one of {', '.join(SOURCES)}."
+        )
+    evidence = read_evidence(session)
+    for camera in session.manifest.footage.cameras:
+        path = evidence.given.get(camera.name, camera.background)
+        if source in ("plate", "clip") and not path:
+            raise FootageError(
+                f"Camera {camera.name} has no {source}.", "Give one with --plates, or choose the median."
+            )
+        if path and source in ("plate", "clip") and is_picture(session.path / path) != (source == "plate"):
+            kind = "picture" if source == "clip" else "video"
+            raise FootageError(
+                f"The background of camera {camera.name} is a {kind}, no {source}.", "Choose the other."
+            )

@@ -1,0 +1,268 @@
+"""Fit the subject of a session: limb lengths and radii found on the silhouettes of a few frames, with their poses.
+
+The frames are those in which the person stands most differently (`runs.subject_frames`). Their first poses come from a
+run of the session where one has them, else each frame is searched for one (`runs.initialising`). The search itself is
+`tracking.shape_search`. What is found is a subject whose dimensions are written out, so that every later run of the
+session has this body.
+"""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.branches import within_limits
+from studio.body.catalogue import load_body
+from studio.body.model import BodyModel
+from studio.body.shape_space import levelled, shape_space
+from studio.body.subject import Subject, fit_subject, write_subject
+from studio.errors import RunError
+from studio.evidence.backgrounds import Backgrounds
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.evidence.pipeline import EvidenceMaker
+from studio.runs.initialising import initialise
+from studio.runs.search_space import parameter_names
+from studio.runs.session_settings import session_settings
+from studio.runs.subject_frames import varied_frames
+from studio.runs.tracks import read_track
+from studio.sessions.names import free_name
+from studio.sessions.session import SUBJECT_NAME, Session
+from studio.tracking.loss_detection import anything_seen
+from studio.tracking.shape_search import FoundShape, ShapeSearch, ShapeSearchSettings
+from studio.weighting.shape_silhouettes import ShapeSilhouettes
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+COUNT = 5
+MOST_FRAMES = 24
+ANGLE_SPREAD, PLACE_SPREAD = 0.35, 60.0
+"""rad and mm: how far the first poses may be off."""
+
+
+@dataclass(frozen=True, slots=True)
+class FitRequest:
+    """What a fit is asked for.
+
+    frames : to look at; () chooses `count`. symmetric : left and right alike. lengths, radii : what may change. run :
+    whose poses to begin with, "" for the session's newest run of this body that has them. body : "" for the session's.
+    height_mm : as known to a few centimetres; None takes the subject's. height_spread : mm, its standard deviation.
+    """
+
+    frames: tuple[int, ...] = ()
+    count: int = COUNT
+    symmetric: bool = True
+    lengths: bool = True
+    radii: bool = True
+    run: str = ""
+    body: str = ""
+    height_mm: float | None = None
+    height_spread: float = 15.0
+    seed: int = 0
+    particles: int = 48
+    layers: int = 120
+
+
+@dataclass(frozen=True, slots=True)
+class FittedSize:
+    """One group of dimensions, mm: before, after, and the standard deviation of the search's last particles."""
+
+    name: str
+    kind: str
+    dimensions: tuple[str, ...]
+    before: float
+    after: float
+    deviation: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FittedSubject:
+    """A subject that was found. frames, poses (F, D) : with it. overlap_before, overlap : (F,) f_s."""
+
+    subject: Subject
+    body: BodyModel
+    sizes: tuple[FittedSize, ...]
+    frames: tuple[int, ...]
+    poses: Array
+    overlap_before: Array
+    overlap: Array
+    poses_from: str
+    evaluations: int
+
+
+class FitCancelledError(RunError):
+    """The fit of a subject was cancelled."""
+
+    code = "cancelled"
+
+
+def fit_session_subject(
+    session: Session,
+    request: FitRequest | None = None,
+    *,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> FittedSubject:
+    """The subject of a session, fitted to its silhouettes. Nothing is written: see `keep_subject`.
+
+    progress : the step in words, how much of it is done, and how much there is. Raises RunError where nothing is to be
+    seen in a frame or nothing may change, NotFoundError for a frame or run that is not there, FitCancelledError.
+    """
+    asked = request or FitRequest()
+    if not asked.lengths and not asked.radii:
+        raise RunError("Neither lengths nor radii are to be fitted.", "Choose at least one of them.")
+    tell = _watched(progress, cancelled)
+    body, subject = _first_body(session, asked)
+    tell("choosing frames", 0, 1)
+    frames, start, poses_from = _first_poses(session, body, asked, tell)
+    evidence = _evidence(session, frames, tell)
+    space = shape_space(body, symmetric=asked.symmetric, lengths=asked.lengths, radii=asked.radii)
+    space = levelled(space) if asked.symmetric else space
+    limbs = {name: number for number, name in enumerate(dict.fromkeys(p.limb for p in body.parameters))}
+    search = ShapeSearch(
+        ShapeSilhouettes(space, session.cameras(), evidence),
+        np.array([[entry.lower for entry in body.parameters], [entry.upper for entry in body.parameters]]),
+        np.array([ANGLE_SPREAD if entry.kind == "angle" else PLACE_SPREAD for entry in body.parameters]),
+        np.array([limbs[entry.limb] for entry in body.parameters]),
+        height=subject.height_mm,
+        settings=ShapeSearchSettings(
+            particles=asked.particles, layers=asked.layers, height_spread=asked.height_spread
+        ),
+        seed=asked.seed,
+        progress=lambda done, total: tell("fitting lengths and radii", done, total),
+    )
+    found = search.run(start)
+    before, after = space.sizes(np.zeros_like(found.shape)), space.sizes(found.shape)
+    sizes = tuple(
+        FittedSize(group.name, group.kind, group.dimensions, float(one), float(other), float(other * share))
+        for group, one, other, share in zip(space.groups, before, after, found.deviation, strict=True)
+    )
+    fitted = _subject_of(subject, space.body_of(found.shape))
+    return _fitted(fitted, space.body_of(found.shape), sizes, frames, found, poses_from)
+
+
+def keep_subject(session: Session, found: FittedSubject, into: Path | None = None) -> Path:
+    """Write a fitted subject: into a file, or as the session's own (the old one stays as subject-before.toml)."""
+    if into is not None:
+        write_subject(found.subject, into)
+        return into
+    own = session.path / SUBJECT_NAME
+    if own.exists():
+        taken = {path.stem for path in session.path.glob("*.toml")}
+        own.rename(session.path / f"{free_name('subject-before', taken)}.toml")
+    write_subject(found.subject, own)
+    return own
+
+
+def _first_body(session: Session, asked: FitRequest) -> tuple[BodyModel, Subject]:
+    """The body to begin with and what is known of the subject."""
+    known = session.subject() or Subject(body=session.manifest.body)
+    if asked.height_mm is not None:
+        known = Subject(body=known.body, height_mm=asked.height_mm)
+    tree = load_body(asked.body or session.manifest.body, session.body_folders)
+    return fit_subject(tree, known, session.body_folders)[0], dataclasses.replace(known, body=tree.name)
+
+
+def _first_poses(
+    session: Session, body: BodyModel, asked: FitRequest, tell: Progress
+) -> tuple[tuple[int, ...], Array, str]:
+    """The frames, a pose in each (F, D), and where the poses are from."""
+    count = session.manifest.frame_count
+    for frame in asked.frames:
+        if not 0 <= frame < count:
+            raise RunError(
+                f"Frame {frame} does not lie in the footage of '{session.name}'.", f"It has frames 0:{count}."
+            )
+    if not 1 <= (len(asked.frames) or asked.count) <= MOST_FRAMES:
+        raise RunError("A subject is fitted to 1 to 24 frames.", "Choose fewer, or at least one.")
+    stored = _stored_poses(session, body, asked.run)
+    if stored is not None:
+        numbers, poses, name = stored
+        frames = asked.frames or varied_frames(body, numbers, poses, asked.count)
+        rows = {int(number): row for row, number in enumerate(numbers)}
+        if all(frame in rows for frame in frames):
+            return frames, poses[[rows[frame] for frame in frames]], f"run {name}"
+    frames = asked.frames or varied_frames(body, np.arange(count), None, asked.count)
+    found = []
+    for done, frame in enumerate(frames):
+
+        def told(step: str, part: int, whole: int, done: int = done) -> None:
+            tell(
+                f"{step} in frame {frames[done]}", done * 100 + 100 * part // max(whole, 1), 100 * len(frames)
+            )
+
+        found.append(
+            within_limits(body, initialise(session, frame, body=body, seed=asked.seed, progress=told).pose)
+        )
+    return frames, np.array(found), "searched for in each frame"
+
+
+def _stored_poses(
+    session: Session, body: BodyModel, wanted: str
+) -> tuple[NDArray[np.int64], Array, str] | None:
+    """Frames, poses and name of the run asked for, or of the newest one of this body with any."""
+    runs = [session.run(wanted)] if wanted else list(reversed(session.runs()))
+    for run in runs:
+        if run.record.parameters != parameter_names(body):
+            continue
+        track = read_track(run)
+        if len(track.frames):
+            return track.frames, track.poses, run.name
+    if wanted:
+        raise RunError(f"Run '{wanted}' has no poses of {body.name}.", "Choose another run, or none.")
+    return None
+
+
+def _evidence(session: Session, frames: Sequence[int], tell: Progress) -> tuple[FrameEvidence, ...]:
+    """The masks of the frames. Raises RunError where nothing is to be seen."""
+    footage = session.footage()
+    try:
+        settings = session_settings(session).evidence
+        maker = EvidenceMaker(session.cameras(), footage, Backgrounds(footage), settings, "none")
+        found = []
+        for done, frame in enumerate(frames):
+            tell("looking at the frames", done, len(frames))
+            evidence = maker.evidence(frame)
+            if not anything_seen(evidence):
+                raise RunError(
+                    f"Nothing is to be seen of a body in frame {frame} of session '{session.name}'.",
+                    "Choose other frames, or check the masks.",
+                )
+            found.append(evidence)
+    finally:
+        footage.close()
+    return tuple(found)
+
+
+def _subject_of(subject: Subject, body: BodyModel) -> Subject:
+    """The subject with all of a body's dimensions, from which that very body comes back."""
+    entries = body.definition.dimensions if body.definition else {}
+    lengths = {name: value for name, value in body.dimensions.items() if entries[name].ratio is None}
+    ratios = {name: value for name, value in body.dimensions.items() if entries[name].ratio is not None}
+    return Subject(body=body.name, height_mm=subject.height_mm, dimensions_mm=lengths, ratios=ratios)
+
+
+def _fitted(
+    subject: Subject,
+    body: BodyModel,
+    sizes: tuple[FittedSize, ...],
+    frames: tuple[int, ...],
+    found: FoundShape,
+    poses_from: str,
+) -> FittedSubject:
+    return FittedSubject(
+        subject, body, sizes, frames, found.poses, found.before, found.fitness, poses_from, found.evaluations
+    )
+
+
+def _watched(progress: Progress | None, cancelled: Callable[[], bool] | None) -> Progress:
+    def tell(step: str, done: int, total: int) -> None:
+        if cancelled is not None and cancelled():
+            raise FitCancelledError("Fitting the subject was cancelled.", "Start it again when you like.")
+        if progress is not None:
+            progress(step, done, total)
+
+    return tell

@@ -1,0 +1,114 @@
+"""Masks of a session: how good they are, what does not count, and how they are made."""
+
+import asyncio
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+from pydantic import Field
+
+from studio.errors import NotFoundError
+from studio.runs.mask_quality import MaskQuality, mask_quality
+from studio.runs.overlay_pictures import forget_composers
+from studio.runs.session_settings import session_settings
+from studio.sessions.background_files import exclusion_path, read_evidence, set_exclusion, write_evidence
+from studio.web.picture_routes import Knobs, knob_changes
+from studio.web.schemas import Answer, Number, Value
+from studio.web.session_routes import OpenSession
+
+router = APIRouter(prefix="/api/sessions/{session}", tags=["masks"])
+
+Frames = Annotated[list[int] | None, Query(max_length=24, description="Empty: five, evenly spread.")]
+
+
+class ViewQualityLine(Answer):
+    """One camera. covered: share of the mask under the hull's silhouette; inside: share of that in the mask; agreement:
+    the smaller; denied: share of the other masks that this camera alone keeps out of the hull; note: what to look for.
+    """
+
+    camera: str
+    agreement: Number
+    covered: Number
+    inside: Number
+    denied: Number
+    usable: bool
+    note: str
+
+
+class MaskQualityAnswer(Answer):
+    """All cameras' masks in some frames."""
+
+    frames: list[int]
+    cameras: list[ViewQualityLine]
+    usable: bool
+    hull_litres: list[Number]
+
+
+class ExclusionAnswer(Answer):
+    """What does not count of a camera."""
+
+    camera: str
+    pixels: int
+
+
+class EvidenceAnswer(Answer):
+    """Knobs of the masks that the session's new runs begin with, by flat name."""
+
+    knobs: dict[str, Value] = Field(default_factory=dict)
+
+
+@router.get("/masks/quality")
+async def quality(session: OpenSession, frames: Frames = None, settings: Knobs = "") -> MaskQualityAnswer:
+    """How far the views agree in the visual hull; `settings` as a preview of other knobs. Takes seconds a frame."""
+    wanted = session_settings(session, changes=knob_changes(settings)).evidence
+    return _answer(await asyncio.to_thread(mask_quality, session, wanted, tuple(frames or ())))
+
+
+@router.get("/exclusions/{camera}", response_class=Response)
+def exclusion(session: OpenSession, camera: str) -> Response:
+    """The painted picture of what does not count: white on black, as stored."""
+    path = exclusion_path(session, camera)
+    if path is None:
+        raise NotFoundError(f"Nothing of camera '{camera[:64]}' is excluded.", "Paint something.")
+    return Response(path.read_bytes(), media_type="image/png", headers={"cache-control": "no-store"})
+
+
+@router.put("/exclusions/{camera}")
+async def put_exclusion(session: OpenSession, camera: str, request: Request) -> ExclusionAnswer:
+    """Exclude what is painted in a PNG of the footage's size; an empty body or picture excludes nothing."""
+    content = await request.body()
+    pixels = await asyncio.to_thread(set_exclusion, session, camera, content)
+    forget_composers()
+    return ExclusionAnswer(camera=camera, pixels=pixels)
+
+
+@router.get("/evidence")
+def evidence(session: OpenSession) -> EvidenceAnswer:
+    """The session's own knobs of masks."""
+    return EvidenceAnswer(knobs=read_evidence(session).knobs)
+
+
+@router.put("/evidence")
+def put_evidence(session: OpenSession, wish: dict[str, Value]) -> EvidenceAnswer:
+    """Let new runs of the session begin with these knobs; runs that are there keep theirs."""
+    session_settings(session, changes=wish)
+    stored = read_evidence(session)
+    write_evidence(session, type(stored)(knobs=dict(wish), given=stored.given))
+    return EvidenceAnswer(knobs=dict(wish))
+
+
+def _answer(found: MaskQuality) -> MaskQualityAnswer:
+    lines = [
+        ViewQualityLine(
+            camera=view.camera,
+            agreement=view.agreement,
+            covered=view.covered,
+            inside=view.inside,
+            denied=view.denied,
+            usable=view.usable,
+            note=view.in_words(),
+        )
+        for view in found.views
+    ]
+    return MaskQualityAnswer(
+        frames=list(found.frames), cameras=lines, usable=found.usable, hull_litres=list(found.hull_litres)
+    )

@@ -1,0 +1,74 @@
+"""Who is in front of the cameras, as OpenAPI shows it."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from studio.web.schemas import Answer, Number, Numbers, Request, RunName
+
+
+class SubjectRequest(Request):
+    """A person by height alone (mm), all lengths by published proportions, and measured lengths if there are any."""
+
+    height_mm: float = Field(ge=300, le=3000)
+    body: RunName | None = Field(None, description="Kinematic tree; null: the session's.")
+    lengths_mm: dict[str, float] = Field(
+        default_factory=dict, description="Pairs of markers: RHip_RKnee to mm."
+    )
+
+
+class SubjectAnswer(Answer):
+    """A session's person. dimensions: mm (ratios without unit), by the body's own names. source: of proportions."""
+
+    body: str
+    height_mm: Number
+    dimensions: dict[str, float]
+    notes: list[str]
+    source: str
+
+
+class FitSubjectRequest(Request):
+    """What a fit looks at and may change. frames: empty chooses `count` of them. keep: as the session's own."""
+
+    frames: list[int] = Field(default_factory=list, max_length=24)
+    count: int = Field(5, ge=1, le=24)
+    symmetric: bool = True
+    lengths: bool = True
+    radii: bool = True
+    run: RunName | None = Field(None, description="Whose poses to begin with; null: the newest.")
+    body: RunName | None = None
+    height_mm: float | None = Field(None, ge=300, le=3000)
+    seed: int = Field(0, ge=0, le=2**63 - 1)
+    keep: bool = Field(True, description="Write it as the session's subject; the old one stays beside it.")
+
+
+class SizeLine(Answer):
+    """A group of dimensions, mm. deviation: of the search's last particles."""
+
+    name: str
+    kind: Literal["length", "radius"]
+    before: Number
+    after: Number
+    deviation: Number
+
+
+class FitSubjectState(Answer):
+    """How a fit stands; code, message and hint say why it failed. overlap: f_s of each frame's silhouettes."""
+
+    identifier: str
+    session: str
+    state: Literal["running", "done", "failed"]
+    step: str = ""
+    done: int = 0
+    total: int = 0
+    seconds_left: Number = None
+    code: str = ""
+    message: str = ""
+    hint: str = ""
+    body: str = ""
+    frames: list[int] = Field(default_factory=list)
+    poses_from: str = ""
+    sizes: list[SizeLine] = Field(default_factory=list)
+    overlap_before: Numbers | None = None
+    overlap: Numbers | None = None
+    file: str = ""

@@ -1,0 +1,103 @@
+"""People with limb lengths drawn around the usual ones, seen by four cameras in a few different postures."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.catalogue import load_body
+from studio.body.inverse_kinematics import pose_from_markers
+from studio.body.model import BodyModel
+from studio.body.subject import Subject, fit_subject
+from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
+from studio.geometry.camera import Camera
+from studio.synthesis.cameras import RIGS
+from studio.synthesis.motions import make_motion
+from studio.synthesis.person import Skeleton, marker_lengths, marker_motion, skeleton_of_height
+from studio.synthesis.renderer import Renderer
+from studio.synthesis.rooms import ROOMS
+from studio.synthesis.wardrobes import WARDROBES
+
+Array = NDArray[np.float64]
+
+SIZE = (640, 480)
+POSTURES = (("run", 12), ("handstand", 24), ("box", 96), ("run", 26), ("box", 70))
+"""Motions and frames of them at 60 Hz."""
+MEASURED = {
+    "thigh_length": "RHip_RKnee",
+    "shin_length": "RKnee_RAnkle",
+    "upper_arm_length": "RShoulder_RElbow",
+    "forearm_length": "RElbow_RWrist",
+}
+"""The limbs whose length the body's dimensions and the markers mean alike."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DrawnPerson:
+    """body : of the height as it was told. lengths : true mm by group. poses : (F, D) of that body, near the truth."""
+
+    skeleton: Skeleton
+    told_height: float
+    body: BodyModel
+    cameras: tuple[Camera, ...]
+    frames: tuple[FrameEvidence, ...]
+    lengths: dict[str, float]
+    poses: Array
+
+
+def drawn_skeleton(rng: np.random.Generator) -> Skeleton:
+    """Lengths ± 10 %, each its own; the height follows from them."""
+    usual = skeleton_of_height(float(rng.uniform(1600.0, 1900.0)), rng)
+
+    def drawn() -> float:
+        return float(rng.uniform(0.9, 1.1))
+
+    def both(value: tuple[float, float]) -> tuple[float, float]:
+        factor = drawn()
+        return value[0] * factor, value[1] * factor
+
+    found = replace(
+        usual,
+        thigh=both(usual.thigh),
+        shin=both(usual.shin),
+        upper_arm=both(usual.upper_arm),
+        forearm=both(usual.forearm),
+        trunk=usual.trunk * drawn(),
+    )
+    return replace(found, height=found.standing_hip_height + found.trunk + found.head)
+
+
+def drawn_person(
+    seed: int, body_name: str = "human31", *, jitter: float = 0.05, postures: int = len(POSTURES)
+) -> DrawnPerson:
+    """The person of a seed. jitter : radians by which the angles of `poses` are off."""
+    rng = np.random.default_rng(np.random.SeedSequence((seed, 0xD2A)))
+    skeleton = drawn_skeleton(rng)
+    told = skeleton.height + float(rng.uniform(-30.0, 30.0))
+    cameras = RIGS["corners"](SIZE, rng)
+    body, _ = fit_subject(load_body(body_name), Subject(body=body_name, height_mm=told))
+    frames, poses, lengths = [], [], {}
+    for number, (motion_name, at) in enumerate(POSTURES[:postures]):
+        motion = make_motion(motion_name, skeleton, at + 2, 60.0, {})
+        lengths = marker_lengths(motion)
+        renderer = Renderer(
+            ROOMS["furnished"](0.0),
+            cameras,
+            motion,
+            noise=0.0,
+            samples=1,
+            seed=seed,
+            wardrobe=WARDROBES["striped"],
+        )
+        shadow = renderer.shadow(at)
+        views = []
+        for index, camera in enumerate(cameras):
+            picture, mask = renderer.picture(index, at, shadow)
+            views.append(ViewEvidence(camera.name, picture, mask, np.zeros_like(mask)))
+        frames.append(FrameEvidence(number, tuple(views)))
+        markers = marker_motion(motion)
+        pose, _ = pose_from_markers(body, markers.names, markers.positions[at], body.neutral)
+        angles = np.array([entry.kind == "angle" for entry in body.parameters])
+        poses.append(pose + angles * rng.normal(0.0, jitter, len(pose)))
+    true = {group: lengths[pair] for group, pair in MEASURED.items()}
+    return DrawnPerson(skeleton, told, body, cameras, tuple(frames), true, np.array(poses))
