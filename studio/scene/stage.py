@@ -10,7 +10,7 @@ from dataclasses import fields
 import numpy as np
 
 from studio.errors import SettingsError
-from studio.export.task import ExportTask, Written
+from studio.export.task import Writer
 from studio.scene.director import Director
 from studio.scene.guarded_server import GuardedServer
 from studio.scene.proposal import Proposal
@@ -21,7 +21,10 @@ from studio.sessions.workspace import Workspace
 
 
 class SceneStage:
-    """The scene of a workspace. control : the tracking process as its owner sees it."""
+    """The scene of a workspace. control : the tracking process as its owner sees it.
+
+    record_scene : writes a run's scene as a recording, beside the one that is shown.
+    """
 
     def __init__(self, workspace: Workspace, control: Control) -> None:
         self._workspace = workspace
@@ -29,6 +32,7 @@ class SceneStage:
         self._server: GuardedServer | None = None
         self._director: Director | None = None
         self._watchers: list[Callable[[Shown], None]] = []
+        self.record_scene: Writer = record_scene
 
     def start(self) -> int:
         """Build the scene; returns the loopback port of viser's server."""
@@ -118,10 +122,6 @@ class SceneStage:
         """Play stored frames, or stop."""
         if self._director is not None:
             self._director.set_playback(playing=playing)
-
-    def record_scene(self, task: ExportTask) -> Written:
-        """Write a run's scene as a recording, beside the one that is shown. Raises ExportError."""
-        return record_scene(task)
 
     def _moved(self, shown: Shown) -> None:
         for callback in self._watchers:

@@ -15,7 +15,7 @@ from typing import Protocol
 
 from fastapi import Request
 
-from studio.export.task import ExportTask, Written
+from studio.export.task import Writer
 from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.workspace import Workspace
 from studio.web.event_stream import EventStream
@@ -154,8 +154,9 @@ class Stage(Protocol):
         """Play stored frames, or stop."""
         ...
 
-    def record_scene(self, task: ExportTask) -> Written:
-        """Write a run's scene as a recording, beside the one that is shown. Raises ExportError."""
+    @property
+    def record_scene(self) -> Writer:
+        """Writes a run's scene as a recording, beside the one that is shown."""
         ...
 
 
