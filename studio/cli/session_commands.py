@@ -36,6 +36,11 @@ INTO_HELP = "Name of the new session in the workspace, or a path."
     help="Turn this camera's pictures clockwise by 90, 180 or 270 degrees (repeatable).",
 )
 @click.option(
+    "--despite-findings",
+    is_flag=True,
+    help="Import a calibration that would make results wrong (z not up, a wrong unit), with a warning.",
+)
+@click.option(
     "--copy/--reference", default=True, help="Copy the footage (default), or refer to it where it lies."
 )
 @command
@@ -47,6 +52,7 @@ def import_command(
     trial: str | None,
     offsets: tuple[str, ...],
     rotations: tuple[str, ...],
+    despite_findings: bool,
     copy: bool,
 ) -> dict[str, object]:
     """Make a session from a folder of footage and calibration, checking one against the other.
@@ -64,6 +70,7 @@ def import_command(
             trial=trial,
             offsets=camera_numbers(offsets, "--offset"),
             rotations=camera_numbers(rotations, "--rotate"),
+            despite_findings=despite_findings,
             progress=report,
         )
     for line in (*told.notes, *(f"Warning: {warning}" for warning in told.warnings)):

@@ -9,6 +9,7 @@ from studio.capture.calibration_files import read_calibration
 from studio.errors import FootageError, SessionError
 from studio.sessions.atomic_files import discard, move_into_place, new_folder_beside
 from studio.sessions.importers.bodytrack import is_bodytrack, plan_bodytrack
+from studio.sessions.importers.checking import check_rig
 from studio.sessions.importers.folder_layout import plan_folder
 from studio.sessions.importers.measuring import measure_source
 from studio.sessions.importers.plan import ImportCancelled, Progress, SourcePlan
@@ -47,6 +48,7 @@ def import_source(
     trial: str | None = None,
     offsets: Mapping[str, int] | None = None,
     rotations: Mapping[str, int] | None = None,
+    despite_findings: bool = False,
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> ImportReport:
@@ -56,7 +58,8 @@ def import_source(
     calibration : which one to take where there are several. fps : frame rate, before any other. copy : False
     refers to the footage where it lies. trial : which one of several. offsets : by camera (or its footage's name), the
     file's frame that was taken with the others' frame 0; rotations : degrees clockwise by which its pictures are
-    turned; both go before what the source says. cancelled : asked often; True stops the import with ImportCancelled.
+    turned; both go before what the source says. despite_findings : import a calibration that would make results wrong
+    (z not up, a wrong unit, …), with a warning. cancelled : asked often; True stops the import with ImportCancelled.
     All is checked before anything is written; whatever fails, nothing is left and nothing that was stored is
     touched. Raises StudioError.
     """
@@ -72,6 +75,8 @@ def import_source(
         if copy:
             check_room(plan, into)
         measured = measure_source(plan, read, fps, report)
+        doubts = check_rig(tuple(entry.camera for entry in measured.cameras), despite_findings)
+        measured = replace(measured, warnings=(*measured.warnings, *doubts))
         folder = new_folder_beside(into)
         try:
             manifest = write_session(

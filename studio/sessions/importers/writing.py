@@ -10,7 +10,6 @@ from studio.capture.calibration_files import Calibration, write_calibration
 from studio.capture.calibration_toml import is_canonical
 from studio.capture.footage_source import CameraSource, FootageSource
 from studio.capture.pictures import list_pictures
-from studio.capture.sanity import sanity_notes
 from studio.capture.trc import read_trc
 from studio.errors import SessionError
 from studio.sessions.importers.measuring import MeasuredSource
@@ -81,7 +80,6 @@ def write_session(
     footage = _write_footage(folder, measured, copy, progress)
     _write_calibration(folder, calibration, measured)
     _write_person(folder, plan, person)
-    cameras = tuple(entry.camera for entry in measured.cameras)
     crops = [entry.crop.words(entry.camera.name) for entry in measured.cameras if entry.crop is not None]
     manifest = SessionManifest(
         name=name,
@@ -96,7 +94,7 @@ def write_session(
         assumptions=(calibration.unit_note, *crops),
         notes=(calibration.unit_note, *calibration.notes, *plan.notes, *measured.notes, *person.notes),
         layout=plan.layout,
-        warnings=(*measured.warnings, *sanity_notes(cameras)),
+        warnings=measured.warnings,
         matching=tuple(CameraMatch(match.footage, match.camera, match.how) for match in measured.matching),
     )
     write_manifest(folder, manifest)

@@ -1,0 +1,63 @@
+"""Calibrations that would make results wrong are not imported without a word."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sources import video_source
+from toy_footage import rig
+
+from studio.capture.calibration_files import export_calibration
+from studio.errors import CalibrationError
+from studio.geometry.camera import Camera
+from studio.sessions.importers.catalogue import import_source
+
+CAMERAS = rig(2, "cam_")
+
+
+def in_world(camera: Camera, turn: np.ndarray) -> Camera:
+    """The camera in a world whose axes are the columns of `turn`."""
+    return replace(camera, rotation=camera.rotation @ turn)
+
+
+Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+Z_DOWN = np.diag([1.0, -1.0, -1.0])
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (lambda camera: in_world(camera, Y_UP), "Y axis points up in all pictures, not Z"),
+        (lambda camera: in_world(camera, Z_DOWN), "(minus Z axis points up|under the floor)"),
+        (
+            lambda camera: replace(camera, translation=camera.translation / 1000.0),
+            "metres were taken for millimetres",
+        ),
+    ],
+)
+def test_what_makes_results_wrong_blocks(
+    tmp_path: Path, spoil: Callable[[Camera], Camera], said: str
+) -> None:
+    source = video_source(tmp_path / "source")
+    path = source / "calibration" / "Calib.toml"
+    export_calibration(tuple(spoil(camera) for camera in CAMERAS), path, "aniposelib")
+    # The unit is named, as FreeMoCap does, so that the distance between the cameras is not asked.
+    path.write_text(path.read_text() + "\n[metadata.board]\nsquare_length_mm = 30.0\n")
+    with pytest.raises(CalibrationError, match=said) as caught:
+        import_source(source, tmp_path / "made")
+    assert "--despite-findings" in caught.value.hint
+    assert not (tmp_path / "made").exists()
+    report = import_source(source, tmp_path / "made", despite_findings=True)
+    assert any("axis points up" in line or "floor" in line or "metres" in line for line in report.warnings)
+
+
+def test_what_is_only_doubtful_warns(tmp_path: Path) -> None:
+    source = video_source(tmp_path / "source")
+    off = replace(
+        CAMERAS[0], matrix=CAMERAS[0].matrix + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 32.0], [0.0, 0.0, 0.0]])
+    )
+    export_calibration((off, CAMERAS[1]), source / "calibration" / "Calib.toml", "pose2sim")
+    report = import_source(source, tmp_path / "made")
+    assert any("principal point" in line for line in report.warnings)
