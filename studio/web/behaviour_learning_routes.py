@@ -12,9 +12,9 @@ from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import list_bodies, load_body
 from studio.errors import BehaviourError, NotFoundError
 from studio.knobs import knobs_of
+from studio.runs.behaviour_models import SUFFIX, models_folder
 from studio.sessions.names import checked_name
 from studio.synthesis.recipe_file import recipe_names
-from studio.training.model_shelf import place_for_model
 from studio.training.oversampling import OversamplingSettings
 from studio.training.sources import FPS, MOTION_FILES
 from studio.web.archives import unpack_zip
@@ -85,7 +85,10 @@ def _order(wish: LearningRequest, doors: Doors) -> LearningOrder:
     """The wish, checked. Raises StudioError for a name that is taken, sources that are not there, wrong knobs."""
     doors.learning.check_free()
     workspace = doors.workspace
-    place_for_model(checked_name(wish.name, "model"), workspace)
+    if (models_folder(workspace.root) / f"{checked_name(wish.name, 'model')}{SUFFIX}").exists():
+        raise BehaviourError(
+            f"There is a model '{wish.name}' already.", "Choose another name, or delete that one first."
+        )
     load_body(wish.body)
     for source in (*wish.sources, *wish.tests):
         _check(source, doors)

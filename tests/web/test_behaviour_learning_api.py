@@ -4,14 +4,11 @@ import io
 import time
 import zipfile
 
-import numpy as np
 import pytest
+from swaying_person import swaying
 from web_doubles import Studio
 
 from studio.behaviour.settings import LearningSettings
-from studio.body.catalogue import load_body
-from studio.body.forward_kinematics import marker_points
-from studio.capture.trc import MarkerMotion, write_trc
 from studio.knobs import knobs_of
 from studio.runs.behaviour_models import models_folder
 from studio.sessions.stored_run import StoredRun
@@ -19,20 +16,6 @@ from studio.training.oversampling import OversamplingSettings
 
 PATIENCE = 120.0
 FEW = {"most_clusters": 6, "reduced_dimensions": 3, "memory": 3, "smoothings": 2}
-
-
-def swaying(folder, frames: int = 60):
-    """A TRC of a person who sways, 30 frames a second."""
-    body = load_body("human31")
-    poses = np.repeat(body.neutral[None], frames, axis=0)
-    angles = [at for at, entry in enumerate(body.parameters) if entry.kind == "angle"]
-    beat = np.sin(2.0 * np.pi * np.arange(frames)[:, None] / 25.0 + np.arange(len(angles)))
-    limits = np.array([[max(entry.lower, -1.0), min(entry.upper, 1.0)] for entry in body.parameters])[angles]
-    poses[:, angles] = limits.mean(axis=1) + 0.1 * beat * np.ptp(limits, axis=1)
-    path = folder / "sway.trc"
-    names = tuple(marker.name for marker in body.markers)
-    write_trc(path, MarkerMotion(names, np.arange(frames) / 30.0, marker_points(body, poses)))
-    return path
 
 
 def uploaded(studio: Studio, name: str, content: bytes) -> str:
