@@ -82,6 +82,14 @@ def read_track(run: StoredRun, name: str = RAW) -> Track:
     return track
 
 
+def track_stamp(run: StoredRun, name: str) -> int:
+    """A number that changes when a derived track is written again; 0 where there is none."""
+    try:
+        return _path(run, name).stat().st_mtime_ns
+    except FileNotFoundError:
+        return 0
+
+
 def write_track(run: StoredRun, track: Track, *, replace: bool = False) -> Path:
     """Keep a track beside the run's others, in one step; returns its file.
 

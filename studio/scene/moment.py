@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from numpy import float64
 from numpy.typing import NDArray
 
+from studio.runs.tracks import RAW
 from studio.scene.live_search import LiveSearch
 from studio.scene.opened_run import OpenedRun
 from studio.tracking.tracker import LayerRecord
@@ -16,8 +17,8 @@ Array = NDArray[float64]
 @dataclass(frozen=True, slots=True, eq=False)
 class Moment:
     """frame : None while there is nothing. pose : (D,) drawn as the body. beside : (D,) the stored answer
-    while a re-annealed one is shown. records : the layers whose clouds are drawn. layer_count : how many
-    layers the frame takes. truth : (M, 3) mm. tracking : how a stored frame went, "" unknown.
+    while a re-annealed one, or another track's, is shown. records : the layers whose clouds are drawn. layer_count :
+    how many layers the frame takes. truth : (M, 3) mm. tracking : how a stored frame went, "" unknown.
     """
 
     frame: int | None
@@ -30,13 +31,19 @@ class Moment:
 
 
 def moment_of(
-    opened: OpenedRun, frame: int | None, live: LiveSearch, *, edited: Array | None = None, layers: int = 0
+    opened: OpenedRun,
+    frame: int | None,
+    live: LiveSearch,
+    *,
+    edited: Array | None = None,
+    layers: int = 0,
+    track: str = RAW,
 ) -> Moment:
     """The moment at `frame`: stored, in progress, annealed again, or the start pose being edited.
 
     live : used where it is about this frame. edited : the start pose under the sliders, shown instead of an
     answer. layers : how many layers a frame takes with the settings in use (for the colours of a frame in
-    progress).
+    progress). track : whose poses are shown of stored frames, where it has one.
     """
     truth = None if frame is None else opened.truth_at(frame)
     if edited is not None:
@@ -53,6 +60,9 @@ def moment_of(
     if frame is not None and stored is not None:
         records = opened.layers(frame)
         count = max(stored.layers, _layers_in(records))
+        made = opened.pose_in(track, frame)
+        if made is not None:
+            return Moment(frame, made, stored.estimate.pose, records, count, truth, stored.tracking)
         return Moment(frame, stored.estimate.pose, None, records, count, truth, stored.tracking)
     records = [] if frame is None else opened.layers(frame)
     pose = records[-1].mean if records else opened.start_pose()

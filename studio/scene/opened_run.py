@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from studio.body.model import BodyModel
 from studio.capture.trc import MarkerMotion, read_trc
-from studio.errors import NotFoundError, StudioError
+from studio.errors import NotFoundError, SessionError, StudioError
 from studio.geometry.camera import Camera
+from studio.runs.tracks import RAW, read_track, track_names, track_stamp
 from studio.sessions.results_store import ResultsReader
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -35,6 +36,7 @@ class OpenedRun:
         self.truth, self.truth_problem = _truth_of(session)
         self._results: OrderedDict[int, FrameResult] = OrderedDict()
         self._layers: OrderedDict[int, list[LayerRecord]] = OrderedDict()
+        self._track: tuple[tuple[str, int], dict[int, Array]] = (RAW, 0), {}
 
     @property
     def span(self) -> tuple[int, int]:
@@ -83,6 +85,23 @@ class OpenedRun:
         if self.results is None:
             return np.zeros(0, dtype=np.int64), np.zeros((0, len(self.body.parameters)))
         return self.results.poses()
+
+    def tracks(self) -> tuple[str, ...]:
+        """The run's tracks, raw first."""
+        return (RAW,) if self.run is None else track_names(self.run)
+
+    def pose_in(self, track: str, frame: int) -> Array | None:
+        """(D,) the pose of a derived track at a frame; None in a gap of it, or where there is no such track."""
+        if self.run is None or track == RAW or track not in self.tracks():
+            return None
+        key = track, track_stamp(self.run, track)
+        if self._track[0] != key:
+            try:
+                found = read_track(self.run, track)
+                self._track = key, dict(zip(found.frames.tolist(), found.poses, strict=True))
+            except SessionError:
+                self._track = key, {}
+        return self._track[1].get(frame)
 
     def truth_at(self, frame: int) -> Array | None:
         """(M, 3) mm: the truth's markers at a frame (rows by time × fps, the first row being frame 0), else

@@ -259,7 +259,8 @@ class SceneState:
         """Bring everything but the pictures up to date."""
         if self.run is None:
             return
-        moment = self.run.moment(self.shown.frame, self.live, self._edited)
+        moment = self.run.moment(self.shown.frame, self.live, self._edited, self.options.track)
+        self._panel.show.offer_tracks(self.run.opened.tracks())
         self.run.draw(moment, self.options, self.shown.layer)
         tokens = colour_tokens(self.options.dark)
         found = self._proposal.said if self._proposal is not None and self._edited is not None else ""
@@ -269,7 +270,7 @@ class SceneState:
     def draw_pictures(self) -> None:
         """Bring the pictures on the cameras up to date."""
         if self.run is not None and (self.options.pictures or self.shown.look_through):
-            moment = self.run.moment(self.shown.frame, self.live, self._edited)
+            moment = self.run.moment(self.shown.frame, self.live, self._edited, self.options.track)
             self.run.hang(moment, self.options, self.shown.layer)
 
     def _dress(self) -> None:

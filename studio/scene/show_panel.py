@@ -11,6 +11,7 @@ from studio.body.extremities import extremities
 from studio.body.model import BodyModel
 from studio.runs.colour_tokens import ColourTokens
 from studio.runs.overlay_drawing import OVERLAYS
+from studio.runs.tracks import RAW
 from studio.scene.trail_view import extremity_markers
 from studio.scene.view_options import ViewOptions
 
@@ -92,6 +93,15 @@ class ShowPanel:
         """Offer the blobs, or do not: only a run that is weighed by them has any."""
         self.inputs["blobs"][0].visible = offered
 
+    def offer_tracks(self, names: tuple[str, ...]) -> None:
+        """Offer the run's tracks and show which is chosen; only where there is more than what the search found."""
+        chosen = self.options.track if self.options.track in names else RAW
+        if self.track.options != names:
+            self.track.options = names
+        if self.track.value != chosen:
+            self.track.value = chosen
+        self.track.visible = len(names) > 1
+
     def show_layers(self, count: int, layer: int | None) -> None:
         """Offer so many layers and show which is chosen."""
         names = (ALL_LAYERS, *(f"layer {index + 1}" for index in range(count)))
@@ -139,6 +149,10 @@ class ShowPanel:
             hint="Layers from cool (first) to warm (last), or weights from low to high.",
         )
         self._wire("colour_by", handle, None)
+        self.track: viser.GuiDropdownHandle[Any] = self._gui.add_dropdown(
+            "poses", (RAW,), hint="As the search found them, or a track made of them: refined, smoothed, …"
+        )
+        self.track.on_update(self._track_updated)
 
     def _build_overlays(self) -> None:
         with self._gui.add_folder("Over the pictures"):
@@ -181,6 +195,9 @@ class ShowPanel:
         if wanted != self.options:
             self.options = wanted
             self._changed(changes)
+
+    async def _track_updated(self, event: viser.GuiEvent) -> None:
+        self._take(track=event.target.value)
 
     async def _layer_updated(self, event: viser.GuiEvent) -> None:
         chosen = event.target.value

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from studio.errors import StudioError
 from studio.knobs import Value
 from studio.runs.search_space import parameter_names
+from studio.runs.tracks import RAW
 from studio.scene.frame_volume import FrameVolumes, has_blobs
 from studio.scene.live_search import LiveSearch
 from studio.scene.moment import Moment, moment_of
@@ -44,9 +45,9 @@ class ShownRun:
         self._trails_read = float("-inf")
         self._trails_stale = True
 
-    def moment(self, frame: int | None, live: LiveSearch, edited: Array | None) -> Moment:
+    def moment(self, frame: int | None, live: LiveSearch, edited: Array | None, track: str = RAW) -> Moment:
         """What there is to draw at a frame."""
-        return moment_of(self.opened, frame, live, edited=edited, layers=self._layers_wanted)
+        return moment_of(self.opened, frame, live, edited=edited, layers=self._layers_wanted, track=track)
 
     def layer_count(self, frame: int | None, live: LiveSearch) -> int:
         """How many layers the shown frame takes."""

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from studio.runs.tracks import RAW
+
 
 @dataclass(frozen=True, slots=True)
 class ViewOptions:
@@ -13,7 +15,8 @@ class ViewOptions:
     : "layer" or "weight". point_size : metres. trails : paths of `trail_markers` (None: the extremities')
     over `trail_frames` frames before and after the shown one (0: all). cameras, pictures : frusta and the
     pictures on them. hull : the frame's visual hull as voxels. blobs : the blobs fitted to it beside the
-    answer's own, in runs that are weighed by them. overlays : what is drawn over the pictures, of
+    answer's own, in runs that are weighed by them. track : whose poses are drawn, of `runs.tracks`; the search's own
+    stand beside as the grey cage. overlays : what is drawn over the pictures, of
     `runs.overlay_drawing.OVERLAYS`. dark : the theme.
     """
 
@@ -32,6 +35,7 @@ class ViewOptions:
     pictures: bool = True
     hull: bool = False
     blobs: bool = False
+    track: str = RAW
     overlays: tuple[str, ...] = ("outline",)
     dark: bool = True
 

@@ -292,3 +292,19 @@ def test_the_runs_status_in_words() -> None:
     assert "It died." in status_html(lost)
     assert "No run" in status_html(None)
     assert clock(3725) == "1:02:05"
+
+
+def test_tracks_are_offered_where_there_are_more_than_the_search_found(server: GuardedServer) -> None:
+    tab, wishes = server.gui.add_tab_group().add_tab("Show"), []
+    panel = ShowPanel(server.gui, tab, wishes.append, lambda _: None)
+    panel.offer_tracks(("raw",))
+    assert not panel.track.visible
+    panel.offer_tracks(("raw", "refined", "smoothed"))
+    assert panel.track.visible
+    assert panel.track.options == ("raw", "refined", "smoothed")
+    panel.track._impl.value = "smoothed"
+    for callback in panel.track._impl.update_cb:
+        asyncio.run(callback(SimpleNamespace(target=panel.track)))
+    assert wishes == [{"track": "smoothed"}]
+    panel.offer_tracks(("raw", "refined"))
+    assert panel.track.value == "raw"
