@@ -128,3 +128,27 @@ def test_the_menu_of_a_run_leads_here(window: StudioPage) -> None:
     row.hover()
     window.choose(row.get_by_role("button", name="More for first"), "Export…")
     assert page.get_by_role("tab", name="Export").get_attribute("aria-selected") == "true"
+
+
+def test_the_scene_page_plays_without_a_studio(window: StudioPage, browser: Browser, tmp_path: Path) -> None:
+    """The page is opened from the disk: it asks nobody for anything, says nothing wrong and plays."""
+    page = window.page
+    choose(page, "html")
+    export(page)
+    link = page.get_by_role("link", name="toy-first.html")
+    link.wait_for()
+    with page.expect_download() as caught:
+        link.click()
+    caught.value.save_as(tmp_path / "scene.html")
+    context = browser.new_context(viewport={"width": 320, "height": 240})
+    alone = context.new_page()
+    wrong: list[str] = []
+    asked: list[str] = []
+    alone.on("pageerror", lambda error: wrong.append(str(error)))
+    alone.on("request", lambda request: asked.append(request.url))
+    alone.goto((tmp_path / "scene.html").as_uri())
+    alone.locator("canvas").first.wait_for()
+    alone.get_by_role("slider").first.wait_for()
+    context.close()
+    assert wrong == []
+    assert [url for url in asked if url.startswith(("http", "ws"))] == []
