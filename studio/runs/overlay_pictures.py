@@ -28,6 +28,7 @@ from studio.geometry.projection import project
 from studio.runs.colour_tokens import colour_tokens
 from studio.runs.marker_lines import marker_links
 from studio.runs.overlay_drawing import NO_MARKS, OVERLAYS, ViewMarks, draw_view, upright
+from studio.runs.run_footage import footage_of
 from studio.runs.session_settings import session_settings
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -52,7 +53,7 @@ class ViewComposer:
     ) -> None:
         self.body: BodyModel = run.body() if run else session.body()
         self.cameras: dict[str, Camera] = {camera.name: camera for camera in session.cameras()}
-        self._footage: Footage = session.footage()
+        self._footage: Footage = footage_of(session, run)
         self._backgrounds = Backgrounds(self._footage)
         self._settings = settings or _settings_of(session, run)
         self._truth = _truth_of(session)

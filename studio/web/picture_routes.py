@@ -10,6 +10,7 @@ from studio.runs.overlay_drawing import encode_jpeg
 from studio.runs.overlay_pictures import compose_view
 from studio.runs.session_settings import session_settings
 from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
 from studio.web.run_routes import RUN, OpenRun
 from studio.web.session_routes import OpenSession
 
@@ -56,7 +57,7 @@ def overlay(
     height: Height = None,
 ) -> Response:
     """What a camera saw in a frame, with the run's answer and evidence over it at choice."""
-    _check_view(session, frame, camera)
+    _check_view(session, frame, camera, run)
     return _jpeg(encode_jpeg(compose_view(session, run, frame, camera, _layers(show), height=height)))
 
 
@@ -76,12 +77,14 @@ def _layers(show: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(word.strip() for word in show.split(",") if word.strip()))
 
 
-def _check_view(session: Session, frame: int, camera: str) -> None:
+def _check_view(session: Session, frame: int, camera: str, run: StoredRun | None = None) -> None:
     """Raise NotFoundError for what the session does not have, before any footage is opened."""
-    if not 0 <= frame < session.manifest.frame_count:
+    last = session.manifest.frame_count
+    if run is not None and run.record.to_and_fro:
+        last = max(last, run.record.last)
+    if not 0 <= frame < last:
         raise NotFoundError(
-            f"Session '{session.name}' has no frame {frame}.",
-            f"It has frames 0 to {session.manifest.frame_count - 1}.",
+            f"Session '{session.name}' has no frame {frame}.", f"It has frames 0 to {last - 1}."
         )
     names = [source.name for source in session.manifest.footage.cameras]
     if camera not in names:

@@ -57,3 +57,14 @@ def test_the_state_event_says_how_it_keeps_up() -> None:
         "latency_ms": None,
         "frames_per_second": 29.8,
     }
+
+
+def test_frames_behind_the_footages_end_have_pictures(studio: Studio) -> None:
+    wish = {"name": "now", "live": True, "to_and_fro": True, "last": 50}
+    studio.client.post("/api/sessions/take1/runs", json=wish)
+    place = "/api/sessions/take1/runs/now/frames/{}/views/cam1.jpg?show="
+    inside, behind = (studio.client.get(place.format(frame)) for frame in (2, 4))
+    assert inside.status_code == behind.status_code == 200
+    assert inside.content == behind.content, "4 is 2 on the way back of four frames"
+    assert studio.client.get(place.format(50)).status_code == 404
+    assert studio.client.get("/api/sessions/take1/frames/4/views/cam1.jpg").status_code == 404
