@@ -11,6 +11,7 @@ from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import load_body
 from studio.cli.output import command, note, progress
 from studio.knobs import Knob, allowed, changed, knobs_of
+from studio.sessions.session import BODIES_NAME
 from studio.sessions.workspace import Workspace
 from studio.training.learning import Learnt, learn, read_sources
 from studio.training.model_shelf import ModelSummary, keep_model, list_models, place_for_model
@@ -92,7 +93,8 @@ def learn_command(
     SESSION/RUN, or recipes of `studio synthesize` (their motion alone). They are put on the body, oversampled with
     varied smoothing, clustered, and their order is learnt. Nothing is written before the model is whole.
     """
-    workspace, model_body = Workspace(), load_body(body)
+    workspace = Workspace()
+    model_body = load_body(body, (workspace.root / BODIES_NAME,))
     place = place_for_model(into, workspace, replace=force)
     learning, material = _settings(LearningSettings, knobs), _settings(OversamplingSettings, knobs)
     with progress("Reading motion") as report:

@@ -14,6 +14,7 @@ from studio.errors import BehaviourError, NotFoundError
 from studio.knobs import knobs_of
 from studio.runs.behaviour_models import SUFFIX, models_folder
 from studio.sessions.names import checked_name
+from studio.sessions.session import BODIES_NAME
 from studio.synthesis.recipe_file import recipe_names
 from studio.training.oversampling import OversamplingSettings
 from studio.training.sources import FPS, MOTION_FILES
@@ -40,7 +41,7 @@ def choices(doors: Door) -> LearningChoices:
     state = doors.learning.state
     return LearningChoices(
         knobs=[knob_view(entry) for entry in knobs],
-        bodies=list(list_bodies()),
+        bodies=list(list_bodies((doors.workspace.root / BODIES_NAME,))),
         default_body=DEFAULT_BODY,
         fps=FPS,
         endings=[*MOTION_FILES, SKELETON, ARCHIVE],
@@ -89,7 +90,7 @@ def _order(wish: LearningRequest, doors: Doors) -> LearningOrder:
         raise BehaviourError(
             f"There is a model '{wish.name}' already.", "Choose another name, or delete that one first."
         )
-    load_body(wish.body)
+    load_body(wish.body, (workspace.root / BODIES_NAME,))
     for source in (*wish.sources, *wish.tests):
         _check(source, doors)
     files = _motion_in(upload_folder(doors, wish.upload)) if wish.upload else ()

@@ -14,6 +14,7 @@ from studio.behaviour.model_file import read_model
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
 from studio.errors import BehaviourError, BodyError
+from studio.sessions.session import BODIES_NAME
 from studio.training.model_shelf import (
     list_models,
     rename_model,
@@ -50,14 +51,14 @@ def behaviours(doors: Door) -> BehaviourList:
 
 
 @router.get("/{behaviour}")
-def behaviour_detail(path: Named) -> BehaviourDetail:
+def behaviour_detail(path: Named, doors: Door) -> BehaviourDetail:
     """Clusters as poses, which follows which, the automaton's states by the length of their history.
 
     Of a model whose body is gone or another one by now, `problem` says so; it has no poses to show then.
     """
     summary, model = summary_of(path), _model(path, path.stat().st_mtime_ns)
     try:
-        return detail_of(summary, model, _body_of(model))
+        return detail_of(summary, model, _body_of(model, doors))
     except BehaviourError as problem:
         return bodiless_detail(summary, model, str(problem))
 
@@ -83,12 +84,13 @@ def behaviour_entropies(path: Named) -> Entropies:
 @router.get("/{behaviour}/walk")
 def behaviour_walk(
     path: Named,
+    doors: Door,
     frames: Annotated[int, Query(ge=2, le=MOST_FRAMES)] = 300,
     seed: Annotated[int, Query(ge=0, le=2**31 - 1)] = 0,
 ) -> GeneratedWalk:
     """A walk through the automaton, as movement."""
     model = _model(path, path.stat().st_mtime_ns)
-    return walk_of(model, _body_of(model), frames, seed)
+    return walk_of(model, _body_of(model, doors), frames, seed)
 
 
 @lru_cache(maxsize=KEPT_MODELS)
@@ -96,11 +98,11 @@ def _model(path: Path, _changed: int) -> BehaviourModel:
     return read_model(path)
 
 
-def _body_of(model: BehaviourModel) -> BodyModel:
-    """A body of the model's kind. Raises BehaviourError saying that there is none any more."""
+def _body_of(model: BehaviourModel, doors: Doors) -> BodyModel:
+    """A body of the model's kind, the studio's or the workspace's own. Raises BehaviourError saying that there is none any more."""
     name = model.space.body
     try:
-        body = load_body(name)
+        body = load_body(name, (doors.workspace.root / BODIES_NAME,))
         model.space.check_body(body)
     except BodyError as problem:
         raise BehaviourError(

@@ -14,6 +14,7 @@ from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import load_body
 from studio.errors import StudioError
 from studio.knobs import Value, changed, knobs_of
+from studio.sessions.session import BODIES_NAME
 from studio.sessions.workspace import Workspace
 from studio.training.learning import learn, read_sources
 from studio.training.model_shelf import keep_model, place_for_model
@@ -75,7 +76,7 @@ def learn_to_order(order: LearningOrder, outbox: Connection) -> None:
 
 def _learnt(order: LearningOrder, tell: Callable[[str, int, int], None]) -> dict[str, object]:
     """Learn and keep the model; its numbers."""
-    workspace, body = Workspace(order.root), load_body(order.body)
+    workspace, body = Workspace(order.root), load_body(order.body, (order.root / BODIES_NAME,))
     place_for_model(order.name, workspace)
     learning, material = order.settings()
     total = len(order.sources) + len(order.tests)

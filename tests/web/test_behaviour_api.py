@@ -1,7 +1,9 @@
 """Behaviour models through the API and as a page: clusters as poses, who follows whom, entropies, walks."""
 
+import dataclasses
 import itertools
 import re
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -173,7 +175,7 @@ def test_what_is_thrown_away_comes_back_from_the_trash(learnt: Studio, model: Be
 def test_a_model_without_its_body_tells_its_numbers_and_says_why(
     learnt: Studio, model: BehaviourModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def gone(name: str) -> None:
+    def gone(name: str, _folders: tuple) -> None:
         raise BodyError(f"There is no body '{name}'.", "Known: human25.")
 
     monkeypatch.setattr(behaviour_routes, "load_body", gone)
@@ -185,6 +187,20 @@ def test_a_model_without_its_body_tells_its_numbers_and_says_why(
     walk = learnt.client.get("/api/behaviours/wave/walk?frames=5")
     assert walk.status_code == 422
     assert "not here any more" in walk.json()["message"]
+
+
+def test_a_body_of_the_workspaces_own_is_found(learnt: Studio, model: BehaviourModel) -> None:
+    own = dataclasses.replace(model, space=dataclasses.replace(model.space, body="my_arm"))
+    write_model(own, models_folder(learnt.workspace.root) / f"own{SUFFIX}")
+    assert "my_arm" in learnt.client.get("/api/behaviours/own").json()["problem"]
+    bodies = learnt.workspace.root / "bodies"
+    bodies.mkdir()
+    text = (resources.files("studio.body") / "models" / "planar_arm4.toml").read_text(encoding="utf-8")
+    (bodies / "my_arm.toml").write_text(text.replace("planar_arm4", "my_arm"))
+    told = learnt.client.get("/api/behaviours/own").json()
+    assert told["problem"] == ""
+    assert len(told["clusters"]) == model.clusters
+    assert "my_arm" in learnt.client.get("/api/learning").json()["bodies"]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
