@@ -15,6 +15,8 @@ POSE, LENS = 6, 4
 FOCAL_PRIOR, CENTRE_PRIOR = 0.005, 0.004
 """A lens that is refined may move by about this share of its focal length, its centre by this share of it."""
 MOST_EVALUATIONS = 60
+INNER_TOLERANCE, INNER_STEPS = 1e-10, 2000
+"""Of the linear solver within a step; scipy's loose default costs three times the steps in all."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,6 +95,7 @@ def adjusted(start: Bundle, seen: Observations, refine_lenses: bool = False) -> 
         ftol=1e-9,
         xtol=1e-10,
         max_nfev=MOST_EVALUATIONS,
+        tr_options={"atol": INNER_TOLERANCE, "btol": INNER_TOLERANCE, "maxiter": INNER_STEPS},
     )
     return layout.unpacked(solved.x, start)
 

@@ -23,6 +23,8 @@ SOME, MANY, PLENTY = 4, 10, 20
 GOOD_COVERAGE = 0.5
 CENTRE_DEVIATION = 0.01
 """The principal point is fixed at the centre if it is uncertain by more than this share of the picture's width."""
+PROFILED = 0.04
+"""The focal length is held off by this share to see how much worse the pictures fit."""
 FOCAL_GUESSES = (0.8, 1.3, 2.2)
 
 
@@ -94,6 +96,7 @@ def solve_lens(board: Board, sightings: Sequence[Sighting]) -> Lens:
         )
         del used[worst]
         solution, model = _fitted(board, used, size)
+    doubt = _profiled_deviation(board, used, size, solution)
     tilts = np.degrees(
         np.arccos(np.clip([abs(cv2.Rodrigues(turn)[0][2, 2]) for turn in solution.turns], 0, 1))
     )
@@ -115,7 +118,7 @@ def solve_lens(board: Board, sightings: Sequence[Sighting]) -> Lens:
         solution.matrix,
         solution.distortion,
         solution.rms,
-        float(np.max(solution.deviations[:2])),
+        max(float(np.max(solution.deviations[:2])), doubt),
         float(np.max(solution.deviations[2:4])),
         model,
         residuals,
@@ -163,6 +166,25 @@ def _fitted(board: Board, sightings: Sequence[Sighting], size: tuple[int, int]) 
     return fixed, "focal length and one radial term free, centre held in the middle"
 
 
+def _profiled_deviation(
+    board: Board, sightings: Sequence[Sighting], size: tuple[int, int], solution: _Solution
+) -> float:
+    """One standard deviation of the focal length, pixels, from how much worse the pictures fit beside it.
+
+    The solver's own deviations hold near its solution only; boards that face the camera fit any focal length, and the
+    solver may be sure of a wrong one. Here the focal length is held a few percent off and all else solved again.
+    """
+    flags = cv2.CALIB_FIX_FOCAL_LENGTH | cv2.CALIB_FIX_PRINCIPAL_POINT | cv2.CALIB_FIX_K3
+    flags |= cv2.CALIB_ZERO_TANGENT_DIST if len(sightings) < MANY else 0
+    count = sum(len(sighting.ids) for sighting in sightings)
+    focal = float(np.mean(np.diag(solution.matrix)[:2]))
+    rises = []
+    for share in (1.0 - PROFILED, 1.0 + PROFILED):
+        held = _solved(board, sightings, size, flags, share * focal, solution.matrix[:2, 2])
+        rises.append(2.0 * count * max((held.rms / max(solution.rms, 1e-9)) ** 2 - 1.0, 1e-12))
+    return PROFILED * focal / float(np.sqrt(min(rises)))
+
+
 def _inside(solution: _Solution, size: tuple[int, int]) -> bool:
     """Whether the principal point lies in the middle half of the picture."""
     share = solution.matrix[:2, 2] / np.array(size)
@@ -184,10 +206,16 @@ def _best_start(board: Board, sightings: Sequence[Sighting], size: tuple[int, in
 
 
 def _solved(
-    board: Board, sightings: Sequence[Sighting], size: tuple[int, int], flags: int, focal: float
+    board: Board,
+    sightings: Sequence[Sighting],
+    size: tuple[int, int],
+    flags: int,
+    focal: float,
+    centre: Array | None = None,
 ) -> _Solution:
     points = board.points
-    start = np.array([[focal, 0.0, (size[0] - 1) / 2.0], [0.0, focal, (size[1] - 1) / 2.0], [0.0, 0.0, 1.0]])
+    middle = (np.array(size) - 1.0) / 2.0 if centre is None else centre
+    start = np.array([[focal, 0.0, middle[0]], [0.0, focal, middle[1]], [0.0, 0.0, 1.0]])
     rms, matrix, distortion, turns, _, deviations, _, of_picture = cv2.calibrateCameraExtended(
         [points[sighting.ids].astype(np.float32) for sighting in sightings],
         [sighting.pixels.astype(np.float32) for sighting in sightings],

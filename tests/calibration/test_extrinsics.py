@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import cv2
 import numpy as np
 import pytest
 from calibrated_scenes import CHARUCO, ring, seen, true_lens, waved
@@ -37,7 +38,9 @@ def position_errors(rig: Rig, cameras: tuple[Camera, ...], board: Board, poses: 
     )
 
 
-@pytest.mark.parametrize("count", range(2, 9))
+@pytest.mark.parametrize(
+    "count", [2, 3, 4, 5, 6, pytest.param(7, marks=pytest.mark.slow), pytest.param(8, marks=pytest.mark.slow)]
+)
 def test_positions_within_ten_millimetres_at_four_metres(count: int) -> None:
     cameras = half_ring(count) if count < 4 else ring(count)
     poses, sightings = waved(CHARUCO, cameras, each=12)
@@ -53,7 +56,7 @@ def test_a_board_that_looks_alike_after_half_a_turn() -> None:
     board = Board("chessboard", 7, 5, 90.0)
     assert board.turn_symmetric
     cameras = ring(5)
-    poses, sightings = waved(board, cameras)
+    _, sightings = waved(board, cameras)
     rng = np.random.default_rng(0)
     sightings = [
         dataclasses.replace(sighting, pixels=sighting.pixels[::-1]) if rng.random() < 0.5 else sighting
@@ -78,18 +81,25 @@ def test_wrong_views_are_left_out() -> None:
     assert position_errors(rig, cameras, CHARUCO, poses).max() < 10.0
 
 
-def test_lenses_are_refined_towards_the_truth() -> None:
+def test_refining_lenses_leads_towards_the_truth_and_never_far_from_a_good_start() -> None:
+    """Boards at four metres say little of a focal length: the prior holds what the close ones said."""
     cameras = ring(4)
-    _, sightings = waved(CHARUCO, cameras, each=14)
+    poses, sightings = waved(CHARUCO, cameras, each=14)
     lenses = {camera.name: true_lens(camera) for camera in cameras}
-    for name, lens in lenses.items():
-        matrix = lens.matrix.copy()
-        matrix[0, 0] *= 1.004
-        matrix[1, 1] *= 1.004
-        lenses[name] = dataclasses.replace(lens, matrix=matrix)
+    matrix = lenses["cam2"].matrix * np.array([[1.006, 1.0, 1.0], [1.0, 1.006, 1.0], [1.0, 1.0, 1.0]])
+    lenses["cam2"] = dataclasses.replace(lenses["cam2"], matrix=matrix)
     rig = solve_rig(CHARUCO, sightings, lenses, refine_lenses=True)
-    for camera, solved in zip(cameras, rig.cameras, strict=True):
-        assert solved.matrix[0, 0] == pytest.approx(camera.matrix[0, 0], rel=2e-3)
+    off = {
+        camera.name: abs(solved.matrix[0, 0] / camera.matrix[0, 0] - 1.0)
+        for camera, solved in zip(cameras, rig.cameras, strict=True)
+    }
+    assert off["cam2"] < 0.9 * 0.006
+    assert max(off["cam1"], off["cam3"], off["cam4"]) < 2e-3
+    held = solve_rig(CHARUCO, sightings, lenses)
+    assert rig.rms["cam2"] < held.rms["cam2"]
+    assert (
+        position_errors(rig, cameras, CHARUCO, poses)[1] < position_errors(held, cameras, CHARUCO, poses)[1]
+    )
 
 
 def test_cameras_that_share_no_view_are_named() -> None:
@@ -115,18 +125,20 @@ def test_footage_out_of_step_is_said() -> None:
         for sighting in sightings
     ]
     lenses = {camera.name: true_lens(camera) for camera in cameras}
-    try:
-        codes = {finding.code for finding in pair_findings(solve_rig(CHARUCO, late, lenses))}
-        assert "out-of-step" in codes
-    except CalibrationError as refused:
-        assert "cam2" in refused.message
-        assert "in step" in refused.hint
+    with pytest.raises(CalibrationError, match="cam2") as refused:
+        solve_rig(CHARUCO, late, lenses)
+    assert "in step" in refused.value.hint
 
 
 def test_the_bundles_own_projection_is_the_studios() -> None:
     camera = placed_camera(
-        "c", (3000.0, 900.0, 1500.0), (0.0, 0.0, 900.0), size=(640, 480), focal_px=560.0, distortion=(-0.2, 0.1, 1e-3, 2e-3, 0.01)
-    )  # fmt: skip
+        "c",
+        (3000.0, 900.0, 1500.0),
+        (0.0, 0.0, 900.0),
+        size=(640, 480),
+        focal_px=560.0,
+        distortion=(-0.2, 0.1, 1e-3, 2e-3, 0.01),
+    )
     pose = np.concatenate([vector_from_rotation(camera.rotation), camera.translation])
     board = np.array([0.3, -0.2, 0.9, 40.0, 80.0, 900.0])
     lens = np.array([560.0, 560.0, *camera.matrix[:2, 2], *camera.distortion])
@@ -143,7 +155,6 @@ def test_the_bundles_own_projection_is_the_studios() -> None:
 
 
 def _turn(vector: np.ndarray) -> np.ndarray:
-    import cv2  # noqa: PLC0415 - the oracle of this test alone
 
     return cv2.Rodrigues(vector)[0]
 

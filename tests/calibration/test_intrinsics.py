@@ -88,13 +88,8 @@ def test_an_outlier_is_dropped_with_the_reason() -> None:
 def test_too_little_is_said_in_words() -> None:
     """Five boards in the middle that all face the camera: focal length and distance cannot be told apart."""
     middle = CHARUCO.points.mean(axis=0)
-    facing = [
-        rigid(
-            CAMERA.rotation.T,
-            CAMERA.rotation.T @ (np.array([0.0, 0.0, 2500.0 + 20 * k]) - middle - CAMERA.translation),
-        )
-        for k in range(5)
-    ]
+    ahead = [np.array([0.0, 0.0, 2500.0 + 20.0 * k]) - middle - CAMERA.translation for k in range(5)]
+    facing = [rigid(CAMERA.rotation.T, CAMERA.rotation.T @ place) for place in ahead]
     lens = solve_lens(CHARUCO, sightings_of(CAMERA, np.array(facing)))
     findings = lens_findings(lens)
     codes = {finding.code for finding in findings}

@@ -1,0 +1,185 @@
+"""From folders of rendered board footage to a calibration file, by the verb and by the command."""
+
+from pathlib import Path
+
+import cv2
+import msgspec
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from studio.calibration.boards import Board
+from studio.calibration.verbs import calibrate
+from studio.capture.calibration_files import read_calibration
+from studio.cli.main import main
+from studio.errors import CalibrationError
+from studio.geometry.camera import Camera
+from studio.geometry.rigid import best_fit, transform
+from studio.synthesis.board_footage import BoardRenderer, close_boards, floor_board, waved_boards
+from studio.synthesis.cameras import placed_camera
+
+BOARD = Board("charuco", 6, 5, 120.0, 90.0, "DICT_4X4_50")
+SIZE = (800, 600)
+PLACES = ((2600.0, -900.0, 1500.0), (2600.0, 900.0, 1900.0))
+CAMERAS = tuple(
+    placed_camera(
+        f"cam{number + 1}",
+        place,
+        (0.0, 0.0, 700.0),
+        size=SIZE,
+        focal_px=690.0 + 15.0 * number,
+        distortion=(-0.1, 0.03, 0.0005, -0.0003, 0.0),
+    )
+    for number, place in enumerate(PLACES)
+)
+
+
+@pytest.fixture(scope="module")
+def footage(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """intrinsics/ and extrinsics/ with a folder of pictures each; in the last common ones the board is on the floor."""
+    folder = tmp_path_factory.mktemp("footage")
+    rng = np.random.default_rng(4)
+    renderer = BoardRenderer(BOARD, CAMERAS)
+    common = [*waved_boards(rng, BOARD, CAMERAS, 13, reach=450.0), floor_board((-250.0, 200.0))]
+    for number, camera in enumerate(CAMERAS):
+        for place, poses in (("intrinsics", close_boards(rng, BOARD, camera, 14)), ("extrinsics", common)):
+            pictures = folder / place / f"{place[:3]}_{camera.name}_img"
+            pictures.mkdir(parents=True)
+            for frame, pose in enumerate(poses):
+                cv2.imwrite(str(pictures / f"{frame:03d}.png"), renderer.picture(number, frame, pose))
+    return folder
+
+
+def same_rig(solved: tuple[Camera, ...]) -> float:
+    """mm by which the distance of the two cameras is off."""
+    true = float(np.linalg.norm(CAMERAS[0].centre - CAMERAS[1].centre))
+    return abs(float(np.linalg.norm(solved[0].centre - solved[1].centre)) - true)
+
+
+def test_two_cameras_from_folders_with_the_floor_board(footage: Path) -> None:
+    steps: list[str] = []
+    found = calibrate(
+        BOARD,
+        intrinsics=footage / "intrinsics",
+        extrinsics=footage / "extrinsics",
+        floor="frame:13",
+        names=("cam1", "cam2"),
+        progress=lambda step, done, total: steps.append(step),
+    )
+    assert found.rig is not None
+    assert [finding.code for finding in found.findings if finding.severity == "blocks"] == []
+    for camera, solved in zip(CAMERAS, found.rig.cameras, strict=True):
+        np.testing.assert_allclose(solved.matrix[0, 0], camera.matrix[0, 0], rtol=5e-3)
+        np.testing.assert_allclose(solved.centre, camera.centre - [-250.0, 200.0, 0.0], atol=20.0)
+    assert same_rig(found.rig.cameras) < 10.0
+    assert any("cam2" in step for step in steps)
+    assert "Adjusting all together" in steps
+
+
+def test_a_person_can_stop_it(footage: Path) -> None:
+    def stop(step: str, done: int, total: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        calibrate(BOARD, extrinsics=footage / "extrinsics", progress=stop)
+
+
+def test_the_command_writes_calibration_report_and_pictures(footage: Path, tmp_path: Path) -> None:
+    target = tmp_path / "rig.toml"
+    words = ["calibrate", str(footage), "--board", BOARD.spelling, "--to", str(target), "--json"]
+    result = CliRunner().invoke(main, words)
+    assert result.exit_code == 0, result.output
+    told = msgspec.json.decode(result.stdout)
+    assert told["usable"] is True
+    assert "no-floor" in {finding["code"] for finding in told["findings"]}
+    cameras = read_calibration(target).cameras
+    assert same_rig(cameras) < 10.0
+    assert all(camera.centre[2] > 0.0 for camera in cameras)
+    report = msgspec.json.decode((tmp_path / "rig.report.json").read_bytes())
+    assert len(report["cameras"][0]["pictures"]) >= 12
+    for name in (camera.name for camera in cameras):
+        picture = cv2.imread(str(tmp_path / f"rig.coverage-{name}.png"))
+        assert picture is not None
+        assert picture.std() > 10.0
+    again = CliRunner().invoke(main, words)
+    assert again.exit_code == 2
+    measured = CliRunner().invoke(
+        main,
+        [
+            *words[:-2],
+            str(tmp_path / "b.toml"),
+            "--distance",
+            f"{cameras[0].name},{cameras[1].name}=1500",
+            "--json",
+        ],
+    )
+    assert measured.exit_code == 2
+    assert not (tmp_path / "b.toml").exists()
+    assert (tmp_path / "b.report.json").exists()
+
+
+def test_the_intrinsics_alone_give_lenses(footage: Path, tmp_path: Path) -> None:
+    result = CliRunner().invoke(
+        main,
+        [
+            "calibrate", str(footage), "--board", BOARD.spelling, "--intrinsics", str(footage / "intrinsics"),
+            "--to", str(tmp_path / "rig.toml"),
+        ],
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "rig.lenses.toml").exists()
+    assert not (tmp_path / "rig.toml").exists()
+
+
+def test_a_mirrored_video_blocks(footage: Path, tmp_path: Path) -> None:
+    for camera in ("cam1", "cam2"):
+        source = footage / "extrinsics" / f"ext_{camera}_img"
+        (tmp_path / camera).mkdir()
+        for path in sorted(source.iterdir()):
+            picture = cv2.imread(str(path))
+            cv2.imwrite(str(tmp_path / camera / path.name), picture[:, ::-1] if camera == "cam2" else picture)
+    found = calibrate(BOARD, intrinsics=footage / "intrinsics", extrinsics=None, names=("cam1", "cam2"))
+    try:
+        spoilt = calibrate(BOARD, extrinsics=tmp_path, lenses=found.lenses)
+    except CalibrationError as refused:
+        assert "cam2" in refused.message  # noqa: PT017 - either way it must be named
+        return
+    assert spoilt.findings[0].code == "mirrored-video"
+    assert spoilt.findings[0].cameras == ("cam2",)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--board", "circles:4x4,3"], "cannot be understood"),
+        (["--board", BOARD.spelling, "--extrinsics", "nowhere"], "no folder"),
+        (["--board", BOARD.spelling, "--distance", "cam1"], "cannot be understood"),
+        (["--board", BOARD.spelling, "--extrinsics", "extrinsics", "--floor", "frame:x"], "is no number"),
+    ],
+)
+def test_refusals_have_remedies(footage: Path, words: list[str], said: str) -> None:
+    words = [str(footage / word) if word == "extrinsics" else word for word in words]
+    result = CliRunner().invoke(main, ["calibrate", str(footage), *words])
+    assert result.exit_code == 2
+    assert said in " ".join(result.stderr.split())
+    assert "remedy" in result.stderr
+
+
+def test_the_board_command(tmp_path: Path) -> None:
+    place = tmp_path / "board.pdf"
+    result = CliRunner().invoke(main, ["board", "--kind", "chessboard", "--to", str(place), "--json"])
+    assert result.exit_code == 0, result.output
+    assert msgspec.json.decode(result.stdout)["board"].startswith("chessboard:9x6,")
+    assert place.read_bytes().startswith(b"%PDF")
+
+
+def test_the_rigs_own_frame_is_kept_by_names(footage: Path) -> None:
+    """Footage is matched to cameras by name, so that the order of folders does not matter."""
+    found = calibrate(BOARD, extrinsics=footage / "extrinsics", names=("cam2", "cam1"))
+    assert found.rig is not None
+    centres = {camera.name: camera.centre for camera in found.rig.cameras}
+    boards = np.array([pose[:, 3] for pose in found.rig.boards.values()])
+    near = {name: float(np.linalg.norm(boards - centre, axis=1).mean()) for name, centre in centres.items()}
+    assert set(near) == {"cam1", "cam2"}
+    fit = best_fit(np.array(list(centres.values())), np.array([CAMERAS[0].centre, CAMERAS[1].centre]))
+    assert np.isfinite(transform(fit, boards)).all()
