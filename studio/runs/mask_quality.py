@@ -130,7 +130,7 @@ def mask_quality(
     finally:
         footage.close()
     names = tuple(camera.name for camera in cameras)
-    return _summed(chosen, names, counted)
+    return summed(chosen, names, counted)
 
 
 def spread_frames(count: int, wanted: int) -> tuple[int, ...]:
@@ -159,10 +159,10 @@ def count_frame(evidence: FrameEvidence, cameras: tuple[Camera, ...]) -> FrameCo
     both = np.array([np.count_nonzero(one & cover) for one, cover in zip(masks, covers, strict=True)])
     denied = np.zeros(len(cameras), dtype=np.int64)
     for left_out in range(len(cameras) if len(cameras) > 2 and box is not None else 0):
-        without = _fine_hull(_without(evidence, left_out), cameras, box)[0]
+        alone = _fine_hull(without(evidence, left_out), cameras, box)[0]
         for other, camera in enumerate(cameras):
             if other != left_out:
-                back = masks[other] & ~covers[other] & _silhouette(without, camera)
+                back = masks[other] & ~covers[other] & _silhouette(alone, camera)
                 denied[left_out] += np.count_nonzero(back)
     hull = np.array([np.count_nonzero(cover) for cover in covers])
     return FrameCounts(mask, hull, both, denied, 0.0 if whole is None else whole.volume() * 1e-6)
@@ -190,7 +190,7 @@ def _large_pieces(hull: Hull) -> Hull:
     return chosen_voxels(hull, volumes[numbers] >= LEAST_PIECE * volumes[0])
 
 
-def _without(evidence: FrameEvidence, left_out: int) -> FrameEvidence:
+def without(evidence: FrameEvidence, left_out: int) -> FrameEvidence:
     """The evidence with one camera denying nothing."""
     views = list(evidence.views)
     views[left_out] = dataclasses.replace(views[left_out], mask=np.full_like(views[left_out].mask, 255))
@@ -203,7 +203,8 @@ def _silhouette(hull: Hull | None, camera: Camera) -> Bytes:
     return silhouette(hull, camera)
 
 
-def _summed(frames: tuple[int, ...], names: tuple[str, ...], counted: Sequence[FrameCounts]) -> MaskQuality:
+def summed(frames: tuple[int, ...], names: tuple[str, ...], counted: Sequence[FrameCounts]) -> MaskQuality:
+    """All frames' pixels together. names : of the cameras. counted : one a frame."""
     mask, hull = np.stack([one.mask for one in counted]), np.stack([one.hull for one in counted])
     both, denied = np.stack([one.both for one in counted]), np.stack([one.denied for one in counted])
     covered, inside = _share(both, mask), _share(both, hull)

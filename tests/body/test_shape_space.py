@@ -1,0 +1,51 @@
+"""A body's size as a few numbers."""
+
+import numpy as np
+import pytest
+
+from studio.body.catalogue import load_body
+from studio.body.forward_kinematics import limb_ends
+from studio.body.shape_space import levelled, shape_space
+from studio.errors import BodyError
+
+
+def test_sides_are_one_group_unless_asked_otherwise() -> None:
+    body = load_body("human31")
+    both, each = shape_space(body), shape_space(body, symmetric=False)
+    thigh = next(group for group in both.groups if group.name == "thigh_length")
+    assert set(thigh.dimensions) == {"left_thigh_length", "right_thigh_length"}
+    assert {"left_thigh_length", "right_thigh_length"} <= set(each.names)
+    radius = next(group for group in both.groups if group.name == "thigh_radius")
+    assert radius.kind == "radius"
+    assert len(radius.dimensions) == 4
+    assert {group.kind for group in shape_space(body, radii=False).groups} == {"length"}
+
+
+def test_zero_is_the_body_and_a_factor_is_one() -> None:
+    space = levelled(shape_space(load_body("human31")))
+    shape = np.zeros(len(space.groups))
+    assert dict(space.body_of(shape).dimensions) == pytest.approx(dict(space.body.dimensions))
+    number = space.names.index("shin_length")
+    shape[number] = np.log(1.1)
+    changed = space.body_of(shape).dimensions
+    assert changed["left_shin_length"] == pytest.approx(1.1 * space.body.dimensions["left_shin_length"])
+    assert changed["left_shin_length"] == pytest.approx(changed["right_shin_length"])
+    assert space.sizes(shape)[number] == pytest.approx(changed["left_shin_length"])
+    ends = limb_ends(space.body_of(shape), space.body.neutral)
+    assert ends.shape == limb_ends(space.body, space.body.neutral).shape
+
+
+def test_a_dog_has_a_shape_too() -> None:
+    space = shape_space(load_body("dog"))
+    assert {"femur_length", "chest_radius"} <= set(space.names)
+
+
+def test_limbs_that_are_not_there_stay_away() -> None:
+    body = load_body("human31")
+    assert body.dimensions["left_foot_length"] == 0.0
+    assert "foot_length" not in shape_space(body).names
+
+
+def test_nothing_to_fit_is_refused() -> None:
+    with pytest.raises(BodyError, match="no dimensions"):
+        shape_space(load_body("human31"), lengths=False, radii=False)

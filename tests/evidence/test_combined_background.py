@@ -1,0 +1,87 @@
+"""Plate and footage combined, on made-up rooms whose empty view is known."""
+
+import numpy as np
+import pytest
+
+from studio.evidence.colour_fit import colour_line, fit_colours
+from studio.evidence.combined_background import agreeing_frames, combine
+
+HEIGHT, WIDTH, COUNT = 160, 240, 24
+
+
+def room(rng: np.random.Generator) -> np.ndarray:
+    """A room of patches in different colours, (H, W, 3)."""
+    patches = rng.integers(60, 200, (HEIGHT // 40, WIDTH // 40, 3))
+    return np.kron(patches, np.ones((40, 40, 1))).astype(np.float64)
+
+
+def frames_of(empty: np.ndarray, rng: np.random.Generator, width: int = 40) -> np.ndarray:
+    """A dark person who goes to and fro in the left half, with noise."""
+    out = []
+    for k in range(COUNT):
+        picture = empty.copy()
+        left = 20 + int(50 * (1 + np.sin(2 * np.pi * k / COUNT)) / 2 * 1.4)
+        picture[30:150, left : left + width] = (25, 20, 30)
+        out.append(np.clip(picture + rng.normal(0, 2.0, picture.shape), 0, 255).astype(np.uint8))
+    return np.stack(out)
+
+
+def test_who_stood_in_the_plate_is_replaced_by_the_footage() -> None:
+    rng = np.random.default_rng(1)
+    empty = room(rng)
+    plate = empty.copy()
+    plate[40:140, 180:210] = (230, 30, 220)
+    model, doubtful = combine(plate.astype(np.uint8), list(frames_of(empty, rng)))
+    assert np.abs(model.mean - empty).max(axis=2)[:, 150:].max() < 6.0
+    assert np.mean(np.abs(model.mean - empty).max(axis=2) < 8.0) > 0.995
+    assert doubtful[90, 195]
+    assert not doubtful[90, 60]
+
+
+def test_where_a_person_never_leaves_the_plate_is_right() -> None:
+    rng = np.random.default_rng(2)
+    empty = np.full((HEIGHT, WIDTH, 3), 150.0)
+    seen = frames_of(empty, rng)
+    seen[:, 60:140, 180:220] = (25, 20, 30)
+    model, doubtful = combine(empty.astype(np.uint8), list(seen))
+    assert np.abs(model.mean - empty)[60:140, 180:220].max() < 8.0
+    assert not doubtful[100, 200]
+
+
+def test_the_plate_is_made_the_footages_colours() -> None:
+    rng = np.random.default_rng(3)
+    empty = room(rng)
+    plate = np.clip((empty - [4.0, -6.0, 9.0]) / [1.1, 0.9, 1.05], 0, 255)
+    fitted = fit_colours(plate.astype(np.uint8), frames_of(empty, rng))
+    assert np.median(np.abs(fitted - empty)) < 1.5
+
+
+def test_a_line_through_most_pixels_is_found() -> None:
+    rng = np.random.default_rng(4)
+    x = rng.uniform(20, 200, (80, 80, 3)).astype(np.float32)
+    y = np.clip(1.15 * x + 7.0 + rng.normal(0, 1.0, x.shape), 0, 255).astype(np.float32)
+    y[:30] = 20.0
+    gains, offsets = colour_line(x, y)
+    assert gains == pytest.approx(1.15, abs=0.02)
+    assert offsets == pytest.approx(7.0, abs=2.0)
+
+
+def test_a_background_of_one_colour_keeps_its_ratio() -> None:
+    gains, offsets = colour_line(
+        np.full((40, 40, 3), 100.0, np.float32), np.full((40, 40, 3), 110.0, np.float32)
+    )
+    assert gains == pytest.approx(1.1)
+    assert offsets == pytest.approx(0.0)
+
+
+def test_counts_and_means_of_agreeing_frames_are_numpys() -> None:
+    rng = np.random.default_rng(5)
+    frames = rng.integers(0, 255, (9, 6, 7, 3), dtype=np.uint8)
+    low, high = np.full((6, 7, 3), 60.0, np.float32), np.full((6, 7, 3), 220.0, np.float32)
+    mean, deviation, count = agreeing_frames(frames, low, high)
+    inside = ((frames >= 60) & (frames <= 220)).all(axis=-1)
+    assert (count == inside.sum(axis=0)).all()
+    y, x = np.argwhere(count >= 2)[0]
+    chosen = frames[inside[:, y, x], y, x].astype(float)
+    assert mean[y, x] == pytest.approx(chosen.mean(axis=0), abs=1e-3)
+    assert deviation[y, x] == pytest.approx(chosen.std(axis=0), abs=1e-2)

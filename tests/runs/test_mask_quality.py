@@ -1,0 +1,105 @@
+"""Masks judged by the views' agreement: a body of cones seen by four cameras, with planted faults."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
+from studio.geometry.camera import Camera
+from studio.geometry.projection import project
+from studio.runs import mask_quality as quality
+from studio.synthesis.cameras import placed_camera
+
+CENTRE, RADIUS = np.array([0.0, 0.0, 900.0]), 350.0
+
+
+def ring() -> tuple[Camera, ...]:
+    """Four cameras around the origin."""
+    places = [(3500.0, 0.0), (0.0, 3500.0), (-3500.0, 0.0), (0.0, -3500.0)]
+    return tuple(
+        placed_camera(f"c{n}", (x, y, 1600.0), (0.0, 0.0, 900.0), size=(320, 240), focal_px=260.0)
+        for n, (x, y) in enumerate(places)
+    )
+
+
+def ball_mask(camera: Camera) -> np.ndarray:
+    """The exact silhouette of a ball: pixels whose ray passes within its radius."""
+    y, x = np.mgrid[: camera.height, : camera.width]
+    inverse = np.linalg.inv(camera.matrix)
+    rays = np.stack([x, y, np.ones_like(x)], axis=-1) @ inverse.T @ camera.rotation
+    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+    away = CENTRE - camera.centre
+    along = rays @ away
+    return np.where(away @ away - along**2 < RADIUS**2, np.uint8(255), np.uint8(0))
+
+
+def seen(masks: list[np.ndarray], cameras: tuple[Camera, ...]) -> FrameEvidence:
+    """Evidence of masks alone."""
+    picture = np.zeros((240, 320, 3), np.uint8)
+    views = [ViewEvidence(c.name, picture, mask, mask) for c, mask in zip(cameras, masks, strict=True)]
+    return FrameEvidence(0, tuple(views))
+
+
+def judged(masks: list[np.ndarray], cameras: tuple[Camera, ...]) -> quality.MaskQuality:
+    """The quality of one frame's masks."""
+    counted = [quality.count_frame(seen(masks, cameras), cameras)]
+    return quality.summed((0,), tuple(camera.name for camera in cameras), counted)
+
+
+def test_good_masks_agree_in_every_view() -> None:
+    cameras = ring()
+    found = judged([ball_mask(camera) for camera in cameras], cameras)
+    assert found.usable
+    for view in found.views:
+        assert view.covered > 0.97
+        assert view.inside > 0.93
+        assert view.denied == 0.0
+        assert view.in_words() == ""
+    exact = 4.0 / 3.0 * np.pi * RADIUS**3 * 1e-6
+    assert exact < found.hull_litres[0] < 1.5 * exact
+
+
+def test_a_bystander_in_one_view_is_told_of_that_view_only() -> None:
+    cameras = ring()
+    masks = [ball_mask(camera) for camera in cameras]
+    masks[1][20:120, 20:60] = 255
+    found = judged(masks, cameras)
+    own = np.count_nonzero(ball_mask(cameras[1]))
+    assert found.views[1].covered == pytest.approx(own / (own + 4000), abs=0.03)
+    assert not found.views[1].usable
+    assert "seen by no other camera" in found.views[1].in_words()
+    assert all(view.usable for view in found.views if view.camera != "c1")
+
+
+def test_a_hole_is_blamed_on_the_camera_that_has_it() -> None:
+    cameras = ring()
+    masks = [ball_mask(camera) for camera in cameras]
+    pixels, _ = project(cameras[2], CENTRE[None])
+    masks[2][: int(pixels[0, 1])] = 0
+    found = judged(masks, cameras)
+    blame = [view.denied for view in found.views]
+    assert blame[2] > 0.2
+    assert max(blame[:2] + blame[3:]) < 0.02
+    assert "holes" in found.views[2].in_words()
+    assert min(view.covered for view in found.views if view.camera != "c2") < 0.9
+
+
+def test_nothing_seen_is_said() -> None:
+    cameras = ring()
+    found = judged([np.zeros((240, 320), np.uint8) for _ in cameras], cameras)
+    assert not found.usable
+    assert "empty" in found.views[0].in_words()
+
+
+def test_frames_are_spread_over_the_footage() -> None:
+    assert quality.spread_frames(100, 5) == (10, 30, 50, 70, 90)
+    assert quality.spread_frames(3, 5) == (0, 1, 2)
+
+
+def test_without_one_camera_leaves_the_others_as_they_are() -> None:
+    cameras = ring()
+    evidence = seen([ball_mask(camera) for camera in cameras], cameras)
+    changed = quality.without(evidence, 0)
+    assert (changed.views[0].mask == 255).all()
+    assert dataclasses.replace(changed, views=changed.views[1:]).views == evidence.views[1:]
