@@ -22,6 +22,7 @@ from studio.body.branches import within_limits
 from studio.errors import RunError, SessionError
 from studio.runs.new_run import software_version
 from studio.runs.problem_source import ProblemSource
+from studio.runs.reannealing import Reannealing
 from studio.runs.tracking_run import TrackingRun
 from studio.sessions import atomic_files
 from studio.sessions.manifest import now
@@ -30,6 +31,7 @@ from studio.sessions.results_store import copy_frames, create_store
 from studio.sessions.run_record import BEHAVIOUR_NAME, CAMERAS_NAME, RunRecord, write_run_record
 from studio.sessions.session import Session, free_run_name
 from studio.sessions.stored_run import BODY_FOLDER, StoredRun
+from studio.settings import settings_from_values
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
@@ -112,14 +114,14 @@ def track_backwards(
 
 def _track_again(tracking: TrackingRun, frame: int, cancelled: Callable[[], bool] | None) -> bool:
     """Search a frame with the settings that it had and put it in the old one's place; False if cancelled."""
-    version, settings = tracking.settings_at(frame)
-    search, layers = tracking.search_again(frame), []
+    entry, record = tracking.history.in_use(frame, 0) or tracking.history.entries[0], tracking.record
+    settings = settings_from_values(record.tracker, record.weighting, entry.values)
+    search = Reannealing(tracking, frame, entry.version, settings)
     while not search.finished:
         if cancelled is not None and cancelled():
             return False
-        problem = tracking.problems.problem(frame, settings)
-        layers.append(search.step(problem, version, settings.tracker))
-    tracking.put_back(tracking.result_of(search, settings), layers, settings)
+        search.step_layer()
+    search.keep(alone=True)
     return True
 
 

@@ -37,8 +37,10 @@ class Reannealing:
         """The frame's result. Raises RunError while layers are left."""
         return self._tracking.result_of(self._search, self.settings)
 
-    def keep(self) -> None:
-        """Make this the run's own frame; later frames are dropped, as they followed from the old one."""
+    def keep(self, *, alone: bool = False) -> None:
+        """Make this the run's own frame; later frames are dropped, as they followed from the old one, unless it stands
+        `alone`.
+        """
         if not self.finished:
             raise RunError(f"Frame {self.frame} is not annealed to its end.", "Wait for its last layer.")
-        self._tracking.keep(self.result(), self.layers, self.version, self.settings)
+        self._tracking.keep(self.result(), self.layers, self.version, self.settings, alone=alone)

@@ -42,10 +42,8 @@ class Problems(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stepped:
-    """What one layer brought. result : of the frame, if this was its last layer. version : of the settings in
-    use.
-
-    applied : the settings that came into use with this layer, None if they were in use before.
+    """What one layer brought. result : of the frame, if this was its last layer. applied : the settings that came into
+    use with this layer, None if they were in use before.
     """
 
     record: LayerRecord
@@ -64,7 +62,7 @@ class TrackingRun:
         self._watch = RunWatch(
             problems,
             self._reader,
-            lambda frame: self.settings_at(frame)[1],
+            lambda frame: self._settings_at(frame)[1],
             seed=self.record.seed,
             first=self.record.first,
             fps=self.record.fps,
@@ -103,7 +101,7 @@ class TrackingRun:
         if partial is None or partial.frame != self.next_frame:
             return
         numbers = partial.state["search_numbers"]
-        held = self.settings_at(partial.frame)[1].tracker
+        held = self._settings_at(partial.frame)[1].tracker
         particles = particles_from(partial.state)
         state = SearchState(
             layers_done=partial.next_layer,
@@ -117,8 +115,6 @@ class TrackingRun:
         )
         self._search = self._new_search(partial.frame, state)
         self._layers = self._reader.layers(partial.frame)
-
-    # ----------------------------------------------------------------- stepping
 
     @property
     def finished(self) -> bool:
@@ -202,8 +198,6 @@ class TrackingRun:
         """How far the run got and how long the rest will take. least : seconds that a layer is made to take."""
         return self._pace.progress(self.done, self.record.frame_count, least)
 
-    # ----------------------------------------------------------------- settings
-
     def latest_settings(self) -> tuple[int, RunSettings]:
         """The newest settings that this run has used, and their version."""
         entry = self.history.entries[-1]
@@ -215,16 +209,15 @@ class TrackingRun:
         if version > self.history.entries[-1].version:
             self._apply(version, settings, frame, layer)
             return version, settings, True
-        return *self.settings_at(frame, layer), False
+        return *self._settings_at(frame, layer), False
 
-    def settings_at(self, frame: int, layer: int = 0) -> tuple[int, RunSettings]:
-        """The settings that a frame's layer was, or is to be, searched with, and their version."""
+    def _settings_at(self, frame: int, layer: int = 0) -> tuple[int, RunSettings]:
         entry = self.history.in_use(frame, layer) or self.history.entries[0]
         return entry.version, self._read(entry)
 
     def _held_in(self, frame: int, settings: RunSettings) -> RunSettings:
         """The settings with what cannot change inside a frame as it was at its first layer."""
-        held = self.settings_at(frame)[1]
+        held = self._settings_at(frame)[1]
         return dataclasses.replace(
             settings,
             weighting=held_over(settings.weighting, held.weighting),
@@ -242,8 +235,6 @@ class TrackingRun:
             self._settings[entry.version] = recorded
         return self._settings[entry.version]
 
-    # ----------------------------------------------------------------- frames
-
     def _new_search(self, frame: int, state: SearchState | None = None) -> FrameSearch:
         space = space_over(self._behaviour.space_in(frame), self._handed.steps_to(frame))
         carried = self._behaviour.carried_into(frame, self.carried_into(frame))
@@ -254,7 +245,7 @@ class TrackingRun:
             carried = Carried(None, memory=carried.memory)
         repeats = 1
         if self._handed.is_first(frame) or sought:
-            repeats = self.settings_at(frame)[1].tracker.start_repeats
+            repeats = self._settings_at(frame)[1].tracker.start_repeats
         return FrameSearch(
             self.tracker,
             carried,
@@ -281,15 +272,23 @@ class TrackingRun:
             )
         return self._new_search(frame)
 
-    def put_back(self, result: FrameResult, layers: list[LayerRecord], settings: RunSettings) -> None:
-        """Store a frame searched again in the place of the old one; all others stay, none followed from it."""
-        self._writer.write_frame(result, layers, settings.recording.record_particles)
-        self._watch.forget()
-
     def keep(
-        self, result: FrameResult, layers: list[LayerRecord], version: int, settings: RunSettings
+        self,
+        result: FrameResult,
+        layers: list[LayerRecord],
+        version: int,
+        settings: RunSettings,
+        *,
+        alone: bool = False,
     ) -> None:
-        """Make a frame annealed again the run's own; later frames, which followed from the old one, are dropped."""
+        """Make a frame annealed again the run's own; later frames, which followed from the old one, are dropped.
+
+        alone : only this one changes, as others do not follow from it.
+        """
+        if alone:
+            self._writer.write_frame(result, layers, settings.recording.record_particles)
+            self._watch.forget()
+            return
         self._writer.forget_from(result.frame)
         self._writer.write_settings(version, result.frame, 0, values(settings))
         self._writer.write_frame(result, layers, settings.recording.record_particles)
