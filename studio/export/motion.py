@@ -81,15 +81,17 @@ def even_motion(body: BodyModel, fps: float, track: Track, options: ExportOption
 
 
 def _filled(body: BodyModel, fps: float, track: Track, rows: NDArray[np.int64], lost: str) -> Motion:
-    """Every frame from the first to the last of the chosen rows."""
+    """Every frame from the first to the last of the chosen rows. Lost frames that a smoother filled are poses."""
     first, count = int(track.frames[rows[0]]), int(track.frames[rows[-1]] - track.frames[rows[0]]) + 1
     states = [""] * count
     confidence = np.full(count, np.nan)
     poses, known = np.zeros((count, track.poses.shape[1])), np.zeros(count, dtype=bool)
+    filled = set(track.made_by.get("filled", ()))
     for row in rows:
         at = int(track.frames[row]) - first
         states[at], confidence[at], poses[at] = track.states[row], track.confidence[row], track.poses[row]
-        known[at] = lost == "keep" or track.states[row] not in UNSEEN
+        seen = track.states[row] not in UNSEEN or int(track.frames[row]) in filled
+        known[at] = lost == "keep" or seen
     if not known.any():
         raise ExportError(
             f"The body is lost in every frame of track '{track.name}' that was chosen.",

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from studio.errors import ExportError, NotFoundError
 from studio.export.task import ExportTask, Written
 from studio.runs.overlay_pictures import compose_view
-from studio.tracking.tracker import LOST, NO_EVIDENCE
 
 Bytes = NDArray[np.uint8]
 
@@ -57,7 +56,7 @@ def _write_video(task: ExportTask, place: Path, camera: str, done: int, total: i
         for row, number in enumerate(motion.frames):
             if row % 5 == 0:
                 task.step(f"video of {camera}", done + row, total)
-            layers = LAYERS if motion.known[row] and motion.states[row] not in (LOST, NO_EVIDENCE) else ()
+            layers = LAYERS if motion.known[row] else ()
             picture = compose_view(
                 task.session,
                 task.run,

@@ -1,5 +1,7 @@
 """Tracks brought onto an even grid: gaps, lost frames, frame rates."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from export_runs import MADE, moving_poses, track_of
@@ -52,6 +54,17 @@ def test_lost_frames_can_be_kept() -> None:
     made = motion(poses, states=("tracked", "lost", "lost", "tracked"), lost="keep")
     assert made.known.all()
     np.testing.assert_array_equal(made.poses, poses)
+
+
+def test_what_a_smoother_filled_is_known() -> None:
+    poses = moving_poses(ARM, 4)
+    smoothed = dataclasses.replace(
+        track_of(poses, states=("tracked", "lost", "lost", "tracked")),
+        made_by={"verb": "smooth", "filled": [1]},
+    )
+    made = even_motion(ARM, 60.0, smoothed, ExportOptions())
+    np.testing.assert_array_equal(made.known, [True, True, False, True])
+    np.testing.assert_array_equal(made.poses[1], poses[1])
 
 
 def test_a_higher_rate_lies_between_and_a_lower_one_picks() -> None:
