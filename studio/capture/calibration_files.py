@@ -44,6 +44,15 @@ __all__ = [
 ]
 
 MM_FROM = 50.0
+WORLDS = {
+    "x": ((0, 1, 0), (0, 0, 1), (1, 0, 0)),
+    "y": ((0, 0, 1), (1, 0, 0), (0, 1, 0)),
+    "z": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    "-x": ((0, 0, 1), (0, 1, 0), (-1, 0, 0)),
+    "-y": ((1, 0, 0), (0, 0, 1), (0, -1, 0)),
+    "-z": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
+}
+"""By the axis that points up: the new world's axes in the old one, rows."""
 PICKLES = frozenset((".pickle", ".pkl"))
 
 
@@ -93,9 +102,11 @@ def find_calibrations(folder: Path) -> tuple[Path, ...]:
     return tuple(sorted(found, key=lambda path: natural_key(path.name)))
 
 
-def read_calibration(path: Path) -> Calibration:
+def read_calibration(path: Path, unit: str = "", up: str = "z") -> Calibration:
     """The cameras of a file of any format that is known, or of a folder of files that belong together.
 
+    unit : "mm" or "m" goes before what the file or the distances say. up : the axis of the file's world that points up
+    (x, y, z, -x, -y, -z); the cameras' world has z up.
     Raises CalibrationError naming file, camera and entry: wrong shapes, numbers that are not finite or no camera's,
     a rotation that is none, a fisheye camera, a name given twice.
     """
@@ -108,7 +119,26 @@ def read_calibration(path: Path) -> Calibration:
     calibration = Calibration(
         path.name, found.cameras, "", found.sources, found.sizes_known, found.crops, (*found.notes, *notes)
     )
-    return _finished(calibration, found.unit, turned=is_canonical(path))
+    if unit not in ("", "mm", "m"):
+        raise CalibrationError(f"'{unit}' is no unit of a calibration.", "Write mm or m.")
+    calibration = with_up(calibration, up)
+    return _finished(calibration, found.unit, unit, turned=is_canonical(path) and up == "z")
+
+
+def with_up(calibration: Calibration, up: str) -> Calibration:
+    """The calibration in a world whose z axis is the old world's `up`. Raises CalibrationError for no axis."""
+    if up not in WORLDS:
+        raise CalibrationError(
+            f"'{up}' is no axis that could point up.", f"Write one of {', '.join(WORLDS)}."
+        )
+    if up == "z":
+        return calibration
+    world = np.array(WORLDS[up], dtype=np.float64)
+    cameras = tuple(
+        dataclasses.replace(camera, rotation=camera.rotation @ world.T) for camera in calibration.cameras
+    )
+    note = f"The calibration's {up} axis was taken to point up, as asked."
+    return dataclasses.replace(calibration, cameras=cameras, notes=(*calibration.notes, note))
 
 
 def read_intrinsics(path: Path) -> tuple[Intrinsics, ...]:
@@ -195,7 +225,7 @@ def _read_folder(folder: Path) -> FoundCameras:
     )
 
 
-def _finished(read: Calibration, unit: str, turned: bool = False) -> Calibration:
+def _finished(read: Calibration, unit: str, asked: str, turned: bool = False) -> Calibration:
     """In mm, sorted, upright (unless the file says how far to turn); names checked."""
     names = [camera.name for camera in read.cameras]
     if len(set(names)) != len(names):
@@ -203,6 +233,11 @@ def _finished(read: Calibration, unit: str, turned: bool = False) -> Calibration
             f"'{read.label}' names a camera twice ({listed(names)}).", "Give each camera its own name."
         )
     scale, note = _unit(read.cameras, unit)
+    if asked:
+        scale, note = (
+            (1.0 if asked == "mm" else 1000.0),
+            f"The calibration is taken to be in {asked}, as asked.",
+        )
     cameras = sorted(read.cameras, key=lambda camera: natural_key(camera.name))
     scaled = [dataclasses.replace(camera, translation=camera.translation * scale) for camera in cameras]
     if not turned:

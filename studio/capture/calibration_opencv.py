@@ -6,6 +6,7 @@ extrinsic_parameters: the board's place in each picture (a camera's place only w
 Files with R and T of a camera, as the studio writes them, place it in the world.
 """
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -55,7 +56,9 @@ def read_opencv(path: Path) -> FoundCameras:
 
 def _is_camera(path: Path) -> bool:
     text = storage_text(path)
-    return text is not None and any(f"{name}:" in text or f"<{name} " in text for name in MATRICES)
+    if text is None or not text.lstrip().startswith(("%YAML", "<?xml")):
+        return False
+    return re.search(rf"^\s*<?(?:{'|'.join(MATRICES)})(?:\s*:| type_id)", text, re.MULTILINE) is not None
 
 
 def _read_file(path: Path) -> FoundCameras:

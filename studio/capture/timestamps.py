@@ -18,7 +18,8 @@ from studio.errors import FootageError
 
 Array = NDArray[np.float64]
 
-TIMESTAMP_NAMES = ("timestamps.csv", "frame_timestamps.csv", "frame_time_history.csv")
+OLDER_NAME = "frame_time_history.csv"
+TIMESTAMP_NAMES = ("timestamps.csv", "frame_timestamps.csv", OLDER_NAME)
 CAMERA_COLUMNS, TIME_COLUMNS, INDEX_COLUMNS = (
     ("cam_id", "port", "camera"),
     ("frame_time", "timestamp"),
@@ -59,7 +60,9 @@ def read_timestamps(path: Path) -> dict[str, Array]:
             columns = [
                 _column(path, rows.fieldnames or (), names) for names in (CAMERA_COLUMNS, TIME_COLUMNS)
             ]
-            index_column = next((name for name in INDEX_COLUMNS if name in (rows.fieldnames or ())), "")
+            # The older file counts frames from the stream's begin, not the video's.
+            numbered = () if path.name == OLDER_NAME else rows.fieldnames or ()
+            index_column = next((name for name in INDEX_COLUMNS if name in numbered), "")
             found: dict[str, list[tuple[int, float]]] = {}
             for number, row in enumerate(rows, 2):
                 camera = (row[columns[0]] or "").strip()

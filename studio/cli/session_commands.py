@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from studio.body.catalogue import list_bodies, load_body
+from studio.capture.calibration_files import WORLDS
 from studio.cli.arguments import camera_numbers
 from studio.cli.output import command, note, progress
 from studio.sessions.importers.catalogue import import_source
@@ -36,6 +37,16 @@ INTO_HELP = "Name of the new session in the workspace, or a path."
     help="Turn this camera's pictures clockwise by 90, 180 or 270 degrees (repeatable).",
 )
 @click.option(
+    "--unit", type=click.Choice(("mm", "m")), help="The calibration's unit, where it is taken wrongly."
+)
+@click.option(
+    "--up",
+    type=click.Choice(tuple(WORLDS)),
+    default="z",
+    show_default=True,
+    help="The axis of the calibration's world that points up.",
+)
+@click.option(
     "--despite-findings",
     is_flag=True,
     help="Import a calibration that would make results wrong (z not up, a wrong unit), with a warning.",
@@ -52,6 +63,8 @@ def import_command(
     trial: str | None,
     offsets: tuple[str, ...],
     rotations: tuple[str, ...],
+    unit: str | None,
+    up: str,
     despite_findings: bool,
     copy: bool,
 ) -> dict[str, object]:
@@ -70,6 +83,8 @@ def import_command(
             trial=trial,
             offsets=camera_numbers(offsets, "--offset"),
             rotations=camera_numbers(rotations, "--rotate"),
+            unit=unit or "",
+            up=up,
             despite_findings=despite_findings,
             progress=report,
         )

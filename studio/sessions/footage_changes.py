@@ -16,8 +16,10 @@ import msgspec
 from studio.capture.footage import camera_reader
 from studio.capture.footage_source import TURNS, CameraSource, FootageSource
 from studio.capture.naming import listed, match_names
+from studio.capture.pictures import list_pictures
 from studio.capture.synchrony import MOST_SECONDS, Progress, Synchrony, estimate_synchrony
 from studio.capture.timestamps import TimedOffsets, offsets_from_times, read_timestamps
+from studio.capture.video_probe import probe_video
 from studio.errors import FootageError, SessionError
 from studio.sessions.run_record import FILE_NAME as RUN_FILE_NAME
 from studio.sessions.session import START_POSE_NAME, THUMBNAIL_NAME, Session, described_anew
@@ -127,7 +129,22 @@ def _changed(
         raise FootageError(
             f"With these offsets no frame is left that all cameras have ({words}).", "Correct them."
         )
+    for camera in cameras:
+        there = _masks_of(session, camera)
+        if 0 < there < camera.offset + count:
+            raise FootageError(
+                f"Camera {camera.name} has {there} masks, and with these offsets {camera.offset + count} are needed.",
+                "Import the session again with masks of all frames, or without masks.",
+            )
     return dataclasses.replace(source, cameras=cameras, frame_count=count)
+
+
+def _masks_of(session: Session, camera: CameraSource) -> int:
+    """How many masks came with a camera, 0 where there are none or it is not known."""
+    place = session.path / camera.masks
+    if not camera.masks:
+        return 0
+    return len(list_pictures(place)) if place.is_dir() else probe_video(place).frame_count
 
 
 def _turned(camera: CameraSource, degrees: int, calibrated: tuple[int, int]) -> CameraSource:

@@ -131,6 +131,8 @@ def _import(doors: Doors, identifier: str, wish: ImportRequest, source: Path, in
             trial=wish.trial,
             offsets=wish.offsets,
             rotations=wish.rotations,
+            unit=wish.unit,
+            up=wish.up,
             despite_findings=wish.despite_findings,
             progress=lambda step, done, total: tell(step=step, done=done, total=total),
             cancelled=stop.is_set,

@@ -24,6 +24,12 @@ class ImportRequest(Request):
     rotations: dict[str, Literal[0, 90, 180, 270]] = Field(
         default_factory=dict, max_length=64, description="By camera: degrees clockwise to turn its pictures."
     )
+    unit: Literal["", "mm", "m"] = Field(
+        "", description="The calibration's; empty: what the file says or its size."
+    )
+    up: Literal["x", "y", "z", "-x", "-y", "-z"] = Field(
+        "z", description="The calibration's axis that points up."
+    )
     despite_findings: bool = Field(False, description="Import a calibration that would make results wrong.")
     copy_footage: bool = Field(True, alias="copy", description="False: refer to it where it lies.")
 

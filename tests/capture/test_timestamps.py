@@ -50,6 +50,10 @@ def test_numbers_of_frames_go_before_the_order_of_lines(tmp_path: Path) -> None:
     assert (len(read["0"]), len(read["1"])) == (50, 62)
     np.testing.assert_allclose(read["0"], times[0])
     assert offsets_from_times(read).offsets == {"0": 0, "1": 12}
+    # Caliscope's older file numbers the frames of the stream, not of the video.
+    older = tmp_path / "frame_time_history.csv"
+    older.write_text(lines(times, first={0: 300, 1: 512}, column="port"))
+    assert [len(moments) for moments in read_timestamps(older).values()] == [50, 50]
 
 
 def test_drift_and_lost_frames_are_said() -> None:

@@ -53,6 +53,49 @@ def test_what_makes_results_wrong_blocks(
     assert any("axis points up" in line or "floor" in line or "metres" in line for line in report.warnings)
 
 
+@pytest.mark.parametrize(
+    ("up", "axes"),
+    [
+        ("y", Y_UP),
+        ("-z", Z_DOWN),
+        ("x", np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])),
+        ("-y", np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])),
+        ("-x", np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])),
+    ],
+)
+def test_the_remedies_work(tmp_path: Path, up: str, axes: np.ndarray) -> None:
+    # The columns of `axes` are the file's axes in our world; its `up` is our z.
+    sign = -1.0 if up.startswith("-") else 1.0
+    turn = axes if (sign * axes[:, "xyz".index(up[-1])])[2] > 0 else axes.T
+    np.testing.assert_allclose(sign * turn[:, "xyz".index(up[-1])], [0.0, 0.0, 1.0])
+    assert np.linalg.det(turn) == pytest.approx(1.0)
+    source = video_source(tmp_path / "source")
+    path = source / "calibration" / "Calib.toml"
+    spoilt = (in_world(camera, turn) for camera in CAMERAS)
+    export_calibration(
+        tuple(replace(camera, translation=camera.translation / 1000.0) for camera in spoilt),
+        path,
+        "aniposelib",
+    )
+    path.write_text(path.read_text() + "\n[metadata.board]\nsquare_length_mm = 30.0\n")
+    with pytest.raises(CalibrationError):
+        import_source(source, tmp_path / "made", up=up)
+    report = import_source(source, tmp_path / "made", up=up, unit="m")
+    assert report.warnings == ()
+    assert any("as asked" in note for note in report.notes)
+    for found, wanted in zip(report.session.cameras(), CAMERAS, strict=True):
+        np.testing.assert_allclose(found.centre[2], wanted.centre[2], atol=1e-6)
+        np.testing.assert_allclose(found.rotation[:, 2], wanted.rotation[:, 2], atol=1e-9)
+        assert found.quarter_turns == 0
+        assert np.linalg.det(found.rotation) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("words", "said"), [({"unit": "inch"}, "no unit"), ({"up": "w"}, "no axis")])
+def test_units_and_axes_that_are_none(tmp_path: Path, words: dict[str, str], said: str) -> None:
+    with pytest.raises(CalibrationError, match=said):
+        import_source(video_source(tmp_path / "source"), tmp_path / "made", **words)
+
+
 def test_what_is_only_doubtful_warns(tmp_path: Path) -> None:
     source = video_source(tmp_path / "source")
     off = replace(

@@ -130,3 +130,26 @@ def test_an_estimate_can_be_stopped(studio: Studio, monkeypatch: pytest.MonkeyPa
     stopped.set()
     told = ended(studio)
     assert (told["state"], told["code"]) == ("failed", "cancelled")
+
+
+def test_an_import_puts_cameras_in_step_and_says_whose_layout_it_was(studio: Studio, source: Path) -> None:
+    wish = {
+        "name": "stepped",
+        "source": str(source),
+        "fps": 25,
+        "offsets": {"cam2": 1},
+        "rotations": {"cam1": 180},
+        "unit": "mm",
+    }
+    identifier = studio.client.post("/api/imports", json=wish).json()["identifier"]
+    deadline = time.monotonic() + 60.0
+    state = {"state": "running"}
+    while state["state"] == "running" and time.monotonic() < deadline:
+        state = studio.client.get(f"/api/imports/{identifier}").json()
+    assert state["state"] == "done", state
+    assert state["layout"] == "folder in the studio's layout"
+    told = studio.client.get("/api/sessions/stepped/footage").json()
+    assert [(camera["offset"], camera["turned"]) for camera in told["cameras"]] == [(0, 180), (1, 0)]
+    assert told["frame_count"] == 3
+    for bad in ({"trial": 3}, {"rotations": {"cam1": 30}}, {"unit": "inch"}, {"up": "w"}):
+        assert studio.client.post("/api/imports", json={**wish, "name": "other", **bad}).status_code == 422

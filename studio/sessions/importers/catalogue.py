@@ -48,6 +48,8 @@ def import_source(
     trial: str | None = None,
     offsets: Mapping[str, int] | None = None,
     rotations: Mapping[str, int] | None = None,
+    unit: str = "",
+    up: str = "z",
     despite_findings: bool = False,
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
@@ -58,8 +60,9 @@ def import_source(
     calibration : which one to take where there are several. fps : frame rate, before any other. copy : False
     refers to the footage where it lies. trial : which one of several. offsets : by camera (or its footage's name), the
     file's frame that was taken with the others' frame 0; rotations : degrees clockwise by which its pictures are
-    turned; both go before what the source says. despite_findings : import a calibration that would make results wrong
-    (z not up, a wrong unit, …), with a warning. cancelled : asked often; True stops the import with ImportCancelled.
+    turned; both go before what the source says. unit, up : of the calibration, as in `read_calibration`.
+    despite_findings : import a calibration that would make results wrong (z not up, a wrong unit, …), with a warning.
+    cancelled : asked often; True stops the import with ImportCancelled.
     All is checked before anything is written; whatever fails, nothing is left and nothing that was stored is
     touched. Raises StudioError.
     """
@@ -70,7 +73,7 @@ def import_source(
         plan = _plan(source, calibration, trial)
         plan = replace(plan, offsets={**plan.offsets, **(offsets or {})})
         plan = replace(plan, rotations={**plan.rotations, **(rotations or {})})
-        read = read_calibration(plan.calibration)
+        read = read_calibration(plan.calibration, unit, up)
         person = check_person(plan)
         if copy:
             check_room(plan, into)
