@@ -125,13 +125,9 @@ class Director:
         self.wishes.make_current(run.opened.session.path, run.opened.run.folder)
         self.wishes.reanneal(frame)
 
-    def edit_pose(self, pose: Array | None) -> None:
-        """Show a start pose under the sliders; None ends it."""
+    def edit_pose(self, pose: Array | Proposal | None) -> None:
+        """Show a start pose under the sliders, one that was found in its session and frame; None ends it."""
         self._presenter.post(lambda: self.state.edit_pose(pose))
-
-    def propose(self, proposal: Proposal) -> None:
-        """Show a start pose that was found, in its session and frame."""
-        self._presenter.post(lambda: self.state.propose(proposal))
 
     def save_pose(self, pose: Array) -> None:
         """Store a start pose for the session."""

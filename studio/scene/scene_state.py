@@ -151,17 +151,21 @@ class SceneState:
             self._dress()
         self._presenter.redraw()
 
-    def edit_pose(self, pose: Array | None) -> None:
-        """Show a start pose being edited; None ends it, and what was found is left."""
+    def edit_pose(self, pose: Array | Proposal | None) -> None:
+        """Show a start pose being edited; None ends it.
+
+        One that was found is shown if it is one of the body that is shown. It stays when another run of its session is
+        opened, until a person saves it or ends the editing.
+        """
+        if isinstance(pose, Proposal):
+            self._propose(pose)
+            return
         self._edited = pose
         if pose is None:
             self._proposal = None
         self._presenter.redraw()
 
-    def propose(self, proposal: Proposal) -> None:
-        """Show a start pose that was found, if it is one of the body that is shown. It stays when another run of its
-        session is opened, until a person saves it or ends the editing.
-        """
+    def _propose(self, proposal: Proposal) -> None:
         tell(self._server, "Start pose found", proposal.said)
         self._proposal = proposal
         if self.shown.session != proposal.session:

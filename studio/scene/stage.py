@@ -85,7 +85,7 @@ class SceneStage:
         was found in.
         """
         if self._director is not None:
-            self._director.propose(Proposal(session, np.array(pose, dtype=np.float64), said, frame))
+            self._director.edit_pose(Proposal(session, np.array(pose, dtype=np.float64), said, frame))
 
     def show_frame(self, frame: int) -> None:
         """Show a stored frame; where it is not stored the nearest one."""
