@@ -46,12 +46,12 @@ def errors(person: DrawnPerson, found: FoundShape) -> tuple[list[float], list[fl
 
 @pytest.fixture(scope="module")
 def person() -> DrawnPerson:
-    """One person in three postures."""
-    return drawn_person(2, postures=3)
+    """One person in two postures."""
+    return drawn_person(2, postures=2)
 
 
 def test_silhouettes_agree_better_afterwards_and_a_seed_repeats(person: DrawnPerson) -> None:
-    settings = ShapeSearchSettings(particles=16, layers=20)
+    settings = ShapeSearchSettings(particles=12, layers=10)
     found = search_of(person, settings).run(person.poses)
     again = search_of(person, settings).run(person.poses)
     assert (found.fitness > found.before + 0.02).all()
