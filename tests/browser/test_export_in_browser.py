@@ -140,7 +140,7 @@ def test_the_scene_page_plays_without_a_studio(window: StudioPage, browser: Brow
     with page.expect_download() as caught:
         link.click()
     caught.value.save_as(tmp_path / "scene.html")
-    context = browser.new_context(viewport={"width": 320, "height": 240})
+    context = browser.new_context(viewport={"width": 420, "height": 300})
     alone = context.new_page()
     wrong: list[str] = []
     asked: list[str] = []
@@ -148,7 +148,7 @@ def test_the_scene_page_plays_without_a_studio(window: StudioPage, browser: Brow
     alone.on("request", lambda request: asked.append(request.url))
     alone.goto((tmp_path / "scene.html").as_uri())
     alone.locator("canvas").first.wait_for()
-    alone.get_by_role("slider").first.wait_for()
+    alone.locator("[role=slider]").first.wait_for(state="attached")
     context.close()
     assert wrong == []
     assert [url for url in asked if url.startswith(("http", "ws"))] == []
