@@ -344,3 +344,9 @@ def test_chessboards_tell_the_qualisys_lenses_from_those_divided_by_64(real_data
                 told.append(float(np.mean(np.sum((guess - seen) ** 2, axis=1))))
     assert len(errors[1.0]) >= 7
     assert np.mean(errors[1.0]) < np.mean(errors[64.0])
+
+
+def test_other_yaml_files_are_passed_over(tmp_path: Path) -> None:
+    (tmp_path / "compose.yml").write_text("WORK: 1\nK: [1, 2]\nM1: a\n")
+    (tmp_path / "boards.yml").write_text("%YAML:1.0\n---\nboard_width: 9\nLOOK: 3\n")
+    assert find_calibrations(tmp_path) == ()
