@@ -10,7 +10,7 @@ from studio.cli.output import command, note, progress
 from studio.errors import RunError
 from studio.runs.correcting import prepare_correction, track_backwards
 from studio.runs.start_pose_file import start_pose_from_file
-from studio.runs.tracks import read_track
+from studio.runs.tracks import pose_in_track
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
@@ -88,10 +88,4 @@ def _pose(run: StoredRun, frame: int, file: Path | None, track: str) -> tuple[Ar
         raise RunError("A corrected frame needs a pose.", "Give one with --pose FILE or --from-track NAME.")
     if file is not None:
         return start_pose_from_file(file, run.body(), frame, run.record.fps)
-    chosen = read_track(run, track)
-    at = chosen.frames.tolist()
-    if frame not in at:
-        raise RunError(
-            f"Track '{track}' of run '{run.name}' has no frame {frame}.", "Choose a frame that it has."
-        )
-    return chosen.poses[at.index(frame)], f"track {track}"
+    return pose_in_track(run, track, frame), f"track {track}"

@@ -82,6 +82,17 @@ def read_track(run: StoredRun, name: str = RAW) -> Track:
     return track
 
 
+def pose_in_track(run: StoredRun, name: str, frame: int) -> Array:
+    """(D,) the pose of a track in a frame. Raises NotFoundError where there is no such track or it has a gap there."""
+    track = read_track(run, name)
+    row = int(np.searchsorted(track.frames, frame))
+    if row == len(track.frames) or track.frames[row] != frame:
+        raise NotFoundError(
+            f"Track '{name}' of run '{run.name}' has no frame {frame}.", "Choose a frame that it has."
+        )
+    return track.poses[row]
+
+
 def track_stamp(run: StoredRun, name: str) -> int:
     """A number that changes when a derived track is written again; 0 where there is none."""
     try:

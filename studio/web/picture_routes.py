@@ -9,6 +9,7 @@ from studio.errors import NotFoundError, SettingsError
 from studio.runs.overlay_drawing import encode_jpeg
 from studio.runs.overlay_pictures import compose_view
 from studio.runs.session_settings import session_settings
+from studio.runs.tracks import RAW, pose_in_track
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.web.run_routes import RUN, OpenRun
@@ -55,10 +56,12 @@ def overlay(
     camera: str,
     show: Show = "outline",
     height: Height = None,
+    track: Annotated[str, Query(max_length=64, description="Whose pose is projected.")] = RAW,
 ) -> Response:
     """What a camera saw in a frame, with the run's answer and evidence over it at choice."""
     _check_view(session, frame, camera, run)
-    return _jpeg(encode_jpeg(compose_view(session, run, frame, camera, _layers(show), height=height)))
+    pose = None if track == RAW else pose_in_track(run, track, frame)
+    return _jpeg(encode_jpeg(compose_view(session, run, frame, camera, _layers(show), pose, height=height)))
 
 
 def knob_changes(text: str) -> dict[str, object]:

@@ -25,7 +25,7 @@ from studio.runs.refining import (
     refine_run,
     smooth_run,
 )
-from studio.runs.tracks import RAW, read_track, track_names
+from studio.runs.tracks import RAW, pose_in_track, read_track, track_names
 from studio.sessions.named_rows import poses_csv
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -183,13 +183,8 @@ def _corrected_pose(run: StoredRun, wish: CorrectionRequest) -> tuple[Any, str]:
         raise SettingsError("A corrected frame needs a pose.", "Give a pose or the name of a track.")
     if wish.pose is not None:
         return np.array(wish.pose), "set in the studio"
-    chosen = read_track(run, wish.track or RAW)
-    at = chosen.frames.tolist()
-    if wish.frame not in at:
-        raise NotFoundError(
-            f"Track '{chosen.name}' of run '{run.name}' has no frame {wish.frame}.", "Choose another frame."
-        )
-    return chosen.poses[at.index(wish.frame)], f"track {chosen.name}"
+    track = wish.track or RAW
+    return pose_in_track(run, track, wish.frame), f"track {track}"
 
 
 def _answer(made: MadeTrack) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from web_doubles import Studio
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.problem_source import ProblemSource
 from studio.runs.tracking_run import TrackingRun
-from studio.runs.tracks import read_track
+from studio.runs.tracks import Track, read_track, write_track
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
 
@@ -65,6 +65,21 @@ def test_refined_smoothed_listed_and_downloaded(studio: Studio, run: StoredRun) 
     assert np.allclose(
         [float(value) for value in rows[3].split(",")[1:]], read_track(run, "smoothed").poses[2]
     )
+
+
+def test_a_track_is_drawn_over_the_pictures(studio: Studio, run: StoredRun) -> None:
+    raw = read_track(run)
+    moved = Track(
+        "moved", raw.frames[:4], raw.poses[:4] + 0.6, raw.confidence[:4], raw.states[:4], {"verb": "test"}
+    )
+    write_track(run, moved)
+    view = f"{RUN}/frames/2/views/front.jpg"
+    plain, other = studio.client.get(view), studio.client.get(view, params={"track": "moved"})
+    assert (plain.status_code, other.status_code) == (200, 200)
+    assert plain.content != other.content
+    assert studio.client.get(view, params={"track": "raw"}).content == plain.content
+    assert studio.client.get(view, params={"track": "none"}).status_code == 404
+    assert studio.client.get(view.replace("/2/", "/5/"), params={"track": "moved"}).status_code == 404
 
 
 @pytest.mark.parametrize(
