@@ -113,7 +113,8 @@ class LiveRun(TrackingRun):
     def rehearse(self) -> None:
         """Search the next frame some times over and keep nothing of it, so that all is compiled and loaded."""
         version, settings = self.settings_source()
-        frame, carried = self.next_frame, self.carried_into(self.next_frame)
+        frame = min(self.next_frame, self.record.last - 1)
+        carried = self.carried_into(frame)
         problem = self.problems.problem(frame, settings)
         for _ in range(REHEARSALS):
             search = FrameSearch(

@@ -92,7 +92,9 @@ def test_footage_that_repeats_has_the_same_pictures(session_on_disk: Session) ->
     assert np.array_equal(again.pictures(count).pictures[0], once.picture("front", count - 2))
     mask = again.mask("front", count + 1)
     assert mask is not None
-    assert np.array_equal(mask, once.mask("front", count - 3))
+    expected = once.mask("front", count - 3)
+    assert expected is not None
+    assert np.array_equal(mask, expected)
     with pytest.raises(NotFoundError):
         again.picture("front", -1)
     once.close()

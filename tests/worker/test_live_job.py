@@ -2,8 +2,9 @@
 
 from collections.abc import Callable
 
+import numpy as np
 import pytest
-from live_driving import live_run
+from live_driving import driving, live_run
 from toy_session import FPS, FRAMES
 
 from studio.runs.live_replay import compare, prepare_replay
@@ -99,6 +100,24 @@ def test_a_step_tracks_one_frame(session_on_disk: Session, desk: Desk) -> None:
     desk.work(lambda: False)
     assert desk.told(StateChanged)[-1].state == "paused"
     assert summary_of(run).tracked == (0,)
+
+
+def test_a_finished_live_run_is_annealed_again_where_frames_were_dropped(
+    session_on_disk: Session, desk: Desk
+) -> None:
+    run = live_run(session_on_disk)
+    with driving(session_on_disk, run) as drive:
+        drive.to_end(2.5 / FPS)
+    assert summary_of(run).tracked == (0, 2, 5, 7)
+    desk.do(commands.Open(session=str(run.folder.parents[1]), run=str(run.folder)))
+    for frame in (5, 6):
+        desk.do(commands.Reanneal(frame=frame))
+        desk.work(lambda: False)
+    answers = [event.result for event in desk.told(FrameFinished) if event.reannealed]
+    assert [result.frame for result in answers] == [5, 6]
+    with run.results() as results:
+        assert np.array_equal(answers[0].estimate.pose, results.result(5).estimate.pose), "the same again"
+        assert results.frames() == [0, 2, 5, 7]
 
 
 def test_runs_are_opened_as_what_they_are(session_on_disk: Session) -> None:
