@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from drawn_people import MEASURED, DrawnPerson, drawn_person
+from sized_people import MEASURED, DrawnPerson, drawn_person
 
 from studio.body.forward_kinematics import limb_ends
 from studio.body.shape_space import shape_space
