@@ -15,7 +15,7 @@ from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import search_space
-from studio.runs.tracks import RAW, Track, read_track, track_names, write_track
+from studio.runs.tracks import RAW, Track, read_track, stretches, track_names, write_track
 from studio.sessions.names import checked_name
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -138,9 +138,11 @@ def jitter(run: StoredRun, track: Track) -> float:
     if not body.markers or len(track.frames) < 3:
         return 0.0
     points = marker_points(body, track.poses)
-    together = np.flatnonzero(track.frames[2:] - track.frames[:-2] == 2)
-    squares = [rms_second_difference(points[at : at + 3]) ** 2 for at in together]
-    return float(np.sqrt(np.mean(squares))) if squares else 0.0
+    parts = [points[part] for part in stretches(track.frames) if part.stop - part.start > 2]
+    if not parts:
+        return 0.0
+    weights = [len(part) - 2 for part in parts]
+    return float(np.sqrt(np.average([rms_second_difference(part) ** 2 for part in parts], weights=weights)))
 
 
 class _FrameRefiner:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from toy_session import true_poses
 
+from studio.body.forward_kinematics import marker_points
 from studio.errors import NotFoundError, RunError, SettingsError
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.problem_source import ProblemSource
@@ -150,3 +151,16 @@ def test_a_run_without_frames_is_refused(session_on_disk: Session) -> None:
     empty = prepare_run(session_on_disk, RunRequest(start_pose=true_poses()[0]))
     with pytest.raises(RunError, match="no finished frame"):
         refine_run(session_on_disk, empty)
+
+
+def test_jitter_is_that_of_frames_that_follow_each_other(run: StoredRun) -> None:
+    raw, body = read_track(run), run.body()
+    points = marker_points(body, raw.poses)
+    second = points[2:] - 2.0 * points[1:-1] + points[:-2]
+    squares = (second**2).sum(axis=2)
+    assert jitter(run, raw) == pytest.approx(np.sqrt(squares.mean()))
+    kept = [0, 1, 2, 4, 5, 6, 7]
+    holed = Track("holed", raw.frames[kept], raw.poses[kept], raw.confidence[kept], raw.states[:7])
+    assert jitter(run, holed) == pytest.approx(np.sqrt(squares[[0, 4, 5]].mean()))
+    few = Track("few", raw.frames[::2], raw.poses[::2], raw.confidence[::2], raw.states[::2])
+    assert jitter(run, few) == 0.0
