@@ -1,5 +1,7 @@
 """A run corrected in the middle: what is kept, what follows from the correction, forwards and backwards."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from toy_session import FRAMES, true_poses
@@ -9,9 +11,10 @@ from studio.runs.correcting import prepare_correction, track_backwards
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.problem_source import ProblemSource
 from studio.runs.tracking_run import TrackingRun
+from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.tracking.tracker import TRACKED
+from studio.tracking.tracker import LOST, TRACKED
 
 QUICK = {"particles": 60, "layers": 4, "start_repeats": 2}
 QUICK_FIRST_LAYERS = 2
@@ -153,3 +156,26 @@ def test_poses_and_names_are_checked(session_on_disk: Session, wrong: StoredRun)
         track_backwards(session_on_disk, wrong)
     with pytest.raises(NotFoundError):
         session_on_disk.run("right")
+
+
+def test_what_was_lost_before_is_not_held_against_a_corrected_frame(session_on_disk: Session) -> None:
+    run = prepare_run(session_on_disk, RunRequest(name="lost", start_pose=true_poses()[0], changes=QUICK))
+    finish(session_on_disk, run)
+    with run.results() as results, ResultsWriter(run.folder) as writer:
+        for frame in (2, 3, 4):
+            lost = dataclasses.replace(results.result(frame), tracking=LOST, doubts=frame)
+            writer.write_frame(lost, results.layers(frame))
+    right = prepare_correction(session_on_disk, run, K, true_poses()[K])
+    problems = ProblemSource(session_on_disk, right.body(), right.cameras())
+    tracking = TrackingRun(right, problems)
+    assert not tracking._watch.is_sought(K)
+    first = tracking.step_layer().record
+    assert np.abs(first.poses.mean(axis=0) - true_poses()[K]).max() < 0.1
+    tracking.close()
+    problems.close()
+    finish(session_on_disk, right)
+    with right.results() as results:
+        states = results.timeline().tracking
+    assert states[2:5] == (LOST,) * 3
+    assert states[K] == TRACKED
+    assert "recovered" not in states[K:]
