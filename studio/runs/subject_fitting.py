@@ -140,7 +140,7 @@ def fit_session_subject(
         FittedSize(group.name, group.kind, group.dimensions, float(one), float(other), float(other * share))
         for group, one, other, share in zip(space.groups, before, after, found.deviation, strict=True)
     )
-    fitted = _subject_of(subject, space.body_of(found.shape))
+    fitted = subject_of(subject, space.body_of(found.shape))
     return _fitted(fitted, space.body_of(found.shape), sizes, frames, found, poses_from)
 
 
@@ -237,7 +237,7 @@ def _evidence(session: Session, frames: Sequence[int], tell: Progress) -> tuple[
     return tuple(found)
 
 
-def _subject_of(subject: Subject, body: BodyModel) -> Subject:
+def subject_of(subject: Subject, body: BodyModel) -> Subject:
     """The subject with all of a body's dimensions, from which that very body comes back."""
     entries = body.definition.dimensions if body.definition else {}
     lengths = {name: value for name, value in body.dimensions.items() if entries[name].ratio is None}
