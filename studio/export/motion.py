@@ -44,6 +44,12 @@ class Motion:
     notes: tuple[str, ...] = ()
 
     @property
+    def numbers(self) -> NDArray[np.int64] | Array:
+        """(K,) the frames' numbers, whole where all of them are."""
+        whole = np.round(self.frames).astype(np.int64)
+        return whole if np.array_equal(whole, self.frames) else self.frames
+
+    @property
     def gaps(self) -> tuple[tuple[int, int], ...]:
         """Rows without a known pose, as half-open ranges."""
         edges = np.flatnonzero(np.diff(np.concatenate([[False], ~self.known, [False]]).astype(np.int8)))

@@ -60,7 +60,7 @@ def write_parquet(task: ExportTask) -> Written:
     motion, count = task.motion, len(points.names)
     converted = task.axes.points(places).reshape(-1, 3)
     columns = {
-        "frame": pa.array(np.repeat(motion.frames, count)),
+        "frame": pa.array(np.repeat(motion.numbers, count)),
         "time": pa.array(np.repeat(motion.times, count)),
         "name": pa.array(np.tile(np.array(points.names), len(places)).tolist()).dictionary_encode(),
         **{axis: pa.array(converted[:, at], from_pandas=True) for at, axis in enumerate("xyz")},
@@ -91,7 +91,7 @@ def write_npz(task: ExportTask) -> Written:
     frames[~motion.known] = np.nan
     poses = np.where(motion.known[:, None], motion.poses, np.nan)
     arrays = {
-        "frames": motion.frames,
+        "frames": motion.numbers,
         "times": motion.times,
         "states": np.array(motion.states),
         "confidence": motion.confidence,

@@ -195,6 +195,16 @@ def test_trimesh_opens_it_and_finds_closed_limbs(make_run, tmp_path: Path) -> No
     assert spans[2] < 0.5
 
 
+def test_an_hour_is_long_for_32_bit_times_and_yet_reads_back(make_run, tmp_path: Path) -> None:
+    count = 100_000
+    session, run = make_run("planar_arm4", lambda body: track_of(moving_poses(body, count)))
+    report = export_run(session, run, GLB, {"track": MADE}, tmp_path / "arm.glb")
+    read = Gltf(report.files[0])
+    times = read.rows(read.told["animations"][0]["samplers"][0]["input"])[:, 0]
+    assert len(times) == count
+    assert np.all(np.diff(times) > 0.0)
+
+
 def test_gaps_are_told(make_run, tmp_path: Path) -> None:
     track = np.arange(FRAMES)
     kept = (track < 10) | (track >= 30)

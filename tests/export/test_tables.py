@@ -73,6 +73,8 @@ def test_duckdb_reads_the_parquet(exported) -> None:
             base.execute(f"SELECT decode(key), decode(value) FROM parquet_kv_metadata('{path}')").fetchall()
         )
     assert missing == len(LOST) * len(markers)
+    assert [row[0] for row in rows] == list(range(FRAMES))
+    assert isinstance(rows[0][0], int)
     assert (told["unit"], told["up"], told["fps"], told["track"], told["body"]) == (
         "m",
         "y",
