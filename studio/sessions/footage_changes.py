@@ -23,6 +23,7 @@ from studio.capture.video_probe import probe_video
 from studio.errors import FootageError, SessionError
 from studio.sessions.run_record import FILE_NAME as RUN_FILE_NAME
 from studio.sessions.session import START_POSE_NAME, THUMBNAIL_NAME, Session, described_anew
+from studio.sessions.stored_run import StoredRun
 
 MOST_OFFSET = 1_000_000
 
@@ -68,8 +69,8 @@ def stale_runs(session: Session) -> tuple[str, ...]:
     """Names of the runs that were made before the footage's offsets or turns were last changed."""
     if not session.manifest.footage_changed:
         return ()
-    moment = datetime.datetime.fromisoformat(session.manifest.footage_changed).timestamp()
-    return tuple(run.name for run in session.runs() if (run.folder / RUN_FILE_NAME).stat().st_mtime < moment)
+    changed = datetime.datetime.fromisoformat(session.manifest.footage_changed)
+    return tuple(run.name for run in session.runs() if _made_before(run, changed))
 
 
 def synchrony_of(
@@ -137,6 +138,14 @@ def _changed(
                 "Import the session again with masks of all frames, or without masks.",
             )
     return dataclasses.replace(source, cameras=cameras, frame_count=count)
+
+
+def _made_before(run: StoredRun, changed: datetime.datetime) -> bool:
+    """Whether a run is older than a change; records hold whole seconds, within which the file's own time decides."""
+    made = datetime.datetime.fromisoformat(run.record.created)
+    if made != changed.replace(microsecond=0):
+        return made < changed
+    return (run.folder / RUN_FILE_NAME).stat().st_mtime < changed.timestamp()
 
 
 def _masks_of(session: Session, camera: CameraSource) -> int:

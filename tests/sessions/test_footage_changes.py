@@ -1,9 +1,9 @@
 """Offsets and turns changed after the import, and what that makes stale."""
 
-import os
 from pathlib import Path
 
 import cv2
+import msgspec
 import numpy as np
 import pytest
 from other_layouts import pose2sim
@@ -14,6 +14,7 @@ from studio.errors import FootageError
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.sessions.footage_changes import change_footage, stale_runs
 from studio.sessions.importers.catalogue import import_source
+from studio.sessions.run_record import write_run_record
 from studio.sessions.session import Session
 
 
@@ -49,12 +50,13 @@ def test_what_a_change_makes_stale_is_said(session: Session) -> None:
         assert words in said
     assert not (session.path / "thumbnail.jpg").exists()
     assert old.record.last == FRAMES
-    # A run made afterwards is not stale; the old one stays so when the session is opened again.
+    # A run made afterwards is not stale; the old one stays so when its record is written again or made earlier.
     new = prepare_run(change.session, RunRequest(name="new"))
-    later = (new.folder / "run.json").stat().st_mtime + 5
-    os.utime(new.folder / "run.json", (later, later))
     assert stale_runs(Session(session.path)) == ("old",)
     assert new.record.last == FRAMES - 1
+    earlier = msgspec.structs.replace(old.record, created="2026-01-01T00:00:00+00:00")
+    write_run_record(old.folder, earlier)
+    assert stale_runs(Session(session.path)) == ("old",)
 
 
 def test_a_turn_is_of_pictures_masks_and_background(session: Session) -> None:
