@@ -1,8 +1,8 @@
 """Events as JSON: small values only.
 
 Each message has `type` (state, acknowledged, layer, frame, settings, log; the web's own: hello, import, initialise,
-subject, comparison, sessions, scene), `session` and `run`. NaN and infinities become null. A layer's particles are not in it:
-they are fetched from `/api/sessions/{session}/runs/{run}/frames/{frame}/layers/{layer}/particles`, or drawn
+subject, synchrony, comparison, sessions, scene), `session` and `run`. NaN and infinities become null. A layer's
+particles are not in it: they are fetched from `/api/sessions/{session}/runs/{run}/frames/{frame}/layers/{layer}/particles`, or drawn
 by the scene.
 """
 
