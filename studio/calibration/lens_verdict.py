@@ -19,7 +19,9 @@ UNLIKE_FOCAL = (0.35, 6.0)
 
 
 def lens_findings(lens: Lens) -> tuple[Finding, ...]:
-    """What speaks against a lens; none for one that can be trusted."""
+    """What speaks against a lens; none for one that can be trusted, or that was read from a file."""
+    if not lens.residuals:
+        return ()
     found = [*_amount(lens), *_tilt(lens), *_precision(lens)]
     return tuple(sorted(found, key=lambda finding: finding.severity != "blocks"))
 
@@ -27,6 +29,8 @@ def lens_findings(lens: Lens) -> tuple[Finding, ...]:
 def verdict(lens: Lens) -> str:
     """One sentence: the focal length, how sure, from what."""
     focal = float(np.mean(np.diag(lens.matrix)[:2]))
+    if not lens.residuals:
+        return f"Camera {lens.camera}: focal length {focal:.1f} px, {lens.model}."
     return (
         f"Camera {lens.camera}: focal length {focal:.1f} ± {2.0 * lens.focal_deviation:.1f} px (95 %), residual"
         f" {lens.rms:.2f} px over {len(lens.used)} of {len(lens.residuals)} pictures that cover"

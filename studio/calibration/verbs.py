@@ -22,6 +22,7 @@ from studio.calibration.findings import Finding, blocking
 from studio.calibration.floor import board_on_floor, floor_from_board
 from studio.calibration.floor_clicks import floor_from_clicks, read_clicks
 from studio.calibration.intrinsics import FEWEST_PICTURES, Lens, solve_lens
+from studio.calibration.lens_files import lenses_of_file
 from studio.calibration.lens_verdict import lens_findings
 from studio.calibration.sightings import Sighting, of_camera
 from studio.capture.naming import listed, natural_key
@@ -63,17 +64,23 @@ def calibrate(
 ) -> Calibrated:
     """Solve the cameras from a folder of board footage for the lenses, and one of footage of all cameras at once.
 
-    Without `intrinsics` (and `lenses`) the lenses come from the extrinsic footage too. floor : "frame:N" of the
-    extrinsic footage in which the board lies on the floor, a folder with pictures of it lying there, or a .json of
-    clicked points.
+    intrinsics may also be a calibration file, of which the lenses are taken. Without it (and `lenses`) the lenses come
+    from the extrinsic footage too. floor : "frame:N" of the extrinsic footage in which the board lies on the floor, a
+    folder with pictures of it lying there, or a .json of clicked points.
     names : the cameras' names (default: the footage's). footage_sizes : of what is to be tracked, to compare.
     progress(step, done, total) may raise to stop; nothing is written here. Raises CalibrationError, FootageError.
     """
     if intrinsics is None and extrinsics is None:
         raise CalibrationError("There is no board footage to calibrate from.", "Give a folder of it.")
+    if extrinsics is None and intrinsics is not None and intrinsics.is_file():
+        raise CalibrationError(
+            "Lenses of a file alone give no cameras.", "Give footage of all cameras at once."
+        )
     names = tuple(names) or _names(extrinsics or intrinsics)
     together = _together(board, extrinsics, names, _floor_frame(floor), progress)
     used: dict[str, tuple[Sighting, ...]] = {}
+    if lenses is None and intrinsics is not None and intrinsics.is_file():
+        lenses = lenses_of_file(intrinsics, names)
     if lenses is None:
         used = _lens_sightings(board, intrinsics, names, together, progress)
         lenses = _lenses(board, used, progress)

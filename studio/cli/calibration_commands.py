@@ -31,7 +31,7 @@ TO_HELP = "The calibration to write; default: calibration/cameras.toml in the se
 @click.option(
     "--intrinsics",
     type=click.Path(path_type=Path),
-    help="Board footage for the lenses, a video or folder each.",
+    help="Board footage for the lenses, a video or folder each; or a calibration file that has them.",
 )
 @click.option(
     "--extrinsics", type=click.Path(path_type=Path), help="Board footage of all cameras at once, in step."

@@ -129,6 +129,17 @@ def test_the_intrinsics_alone_give_lenses(footage: Path, tmp_path: Path) -> None
     assert result.exit_code == 0, result.output
     assert (tmp_path / "rig.lenses.toml").exists()
     assert not (tmp_path / "rig.toml").exists()
+    placed = calibrate(
+        BOARD,
+        intrinsics=tmp_path / "rig.lenses.toml",
+        extrinsics=footage / "extrinsics",
+        floor="frame:13",
+        names=("cam1", "cam2"),
+    )
+    assert placed.rig is not None
+    assert same_rig(placed.rig.cameras) < 10.0
+    with pytest.raises(CalibrationError, match="Lenses of a file alone"):
+        calibrate(BOARD, intrinsics=tmp_path / "rig.lenses.toml")
 
 
 def test_a_mirrored_video_blocks(footage: Path, tmp_path: Path) -> None:
