@@ -1,4 +1,4 @@
-"""All bodies of people take a height by the same published shares of it (Drillis & Contini 1966, in Winter, Fig. 4.1)."""
+"""Bodies of people take a height by the same published shares (Drillis & Contini 1966, in Winter, Fig. 4.1)."""
 
 import pytest
 
