@@ -2,8 +2,8 @@
 
 Each message has `type` (state, acknowledged, layer, frame, settings, log; the web's own: hello, import, initialise,
 subject, synchrony, comparison, sessions, scene), `session` and `run`. NaN and infinities become null. A layer's
-particles are not in it: they are fetched from `/api/sessions/{session}/runs/{run}/frames/{frame}/layers/{layer}/particles`, or drawn
-by the scene.
+particles are not in it: they are fetched from
+`/api/sessions/{session}/runs/{run}/frames/{frame}/layers/{layer}/particles`, or drawn by the scene.
 """
 
 import dataclasses
