@@ -104,10 +104,10 @@ def _body_of(model: BehaviourModel, doors: Doors) -> BodyModel:
     try:
         body = load_body(name, (doors.workspace.root / BODIES_NAME,))
         model.space.check_body(body)
-    except BodyError as problem:
+    except BodyError:
         raise BehaviourError(
             f"The model's body '{name}' is not here any more, so its movements cannot be drawn.",
-            f"Put the body back or learn the model anew on another one. ({problem.message})",
+            "Put the body back, or learn the model anew on another one.",
         ) from None
     except BehaviourError as problem:
         raise BehaviourError(
