@@ -99,7 +99,7 @@ def _model(path: Path, _changed: int) -> BehaviourModel:
 
 
 def _body_of(model: BehaviourModel, doors: Doors) -> BodyModel:
-    """A body of the model's kind, the studio's or the workspace's own. Raises BehaviourError saying that there is none any more."""
+    """A body of the model's kind, the studio's or the workspace's own. Raises BehaviourError where it is gone."""
     name = model.space.body
     try:
         body = load_body(name, (doors.workspace.root / BODIES_NAME,))
