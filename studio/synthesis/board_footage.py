@@ -48,7 +48,7 @@ class BoardRenderer:
             last = self._levels[-1]
             half = (max(1, last.shape[1] // 2), max(1, last.shape[0] // 2))
             self._levels.append(np.asarray(cv2.resize(last, half, interpolation=cv2.INTER_AREA), np.float32))
-        self._rays = [pixel_rays(camera, self._footage.samples) for camera in self._cameras]
+        self._rays = [pixel_rays(camera, 1) for camera in self._cameras]
 
     def picture(self, camera: int, frame: int, world_from_board: Array) -> Bytes:
         """(H, W, 3) BGR of camera number `camera`; `frame` keys the noise. world_from_board : (3, 4), mm."""
@@ -69,7 +69,8 @@ class BoardRenderer:
     ) -> NDArray[np.float32]:
         """Grey levels of a window: the board's face, its back, or the wall."""
         view, s = self._cameras[camera], self._footage.samples
-        rays = self._rays[camera][rows.start * s : rows.stop * s, columns.start * s : columns.stop * s]
+        coarse = self._rays[camera][rows, columns]
+        rays = cv2.resize(coarse, None, fx=s, fy=s, interpolation=cv2.INTER_LINEAR)
         turn, origin = world_from_board[:, :3], world_from_board[:, 3]
         start, ahead = (view.centre - origin) @ turn, rays @ turn.astype(np.float32)
         with np.errstate(divide="ignore", invalid="ignore"):
