@@ -163,7 +163,10 @@ def _told(finding: Finding) -> str:
 
 
 def _text(found: Calibrated, written: tuple[Path, ...]) -> str:
-    lines = [verdict(lens) for lens in found.lenses.values()]
+    lines: list[str] = []
+    for lens in found.lenses.values():
+        lines.append(verdict(lens))
+        lines += [f"  left out {each.picture}: {each.dropped}" for each in lens.residuals if each.dropped]
     if found.rig is not None:
         for camera in found.rig.cameras:
             x, y, z = camera.centre
