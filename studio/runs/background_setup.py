@@ -38,14 +38,12 @@ TRIED_FRAMES = 3
 TRIALS: tuple[dict[str, Knob], ...] = (
     {},
     {"mask_shadow_test": False},
-    {"mask_shadow_darkest": 0.75, "mask_shadow_colour": 0.03},
-    {"mask_shadow_test": False, "mask_threshold": 6.0},
-    {"mask_shadow_test": False, "mask_min_component": 3000},
+    {"mask_shadow_test": False, "mask_keep_components": 1},
     {
         "mask_shadow_darkest": 0.75,
         "mask_shadow_colour": 0.03,
-        "mask_threshold": 6.0,
-        "mask_min_component": 3000,
+        "mask_threshold": 5.0,
+        "mask_keep_components": 1,
     },
 )
 """Knobs that are tried, beside what the session or the person has."""
@@ -114,7 +112,9 @@ def _tuned(
             if progress is not None:
                 progress("trying knobs", done, len(TRIALS))
             knobs = {**trial, **own}
-            found = mask_quality(session, _settings(session, knobs), frames, backgrounds=backgrounds)
+            found = mask_quality(
+                session, _settings(session, knobs), frames, backgrounds=backgrounds, blame=False
+            )
             worst = min((0.0 if view.agreement != view.agreement else view.agreement) for view in found.views)
             if best is None or worst > best[0] + 1e-9:
                 best = (worst, knobs, found)

@@ -105,11 +105,13 @@ def mask_quality(
     frames: Sequence[int] = (),
     *,
     backgrounds: Backgrounds | None = None,
+    blame: bool = True,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> MaskQuality:
     """The quality of a session's masks in some frames (default: five, evenly spread).
 
-    backgrounds : already fitted, of this session's footage. Raises RunError for a single camera, FootageError,
+    backgrounds : already fitted, of this session's footage. blame : find out what each camera denies, which takes most
+    of the time (else 0). Raises RunError for a single camera, FootageError,
     NotFoundError.
     """
     cameras = session.cameras()
@@ -126,7 +128,7 @@ def mask_quality(
         for done, frame in enumerate(chosen):
             if progress is not None:
                 progress("comparing masks", done, len(chosen))
-            counted.append(count_frame(maker.evidence(frame), cameras))
+            counted.append(count_frame(maker.evidence(frame), cameras, blame))
     finally:
         footage.close()
     names = tuple(camera.name for camera in cameras)
@@ -150,7 +152,7 @@ class FrameCounts:
     litres: float
 
 
-def count_frame(evidence: FrameEvidence, cameras: tuple[Camera, ...]) -> FrameCounts:
+def count_frame(evidence: FrameEvidence, cameras: tuple[Camera, ...], blame: bool = True) -> FrameCounts:
     """The pixels that `ViewQuality`'s shares are made of."""
     masks = [view.mask for view in evidence.views]
     whole, box = _fine_hull(evidence, cameras)
@@ -158,7 +160,8 @@ def count_frame(evidence: FrameEvidence, cameras: tuple[Camera, ...]) -> FrameCo
     covers = [_silhouette(whole, camera) for camera in cameras]
     both = np.array([np.count_nonzero(one & cover) for one, cover in zip(masks, covers, strict=True)])
     denied = np.zeros(len(cameras), dtype=np.int64)
-    for left_out in range(len(cameras) if len(cameras) > 2 and box is not None else 0):
+    judged = blame and len(cameras) > 2 and box is not None
+    for left_out in range(len(cameras) if judged else 0):
         alone = _fine_hull(without(evidence, left_out), cameras, box)[0]
         for other, camera in enumerate(cameras):
             if other != left_out:
