@@ -169,6 +169,7 @@ def in_words(told: Mapping[str, object]) -> str:
 
 RUNS = {
     "scene_open": "at 30 Hz with the scene open",
+    "scene_open_pressed": "at 36 Hz with the scene open",
     "alone": "at 30 Hz without a scene",
     "at_60_hz": "at 60 Hz without a scene",
 }
