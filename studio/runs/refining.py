@@ -165,6 +165,8 @@ class _FrameRefiner:
         evidence, problem = self._seen(frame)
         found = self._refiner.refine(pose, silhouette_distances(evidence), problem)
         overlap = self._onlooker.sight(evidence, found.pose).overlap
+        if overlap < self._refiner.settings.refinement_least_overlap:
+            return pose, self._onlooker.sight(evidence, pose).overlap, None
         return found.pose, overlap, found.gain if found.moved else None
 
     def _seen(self, frame: int) -> tuple[FrameEvidence, FrameProblem]:

@@ -78,6 +78,13 @@ class RefinementSettings:
         help="Pull towards the pose that the search found; it settles what no silhouette shows.",
     )  # fmt: skip
 
+    # Walks and runs on subtracted masks: 0.84 to 0.95; masks that show a platform and its shadow as well: 0.57 to 0.64,
+    # and refined poses that jump by 100 mm from frame to frame.
+    refinement_least_overlap: float = knob(
+        0.7, 0.0, 1.0, 0.05,
+        help="Frames whose silhouettes agree less than this even when refined keep their pose: masks show more.",
+    )  # fmt: skip
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Refined:

@@ -78,6 +78,15 @@ class TrackingSettings:
         self.source.close()
 
 
+def test_frames_whose_silhouettes_do_not_agree_keep_their_pose(
+    session_on_disk: Session, run: StoredRun
+) -> None:
+    settings = RefinementSettings(refinement_least_overlap=1.0)
+    made = refine_run(session_on_disk, run, settings=settings)
+    assert made.moved == 0
+    assert np.array_equal(made.track.poses, read_track(run).poses)
+
+
 def test_smoothing_takes_the_refined_track_else_the_raw(session_on_disk: Session, run: StoredRun) -> None:
     assert smooth_run(run, into="first").track.made_by["from"] == "raw"
     refine_run(session_on_disk, run)
