@@ -11,8 +11,9 @@ would be hundreds of dimensions, but given the shape the frames do not depend on
 3. weighs each particle by the sum over the frames, with the prior of the shapes, at a sharpness that leaves the wanted
    share of particles alive (Eqs. 11, 12), and draws the next ones, the best one always among them.
 
-The answer is the mean shape of the last layers' survivors, the uncertainty their standard deviation: how far a shape can
-go at full sharpness without being worse, given that poses follow.
+The answer is the mean shape of the last layers' survivors, the uncertainty their standard deviation: how far a
+shape can go at full sharpness without being worse, given that poses follow. It knows nothing of what a person in
+clothes and a body of cones differ by, which is more.
 """
 
 from collections.abc import Callable

@@ -79,7 +79,7 @@ def test_counts_and_means_of_agreeing_frames_are_numpys() -> None:
     frames = rng.integers(0, 255, (9, 6, 7, 3), dtype=np.uint8)
     low, high = np.full((6, 7, 3), 60.0, np.float32), np.full((6, 7, 3), 220.0, np.float32)
     mean, deviation, count = agreeing_frames(frames, low, high)
-    inside = ((frames >= 60) & (frames <= 220)).all(axis=-1)
+    inside = np.asarray(((frames >= 60) & (frames <= 220)).all(axis=-1))
     assert (count == inside.sum(axis=0)).all()
     y, x = np.argwhere(count >= 2)[0]
     chosen = frames[inside[:, y, x], y, x].astype(float)
