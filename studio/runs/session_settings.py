@@ -1,4 +1,4 @@
-"""The settings that a session's runs and pictures begin with: the studio's defaults, and what the session says of masks."""
+"""The settings that a session begins with: the studio's defaults, and what the session says of its masks."""
 
 from collections.abc import Mapping
 
