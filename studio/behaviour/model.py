@@ -18,6 +18,7 @@ from studio.behaviour.feature_space import FeatureSpace
 from studio.behaviour.gaussian_mixture import GaussianMixture
 from studio.behaviour.prototypes import Prototypes
 from studio.behaviour.reduction import Reduction
+from studio.behaviour.root_motion import RootMotion
 from studio.behaviour.settings import LearningSettings
 from studio.errors import BehaviourError
 
@@ -47,7 +48,8 @@ class BehaviourModel:
 
     mixture : the clusters in the reduced space, where frames are labelled and the likelihood of Eq. 3 is taken (what
     the reduction leaves out is taken to say the same of every cluster). dynamics : the same clusters as Gaussians of
-    the features (x, ẋ), for Eq. 4 and sampling. prototypes : a real pose of each.
+    the features (x, ẋ), for Eq. 4 and sampling. prototypes : a real pose of each. root : how position and orientation
+    change in each, None for a body without.
     """
 
     space: FeatureSpace
@@ -57,6 +59,7 @@ class BehaviourModel:
     automaton: Automaton
     prototypes: Prototypes
     making: Making
+    root: RootMotion | None = None
 
     @property
     def clusters(self) -> int:
@@ -116,6 +119,7 @@ class BehaviourModel:
             reduction=reduction,
             dynamics=self.dynamics.mapped(np.diag(factor)),
             prototypes=dataclasses.replace(self.prototypes, derivatives=self.prototypes.derivatives * ratio),
+            root=self.root and self.root.at_ratio(ratio),
         )
 
     def with_automaton(self, settings: LearningSettings) -> "BehaviourModel":

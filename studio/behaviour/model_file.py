@@ -18,11 +18,12 @@ from studio.behaviour.gaussian_mixture import GaussianMixture
 from studio.behaviour.model import BehaviourModel, Making
 from studio.behaviour.prototypes import Prototypes
 from studio.behaviour.reduction import Reduction
+from studio.behaviour.root_motion import RootFrame, RootMotion
 from studio.behaviour.settings import LearningSettings
 from studio.errors import BehaviourError
 from studio.typed_decoding import decode_json
 
-VERSION = 1
+VERSION = 2
 KIND = "studio behaviour model"
 
 
@@ -42,6 +43,7 @@ class _Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     learnt_fps: float = 0.0
     entropy_train: float | None = None
     entropy_test: float | None = None
+    heading: int = -1
 
 
 def write_model(model: BehaviourModel, path: Path) -> None:
@@ -104,6 +106,7 @@ def _head(model: BehaviourModel) -> bytes:
         "learnt_fps": making.learnt_fps,
         "entropy_train": _or_none(making.entropy_train),
         "entropy_test": _or_none(making.entropy_test),
+        "heading": model.root.frame.heading if model.root else -1,
     }
     return json.dumps(head).encode()
 
@@ -136,6 +139,7 @@ def _arrays(model: BehaviourModel) -> dict[str, NDArray[np.generic]]:
         "reduction_loadings": model.reduction.loadings,
         **_mixture_arrays("mixture", model.mixture),
         **_mixture_arrays("dynamics", model.dynamics),
+        **_root_arrays(model.root),
         "contexts": np.array([label for context in automaton.contexts for label in context], dtype=np.int64),
         "context_lengths": np.array(lengths, dtype=np.int64),
         "context_kept": automaton.kept,
@@ -154,6 +158,21 @@ def _arrays(model: BehaviourModel) -> dict[str, NDArray[np.generic]]:
 def _mixture_arrays(name: str, mixture: GaussianMixture) -> dict[str, NDArray[np.generic]]:
     parts = {"weights": mixture.weights, "means": mixture.means, "covariances": mixture.covariances}
     return {f"{name}_{part}": values for part, values in parts.items()}
+
+
+def _root_arrays(root: RootMotion | None) -> dict[str, NDArray[np.generic]]:
+    if root is None:
+        return {}
+    frame = root.frame
+    places = {"root_columns": frame.columns, "root_turning": frame.turning, "root_level": frame.level}
+    return places | _mixture_arrays("root", root.changes)
+
+
+def _root(head: _Head, arrays: dict[str, NDArray]) -> RootMotion | None:
+    if "root_columns" not in arrays:
+        return None
+    frame = RootFrame(arrays["root_columns"], arrays["root_turning"], head.heading, arrays["root_level"])
+    return RootMotion(frame, _mixture("root", arrays))
 
 
 def _model(head: _Head, arrays: dict[str, NDArray]) -> BehaviourModel:
@@ -194,7 +213,8 @@ def _model(head: _Head, arrays: dict[str, NDArray]) -> BehaviourModel:
         entropy_train=_or_nan(head.entropy_train),
         entropy_test=_or_nan(head.entropy_test),
     )
-    model = BehaviourModel(space, reduction, mixture, dynamics, automaton, prototypes, making)
+    root = _root(head, arrays)
+    model = BehaviourModel(space, reduction, mixture, dynamics, automaton, prototypes, making, root)
     _check_shapes(model)
     return model
 
@@ -224,6 +244,13 @@ def _check_shapes(model: BehaviourModel) -> None:
         (model.prototypes.derivatives.shape, (clusters, half)),
         (model.space.rest.shape, (whole,)),
     }
+    if model.root is not None:
+        width = len(model.root.frame.columns)
+        found |= {
+            (model.root.changes.means.shape, (clusters, width)),
+            (model.root.changes.covariances.shape, (clusters, width, width)),
+            (model.root.frame.turning.shape, (width,)),
+        }
     if any(shape != wanted for shape, wanted in found):
         raise ValueError("shapes")
     if model.automaton.next_state.min() < 0 or model.automaton.next_state.max() >= states:

@@ -11,6 +11,7 @@ from studio.behaviour.gaussian_mixture import GaussianMixture
 from studio.behaviour.model import BehaviourModel, Making, automaton_of
 from studio.behaviour.prototypes import find_prototypes
 from studio.behaviour.reduction import fit_reduction, full_clusters
+from studio.behaviour.root_motion import learn_root_motion
 from studio.behaviour.settings import LearningSettings
 from studio.body.model import BodyModel
 from studio.errors import BehaviourError
@@ -46,7 +47,8 @@ def learn_model(
     # A cluster that no frame belongs to for the most part is no label.
     mixture = found.chosen(np.unique(found.labels(points)))
     labels = _split(mixture.labels(points), [len(part) for part in features])
-    dynamics = _dynamics(everything, mixture, points)
+    shares = mixture.responsibilities(points)
+    dynamics = _dynamics(everything, shares)
     automaton = automaton_of(labels, mixture.size, settings)
     making = Making(
         settings=settings,
@@ -60,7 +62,8 @@ def learn_model(
     prototypes = find_prototypes(
         recordings, labels, dynamics.log_densities(everything), dynamics.means[:, half:]
     )
-    return BehaviourModel(space, reduction, mixture, dynamics, automaton, prototypes, making)
+    root = learn_root_motion(body, recordings, shares)
+    return BehaviourModel(space, reduction, mixture, dynamics, automaton, prototypes, making, root)
 
 
 def _features(space: FeatureSpace, recordings: Sequence[Array]) -> list[Array]:
@@ -80,9 +83,9 @@ def _split(labels: IntArray, lengths: Sequence[int]) -> tuple[IntArray, ...]:
     return tuple(np.split(labels, np.cumsum(lengths)[:-1]))
 
 
-def _dynamics(features: Array, mixture: GaussianMixture, points: Array) -> GaussianMixture:
+def _dynamics(features: Array, shares: Array) -> GaussianMixture:
     """The clusters as Gaussians of the features, every angle and every derivative with a least variance."""
     half = features.shape[1] // 2
     variances = features.var(axis=0)
     floor = np.repeat([FLOOR * part.mean() for part in np.split(variances, [half])], half)
-    return full_clusters(features, mixture.responsibilities(points), np.maximum(floor, 1e-12))
+    return full_clusters(features, shares, np.maximum(floor, 1e-12))

@@ -15,7 +15,7 @@ class BehaviourSettings:
     particles: int = knob(
         1000, 2, 200000, 50, takes_effect="next frame", help="N: particles, each weighed once (section 7.3)."
     )
-    attenuation: float = shared_knobs.attenuation(0.6)
+    attenuation: float = shared_knobs.attenuation(0.5)
     entering: str = shared_knobs.entering()
     model_free_share: float = shared_knobs.model_free_share(0.1)
     model_free_grows: bool = shared_knobs.model_free_grows()
@@ -24,7 +24,7 @@ class BehaviourSettings:
         help="How peaked the weights are: so that a wanted share survives, or as the weighting gives them (3.3).",
     )  # fmt: skip
     survival: float = knob(
-        0.05, 0.005, 0.98, 0.005, label="survival rate",
+        0.4, 0.005, 0.98, 0.005, label="survival rate",
         help="Share of the particles that survive a frame, where the selection is by survival.",
     )  # fmt: skip
     expected_support: float = knob(
@@ -36,7 +36,9 @@ class BehaviourSettings:
         help="From how many clusters' means the blobs are fitted at most (6.3).",
     )  # fmt: skip
     diffusion_scale: float = shared_knobs.diffusion_scale()
-    global_scale: float = shared_knobs.global_scale(0.4)
+    root_prediction: str = shared_knobs.root_prediction()
+    global_scale: float = shared_knobs.global_scale(1.0)
+    automaton_share: float = shared_knobs.automaton_share()
     estimate: str = knob(
         "mode", choices=("mode", "mean"), takes_effect="next layer",
         help="The pose that is reported: the particle with the highest weight (3.3), or the weighted mean.",

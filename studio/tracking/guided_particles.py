@@ -2,11 +2,12 @@
 6.3), as every tracker uses them.
 
 A guided set carries with each particle the state of the automaton that its path has reached, and its joint angles'
-movement in the last frame. The model moves the joint angles; the parameters of the root, which it does not know, get
-Gaussian noise of σ0 (5.2). A particle that is moved without the model gets that noise in every parameter. It keeps the
-movement that it had, as noise is none (taken for one it would be added again in the next frame, and no such particle
-would survive that). Its state is found again: the model's label of where it is and how it moves, taken as the
-automaton's next symbol, exactly as training sequences are read (`followed`).
+movement in the last frame. The model moves the joint angles. The parameters of the root get Gaussian noise of σ0 (5.2)
+and, by choice, the movement that roots had in the particle's cluster (`behaviour.root_motion`). A particle that is
+moved without the model gets noise in every parameter. It keeps the movement that it had, as noise is none (taken for
+one it would be added again in the next frame, and no such particle would survive that). Its state is found again: the
+model's label of where it is and how it moves, taken as the automaton's next symbol, exactly as training sequences are
+read (`followed`).
 
 In the first frame of a run nothing has moved yet: there is noise only, and a particle's state and movement are drawn
 from the clusters near its pose (`near`): the probability of each cluster given the angles, its movement unknown, then
@@ -24,7 +25,7 @@ from studio.behaviour.model import BehaviourModel
 from studio.behaviour.prediction import propagate, start_states, states_at
 from studio.tracking.hard_priors import Rules
 from studio.tracking.particles import unweighted
-from studio.tracking.shared_knobs import BEHAVIOUR
+from studio.tracking.shared_knobs import BEHAVIOUR, LEARNT
 from studio.tracking.tracker import Carried, ParticleSet, SearchSpace
 
 Array = NDArray[np.float64]
@@ -37,6 +38,9 @@ STATES, VELOCITY = "automaton_state", "velocity"
 
 # Standard deviations beyond √d: where a pose lies far outside a cluster, the regression from it is not believed.
 NOT_BELIEVED = 3.0
+# Of what a cluster's roots did in training, standard deviations: others perform it otherwise. Of 1, 1.5 and 2 on two
+# dances of other people the last one lost them least.
+ROOT_SPREAD = 2.0
 # Particles whose states are sought at once: the automaton has thousands, and each particle a chance of each.
 AT_ONCE = 4096
 
@@ -72,6 +76,16 @@ class GuidedRules(Rules, Protocol):
     @property
     def global_scale(self) -> float:
         """Multiplies σ0 once more, of what the model does not know of particles that it moves."""
+        ...
+
+    @property
+    def root_prediction(self) -> str:
+        """ "learnt" or "noise"."""
+        ...
+
+    @property
+    def automaton_share(self) -> float:
+        """Of the particles, those that change cluster by the automaton alone."""
         ...
 
 
@@ -154,8 +168,13 @@ def walked(
     poses = walkers.poses + np.where(free[:, None], noise, rules.global_scale * noise)
     states, angles, velocity = walkers.states, walkers.poses[:, columns], walkers.velocity
     for _ in range(space.steps):
-        moved = propagate(rng, model, states, angles, velocity, rules.attenuation, rules.entering)
+        moved = propagate(
+            rng, model, states, angles, velocity, rules.attenuation, rules.entering, rules.automaton_share
+        )
         states, angles, velocity = moved.states, moved.values, moved.velocities
+        if model.root is not None and rules.root_prediction == LEARNT:
+            labels = np.maximum(model.automaton.last_symbols[states], 0)
+            poses = np.where(free[:, None], poses, model.root.moved(rng, poses, labels, ROOT_SPREAD))
     poses[:, columns] = np.where(free[:, None], poses[:, columns], angles)
     velocity = np.where(free[:, None], walkers.velocity, velocity)
     alone = followed(rng, model, walkers.states, poses[:, columns], velocity, space.steps)

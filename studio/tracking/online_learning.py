@@ -29,6 +29,7 @@ from studio.behaviour.gaussian_mixture import GaussianMixture
 from studio.behaviour.model import BehaviourModel, automaton_of
 from studio.behaviour.prototypes import Prototypes
 from studio.behaviour.reduction import full_clusters
+from studio.behaviour.root_motion import RootMotion, gaussians_of
 from studio.tracking.guided_particles import STATES, known_of
 from studio.tracking.guided_start import CAME_FROM_STATES
 from studio.tracking.guided_swarm import BEFORE_STATE, LEADER_STATE
@@ -105,7 +106,7 @@ def taught(
         return known
     now = known.at_rate(known.making.learnt_fps)
     features = [now.space.features(recording) for recording in recordings]
-    now = _with_new_clusters(now, np.concatenate(recordings), np.concatenate(features), rng)
+    now = _with_new_clusters(now, recordings, np.concatenate(features), rng)
     labels = tuple(now.mixture.labels(now.reduction.reduced(part)) for part in features)
     everything = (*base.making.labels, *labels)
     automaton = automaton_of(everything, now.clusters, now.making.settings)
@@ -169,11 +170,12 @@ LESSON_KEY = 0x1E550
 
 
 def _with_new_clusters(
-    model: BehaviourModel, poses: Array, features: Array, rng: np.random.Generator
+    model: BehaviourModel, recordings: Sequence[Array], features: Array, rng: np.random.Generator
 ) -> BehaviourModel:
-    """The model, at its learnt rate, with clusters of what it does not explain among frames (n, D) with features
-    (n, 2 d).
+    """The model, at its learnt rate, with clusters of what it does not explain among the frames of recordings (F, D),
+    n in all, with features (n, 2 d).
     """
+    poses = np.concatenate(recordings)
     strange = np.flatnonzero(novel(model, features))
     points = model.reduction.reduced(features)
     parameters = parameters_of(points.shape[1], "full")
@@ -203,7 +205,16 @@ def _with_new_clusters(
         mixture=_joined(model.mixture, found, share),
         dynamics=_joined(model.dynamics, movements, share),
         prototypes=prototypes,
+        root=model.root and _root_joined(model.root, recordings, strange, shares),
     )
+
+
+def _root_joined(
+    root: RootMotion, recordings: Sequence[Array], strange: Indices, shares: Array
+) -> RootMotion:
+    """With the new clusters' movement of the root: of the frames `strange`, by their shares (n, K) in the clusters."""
+    changes = np.concatenate([root.frame.changes(poses) for poses in recordings])
+    return root.joined(gaussians_of(changes[strange], shares))
 
 
 def _joined(first: GaussianMixture, second: GaussianMixture, share: float) -> GaussianMixture:

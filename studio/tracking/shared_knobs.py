@@ -7,6 +7,7 @@ from studio.knobs import knob
 CONSTRAINTS = ("redraw", "reject", "clamp", "ignore")
 NOISE, BEHAVIOUR = "noise", "behaviour"
 PREDICTIONS = (NOISE, BEHAVIOUR)
+LEARNT = "learnt"
 
 
 def diffusion_scale(default: float = 1.0) -> Any:  # noqa: ANN401 - a dataclass field, as `knob` returns it
@@ -94,6 +95,24 @@ def global_scale(default: float) -> Any:  # noqa: ANN401
     return knob(
         default, 0.02, 2.0, 0.02, label="root's noise", takes_effect="next frame",
         help="Multiplies σ0 of position and orientation, which no model knows, of particles that a model moves (5.2).",
+    )  # fmt: skip
+
+
+def root_prediction() -> Any:  # noqa: ANN401
+    """What moves the root beside a model."""
+    return knob(
+        LEARNT, choices=(LEARNT, NOISE), label="root's prediction", takes_effect="next frame",
+        help="How position and orientation move beside a model: as they did in the particle's motion cluster when it "
+        "was learnt, with noise; or by noise alone (5.2).",
+    )  # fmt: skip
+
+
+def automaton_share() -> Any:  # noqa: ANN401
+    """Of the particles that a model moves (`behaviour.prediction`)."""
+    return knob(
+        0.8, 0.0, 1.0, 0.05, label="automaton's share", takes_effect="next frame",
+        help="Share of the particles that change cluster by the automaton's probabilities alone, whatever Eq. 3's "
+        "density says of them; 0 is the paper's Eq. 3.",
     )  # fmt: skip
 
 

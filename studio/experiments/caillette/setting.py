@@ -27,8 +27,8 @@ MEMORY = 20
 BOTH = Training((EXERCISE, EXERCISE_2))
 QUICK_TRAINING = Training((EXERCISE,))
 
-# The dancer turns by 12 degrees a frame and more (360 degrees a second), where the body's σ0 is 6.7: all trackers get
-# twice that. Measured with 1 to 4 times: less loses the guided particles in the first turn, more blurs all.
+# The dancer turns by 12 degrees a frame and more (360 degrees a second), where the body's σ0 is 6.7: trackers without a
+# model get twice that. Measured with 1 to 4 times: less loses them in the first turn, more blurs all.
 SIGMA: Mapping[str, Any] = {"diffusion_scale": 2.0}
 # As in the paper: no particle is moved without the model, and the best particle is the pose.
 AS_PAPER: Mapping[str, Any] = {"model_free_share": 0.0, "model_free_grows": False, "estimate": "mode"}
@@ -48,7 +48,7 @@ IMPROVED = Contender(
 def guided(particles: int, name: str = "", **changes: Any) -> Contender:  # noqa: ANN401 - knobs
     """The paper's tracker with so many particles. changes : further knobs."""
     words = name or f"guided, {particles}"
-    return Contender(words, GUIDED, BLOBS, {"particles": particles, **AS_PAPER, **SIGMA, **changes})
+    return Contender(words, GUIDED, BLOBS, {"particles": particles, **AS_PAPER, **changes})
 
 
 def last_frame(footage: str, quick: bool, most: int | None = None) -> int:
