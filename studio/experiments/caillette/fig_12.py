@@ -186,21 +186,6 @@ def _before_the_pirouettes(groups: Groups) -> str:
     )
 
 
-def _prediction_or_number(groups: Groups) -> str:
-    """Whether more particles would help: with as many as Condensation has, only the prediction differs."""
-    ours, theirs = mean_of(groups[MANY.name]), mean_of(groups[CONDENSATION.name])
-    told = (
-        f" With 5000 particles each the guided tracker is at {ours:.1f}° and Condensation at {theirs:.1f}°: "
-    )
-    if ours < theirs:
-        return told + "the prediction helps, and 200 are too few for a body of 25 parameters."
-    return (
-        told
-        + "it is the prediction that misleads, not the number of particles. 'caillette-clusters' counts how many "
-        "frames of another performance lie outside of all clusters."
-    )
-
-
 def _calm(groups: Groups) -> tuple[Number, ...]:
     """The first frames alone."""
     first = {name: [beginning(run, CALM_FRAMES) for run in runs] for name, runs in groups.items()}
