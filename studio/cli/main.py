@@ -30,7 +30,11 @@ COMMANDS = {
         "background",
         "Choose where a session's masks come from, and see how well its views agree.",
     ),
-    "subject": ("subject_commands", "subject", "Write down who is in front of the cameras: a height, lengths."),
+    "subject": (
+        "subject_commands",
+        "subject",
+        "Write down who is in front of the cameras: a height, lengths.",
+    ),
     "fit-subject": (
         "subject_commands",
         "fit_subject_command",

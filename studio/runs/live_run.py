@@ -143,11 +143,17 @@ class LiveRun(TrackingRun):
         self._behind.do(lambda: self._writer.write_frame(result, layers, kept, came=times))
 
     def keep(
-        self, result: FrameResult, layers: list[LayerRecord], version: int, settings: RunSettings
+        self,
+        result: FrameResult,
+        layers: list[LayerRecord],
+        version: int,
+        settings: RunSettings,
+        *,
+        alone: bool = False,
     ) -> None:
         """As `TrackingRun.keep`; a run that was over goes on from there."""
         self._behind.wait()
-        super().keep(result, layers, version, settings)
+        super().keep(result, layers, version, settings, alone=alone)
         with self.run.results() as results:
             self.meter = LiveMeter(results.frames())
         self._over = False

@@ -198,7 +198,8 @@ def test_the_share_grows_on_a_motion_that_the_model_does_not_know(name: str) -> 
             poses = np.array([result.estimate.pose for result in results])
             errors[kind, grows] = float(np.abs(poses - truth[:30]).mean())
     assert shares["unknown", False] == shares["known", False] == pytest.approx(0.2)
-    assert shares["unknown", True] > shares["known", True] + 0.1
+    # Annealing finds the body in its later layers without a model, so that the model is beaten less often.
+    assert shares["unknown", True] > shares["known", True] + {"behaviour": 0.1, "annealed": 0.02}[name]
     assert shares["known", True] < 0.25
     assert errors["unknown", True] < 1.2 * errors["unknown", False]
 
