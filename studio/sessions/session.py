@@ -43,8 +43,19 @@ class Session:
         """The session's name: its folder's."""
         return self.path.name
 
+    @property
+    def has_footage(self) -> bool:
+        """Whether any camera's footage is there; a session begins without."""
+        return bool(self.manifest.footage.cameras)
+
+    @property
+    def is_calibrated(self) -> bool:
+        """Whether there is a calibration; a session may begin without."""
+        return (self.path / CAMERAS_PATH).is_file()
+
     def cameras(self) -> tuple[Camera, ...]:
-        """The calibrated cameras in the order of the footage. Raises CalibrationError."""
+        """The calibrated cameras in the order of the footage. Raises CalibrationError; SessionError without any."""
+        self._check_begun()
         by_name = {camera.name: camera for camera in self._calibrated}
         sources = self.manifest.footage.cameras
         missing = [source.name for source in sources if source.name not in by_name]
@@ -55,12 +66,28 @@ class Session:
             )
         return tuple(by_name[source.name] for source in sources)
 
+    def _check_footage(self) -> None:
+        if not self.has_footage:
+            raise SessionError(
+                f"Session '{self.name}' has no footage yet.",
+                "Add it in the guided way, or with 'studio add-footage'.",
+            )
+
+    def _check_begun(self) -> None:
+        self._check_footage()
+        if not self.is_calibrated:
+            raise SessionError(
+                f"Session '{self.name}' has no calibration yet.",
+                "Calibrate its cameras in the guided way, or with 'studio calibrate'.",
+            )
+
     @cached_property
     def _calibrated(self) -> tuple[Camera, ...]:
         return tuple(read_calibration(self.path / CAMERAS_PATH).cameras)
 
     def footage(self) -> Footage:
-        """The session's footage, opened anew; close it when done. Raises FootageError."""
+        """The session's footage, opened anew; close it when done. Raises FootageError; SessionError without any."""
+        self._check_footage()
         return open_footage(self.manifest.footage, self.path)
 
     def subject(self) -> Subject | None:

@@ -16,6 +16,7 @@ from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.workspace import Workspace
 from studio.web import (
     background_routes,
+    background_setup_routes,
     behaviour_learning_routes,
     behaviour_routes,
     comparison_routes,
@@ -38,6 +39,7 @@ from studio.web import (
     subject_routes,
     track_routes,
     upload_routes,
+    way_routes,
 )
 from studio.web.access import AccessGuard, HostRule, binding_rule
 from studio.web.body_limit import BodyLimit
@@ -58,11 +60,13 @@ ROUTERS = (
     page_routes.router,
     guide_routes.router,
     session_routes.router,
+    way_routes.router,
     import_routes.router,
     upload_routes.router,
     footage_routes.router,
     initialisation_routes.router,
     background_routes.router,
+    background_setup_routes.router,
     subject_routes.router,
     run_routes.router,
     settings_routes.router,

@@ -87,6 +87,7 @@ class SessionLine(Answer):
     warnings: list[str]
     runs: list[RunLine]
     comparisons: int = 0
+    next_step: str = Field("", description="footage or calibration, where that is lacking; else empty.")
     problem: str = ""
 
 
@@ -167,6 +168,7 @@ class SessionDetail(Answer):
     cameras: list[CameraView]
     subject: SubjectView | None
     has_truth: bool
+    next_step: str = ""
     has_start_pose: bool
     tracker: str
     weighting: str

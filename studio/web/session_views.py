@@ -7,6 +7,7 @@ from studio.capture.footage_source import CameraSource
 from studio.errors import StudioError
 from studio.experiments.comparison_folders import comparison_count
 from studio.geometry.camera import Camera
+from studio.sessions.beginning import next_step
 from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session
 from studio.sessions.workspace import SessionSummary
@@ -44,6 +45,7 @@ def session_line(summary: SessionSummary, session: Session | None) -> SessionLin
         warnings=list(summary.warnings),
         runs=runs,
         comparisons=comparison_count(session) if session else 0,
+        next_step=next_step(len(summary.cameras), bool(session and session.is_calibrated)),
         problem=summary.problem,
     )
 
@@ -86,6 +88,7 @@ def session_detail(session: Session) -> SessionDetail:
     body = session.body()
     subject = session.subject()
     sources = {source.name: source for source in manifest.footage.cameras}
+    cameras = session.cameras() if session.has_footage and session.is_calibrated else ()
     return SessionDetail.model_validate(
         {
             "name": session.name,
@@ -94,9 +97,10 @@ def session_detail(session: Session) -> SessionDetail:
             "fps": manifest.fps,
             "frame_count": manifest.frame_count,
             "body": body_view(body),
-            "cameras": [camera_view(camera, sources[camera.name]) for camera in session.cameras()],
+            "cameras": [camera_view(camera, sources[camera.name]) for camera in cameras],
             "subject": subject,
             "has_truth": session.truth_path is not None,
+            "next_step": next_step(len(sources), session.is_calibrated),
             "has_start_pose": session.start_pose(body) is not None,
             "tracker": _tracker(session),
             "weighting": _weighting(session),

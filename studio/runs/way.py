@@ -1,0 +1,95 @@
+"""The guided way: how far a session is, step by step, computed from what is there.
+
+A step is "done", "ready" to be done, "blocked" by an earlier one, "stale" where what it was made from has changed
+since, or "running". Nothing of it is kept; `sessions.made_from` and the snapshots in the runs' folders say what a
+result was made from.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from studio.errors import StudioError
+from studio.runs.way_results import check_step, export_step, track_step
+from studio.runs.way_setup import (
+    background_step,
+    calibration_step,
+    footage_step,
+    start_pose_step,
+    subject_step,
+)
+from studio.runs.way_step import STEPS, StepName, StepStatus
+from studio.sessions.session import Session
+
+NEEDS: Mapping[str, tuple[str, ...]] = {
+    "footage": (),
+    "calibration": ("footage",),
+    "background": ("footage",),
+    "subject": ("footage", "calibration"),
+    "start-pose": ("footage", "calibration"),
+    "track": ("footage", "calibration"),
+    "check": ("track",),
+    "export": ("track",),
+}
+"""Step to those that have to be done (stale counts) before it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """All steps in order. next : the first that wants something, "" if none does."""
+
+    steps: tuple[StepStatus, ...]
+    next: str
+
+
+def way_of(
+    session: Session, running: Mapping[str, str] | None = None, exports: Sequence[str] | None = None
+) -> Way:
+    """How far a session is. running : step to how far its job is, in words. exports : files that were exported from
+    the newest run, None where nobody looked.
+
+    Never raises for a part that cannot be read: that step says so.
+    """
+    makers: dict[StepName, Callable[[], StepStatus]] = {
+        "footage": lambda: footage_step(session),
+        "calibration": lambda: calibration_step(session),
+        "background": lambda: background_step(session),
+        "subject": lambda: subject_step(session),
+        "start-pose": lambda: start_pose_step(session),
+        "track": lambda: track_step(session),
+        "check": lambda: check_step(session),
+        "export": lambda: export_step(session, exports or ()),
+    }
+    steps: dict[str, StepStatus] = {}
+    for step in STEPS:
+        steps[step] = _status(step, makers[step], steps, running or {})
+    return Way(tuple(steps.values()), _next(tuple(steps.values())))
+
+
+def _status(
+    step: StepName,
+    make: Callable[[], StepStatus],
+    before: Mapping[str, StepStatus],
+    running: Mapping[str, str],
+) -> StepStatus:
+    lacking = next((need for need in NEEDS[step] if before[need].state not in ("done", "stale")), None)
+    if lacking is not None:
+        return StepStatus(step, "blocked", "", f"It needs {LACKING[lacking]}.")
+    try:
+        status = make()
+    except StudioError as error:
+        status = StepStatus(step, "ready", "", str(error))
+    return replace(status, state="running", words=running[step]) if step in running else status
+
+
+LACKING = {"footage": "footage", "calibration": "a calibration", "track": "a run that has frames"}
+
+Order = Literal["stale", "ready", "running"]
+
+
+def _next(steps: Sequence[StepStatus]) -> str:
+    """The first step that has to be done or redone; else the first optional one that is ready."""
+    pressing = [
+        step.step for step in steps if not step.optional and step.state in ("stale", "ready", "running")
+    ]
+    return pressing[0] if pressing else next((step.step for step in steps if step.state == "stale"), "")

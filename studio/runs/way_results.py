@@ -1,0 +1,66 @@
+"""The steps of the guided way from tracking on: track, check, export."""
+
+from collections.abc import Sequence
+
+from studio.runs.tracks import track_names
+from studio.runs.way_step import StepStatus, counted, enumerated
+from studio.sessions.footage_changes import stale_runs
+from studio.sessions.run_record import CAMERAS_NAME
+from studio.sessions.session import CAMERAS_PATH, Session
+from studio.sessions.stored_run import StoredRun
+
+
+def newest_run(session: Session) -> StoredRun | None:
+    """The run that the way is about: the newest one of footage that has an end; None without."""
+    runs = [run for run in session.runs() if not run.record.to_and_fro]
+    return runs[-1] if runs else None
+
+
+def run_changes(session: Session, run: StoredRun) -> list[str]:
+    """What a run was made with that is another one now, in words."""
+    changed = []
+    if run.name in stale_runs(session):
+        changed.append("the footage's offsets or turns")
+    calibration = session.path / CAMERAS_PATH
+    if calibration.is_file() and calibration.read_bytes() != (run.folder / CAMERAS_NAME).read_bytes():
+        changed.append("the calibration")
+    if session.body(run.record.body).dimensions != run.record.dimensions:
+        changed.append("the subject's measures")
+    return changed
+
+
+def track_step(session: Session) -> StepStatus:
+    """The newest run, and whether what it was made with still holds."""
+    run = newest_run(session)
+    if run is None:
+        return StepStatus("track", "ready", "nothing tracked yet")
+    summary = run.summary()
+    words = f"{run.name}: {summary.done} of {counted(run.record.frame_count, 'frame')}"
+    if summary.status == "tracking":
+        return StepStatus("track", "running", words)
+    if not summary.done:
+        return StepStatus("track", "ready", f"{run.name} has not begun")
+    changed = run_changes(session, run)
+    if changed:
+        why = f"{run.name} was tracked before {enumerated(changed)} changed: track again."
+        return StepStatus("track", "stale", words, why)
+    return StepStatus("track", "done", words)
+
+
+def check_step(session: Session) -> StepStatus:
+    """How good the newest run is."""
+    run = newest_run(session)
+    if run is None:
+        return StepStatus("check", "blocked", "", "It needs a run.")
+    derived = [name for name in track_names(run) if name != "raw"]
+    if derived:
+        return StepStatus("check", "done", f"{run.name}: {enumerated(derived)}")
+    return StepStatus("check", "ready", f"look at {run.name}", optional=True)
+
+
+def export_step(session: Session, exports: Sequence[str]) -> StepStatus:
+    """The files that were exported from the newest run."""
+    run = newest_run(session)
+    if run is None or not exports:
+        return StepStatus("export", "ready", "no file yet")
+    return StepStatus("export", "done", f"{counted(len(exports), 'file')} of {run.name}")

@@ -1,0 +1,111 @@
+"""The steps of the guided way before tracking: footage, calibration, background, subject, start pose."""
+
+from studio.runs.way_step import StepName, StepStatus, counted, enumerated
+from studio.sessions.background_files import read_evidence
+from studio.sessions.made_from import changed_inputs, origin_of
+from studio.sessions.session import START_POSE_NAME, SUBJECT_NAME, Session
+
+CHANGED = {
+    "footage": "the footage",
+    "calibration": "the calibration",
+    "subject": "the subject",
+    "masks": "the masks",
+}
+
+
+def footage_step(session: Session) -> StepStatus:
+    """Cameras, frames, rate; refused where a file is gone."""
+    source = session.manifest.footage
+    if not source.cameras:
+        return StepStatus("footage", "ready", "no footage yet")
+    words = f"{counted(len(source.cameras), 'camera')}, {counted(source.frame_count, 'frame')}, {source.fps:g} fps"
+    gone = [camera.name for camera in source.cameras if not (session.path / camera.path).exists()]
+    if gone:
+        return StepStatus("footage", "stale", words, f"The file of camera {enumerated(gone)} is gone.")
+    return StepStatus("footage", "done", words)
+
+
+def calibration_step(session: Session) -> StepStatus:
+    """Whether every camera with footage is calibrated."""
+    if not session.is_calibrated:
+        return StepStatus("calibration", "ready", "not calibrated yet")
+    cameras = session.cameras()
+    words = counted(len(cameras), "camera")
+    source = session.manifest.calibration_source
+    sizes = {camera.name: (camera.width, camera.height) for camera in cameras}
+    other = [
+        entry.name
+        for entry in session.manifest.footage.cameras
+        if (entry.width, entry.height) != sizes[entry.name]
+    ]
+    if other:
+        return StepStatus(
+            "calibration",
+            "stale",
+            words,
+            f"The footage of camera {enumerated(other)} is of another size now.",
+        )
+    return StepStatus("calibration", "done", f"{words}, {source}" if source else words)
+
+
+def background_step(session: Session) -> StepStatus:
+    """Whether masks can be made well: given, or from a background that was set; their measured quality."""
+    sources = session.manifest.footage.cameras
+    masks = sum(bool(source.masks) for source in sources)
+    plates = sum(bool(source.background) for source in sources)
+    given = masks == len(sources)
+    known = origin_of(session, "background")
+    if given:
+        words = "masks came with the footage"
+    elif plates:
+        words = f"backgrounds of {counted(plates, 'camera')}"
+    else:
+        words = "taken from the footage itself"
+    if known is None:
+        is_set = given or plates == len(sources) or bool(read_evidence(session).knobs)
+        return StepStatus("background", "done" if is_set else "ready", words)
+    words = known.words or words
+    stale = _stale(session, "background", words, "Measured with")
+    if stale is not None:
+        return stale
+    why = "" if known.good else "Some views do not agree in the hull: look at the masks."
+    return StepStatus("background", "done" if known.good else "ready", words, why)
+
+
+def subject_step(session: Session) -> StepStatus:
+    """The person: by height, or fitted."""
+    if not (session.path / SUBJECT_NAME).exists():
+        return StepStatus("subject", "ready", f"body {session.manifest.body}, of usual size", optional=True)
+    subject = session.subject()
+    known = origin_of(session, "subject")
+    height = subject.height_mm if subject else None
+    parts = [subject.body if subject else session.manifest.body]
+    parts += [f"{height / 1000:.2f} m"] if height else []
+    parts += ["fitted to the footage"] if known else ["by height"] if height else ["measures given"]
+    words = ", ".join(parts)
+    return _stale(session, "subject", words, "Fitted with") or StepStatus("subject", "done", words)
+
+
+def start_pose_step(session: Session) -> StepStatus:
+    """The pose in the first frame; bodies with limits everywhere can begin without one."""
+    if not (session.path / START_POSE_NAME).exists():
+        optional = all(_is_bounded(entry.lower, entry.upper) for entry in session.body().parameters)
+        return StepStatus("start-pose", "ready", "not set yet", optional=optional)
+    session.start_pose()
+    known = origin_of(session, "start-pose")
+    words = (known.words if known else "") or "set"
+    return _stale(session, "start-pose", words, "Made with") or StepStatus("start-pose", "done", words)
+
+
+def _stale(session: Session, step: StepName, words: str, how: str) -> StepStatus | None:
+    """The step as stale where what it was made from has changed, else None."""
+    changed = [CHANGED[name] for name in changed_inputs(session, step)]
+    if not changed:
+        return None
+    has = "have" if len(changed) > 1 or changed[0].endswith("masks") else "has"
+    why = f"{how} {enumerated(changed)} as it was before; {enumerated(changed)} {has} changed since."
+    return StepStatus(step, "stale", words, why)
+
+
+def _is_bounded(lower: float, upper: float) -> bool:
+    return lower > float("-inf") and upper < float("inf")

@@ -1,0 +1,158 @@
+"""What a session's parts were made from: digests, so that a change of one says which others are stale.
+
+`made_from.json` holds, for a part that was made here (the start pose, the fitted subject, the measured masks), its own
+digest and those of what it was made from. A part that was given (imported, typed in) has no entry and is never stale;
+neither is one whose file was replaced by hand since.
+"""
+
+import hashlib
+from pathlib import Path
+
+import msgspec
+
+from studio.capture.footage import EXCLUSIONS
+from studio.sessions.background_files import EVIDENCE_NAME
+from studio.sessions.record_files import read_record, write_record
+from studio.sessions.session import CAMERAS_PATH, START_POSE_NAME, SUBJECT_NAME, Session
+
+FILE_NAME = "made_from.json"
+SCHEMA_VERSION = 1
+SMALL_FILE = 64 << 20
+"""A background clip that is larger counts by its size and time alone."""
+
+INPUTS = {
+    "background": ("footage", "calibration", "masks"),
+    "subject": ("footage", "calibration"),
+    "start-pose": ("footage", "calibration", "subject"),
+}
+"""Part to what it is made from."""
+
+FILES = {"subject": SUBJECT_NAME, "start-pose": START_POSE_NAME}
+
+
+class Origin(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Of one part. content : digest of its file, "" where it has none. inputs : digests of what it was made from.
+    words : what was found, in words; good : whether it is fit for what comes next.
+    """
+
+    content: str
+    inputs: dict[str, str]
+    words: str = ""
+    good: bool = True
+
+
+class MadeFrom(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The file. parts : by the name of the step that makes them."""
+
+    schema: int = SCHEMA_VERSION
+    parts: dict[str, Origin] = {}
+
+
+def digests(session: Session) -> dict[str, str]:
+    """Digests of "footage", "calibration", "subject" and "masks" as they are now; "" for what is not there."""
+    return {
+        "footage": _digest(msgspec.json.encode(_footage_facts(session))) if session.has_footage else "",
+        "calibration": _file_digest(session.path / CAMERAS_PATH),
+        "subject": _digest(session.manifest.body.encode(), _content(session.path / SUBJECT_NAME)),
+        "masks": _masks_digest(session),
+    }
+
+
+def note(session: Session, part: str, words: str = "", good: bool = True) -> None:
+    """Remember that a part was made just now, of what is there now. part : a key of INPUTS."""
+    now = digests(session)
+    origin = Origin(_own(session, part), {name: now[name] for name in INPUTS[part]}, words, good)
+    _write(session, {**_read(session).parts, part: origin})
+
+
+def origin_of(session: Session, part: str) -> Origin | None:
+    """What is known of a part; None where it was given, or its file is another one since."""
+    found = _read(session).parts.get(part)
+    return found if found is not None and found.content == _own(session, part) else None
+
+
+def changed_inputs(session: Session, part: str) -> tuple[str, ...]:
+    """What a part was made from that is another one now: some of INPUTS[part], in their order."""
+    found = origin_of(session, part)
+    if found is None:
+        return ()
+    now = digests(session)
+    return tuple(name for name in INPUTS[part] if found.inputs.get(name, "") != now[name])
+
+
+def adopt(session: Session) -> None:
+    """Before something changes: parts that were given count as made from what is there now."""
+    known = _read(session).parts
+    now = digests(session)
+    given = {
+        part: Origin(_own(session, part), {name: now[name] for name in INPUTS[part]})
+        for part in FILES
+        if (session.path / FILES[part]).exists() and origin_of(session, part) is None and part != "subject"
+    }
+    if given:
+        _write(session, {**known, **given})
+
+
+def _footage_facts(session: Session) -> list[object]:
+    source = session.manifest.footage
+    return [
+        source.fps,
+        [
+            [camera.name, camera.path, camera.width, camera.height, camera.offset, camera.turned]
+            for camera in source.cameras
+        ],
+    ]
+
+
+def _masks_digest(session: Session) -> str:
+    """Of all that masks are made from: given masks, backgrounds, exclusions, knobs."""
+    sources = session.manifest.footage.cameras
+    parts = [msgspec.json.encode([[source.name, source.masks, source.background] for source in sources])]
+    files = [session.path / source.background for source in sources if source.background]
+    files += sorted((session.path / EXCLUSIONS).glob("*.png"))
+    parts += [_file_digest(path).encode() for path in files]
+    return _digest(*parts, _content(session.path / EVIDENCE_NAME))
+
+
+def _own(session: Session, part: str) -> str:
+    return _file_digest(session.path / FILES[part]) if part in FILES else ""
+
+
+def _digest(*parts: bytes) -> str:
+    made = hashlib.sha256()
+    for part in parts:
+        made.update(len(part).to_bytes(8, "big"))
+        made.update(part)
+    return made.hexdigest()[:24]
+
+
+def _content(path: Path) -> bytes:
+    return path.read_bytes() if path.is_file() else b""
+
+
+def _file_digest(path: Path) -> str:
+    """Of a file's content; of its size and time where it is large; "" without one."""
+    if not path.is_file():
+        return ""
+    status = path.stat()
+    if status.st_size > SMALL_FILE:
+        return _digest(f"{status.st_size} {status.st_mtime_ns}".encode())
+    return _digest(path.read_bytes())
+
+
+def _read(session: Session) -> MadeFrom:
+    path = session.path / FILE_NAME
+    if not path.exists():
+        return MadeFrom()
+    return read_record(
+        path,
+        MadeFrom,
+        SCHEMA_VERSION,
+        missing=(f"There is no '{FILE_NAME}'.", "Make the parts again."),
+        what="what a session's parts were made from",
+        remedy="Remove it; the parts then count as given.",
+    )
+
+
+def _write(session: Session, parts: dict[str, Origin]) -> None:
+    write_record(session.path / FILE_NAME, MadeFrom(parts=parts))

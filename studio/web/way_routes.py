@@ -1,0 +1,66 @@
+"""The guided way: its page, a session that begins empty, and how far a session is."""
+
+import asyncio
+from typing import Annotated
+
+from fastapi import APIRouter, Depends
+from starlette.responses import FileResponse, Response
+
+from studio.export.kept_exports import kept_exports
+from studio.runs.way import Way, way_of
+from studio.runs.way_results import newest_run
+from studio.sessions.beginning import begin_session
+from studio.sessions.session import Session
+from studio.web.doors import Doors, doors_of
+from studio.web.page_routes import assets_folder
+from studio.web.schemas import NewName
+from studio.web.session_routes import OpenSession
+from studio.web.way_schemas import NewSession, WayAnswer
+
+router = APIRouter(tags=["way"])
+
+Door = Annotated[Doors, Depends(doors_of)]
+
+
+@router.get("/way", include_in_schema=False)
+def page() -> Response:
+    """The page of the guided way."""
+    return FileResponse(
+        assets_folder() / "way.html", media_type="text/html", headers={"cache-control": "no-cache"}
+    )
+
+
+@router.post("/api/sessions", status_code=201)
+def begin(wish: NewSession, doors: Door) -> NewName:
+    """Make an empty session: footage and calibration are added later."""
+    session = begin_session(doors.workspace.place_for(wish.name), wish.title, wish.body)
+    doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
+    return NewName(name=session.name)
+
+
+@router.get("/api/sessions/{session}/way")
+async def way(session: OpenSession, doors: Door) -> WayAnswer:
+    """Every step of the guided way: done, ready, blocked, stale (and why) or running."""
+    found = await asyncio.to_thread(_way, session, running_steps(doors, session))
+    return WayAnswer.model_validate(found)
+
+
+def running_steps(doors: Doors, session: Session) -> dict[str, str]:
+    """Steps whose job is under way in this server, with how far it is, in words."""
+    jobs = {
+        "subject": doors.subject_fits.values(),
+        "start-pose": doors.initialisations.values(),
+        "check": doors.track_jobs.values(),
+        "export": doors.exports.values(),
+    }
+    return {
+        step: state.step or "beginning"
+        for step, states in jobs.items()
+        for state in states
+        if state.session == session.name and state.state == "running"
+    }
+
+
+def _way(session: Session, running: dict[str, str]) -> Way:
+    run = newest_run(session)
+    return way_of(session, running, [made.file for made in kept_exports(run)] if run else [])
