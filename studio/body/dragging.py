@@ -1,0 +1,201 @@
+"""A limb's end dragged to a place: the pose follows by inverse kinematics, limits kept.
+
+First the chain from the root to the limb moves, its outer joints more readily than its inner ones; the root stays.
+Where the chain does not reach, the whole body follows, the other ends holding on to where they are, and then the chain
+takes the rest of the way. Least squares (trust region, scipy) from the present pose, so that a drag is smooth.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from studio.body.branches import within_limits
+from studio.body.extremities import extremities
+from studio.body.forward_kinematics import limb_ends
+from studio.body.inverse_kinematics import MM_PER_RADIAN
+from studio.body.model import BodyModel
+from studio.errors import BodyError
+
+Array = NDArray[np.float64]
+
+REACHED = 1.0
+"""mm; a chain that comes this near needs no help of the rest of the body."""
+PULL, PULL_INWARDS = 0.3, 3.0
+"""Residual (mm) of one radian off the present pose, of the outermost joint and more with every joint inwards."""
+ROOT_PULL = 20.0
+"""The same of the root while the whole body follows."""
+HOLD = 0.2
+"""Weight of the other ends' places while the whole body follows."""
+BEND = 0.4
+"""Share of the way to the middle of its limits by which a chain is bent where it did not reach as it was."""
+DIFFERENCE = 1e-5
+MOST_STEPS = 40
+
+
+@dataclass(frozen=True, slots=True)
+class Grip:
+    """What can be taken hold of: the far end of a drawn limb. limb : its index among the drawn. root : whether only the
+    root moves it.
+    """
+
+    name: str
+    limb: int
+    side: str
+    root: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Dragged:
+    """pose : (D,). left_mm : how far the grip still is from where it was dragged."""
+
+    pose: Array
+    left_mm: float
+
+
+class Dragger:
+    """Drags one body. Holds nothing that changes; about 10 ms a drag of a person."""
+
+    def __init__(self, body: BodyModel) -> None:
+        self.body = body
+        self._lower = np.array([entry.lower for entry in body.parameters])
+        self._upper = np.array([entry.upper for entry in body.parameters])
+        self._scale = np.array([1.0 if entry.kind == "angle" else MM_PER_RADIAN for entry in body.parameters])
+        self._ends = extremities(body)
+        root = _moved_by(body, root_joint(body))
+        self._root = np.isin(np.arange(len(body.parameters)), root)
+        self._chains = [self._chain(limb.joint) for limb in body.drawn]
+        self.grips = tuple(
+            Grip(limb.name, at, limb.side, not len(self._chains[at])) for at, limb in enumerate(body.drawn)
+        )
+
+    def points(self, pose: Array) -> Array:
+        """(G, 3) where the grips are, mm."""
+        return limb_ends(self.body, pose)[0, :, 1]
+
+    def grip(self, name: str) -> Grip:
+        """The grip of a name. Raises BodyError."""
+        found = next((grip for grip in self.grips if grip.name == name), None)
+        if found is None:
+            listed = ", ".join(grip.name for grip in self.grips)
+            raise BodyError(f"Body '{self.body.name}' has no limb '{name[:64]}'.", f"Its limbs: {listed}.")
+        return found
+
+    def dragged(self, pose: Array, name: str, target: Array) -> Dragged:
+        """The pose (D,) with the grip at `target` (3,) mm, or as near as limits let it. Raises BodyError for an unknown
+        grip and for numbers that do not fit.
+        """
+        grip, wanted = self.grip(name), np.asarray(target, dtype=np.float64)
+        given = np.asarray(pose, dtype=np.float64)
+        fits = given.shape == (len(self.body.parameters),) and wanted.shape == (3,)
+        if not fits or not np.isfinite(given).all() or not np.isfinite(wanted).all():
+            raise BodyError(
+                f"A drag of body '{self.body.name}' needs {len(self.body.parameters)} numbers and a place.",
+                "Give a finite pose in the order of its parameters, and x, y, z in mm.",
+            )
+        start = np.clip(within_limits(self.body, given), self._lower, self._upper)
+        found = self._pulled(start, start, grip, wanted)
+        if not self._reached(found, grip, wanted):
+            bent = self._pulled(self._bent(start, grip), start, grip, wanted)
+            found = bent if self._left(bent, grip, wanted) < self._left(found, grip, wanted) else found
+        if not self._reached(found, grip, wanted):
+            everything = np.arange(len(start))
+            found = self._fitted(found, start, everything, self._whole_pull(), grip, wanted, self._ends)
+            found = self._pulled(found, found, grip, wanted)
+        return Dragged(found, self._left(found, grip, wanted))
+
+    def _pulled(self, pose: Array, start: Array, grip: Grip, wanted: Array) -> Array:
+        """Only the chain moves."""
+        chain = self._chains[grip.limb]
+        if not len(chain):
+            return pose
+        inwards = np.arange(len(chain))[::-1] / max(1, len(chain) - 1)
+        pull = PULL + (PULL_INWARDS - PULL) * inwards
+        return self._fitted(pose, start, chain, pull, grip, wanted, ())
+
+    def _reached(self, pose: Array, grip: Grip, wanted: Array) -> bool:
+        return not grip.root and self._left(pose, grip, wanted) < REACHED
+
+    def _bent(self, start: Array, grip: Grip) -> Array:
+        """The pose with the chain part of the way to the middle of its limits: a stretched one cannot bend."""
+        chain = self._chains[grip.limb]
+        bounded = chain[np.isfinite(self._lower[chain]) & np.isfinite(self._upper[chain])]
+        bent = start.copy()
+        bent[bounded] += BEND * (0.5 * (self._lower[bounded] + self._upper[bounded]) - start[bounded])
+        return bent
+
+    def _whole_pull(self) -> Array:
+        return np.where(self._root, ROOT_PULL, PULL_INWARDS)
+
+    def _left(self, pose: Array, grip: Grip, wanted: Array) -> float:
+        return float(np.linalg.norm(self.points(pose)[grip.limb] - wanted))
+
+    def _fitted(
+        self,
+        pose: Array,
+        start: Array,
+        free: NDArray[np.int64],
+        pull: Array,
+        grip: Grip,
+        wanted: Array,
+        held: tuple[int, ...],
+    ) -> Array:
+        """The pose with its `free` parameters at the least squares: the grip at `wanted`, the held ends where they are
+        in `start`, everything near `start`.
+        """
+        held = tuple(at for at in held if at != grip.limb)
+        weights = np.array([1.0, *[HOLD] * len(held)])[:, None]
+        places = np.concatenate([wanted[None], self.points(start)[list(held)]])
+        limbs = [grip.limb, *held]
+        scale, lower, upper = self._scale[free], self._lower[free], self._upper[free]
+        home = start[free] / scale
+
+        def offsets(values: Array) -> Array:
+            poses = np.repeat(pose[None], len(values), axis=0)
+            poses[:, free] = values * scale
+            ends = limb_ends(self.body, poses)[:, limbs, 1]
+            return ((ends - places) * weights).reshape(len(values), -1)
+
+        def residuals(values: Array) -> Array:
+            return np.concatenate([offsets(values[None])[0], pull * (values - home)])
+
+        def slopes(values: Array) -> Array:
+            steps = DIFFERENCE * np.eye(len(free))
+            change = (offsets(values + steps) - offsets(values - steps)).T / (2.0 * DIFFERENCE)
+            return np.concatenate([change, np.diag(pull)])
+
+        # scipy wants the start strictly inside the limits.
+        inside = np.where(np.isfinite(upper - lower), 1e-9 * (upper - lower), 1e-9)
+        begin = np.clip(pose[free], lower + inside, upper - inside) / scale
+        limits = (lower / scale, upper / scale)
+        answer = least_squares(residuals, begin, slopes, limits, max_nfev=MOST_STEPS, xtol=1e-6, ftol=1e-6)  # pyright: ignore[reportArgumentType]
+        found = pose.copy()
+        found[free] = np.clip(answer.x * scale, lower, upper)
+        return found
+
+    def _chain(self, joint: int) -> NDArray[np.int64]:
+        """The parameters that move a joint's frame, root's left out, from the root outwards."""
+        found: list[int] = []
+        while joint >= 0:
+            found = [place for place in _moved_by(self.body, joint) if not self._root[place]] + found
+            joint = self.body.joints[joint].parent
+        return np.array(found, dtype=np.int64)
+
+
+def _moved_by(body: BodyModel, joint: int) -> list[int]:
+    """The parameters of a joint's steps, root joints of several frames counting as one."""
+    if joint < 0:
+        return []
+    return [step.parameter for step in body.joints[joint].steps if step.parameter >= 0]
+
+
+def root_joint(body: BodyModel) -> int:
+    """The joint that carries the body through the world; -1 where it is fixed to it."""
+    for at, joint in enumerate(body.joints):
+        used = [body.parameters[step.parameter] for step in joint.steps if step.parameter >= 0]
+        if used:
+            free = any(entry.kind == "length" and not math.isfinite(entry.lower) for entry in used)
+            return at if free else -1
+    return -1

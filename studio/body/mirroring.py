@@ -1,0 +1,177 @@
+"""A pose seen in a mirror: what the left limbs do the right ones do, and the other way round.
+
+Which parameters are twins follows from their groups' names (left and right), with which sign from the body itself: the
+turn that a parameter makes at rest, mirrored, is its twin's, or the reverse of it. A body without sides has no mirror.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from studio.body.branches import within_limits
+from studio.body.dragging import root_joint
+from studio.body.forward_kinematics import joint_frames, limb_ends
+from studio.body.inverse_kinematics import MM_PER_RADIAN
+from studio.body.model import BodyModel
+from studio.errors import BodyError
+from studio.geometry.rotations import vector_from_rotation
+
+Array = NDArray[np.float64]
+
+SMALL = 1e-3
+UNEVEN = 5.0
+"""mm; limbs that stay farther off are fitted one by one: the body's own sides differ."""
+PULL = 0.02
+"""Residual (mm) of one radian: settles twists that no limb's end shows."""
+LEVEL = 0.3
+"""Of a body whose own sideways is steeper than that (its level part) the mirror is not upright."""
+
+
+class Mirror:
+    """Mirrors poses of one body. Raises BodyError for a body that has no left and right."""
+
+    def __init__(self, body: BodyModel) -> None:
+        self.body = body
+        self._twin = _parameter_twins(body)
+        self._limbs = _twins([limb.name for limb in body.drawn])
+        sides = np.array([limb.side for limb in body.drawn])
+        if not (self._limbs != np.arange(len(sides))).any() or not (sides == "left").any():
+            raise BodyError(
+                f"Body '{body.name}' has no left and right to be exchanged.",
+                "Choose a body whose limbs come in left and right.",
+            )
+        rest = limb_ends(body, body.neutral)[0]
+        across = (rest[sides == "left"] - rest[self._limbs][sides == "left"]).mean(axis=(0, 1))
+        self._across = across / np.linalg.norm(across)
+        self._joint = root_joint(body)
+        self._root = _parameters_of(body, self._joint)
+        self._sign = self._signs()
+
+    def mirrored(self, pose: Array) -> Array:
+        """The pose (D,) mirrored where it stands, facing where it faces."""
+        ends, sideways = limb_ends(self.body, pose)[0], self._sideways(pose)
+        return self._placed(self._exchanged(pose), self._reflected(ends, sideways))
+
+    def turned_round(self, pose: Array) -> Array:
+        """The pose (D,) facing the other way, left and right exchanged: from front and back it looks the same."""
+        ends, sideways = limb_ends(self.body, pose)[0], self._sideways(pose)
+        ahead = np.cross(sideways, [0.0, 0.0, 1.0])
+        if np.linalg.norm(ahead) < SMALL:
+            ahead = np.array([1.0, 0.0, 0.0])
+        return self._placed(self._exchanged(pose), self._reflected(ends, ahead / np.linalg.norm(ahead)))
+
+    def _exchanged(self, pose: Array) -> Array:
+        """The limbs mirrored, the root as it is."""
+        rest = self.body.neutral
+        swapped = rest + self._sign * (np.asarray(pose) - rest)[self._twin]
+        swapped[self._root] = np.asarray(pose)[self._root]
+        return swapped
+
+    def _reflected(self, ends: Array, normal: Array) -> Array:
+        """(L, 2, 3) where the limbs are to be: their twins' ends, mirrored in the plane through the root."""
+        swapped = ends[self._limbs]
+        middle = ends.reshape(-1, 3).mean(axis=0)
+        return swapped - 2.0 * ((swapped - middle) @ normal)[..., None] * normal
+
+    def _sideways(self, pose: Array) -> Array:
+        """(3,) the body's left, level if it can be."""
+        if self._joint < 0:
+            return self._across
+        frames = joint_frames(self.body, np.stack([self.body.neutral, pose]))[:, self._joint, :, :3]
+        own = frames[1] @ frames[0].T @ self._across
+        level = own * [1.0, 1.0, 0.0]
+        return level / np.linalg.norm(level) if np.linalg.norm(level) > LEVEL else own
+
+    def _placed(self, pose: Array, wanted: Array) -> Array:
+        """The pose with its root where the limbs are nearest to `wanted`; a body that is not quite even, whole."""
+        best, least = pose, math.inf
+        for begin in self._beginnings(pose):
+            found, cost = self._fitted(begin, wanted, self._root)
+            if cost < least:
+                best, least = found, cost
+        best = within_limits(self.body, best)
+        if math.sqrt(least / len(wanted)) > UNEVEN:
+            best = self._fitted(best, wanted, np.arange(len(best)))[0]
+        return best
+
+    def _fitted(self, pose: Array, wanted: Array, free: NDArray[np.int64]) -> tuple[Array, float]:
+        """The pose with its `free` parameters where the limbs are nearest to `wanted`, limits kept, and half the sum of
+        squares that remains.
+        """
+        entries = [self.body.parameters[at] for at in free.tolist()]
+        scale = np.array([1.0 if entry.kind == "angle" else MM_PER_RADIAN for entry in entries])
+        lower = np.array([entry.lower for entry in entries]) / scale
+        upper = np.array([entry.upper for entry in entries]) / scale
+        inside = np.where(np.isfinite(upper - lower), 1e-9 * (upper - lower), 1e-9)
+        begin = np.clip(pose[free] / scale, lower + inside, upper - inside)
+
+        def placed(values: Array) -> Array:
+            moved = pose.copy()
+            moved[free] = values * scale
+            return moved
+
+        def residuals(values: Array) -> Array:
+            offsets = (limb_ends(self.body, placed(values))[0] - wanted).ravel()
+            return np.concatenate([offsets, PULL * (values - begin)])
+
+        if not len(free):
+            return pose.copy(), 0.0
+        answer = least_squares(residuals, begin, bounds=(lower, upper), max_nfev=60)
+        return placed(answer.x), float(answer.cost)
+
+    def _beginnings(self, pose: Array) -> list[Array]:
+        """The pose as it is, and with half a turn about each of the root's axes."""
+        found = [pose]
+        for place in self._root.tolist():
+            if self.body.parameters[place].kind == "angle":
+                turned = pose.copy()
+                turned[place] += math.pi
+                found.append(turned)
+        return found
+
+    def _signs(self) -> Array:
+        """(D,) ±1: how a parameter follows its twin."""
+        body = self.body
+        steps = SMALL * np.eye(len(body.parameters))
+        frames = joint_frames(body, np.concatenate([body.neutral[None], body.neutral + steps]))[..., :3]
+        turns = np.zeros((len(steps), 3))
+        for joint, entry in enumerate(body.joints):
+            for step in entry.steps:
+                if step.parameter >= 0:
+                    turn = frames[step.parameter + 1, joint] @ frames[0, joint].T
+                    turns[step.parameter] += vector_from_rotation(turn)
+        # What turns both sides against each other adds up to nothing, and is its own mirror image.
+        # A turn is an axial vector: in the mirror its part along the mirror's normal stays.
+        mirrored = 2.0 * (turns @ self._across)[:, None] * self._across - turns
+        along = np.einsum("dk,dk->d", mirrored[self._twin], turns)
+        return np.where(along < -0.01 * SMALL**2, -1.0, 1.0)
+
+
+def _twins(names: list[str]) -> NDArray[np.int64]:
+    """Each name's place, or that of the one that says left where it says right."""
+    places = {name: at for at, name in enumerate(names)}
+    found = []
+    for at, name in enumerate(names):
+        other = name.replace("left", "right") if "left" in name else name.replace("right", "left", 1)
+        found.append(places.get(other, at))
+    return np.array(found, dtype=np.int64)
+
+
+def _parameter_twins(body: BodyModel) -> NDArray[np.int64]:
+    """Each parameter's place, or that of its like in the group of the other side (left arm, right arm)."""
+    groups: dict[str, list[int]] = {}
+    for at, entry in enumerate(body.parameters):
+        groups.setdefault(entry.limb, []).append(at)
+    names = list(groups)
+    found = np.arange(len(body.parameters))
+    for name, other in zip(names, _twins(names).tolist(), strict=True):
+        if len(groups[name]) == len(groups[names[other]]):
+            found[groups[name]] = groups[names[other]]
+    return found
+
+
+def _parameters_of(body: BodyModel, joint: int) -> NDArray[np.int64]:
+    steps = body.joints[joint].steps if joint >= 0 else ()
+    return np.array([step.parameter for step in steps if step.parameter >= 0], dtype=np.int64)
