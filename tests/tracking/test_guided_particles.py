@@ -7,6 +7,7 @@ import pytest
 from toy_problems import toy_space
 from turning_behaviour import CLUSTERS, DWELL, PERIOD, ROOT, guided_space, toy_model, turning_poses
 
+from studio.behaviour.root_motion import RootFrame, RootMotion, gaussians_of
 from studio.tracking.behaviour_settings import BehaviourSettings
 from studio.tracking.guided_particles import (
     STATES,
@@ -20,7 +21,7 @@ from studio.tracking.guided_particles import (
     walked,
     walkers_from,
 )
-from studio.tracking.tracker import Carried, ParticleSet
+from studio.tracking.tracker import Carried, ParticleSet, SearchSpace
 
 SPACE = guided_space()
 MODEL = toy_model()
@@ -36,6 +37,14 @@ def walkers(frame: int = 12, free: bool = False) -> Walkers:
     return Walkers(np.tile(poses[-1], (COUNT, 1)), states, velocity, np.full(COUNT, free))
 
 
+def walking_space() -> SearchSpace:
+    """A space whose model knows how the root of `turning_poses` goes as well."""
+    frame = RootFrame(np.arange(ROOT), np.zeros(ROOT, dtype=bool), -1, np.array([], dtype=np.int64))
+    poses = turning_poses(9, 8 * PERIOD)
+    root = RootMotion(frame, gaussians_of(frame.changes(poses), np.eye(CLUSTERS)[MODEL.labels(poses)]))
+    return dataclasses.replace(SPACE, behaviour=dataclasses.replace(MODEL, root=root))
+
+
 def test_the_root_gets_noise_and_the_angles_the_models_movement() -> None:
     past = walkers()
     rules = BehaviourSettings(attenuation=0.0, global_scale=0.5)
@@ -49,6 +58,28 @@ def test_the_root_gets_noise_and_the_angles_the_models_movement() -> None:
     assert stayed.sum() > 100
     assert np.allclose(gone.poses[stayed, ROOT:], past.poses[stayed, ROOT:] + past.velocity[stayed])
     assert np.allclose(gone.velocity[stayed], past.velocity[stayed])
+
+
+@pytest.mark.parametrize(("prediction", "wanted"), [("learnt", 0.05), ("noise", 0.0)])
+def test_the_root_goes_as_it_was_learnt_or_by_noise_alone(prediction: str, wanted: float) -> None:
+    past = walkers()
+    past = dataclasses.replace(past, free=np.arange(COUNT) % 2 == 0)
+    rules = BehaviourSettings(root_prediction=prediction, global_scale=0.5)
+    gone = walked(np.random.default_rng(5), past, walking_space(), rules, SPACE.sigma)
+    led, free = (gone.poses[rows, :ROOT] - past.poses[rows, :ROOT] for rows in (~past.free, past.free))
+    assert np.allclose(led.mean(axis=0), [wanted, 0.0, 0.0], atol=5 * 0.3 / np.sqrt(COUNT / 2))
+    # What was learnt has next to no spread here; noise of σ0 comes to it as before.
+    assert np.allclose(led.std(axis=0), 0.15, rtol=0.06)
+    # Free particles are moved without the model, and that is without its root too.
+    assert np.allclose(free.mean(axis=0), 0.0, atol=5 * 0.3 / np.sqrt(COUNT / 2))
+    assert np.allclose(free.std(axis=0), 0.3, rtol=0.06)
+
+
+def test_the_root_goes_as_many_steps_as_the_space_has() -> None:
+    past, rules = walkers(), BehaviourSettings(global_scale=0.0)
+    space = dataclasses.replace(walking_space(), steps=3)
+    gone = walked(np.random.default_rng(6), past, space, rules, SPACE.sigma)
+    assert np.allclose(gone.poses[:, :ROOT] - past.poses[:, :ROOT], [0.15, 0.0, 0.0], atol=1e-4)
 
 
 def test_noise_of_those_that_stay_has_the_clusters_covariance_times_lambda_squared() -> None:
