@@ -1,7 +1,7 @@
 """Board footage of several cameras: one video, or one folder of pictures, or one picture a camera."""
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from studio.calibration.detection import BoardFinder, sharpness
 from studio.calibration.sightings import Sighting
+from studio.capture.footage import background_turn, turned_picture
 from studio.capture.naming import match_names, natural_key
 from studio.capture.pictures import is_picture, list_pictures, read_picture
 from studio.capture.video import VIDEO_SUFFIXES, VideoReader, measure_video
@@ -30,6 +31,26 @@ class BoardFootage:
     name: str
     video: Path | None
     pictures: tuple[Path, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class HowTaken:
+    """How a session's footage is read, for board footage taken with it. offsets : camera → the recording's frame (or
+    picture) that is moment 0. turned : camera → degrees clockwise. sizes : camera → width, height of the turned
+    footage; board pictures that lie as that already stay as they are.
+    """
+
+    offsets: Mapping[str, int] = field(default_factory=dict)
+    turned: Mapping[str, int] = field(default_factory=dict)
+    sizes: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+
+    def upright(self, camera: str, picture: Bytes) -> Bytes:
+        """A recording's picture, turned as the footage of its camera is."""
+        turn, given = self.turned.get(camera, 0), (picture.shape[1], picture.shape[0])
+        return turned_picture(picture, background_turn(turn, self.sizes.get(camera, given), given))
+
+
+AS_IT_IS = HowTaken()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,12 +95,18 @@ def by_camera(footage: Sequence[BoardFootage], names: Sequence[str]) -> dict[str
 
 
 def look_for_lens(
-    finder: BoardFinder, camera: str, footage: BoardFootage, progress: Progress | None = None
+    finder: BoardFinder,
+    camera: str,
+    footage: BoardFootage,
+    progress: Progress | None = None,
+    taken: HowTaken = AS_IT_IS,
 ) -> list[Seen]:
-    """The board in one camera's pictures, or in up to 60 frames of its video spread over all of it."""
+    """The board in one camera's pictures, or in up to 60 frames of its video spread over all of it; frames count as
+    the recording's do.
+    """
     count = frame_count(footage)
     frames = np.arange(count) if footage.video is None else frames_in_step([count], LENS_FRAMES)
-    return _looked(finder, camera, footage, count, frames, progress)
+    return _looked(finder, camera, footage, count, frames, progress, taken)
 
 
 def look_together(
@@ -87,17 +114,27 @@ def look_together(
     footage: dict[str, BoardFootage],
     progress: Progress | None = None,
     also: Sequence[int] = (),
+    taken: HowTaken = AS_IT_IS,
 ) -> list[Seen]:
-    """The board in up to 120 moments of all cameras; frames (or pictures in their order) of equal number belong
-    together, as far as the shortest recording goes. also : frames to look at in any case.
+    """The board in up to 120 moments of all cameras; frames (or pictures in their order) of equal number, counted from
+    the offsets on, belong together, as far as the shortest recording goes. also : moments to look at in any case.
+
+    Raises CalibrationError if the offsets leave none.
     """
     counts = {camera: frame_count(entry) for camera, entry in footage.items()}
-    least = min(counts.values())
-    frames = frames_in_step([least], RIG_FRAMES)
-    frames = np.union1d(frames, [frame for frame in also if frame < least]).astype(np.int64)
+    begins = {camera: taken.offsets.get(camera, 0) for camera in footage}
+    first = max(0, -min(begins.values()))
+    least = min(counts[camera] - begins[camera] for camera in footage)
+    if least <= first:
+        raise CalibrationError(
+            "With these offsets no moment of the board footage is left that all cameras have.",
+            "Correct them, or leave them out where the board was recorded by itself.",
+        )
+    frames = first + frames_in_step([least - first], RIG_FRAMES)
+    frames = np.union1d(frames, [frame for frame in also if first <= frame < least]).astype(np.int64)
     found: list[Seen] = []
     for camera, entry in footage.items():
-        found += _looked(finder, camera, entry, counts[camera], frames, progress)
+        found += _looked(finder, camera, entry, counts[camera], frames, progress, taken, begins[camera])
     return found
 
 
@@ -149,15 +186,24 @@ def _looked(
     count: int,
     frames: NDArray[np.int64],
     progress: Progress | None,
+    taken: HowTaken,
+    begin: int = 0,
 ) -> list[Seen]:
     found: list[Seen] = []
-    for done, (frame, name, picture) in enumerate(_pictures(footage, count, frames)):
+    for done, (frame, name, raw) in enumerate(_pictures(footage, count, frames + begin)):
         if progress is not None:
             progress(f"Looking for the board, camera {camera}", done, len(frames))
-        sighting = finder.find(picture, camera, frame, name)
+        picture = taken.upright(camera, raw)
+        sighting = finder.find(picture, camera, frame - begin, name)
         if sighting is not None:
             found.append(Seen(sighting, sharpness(picture, sighting)))
     return found
+
+
+def footage_picture(footage: BoardFootage, frame: int) -> Bytes:
+    """(H, W, 3) one frame of a recording (or picture, in their order), as it is stored. Raises FootageError."""
+    count = frame_count(footage)
+    return next(iter(_pictures(footage, count, np.array([min(max(frame, 0), count - 1)]))))[2]
 
 
 def _pictures(

@@ -7,13 +7,16 @@ from numpy.typing import NDArray
 
 from studio.calibration.fault_hypotheses import inverted, transposed
 from studio.calibration.findings import Finding
-from studio.capture.sanity import FAR_FROM_AXES, LARGEST_RIG_MM, SMALLEST_RIG_MM, common_target
+from studio.capture.sanity import common_target
 from studio.geometry.camera import Camera
 from studio.geometry.rotations import orthonormality_error
 
 Array = NDArray[np.float64]
 
 ROTATION_TOLERANCE = 1e-3
+SMALLEST_RIG_MM, LARGEST_RIG_MM = 100.0, 100_000.0
+FAR_FROM_AXES = 0.35
+"""Cameras look at one place if their optical axes pass it within this share of their distance."""
 LEVEL, UPRIGHT = 0.3, 0.2
 """Cameras stand upright about an axis if their pictures' rows lie across it within the first (sine) and their
 pictures' up has at least the second of it."""

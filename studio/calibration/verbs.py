@@ -8,6 +8,8 @@ import numpy as np
 
 from studio.calibration.board_checks import mirrored_cameras, mirrored_sightings, pair_findings
 from studio.calibration.board_footage_reading import (
+    AS_IT_IS,
+    HowTaken,
     by_camera,
     chosen_for_lens,
     list_footage,
@@ -60,6 +62,7 @@ def calibrate(
     footage_sizes: Mapping[str, tuple[int, int]] | None = None,
     distances_mm: Mapping[tuple[str, str], float] | None = None,
     refine_lenses: bool = False,
+    taken: HowTaken = AS_IT_IS,
     progress: Progress | None = None,
 ) -> Calibrated:
     """Solve the cameras from a folder of board footage for the lenses, and one of footage of all cameras at once.
@@ -68,6 +71,7 @@ def calibrate(
     from the extrinsic footage too. floor : "frame:N" of the extrinsic footage in which the board lies on the floor, a
     folder with pictures of it lying there, or a .json of clicked points.
     names : the cameras' names (default: the footage's). footage_sizes : of what is to be tracked, to compare.
+    taken : turns of all board footage, and offsets of the common one.
     progress(step, done, total) may raise to stop; nothing is written here. Raises CalibrationError, FootageError.
     """
     if intrinsics is None and extrinsics is None:
@@ -77,12 +81,12 @@ def calibrate(
             "Lenses of a file alone give no cameras.", "Give footage of all cameras at once."
         )
     names = tuple(names) or _names(extrinsics or intrinsics)
-    together = _together(board, extrinsics, names, _floor_frame(floor), progress)
+    together = _together(board, extrinsics, names, _floor_frame(floor), taken, progress)
     used: dict[str, tuple[Sighting, ...]] = {}
     if lenses is None and intrinsics is not None and intrinsics.is_file():
         lenses = lenses_of_file(intrinsics, names)
     if lenses is None:
-        used = _lens_sightings(board, intrinsics, names, together, progress)
+        used = _lens_sightings(board, intrinsics, names, together, taken, progress)
         lenses = _lenses(board, used, progress)
     findings = [finding for lens in lenses.values() for finding in lens_findings(lens)]
     everything = [*together, *(sighting for group in used.values() for sighting in group)]
@@ -92,7 +96,7 @@ def calibrate(
     missing = [name for name in names if name not in lenses]
     if missing:
         raise CalibrationError(f"Camera {listed(missing)} has no lens.", "Add its pictures of the board.")
-    solved, floor_words, more = _placed(board, together, lenses, floor, refine_lenses, progress)
+    solved, floor_words, more = _placed(board, together, lenses, floor, refine_lenses, taken, progress)
     findings += more
     findings += check_calibration(
         solved.cameras, footage_sizes=footage_sizes, distances_mm=distances_mm, board=board
@@ -119,14 +123,19 @@ def _floor_frame(floor: str | None) -> int | None:
 
 
 def _together(
-    board: Board, folder: Path | None, names: Sequence[str], floor: int | None, progress: Progress | None
+    board: Board,
+    folder: Path | None,
+    names: Sequence[str],
+    floor: int | None,
+    taken: HowTaken,
+    progress: Progress | None,
 ) -> list[Sighting]:
     if folder is None:
         return []
     footage = by_camera(list_footage(folder), names)
     pictures = all(entry.video is None for entry in footage.values())
     finder = BoardFinder(board, thorough=pictures)
-    seen = look_together(finder, footage, progress, () if floor is None else (floor,))
+    seen = look_together(finder, footage, progress, () if floor is None else (floor,), taken)
     return [entry.sighting for entry in seen]
 
 
@@ -135,6 +144,7 @@ def _lens_sightings(
     folder: Path | None,
     names: Sequence[str],
     together: Sequence[Sighting],
+    taken: HowTaken,
     progress: Progress | None,
 ) -> dict[str, tuple[Sighting, ...]]:
     """Camera → what its lens is solved from; cameras without any are left out only if their footage is missing."""
@@ -143,7 +153,7 @@ def _lens_sightings(
     found: dict[str, tuple[Sighting, ...]] = {}
     for name, entry in by_camera(list_footage(folder), names).items():
         finder = BoardFinder(board, thorough=entry.video is None)
-        seen = look_for_lens(finder, name, entry, progress)
+        seen = look_for_lens(finder, name, entry, progress, taken)
         if len(seen) < FEWEST_PICTURES:
             raise CalibrationError(
                 f"The board {board.spelling} is found in {len(seen)} pictures of camera {name}.",
@@ -175,6 +185,7 @@ def _placed(
     lenses: Mapping[str, Lens],
     floor: str | None,
     refine: bool,
+    taken: HowTaken,
     progress: Progress | None,
 ) -> tuple[Rig, str, list[Finding]]:
     """The rig on its floor, how that was set, and what the pairs say. Raises CalibrationError for mirrored ones."""
@@ -197,7 +208,7 @@ def _placed(
         raise CalibrationError(backwards[0].message, backwards[0].remedy)
     rig = solve_rig(board, together, lenses, refine_lenses=refine, progress=progress)
     findings = list(pair_findings(rig))
-    new_from_old, words = _floor(board, rig, together, lenses, floor, progress)
+    new_from_old, words = _floor(board, rig, together, lenses, floor, taken, progress)
     rig = moved(rig, new_from_old)
     upright = tuple(replace(camera, quarter_turns=quarter_turns(camera)) for camera in rig.cameras)
     if not words:
@@ -218,6 +229,7 @@ def _floor(
     together: Sequence[Sighting],
     lenses: Mapping[str, Lens],
     floor: str | None,
+    taken: HowTaken,
     progress: Progress | None,
 ) -> tuple[np.ndarray, str]:
     number = _floor_frame(floor)
@@ -238,7 +250,7 @@ def _floor(
     finder = BoardFinder(board)
     seen = []
     for name, entry in footage.items():
-        found = look_for_lens(finder, name, entry, progress)
+        found = look_for_lens(finder, name, entry, progress, taken)
         seen += [max(found, key=lambda each: each.sharpness).sighting] if found else []
     pose = board_on_floor(rig, board, seen, lenses)
     return floor_from_board(

@@ -1,4 +1,4 @@
-"""Upright display and doubts in words."""
+"""Upright display, and where cameras look."""
 
 import dataclasses
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from toy_footage import looking_at, rig
 
-from studio.capture.sanity import common_target, quarter_turns, sanity_notes
+from studio.capture.sanity import common_target, quarter_turns
 from studio.geometry.projection import project
 
 
@@ -31,17 +31,7 @@ def test_a_camera_that_looks_straight_down_is_not_turned() -> None:
     assert quarter_turns(camera) == 0
 
 
-def test_a_good_rig_raises_no_doubt_and_looks_at_its_target() -> None:
-    assert sanity_notes(rig(4)) == ()
+def test_a_good_rig_looks_at_its_target() -> None:
     target = common_target(rig(4))
     assert target is not None
     np.testing.assert_allclose(target, [0.0, 0.0, 1000.0], atol=1e-6)
-
-
-def test_doubts_in_words() -> None:
-    under = looking_at("low", (3000.0, 0.0, -500.0), (0.0, 0.0, 1000.0))
-    assert "low lies under the floor" in sanity_notes((*rig(2), under))[0]
-    away = looking_at("stray", (0.0, -3000.0, 1500.0), (0.0, -9000.0, 1000.0))
-    assert any("stray" in note and "does not look" in note for note in sanity_notes((*rig(4), away)))
-    tiny = [dataclasses.replace(c, translation=c.translation * 1e-3) for c in rig(3)]
-    assert any("unit" in note for note in sanity_notes(tuple(tiny)))
