@@ -24,6 +24,7 @@ async function call(method, path, body, options = {}) {
 
 export const fetchJson = (path, options) => call("GET", path, undefined, options);
 export const post = (path, body = {}) => call("POST", path, body);
+export const put = (path, body) => (body instanceof Blob || typeof body === "string" ? call("PUT", path, undefined, { body }) : call("PUT", path, body));
 export const patch = (path, body) => call("PATCH", path, body);
 export const remove = (path) => call("DELETE", path);
 
