@@ -21,6 +21,7 @@ from studio.runs.clean_plates import clean_plates
 from studio.runs.mask_quality import MaskQuality, mask_quality, spread_frames
 from studio.runs.session_settings import session_settings
 from studio.sessions.background_files import (
+    EVIDENCE_NAME,
     Knob,
     given_backgrounds,
     read_evidence,
@@ -28,7 +29,7 @@ from studio.sessions.background_files import (
     use_cleaned,
     write_evidence,
 )
-from studio.sessions.session import Session
+from studio.sessions.session import Session, described_anew
 from studio.settings import changed_settings
 
 SOURCES = ("plate", "clip", "median", "combined")
@@ -74,11 +75,35 @@ def set_up_background(
     """Choose a session's background and keep it. knobs : of masks, as they shall be. tune : try others for the rest.
 
     exclude_unused : what no hull comes near in any frame does not count (only where backgrounds are cleaned; exclusions
-    that are there stay). Raises FootageError for a source that is not there, SettingsError for a knob.
+    that are there stay). What fails or is cancelled leaves the session's backgrounds and knobs as they were. Raises
+    FootageError for a source that is not there, SettingsError for a knob.
     """
     _check_source(session, source)
     chosen = dict(knobs or {})
     session_settings(session, changes=chosen)
+    manifest, evidence = session.manifest, read_evidence(session)
+    had_evidence = (session.path / EVIDENCE_NAME).exists()
+    try:
+        return _set_up(session, source, chosen, tune, exclude_unused, progress, cancelled)
+    except BaseException:
+        described_anew(session, manifest)
+        if had_evidence:
+            write_evidence(session, evidence)
+        else:
+            (session.path / EVIDENCE_NAME).unlink(missing_ok=True)
+        raise
+
+
+def _set_up(
+    session: Session,
+    source: str,
+    chosen: dict[str, Knob],
+    tune: bool,
+    exclude_unused: bool,
+    progress: Progress | None,
+    cancelled: Callable[[], bool] | None,
+) -> BackgroundSetup:
+    """`set_up_background` for what was checked."""
     session = given_backgrounds(session)
     notes: list[str] = []
     model = MODEL_OF[source]

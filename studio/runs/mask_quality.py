@@ -98,6 +98,25 @@ class MaskQuality:
         """Whether every camera's masks are."""
         return all(view.usable for view in self.views)
 
+    @property
+    def worst(self) -> str:
+        """The camera to look at first, "" where all are usable: one that denies what the others see is the cause of
+        their poor agreement, else the one that agrees least.
+        """
+        if self.usable:
+            return ""
+        denying = max(self.views, key=lambda view: view.denied)
+        if denying.denied > BLAMED:
+            return denying.camera
+        return min(self.views, key=lambda view: np.nan_to_num(view.agreement, nan=-1.0)).camera
+
+    def in_words(self) -> str:
+        """How the worst camera agrees, for a line."""
+        least = min(float(np.nan_to_num(view.agreement)) for view in self.views)
+        if self.usable:
+            return f"every view agrees by {least:.2f} or more"
+        return f"camera {self.worst} to look at, least agreement {least:.2f}"
+
 
 def mask_quality(
     session: Session,

@@ -11,36 +11,15 @@ from studio.runs.mask_quality import MaskQuality, mask_quality
 from studio.runs.overlay_pictures import forget_composers
 from studio.runs.session_settings import session_settings
 from studio.sessions.background_files import exclusion_path, read_evidence, set_exclusion, write_evidence
+from studio.sessions.made_from import note
+from studio.web.background_schemas import MaskQualityAnswer, ViewQualityLine
 from studio.web.picture_routes import Knobs, knob_changes
-from studio.web.schemas import Answer, Number, Value
+from studio.web.schemas import Answer, Value
 from studio.web.session_routes import OpenSession
 
 router = APIRouter(prefix="/api/sessions/{session}", tags=["masks"])
 
 Frames = Annotated[list[int] | None, Query(max_length=24, description="Empty: five, evenly spread.")]
-
-
-class ViewQualityLine(Answer):
-    """One camera. covered: share of the mask under the hull's silhouette; inside: share of that in the mask; agreement:
-    the smaller; denied: share of the other masks that this camera alone keeps out of the hull; note: what to look for.
-    """
-
-    camera: str
-    agreement: Number
-    covered: Number
-    inside: Number
-    denied: Number
-    usable: bool
-    note: str
-
-
-class MaskQualityAnswer(Answer):
-    """All cameras' masks in some frames."""
-
-    frames: list[int]
-    cameras: list[ViewQualityLine]
-    usable: bool
-    hull_litres: list[Number]
 
 
 class ExclusionAnswer(Answer):
@@ -60,7 +39,19 @@ class EvidenceAnswer(Answer):
 async def quality(session: OpenSession, frames: Frames = None, settings: Knobs = "") -> MaskQualityAnswer:
     """How far the views agree in the visual hull; `settings` as a preview of other knobs. Takes seconds a frame."""
     wanted = session_settings(session, changes=knob_changes(settings)).evidence
-    return _answer(await asyncio.to_thread(mask_quality, session, wanted, tuple(frames or ())))
+    return quality_answer(await asyncio.to_thread(mask_quality, session, wanted, tuple(frames or ())))
+
+
+@router.post("/masks/quality")
+async def measure(session: OpenSession) -> MaskQualityAnswer:
+    """Measure the masks as the session makes them, and remember it for the guided way."""
+
+    def measured() -> MaskQuality:
+        found = mask_quality(session, session_settings(session).evidence)
+        note(session, "background", found.in_words(), found.usable)
+        return found
+
+    return quality_answer(await asyncio.to_thread(measured))
 
 
 @router.get("/exclusions/{camera}", response_class=Response)
@@ -96,7 +87,8 @@ def put_evidence(session: OpenSession, wish: dict[str, Value]) -> EvidenceAnswer
     return EvidenceAnswer(knobs=dict(wish))
 
 
-def _answer(found: MaskQuality) -> MaskQualityAnswer:
+def quality_answer(found: MaskQuality) -> MaskQualityAnswer:
+    """A quality as the API shows it."""
     lines = [
         ViewQualityLine(
             camera=view.camera,
@@ -110,5 +102,9 @@ def _answer(found: MaskQuality) -> MaskQualityAnswer:
         for view in found.views
     ]
     return MaskQualityAnswer(
-        frames=list(found.frames), cameras=lines, usable=found.usable, hull_litres=list(found.hull_litres)
+        frames=list(found.frames),
+        cameras=lines,
+        usable=found.usable,
+        hull_litres=list(found.hull_litres),
+        worst=found.worst,
     )

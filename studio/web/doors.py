@@ -18,6 +18,7 @@ from fastapi import Request
 from studio.export.task import Writer
 from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.workspace import Workspace
+from studio.web.background_schemas import BackgroundJob
 from studio.web.event_stream import EventStream
 from studio.web.export_schemas import ExportState
 from studio.web.footage_schemas import SynchronyState
@@ -167,7 +168,7 @@ class Doors:
     scene_port : of the inner viser server, 0 while it is not running. footage_roots : folders that may be
     imported from. presets : the studio's own. log_path : the server's log file. imports,
     initialisations, exports, track_jobs, uploads : those under way, by their identifiers; synchronies : estimates
-    of offsets, by session. desk : where comparisons are worked at,
+    of offsets, background_setups : set-ups of backgrounds, by session. desk : where comparisons are worked at,
     learning : where behaviour models are learnt.
     """
 
@@ -182,6 +183,7 @@ class Doors:
     imports: dict[str, ImportState] = field(default_factory=dict)
     initialisations: dict[str, InitialisationState] = field(default_factory=dict)
     subject_fits: dict[str, FitSubjectState] = field(default_factory=dict)
+    background_setups: dict[str, BackgroundJob] = field(default_factory=dict)
     synchronies: dict[str, SynchronyState] = field(default_factory=dict)
     exports: dict[str, ExportState] = field(default_factory=dict)
     track_jobs: dict[str, TrackJobState] = field(default_factory=dict)

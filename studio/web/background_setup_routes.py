@@ -1,0 +1,231 @@
+"""What a session's backgrounds are made of: plates and clips taken over, the set-up in the background (`background`
+events), with the masks' quality at its end.
+"""
+
+import asyncio
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Depends
+
+from studio.capture.naming import match_names
+from studio.capture.pictures import is_picture
+from studio.errors import FootageError, RunError, StudioError
+from studio.knobs import knobs_of
+from studio.runs.background_setup import MODEL_OF, SOURCES, set_up_background
+from studio.runs.mask_quality import MaskQuality, mask_quality
+from studio.runs.overlay_pictures import forget_composers
+from studio.runs.session_settings import session_settings
+from studio.sessions.background_files import exclusion_path, read_evidence, set_backgrounds
+from studio.sessions.made_from import note
+from studio.sessions.session import Session
+from studio.settings import values
+from studio.web.background_routes import quality_answer
+from studio.web.background_schemas import (
+    BackgroundAnswer,
+    BackgroundCamera,
+    BackgroundJob,
+    BackgroundWish,
+    PlatesWish,
+)
+from studio.web.doors import Doors, doors_of
+from studio.web.error_responses import UnforeseenError, log
+from studio.web.safe_paths import place_in, relative_path
+from studio.web.session_routes import OpenSession
+from studio.web.setting_views import knob_view
+from studio.web.upload_routes import forget, upload_folder
+
+router = APIRouter(prefix="/api/sessions/{session}", tags=["masks"])
+
+Door = Annotated[Doors, Depends(doors_of)]
+
+KEPT = 50
+SECONDS_BETWEEN = 0.2
+
+
+class SetupStoppedError(RunError):
+    """The set-up of a background was cancelled."""
+
+    code = "cancelled"
+
+
+@router.get("/background")
+def background(session: OpenSession, doors: Door) -> BackgroundAnswer:
+    """What masks are made of and with which knobs, and the set-up under way or the last one."""
+    evidence = read_evidence(session)
+    settings = session_settings(session)
+    knobs = knobs_of(settings.evidence)
+    now = values(settings)
+    sources = session.manifest.footage.cameras
+    cameras = [
+        BackgroundCamera(
+            name=source.name,
+            given=_kind(evidence.given.get(source.name, source.background)),
+            file=evidence.given.get(source.name, source.background).rpartition("/")[2],
+            masks=bool(source.masks),
+            excluded=exclusion_path(session, source.name) is not None,
+            width=source.width,
+            height=source.height,
+        )
+        for source in sources
+    ]
+    possible = [
+        name for name in SOURCES if name not in ("plate", "clip") or all(one.given == name for one in cameras)
+    ]
+    return BackgroundAnswer.model_validate(
+        {
+            "session": session.name,
+            "source": _source(settings.evidence.background_model, bool(evidence.given), cameras),
+            "possible": possible,
+            "frame_count": session.manifest.frame_count,
+            "cameras": cameras,
+            "knobs": [knob_view(entry) for entry in knobs],
+            "settings": {entry.name: now[entry.name] for entry in knobs},
+            "own": evidence.knobs,
+            "job": doors.background_setups.get(session.name),
+        }
+    )
+
+
+@router.post("/backgrounds")
+async def take_over(session: OpenSession, wish: PlatesWish, doors: Door) -> BackgroundAnswer:
+    """Take over uploaded pictures or clips of the empty room; files that are not named are matched by name."""
+    _check_free(doors, session.name)
+    folder = upload_folder(doors, wish.upload)
+    names = [path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*")) if path.is_file()]
+    files = dict(wish.files)
+    rest = [name for name in names if name not in files.values()]
+    if rest:
+        cameras = [one.name for one in session.manifest.footage.cameras if one.name not in files]
+        stems = {name.rpartition("/")[2].rpartition(".")[0]: name for name in rest}
+        for match in match_names(list(stems), cameras, "backgrounds", FootageError):
+            files[match.camera] = stems[match.footage]
+    if not files:
+        raise FootageError("No file has been uploaded.", "Upload a picture or a video of the empty room.")
+    places = {camera: place_in(folder, relative_path(name)) for camera, name in files.items()}
+    changed = await asyncio.to_thread(set_backgrounds, session, places)
+    await asyncio.to_thread(forget, doors, wish.upload)
+    forget_composers()
+    return background(changed, doors)
+
+
+@router.post("/background", status_code=202)
+async def begin_setup(session: OpenSession, wish: BackgroundWish, doors: Door) -> BackgroundJob:
+    """Begin to set the background up. Ask `GET …/background` how it stands, or wait for `background` events."""
+    _check_free(doors, session.name)
+    session_settings(session, changes=wish.knobs)
+    state = BackgroundJob(session=session.name, source=wish.source, state="running")
+    doors.background_setups.pop(session.name, None)
+    doors.background_setups[session.name] = state
+    doors.stops[_stop_name(session.name)] = threading.Event()
+    while len(doors.background_setups) > KEPT:
+        doors.background_setups.pop(next(iter(doors.background_setups)))
+    job = asyncio.create_task(asyncio.to_thread(_set_up, doors, session, wish))
+    doors.jobs.add(job)
+    job.add_done_callback(doors.jobs.discard)
+    return state
+
+
+@router.delete("/background", status_code=202)
+def cancel_setup(session: OpenSession, doors: Door) -> BackgroundAnswer:
+    """Stop the set-up; the background stays as it was."""
+    stop = doors.stops.get(_stop_name(session.name))
+    if stop is not None:
+        stop.set()
+    return background(session, doors)
+
+
+def _set_up(doors: Doors, session: Session, wish: BackgroundWish) -> None:
+    """Set up in this thread, keeping the state up to date; never raises."""
+    stop, told, begun, last_step = doors.stops[_stop_name(session.name)], 0.0, time.monotonic(), ""
+
+    def tell(**changes: object) -> None:
+        state = doors.background_setups[session.name].model_copy(update=changes)
+        doors.background_setups[session.name] = state
+        doors.events.publish({"type": "background", "run": "", **state.model_dump()})
+
+    def report(step: str, done: int, total: int) -> None:
+        nonlocal told, begun, last_step
+        if stop.is_set():
+            raise SetupStoppedError("Setting up the background was cancelled.", "Start it again.")
+        now = time.monotonic()
+        if done == 0 and step != last_step:
+            begun = now
+        if step == last_step and now - told < SECONDS_BETWEEN and done < total:
+            return
+        told, last_step = now, step
+        left = (now - begun) * (total - done) / done if done else None
+        tell(step=step, done=done, total=total, seconds_left=left)
+
+    try:
+        made = set_up_background(
+            session,
+            wish.source,
+            knobs=wish.knobs,
+            tune=wish.tune,
+            exclude_unused=wish.exclude_unused,
+            progress=report,
+            cancelled=stop.is_set,
+        )
+        quality = _measured(Session(session.path), report, stop)
+    except StudioError as error:
+        ended = "cancelled" if stop.is_set() else "failed"
+        tell(state=ended, code=error.code, message=error.message, hint=error.hint)
+        return
+    except Exception as error:
+        log.exception("the background of '%s' failed", session.name)
+        wrong = UnforeseenError(f"The set-up failed: {type(error).__name__}.", f"See '{doors.log_path}'.")
+        tell(state="failed", code=wrong.code, message=wrong.message, hint=wrong.hint)
+        return
+    finally:
+        doors.stops.pop(_stop_name(session.name), None)
+        forget_composers()
+    answer = quality_answer(quality) if quality is not None else None
+    tell(state="done", notes=list(made.notes), knobs=made.knobs, quality=answer, seconds_left=0.0)
+    doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
+
+
+def _measured(
+    session: Session, report: Callable[[str, int, int], None], stop: threading.Event
+) -> MaskQuality | None:
+    """The quality of the masks that are in use now, remembered; None where views cannot be compared, or nobody waits
+    for it any more.
+    """
+    if len(session.manifest.footage.cameras) < 2 or not session.is_calibrated:
+        return None
+    try:
+        found = mask_quality(session, session_settings(session).evidence, progress=report)
+    except StudioError:
+        if stop.is_set():
+            return None
+        raise
+    note(session, "background", found.in_words(), found.usable)
+    return found
+
+
+def _check_free(doors: Doors, name: str) -> None:
+    known = doors.background_setups.get(name)
+    if known is not None and known.state == "running":
+        raise RunError(f"The background of '{name}' is being set up.", "Wait until it is done, or cancel it.")
+
+
+def _stop_name(name: str) -> str:
+    return f"background of {name}"
+
+
+def _kind(path: str) -> Literal["", "plate", "clip"]:
+    return "" if not path else "plate" if is_picture(Path(path)) else "clip"
+
+
+def _source(model: str, cleaned: bool, cameras: list[BackgroundCamera]) -> str:
+    """What masks are made of, as `SOURCES` has it; "masks" where they are given."""
+    if model == "mask" or (model == "auto" and cameras and all(one.masks for one in cameras)):
+        return "masks"
+    if cleaned or model == MODEL_OF["combined"]:
+        return "combined"
+    if model == MODEL_OF["median"] or not cameras or not all(one.given for one in cameras):
+        return "median"
+    return "clip" if cameras[0].given == "clip" else "plate"
