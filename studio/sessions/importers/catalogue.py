@@ -66,13 +66,16 @@ def import_source(
     All is checked before anything is written; whatever fails, nothing is left and nothing that was stored is
     touched. Raises StudioError.
     """
-    report = _watched(progress, cancelled)
-    _check_request(source, into, fps)
+    report = watched(progress, cancelled)
+    check_request(source, fps)
+    if into.exists():
+        raise _taken(into)
     source = source.resolve()
     try:
         plan = _plan(source, calibration, trial)
         plan = replace(plan, offsets={**plan.offsets, **(offsets or {})})
         plan = replace(plan, rotations={**plan.rotations, **(rotations or {})})
+        assert plan.calibration is not None
         read = read_calibration(plan.calibration, unit, up)
         person = check_person(plan)
         if copy:
@@ -105,19 +108,17 @@ def _plan(source: Path, calibration: Path | str | None, trial: str | None) -> So
     return plan_folder(source, calibration, trial)
 
 
-def _check_request(source: Path, into: Path, fps: float | None) -> None:
-    """What can be refused before looking into the source."""
+def check_request(source: Path, fps: float | None) -> None:
+    """What can be refused before looking into the source. Raises FootageError."""
     if not source.is_dir():
         raise FootageError(
             f"There is no folder '{source}'.", "Give the folder that holds the footage and its calibration."
         )
-    if into.exists():
-        raise _taken(into)
     if fps is not None and not (math.isfinite(fps) and 0.0 < fps <= FASTEST):
         raise FootageError(f"{fps:g} is no frame rate.", "Give frames per second, such as --fps 60.")
 
 
-def _watched(progress: Progress | None, cancelled: Callable[[], bool] | None) -> Progress:
+def watched(progress: Progress | None, cancelled: Callable[[], bool] | None) -> Progress:
     """A progress callback that also stops a cancelled import."""
 
     def report(step: str, done: int, total: int) -> None:

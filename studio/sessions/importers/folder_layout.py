@@ -30,8 +30,11 @@ from studio.sessions.importers.plan import SourcePlan
 from studio.sessions.manifest import FILE_NAME, read_manifest
 
 
-def plan_folder(source: Path, calibration: Path | str | None, trial: str | None = None) -> SourcePlan:
-    """What a folder holds. trial : which one of several below it, or of several takes in one folder of videos.
+def plan_folder(
+    source: Path, calibration: Path | str | None, trial: str | None = None, *, bare: bool = False
+) -> SourcePlan:
+    """What a folder holds. trial : which one of several below it, or of several takes in one folder of videos. bare :
+    footage alone will do; the plan's calibration is None where none can be chosen.
 
     Raises FootageError, CalibrationError naming what is missing, or the trials there are.
     """
@@ -39,11 +42,17 @@ def plan_folder(source: Path, calibration: Path | str | None, trial: str | None 
     folder = layout.folder
     session = read_manifest(folder) if (folder / FILE_NAME).is_file() else None
     kept = session.footage.cameras if session else ()
-    wanted = _calibration(folder, layout.calibrations, calibration)
+    try:
+        wanted, chosen = _calibration(folder, layout.calibrations, calibration), True
+    except CalibrationError:
+        if not bare or calibration is not None:
+            raise
+        wanted, chosen = folder, False
+    said = f"calibration '{wanted.name}'" if chosen else "without a calibration"
     above = "" if folder == source else f" in '{source.name}'"
     return SourcePlan(
         source=folder,
-        calibration=wanted,
+        calibration=wanted if chosen else None,
         footage=footage,
         masks=next((found for name in MASK_FOLDERS if (found := entries(folder / name))), ()),
         backgrounds=_backgrounds(folder / "background") or _backgrounds(folder / "backgrounds"),
@@ -55,7 +64,7 @@ def plan_folder(source: Path, calibration: Path | str | None, trial: str | None 
         sigma_file=_file(folder / "sigma.csv"),
         tracker=session.tracker if session else "",
         weighting=session.weighting if session else "",
-        notes=(f"Taken for a {layout.title}: '{folder.name}'{above}, calibration '{wanted.name}'.",),
+        notes=(f"Taken for a {layout.title}: '{folder.name}'{above}, {said}.",),
         layout=layout.title,
         timestamps=layout.timestamps,
         offsets={camera.name: camera.offset for camera in kept if camera.offset},

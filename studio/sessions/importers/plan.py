@@ -25,8 +25,9 @@ class ImportCancelled(SessionError):
 class SourcePlan:
     """The parts of a source.
 
-    calibration : a file, or the folder of several .cal files. footage, masks : videos and folders of
-    pictures. backgrounds : pictures and clips. fps : known frame rate or None. subject, start_pose, sigma :
+    calibration : a file, or the folder of several .cal files; None where footage is added without. footage, masks :
+    videos and folders of pictures. backgrounds : pictures and clips. fps : known frame rate or None. subject,
+    start_pose, sigma :
     values where the layout gives them in a form of its own; the files of the same names otherwise.
     sigma_fps : the rate at which sigma was measured. tracker, weighting : what runs of the session use unless
     told otherwise, "" for the default. layout : whose folder layout it was taken for, in words. timestamps : a
@@ -34,7 +35,7 @@ class SourcePlan:
     """
 
     source: Path
-    calibration: Path
+    calibration: Path | None
     footage: tuple[Path, ...]
     masks: tuple[Path, ...] = ()
     backgrounds: tuple[Path, ...] = ()

@@ -77,9 +77,9 @@ def write_session(
     progress: Progress,
 ) -> SessionManifest:
     """Fill `folder` with a session named `name`; the manifest comes last."""
-    footage = _write_footage(folder, measured, copy, progress)
-    _write_calibration(folder, calibration, measured)
-    _write_person(folder, plan, person)
+    footage = write_footage(folder, measured, copy, progress)
+    write_calibrations(folder, calibration, measured)
+    write_person(folder, plan, person)
     crops = [entry.crop.words(entry.camera.name) for entry in measured.cameras if entry.crop is not None]
     manifest = SessionManifest(
         name=name,
@@ -101,7 +101,7 @@ def write_session(
     return manifest
 
 
-def _write_footage(folder: Path, measured: MeasuredSource, copy: bool, progress: Progress) -> FootageSource:
+def write_footage(folder: Path, measured: MeasuredSource, copy: bool, progress: Progress) -> FootageSource:
     """Copy or refer to all footage, masks and backgrounds; returns their description."""
     sources: list[CameraSource] = []
     taken: set[str] = set()
@@ -160,7 +160,7 @@ def _file_name(video: Path, plain: str) -> str:
     return video.name if name_from(video.stem) == video.stem else f"{plain}{video.suffix.lower()}"
 
 
-def _write_calibration(folder: Path, calibration: Calibration, measured: MeasuredSource) -> None:
+def write_calibrations(folder: Path, calibration: Calibration, measured: MeasuredSource) -> None:
     """The imported files byte for byte, and the canonical one with the cameras that have footage."""
     place = folder / "calibration"
     place.mkdir()
@@ -182,7 +182,7 @@ def _write_calibration(folder: Path, calibration: Calibration, measured: Measure
     write_calibration(tuple(entry.camera for entry in measured.cameras), place / "cameras.toml", crops)
 
 
-def _write_person(folder: Path, plan: SourcePlan, person: CheckedPerson) -> None:
+def write_person(folder: Path, plan: SourcePlan, person: CheckedPerson) -> None:
     """Subject, start pose, σ, truth and bodies."""
     if plan.subject is not None:
         write_subject(plan.subject, folder / "subject.toml")

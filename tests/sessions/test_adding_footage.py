@@ -1,0 +1,106 @@
+"""Footage added to a session that is there: empty, with footage, calibrated."""
+
+import shutil
+from pathlib import Path
+
+import cv2
+import pytest
+from toy_session import FRAMES, make_session
+
+from studio.errors import CalibrationError, FootageError, SessionError
+from studio.runs.way import way_of
+from studio.sessions.beginning import begin_session
+from studio.sessions.importers.adding import FootageWish, add_footage
+from studio.sessions.importers.plan import ImportCancelled
+from studio.sessions.session import Session
+
+
+@pytest.fixture
+def made(tmp_path: Path) -> Session:
+    """The toy session, whose parts are the raw files."""
+    return make_session(tmp_path / "toy")
+
+
+@pytest.fixture
+def raw(tmp_path: Path, made: Session) -> Path:
+    """Its pictures and masks alone, as a camera leaves them."""
+    folder = tmp_path / "raw"
+    for part in ("pictures", "masks"):
+        shutil.copytree(made.path / part, folder / part)
+    return folder
+
+
+@pytest.fixture
+def empty(tmp_path: Path) -> Session:
+    """A session without anything."""
+    return begin_session(tmp_path / "mine")
+
+
+def test_an_empty_session_takes_bare_footage(empty, raw):
+    added = add_footage(empty, raw, FootageWish(fps=60.0))
+    source = added.session.manifest.footage
+    assert [(camera.name, camera.width, camera.height) for camera in source.cameras] == [("front", 160, 120)]
+    assert (source.frame_count, source.fps) == (FRAMES, 60.0)
+    assert not added.calibrated
+    assert source.cameras[0].masks == "masks/front"
+    footage = added.session.footage()
+    assert footage.picture("front", 3).shape == (120, 160, 3)
+    footage.close()
+    way = way_of(added.session)
+    assert way.steps[0].state == "done"
+    assert way.next == "calibration"
+    with pytest.raises(SessionError, match="no calibration yet"):
+        added.session.cameras()
+
+
+def test_a_calibration_beside_the_footage_is_taken_over(empty, raw, made):
+    shutil.copytree(made.path / "calibration", raw / "calibration")
+    added = add_footage(empty, raw, FootageWish(fps=60.0))
+    assert added.calibrated
+    assert [camera.name for camera in added.session.cameras()] == ["front"]
+
+
+def test_footage_is_replaced_and_old_files_are_gone(empty, raw, tmp_path):
+    first = add_footage(empty, raw, FootageWish(fps=60.0)).session
+    for path in sorted((raw / "pictures" / "front").iterdir())[5:]:
+        path.unlink()
+    second = add_footage(first, raw, FootageWish(fps=60.0)).session
+    source = second.manifest.footage
+    assert source.frame_count == 5
+    assert source.cameras[0].path == "take-2/pictures/front"
+    assert not (second.path / "pictures" / "front").exists()
+    assert second.manifest.footage_changed
+
+
+def test_another_camera_joins_at_the_same_rate_only(empty, raw, tmp_path):
+    session = add_footage(empty, raw, FootageWish(fps=60.0)).session
+    other = tmp_path / "other"
+    shutil.copytree(raw / "pictures" / "front", other / "pictures" / "side")
+    with pytest.raises(FootageError, match="frames a second"):
+        add_footage(session, other, FootageWish(fps=30.0))
+    assert [camera.name for camera in Session(session.path).manifest.footage.cameras] == ["front"]
+    joined = add_footage(session, other, FootageWish(fps=60.0)).session
+    assert [camera.name for camera in joined.manifest.footage.cameras] == ["front", "side"]
+    alone = add_footage(joined, other, FootageWish(fps=60.0, replaced=True)).session
+    assert [camera.name for camera in alone.manifest.footage.cameras] == ["side"]
+
+
+def test_a_calibrated_session_refuses_footage_of_another_size(made, raw, tmp_path):
+    for path in (raw / "pictures" / "front").iterdir():
+        cv2.imwrite(str(path), cv2.resize(cv2.imread(str(path)), (80, 60)))
+    shutil.rmtree(raw / "masks")
+    with pytest.raises((CalibrationError, FootageError)):
+        add_footage(made, raw, FootageWish(fps=60.0))
+    assert Session(made.path).manifest == made.manifest
+
+
+def test_a_cancelled_addition_leaves_nothing(empty, raw):
+    with pytest.raises(ImportCancelled):
+        add_footage(empty, raw, FootageWish(fps=60.0), cancelled=lambda: True)
+    assert sorted(path.name for path in empty.path.iterdir()) == ["session.json"]
+
+
+def test_references_stay_where_they_lie(empty, raw):
+    session = add_footage(empty, raw, FootageWish(fps=60.0, copy=False)).session
+    assert session.manifest.footage.cameras[0].path == str(raw / "pictures" / "front")
+    assert not (session.path / "pictures").exists()
