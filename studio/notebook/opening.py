@@ -1,0 +1,79 @@
+"""Sessions and runs as a person names them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.errors import RunError
+from studio.runs.tracks import Track
+from studio.sessions.session import RUNS_NAME, Session
+from studio.sessions.stored_run import RunSummary, StoredRun
+from studio.sessions.workspace import Workspace
+
+SessionName = Session | str | Path
+"""A session that was opened, its name in the workspace (STUDIO_WORKSPACE), or its folder."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tracked:
+    """A run that was tracked. Goes wherever a run is wanted.
+
+    run : on disk. track : frames (K,), poses (K, D) rad and mm, confidence (K,), states. names : D parameters. notes :
+    on what was filled in. seconds, evaluations_per_frame : of the search.
+    """
+
+    run: StoredRun
+    track: Track
+    names: tuple[str, ...]
+    notes: tuple[str, ...]
+    seconds: float
+    evaluations_per_frame: int
+
+    @property
+    def frames(self) -> NDArray[np.int64]:
+        """(K,) the frames that were tracked."""
+        return self.track.frames
+
+    @property
+    def poses(self) -> NDArray[np.float64]:
+        """(K, D) radians and mm, in the order of `names`."""
+        return self.track.poses
+
+
+RunName = Tracked | StoredRun | str | Path
+"""A run that was tracked or opened, "SESSION/RUN" as in the workspace, or its folder."""
+
+
+def open_session(session: SessionName) -> Session:
+    """A session as it is now, by name or folder. Raises NotFoundError."""
+    return Session(session.path) if isinstance(session, Session) else Workspace().resolve(session)
+
+
+def list_sessions() -> tuple[str, ...]:
+    """Names of the workspace's sessions."""
+    return tuple(entry.name for entry in Workspace().sessions())
+
+
+def list_runs(session: SessionName) -> tuple[RunSummary, ...]:
+    """The runs of a session, oldest first: what each is and how far it came."""
+    return tuple(run.summary() for run in open_session(session).runs())
+
+
+def open_run(run: RunName) -> StoredRun:
+    """A run by its name or folder. Raises RunError, NotFoundError."""
+    if isinstance(run, Tracked):
+        return StoredRun(run.run.folder)
+    if isinstance(run, StoredRun):
+        return run
+    session, slash, name = str(run).rstrip("/").rpartition("/")
+    if not slash or not session:
+        raise RunError(f"'{run}' names no run.", "Write SESSION/RUN, such as walk/run-1.")
+    place = Path(session)
+    return open_session(place.parent if place.name == RUNS_NAME else session).run(name)
+
+
+def session_of(run: StoredRun) -> Session:
+    """The session that a run belongs to."""
+    return Session(run.folder.parent.parent)
