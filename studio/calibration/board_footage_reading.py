@@ -70,7 +70,7 @@ def list_footage(folder: Path) -> tuple[BoardFootage, ...]:
         raise CalibrationError(
             f"There is no folder '{folder}'.", "Name the folder with the board's videos or pictures."
         )
-    entries = sorted((path for path in folder.iterdir() if not path.name.startswith(".")), key=_natural)
+    entries = sorted((path for path in folder.iterdir() if not _is_litter(path.name)), key=_natural)
     videos = [path for path in entries if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()]
     if videos:
         return tuple(BoardFootage(path.stem, path, ()) for path in videos)
@@ -220,6 +220,11 @@ def _pictures(
             yield frame, f"frame {frame}", reader.read(frame)
     finally:
         reader.close()
+
+
+def _is_litter(name: str) -> bool:
+    """Hidden files, and the coverage pictures of an earlier calibration."""
+    return name.startswith(".") or ".coverage-" in name
 
 
 def _natural(path: Path) -> tuple[tuple[int, int, str], ...]:

@@ -255,13 +255,18 @@ def _rig(
 
 def moved(rig: Rig, new_from_old: Array) -> Rig:
     """The rig in another world: (3, 4) new_from_old."""
-    back = inverse(new_from_old)
-    cameras = []
-    for camera in rig.cameras:
-        pose = compose(rigid(camera.rotation, camera.translation), back)
-        cameras.append(replace(camera, rotation=pose[:, :3].copy(), translation=pose[:, 3].copy()))
     boards = {frame: compose(new_from_old, pose) for frame, pose in rig.boards.items()}
-    return replace(rig, cameras=tuple(cameras), boards=boards)
+    return replace(rig, cameras=moved_cameras(rig.cameras, new_from_old), boards=boards)
+
+
+def moved_cameras(cameras: Sequence[Camera], new_from_old: Array) -> tuple[Camera, ...]:
+    """Cameras in another world: (3, 4) new_from_old."""
+    back = inverse(new_from_old)
+    found = []
+    for camera in cameras:
+        pose = compose(rigid(camera.rotation, camera.translation), back)
+        found.append(replace(camera, rotation=pose[:, :3].copy(), translation=pose[:, 3].copy()))
+    return tuple(found)
 
 
 def board_points(board: Board, pose: Array) -> Array:

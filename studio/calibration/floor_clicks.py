@@ -5,15 +5,19 @@
 `world` (mm, Z up) is given for all points or for none.
 """
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.calibration.extrinsics import Rig
 from studio.calibration.floor import floor_from_points, triangulated, world_from_points
 from studio.errors import CalibrationError
+from studio.geometry.camera import Camera
+from studio.geometry.projection import project
+from studio.geometry.rigid import transform
 
 Array = NDArray[np.float64]
 
@@ -44,17 +48,40 @@ def read_clicks(path: Path) -> Clicks:
         ) from None
 
 
-def floor_from_clicks(clicks: Clicks, rig: Rig) -> Array:
-    """(3, 4) new_from_old of the clicked floor. Raises CalibrationError, also where known lengths contradict."""
-    cameras = sorted({name for click in clicks.points for name in click.pixels})
+@dataclass(frozen=True, slots=True, eq=False)
+class ClickedFloor:
+    """new_from_old : (3, 4). points : (N, 3) the clicked points in the new world, mm. missed : camera → (N,) pixels
+    between each click and its point, NaN where a camera does not have it.
+    """
+
+    new_from_old: Array
+    points: Array
+    missed: dict[str, Array]
+
+
+def clicked_floor(clicks: Clicks, cameras: Sequence[Camera]) -> ClickedFloor:
+    """The clicked points in space, and the world that they make. Raises CalibrationError, also where known lengths
+    contradict.
+    """
+    names = sorted({name for click in clicks.points for name in click.pixels})
     pixels = {
         name: np.array([click.pixels.get(name, (np.nan, np.nan)) for click in clicks.points])
-        for name in cameras
+        for name in names
     }
-    points = triangulated(rig.cameras, pixels)
+    points = triangulated(cameras, pixels)
+    known = {camera.name: camera for camera in cameras}
+    missed = {
+        name: np.linalg.norm(project(known[name], points)[0] - clicked, axis=1)
+        for name, clicked in pixels.items()
+    }
+    new_from_old = _world_of(clicks, points, cameras)
+    return ClickedFloor(new_from_old, transform(new_from_old, points), missed)
+
+
+def _world_of(clicks: Clicks, points: Array, cameras: Sequence[Camera]) -> Array:
     known = [click.world for click in clicks.points if click.world is not None]
     if not known:
-        return floor_from_points(points, rig.cameras)
+        return floor_from_points(points, cameras)
     if len(known) != len(points):
         raise CalibrationError(
             f"{len(known)} of {len(points)} points have a place in the world.",

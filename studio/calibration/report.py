@@ -48,6 +48,16 @@ def report_of(calibrated: Calibrated) -> dict[str, object]:
     }
 
 
+def told_source(calibrated: Calibrated) -> str:
+    """Where a calibration comes from, in a few words: the board, and the pixels that its corners are off."""
+    rig = calibrated.rig
+    off = (
+        math.sqrt(sum(value**2 for value in rig.rms.values()) / len(rig.rms)) if rig is not None else math.nan
+    )
+    told = f"board {calibrated.board.spelling}"
+    return f"{told}, {off:.2f} px" if math.isfinite(off) else told
+
+
 def write_calibrated(calibrated: Calibrated, path: Path, *, anyway: bool = False) -> tuple[Path, ...]:
     """Write the calibration (TOML, mm) with its report and coverage pictures beside it; returns the files written.
 

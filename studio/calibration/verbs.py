@@ -22,7 +22,7 @@ from studio.calibration.detection import BoardFinder
 from studio.calibration.extrinsics import Rig, moved, solve_rig
 from studio.calibration.findings import Finding, blocking
 from studio.calibration.floor import board_on_floor, floor_from_board
-from studio.calibration.floor_clicks import floor_from_clicks, read_clicks
+from studio.calibration.floor_clicks import clicked_floor, read_clicks
 from studio.calibration.intrinsics import FEWEST_PICTURES, Lens, solve_lens
 from studio.calibration.lens_files import lenses_of_file
 from studio.calibration.lens_verdict import lens_findings
@@ -245,7 +245,7 @@ def _floor(
         return floor_from_board(pose, board.thickness_mm), f"board on the floor in frame {number}"
     path = Path(floor)
     if path.suffix.lower() == ".json":
-        return floor_from_clicks(read_clicks(path), rig), f"points of {path.name}"
+        return clicked_floor(read_clicks(path), rig.cameras).new_from_old, f"points of {path.name}"
     footage = by_camera(list_footage(path), [camera.name for camera in rig.cameras])
     finder = BoardFinder(board)
     seen = []

@@ -5,14 +5,17 @@ from pathlib import Path
 import click
 
 from studio.calibration.board_folders import find_board_footage
+from studio.calibration.board_footage_reading import HowTaken
 from studio.calibration.board_pdf import PAGES, usual_board, write_board_pdf
 from studio.calibration.boards import board_from_text
 from studio.calibration.findings import Finding, blocking
 from studio.calibration.lens_verdict import verdict
-from studio.calibration.report import report_of, write_calibrated
+from studio.calibration.report import report_of, told_source, write_calibrated
 from studio.calibration.verbs import Calibrated, calibrate
 from studio.cli.output import command, note, progress
 from studio.errors import CalibrationError, NotFoundError
+from studio.sessions.calibration_changes import NewCalibration, replace_calibration
+from studio.sessions.calibration_fit import fit_to_session
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 
@@ -45,11 +48,16 @@ TO_HELP = "The calibration to write; default: calibration/cameras.toml in the se
     metavar="A,B=MM",
     help="A measured distance between two lenses, to check the scale; again for more.",
 )
+@click.option(
+    "--offset",
+    "offsets",
+    multiple=True,
+    metavar="CAMERA=FRAMES",
+    help="The camera's frame of the common board footage that the others' frame 0 belongs to; again for more.",
+)
 @click.option("--refine", is_flag=True, help="Let the lenses move a little in the last adjustment.")
 @click.option("--to", "place", type=click.Path(path_type=Path), help=TO_HELP)
-@click.option(
-    "--force", is_flag=True, help="Replace the calibration that is there (it is kept as *.before.toml)."
-)
+@click.option("--force", is_flag=True, help="Replace the calibration that is there (it is kept).")
 @click.option("--anyway", is_flag=True, help="Write it even if a check says that it is wrong.")
 @command
 def calibrate_command(
@@ -60,6 +68,7 @@ def calibrate_command(
     floor: str | None,
     thickness: float,
     distances: tuple[str, ...],
+    offsets: tuple[str, ...],
     refine: bool,
     place: Path | None,
     force: bool,
@@ -91,12 +100,11 @@ def calibrate_command(
             footage_sizes={entry.name: (entry.width, entry.height) for entry in sources},
             distances_mm=measured,
             refine_lenses=refine,
+            taken=_taken(session, offsets),
             progress=report,
         )
     stops = blocking(found.findings) if not anyway else ()
-    if target.exists() and found.rig is not None and not stops:
-        target.replace(target.with_name(f"{target.stem}.before.toml"))
-    written = write_calibrated(found, target, anyway=anyway)
+    written = _kept(found, session if place is None else None, target, stops)
     for finding in found.findings:
         note(_told(finding))
     if stops:
@@ -128,6 +136,43 @@ def board_command(kind: str, board_text: str | None, page: str, place: Path) -> 
         "written": str(place),
         "text": f"{place}: {board.spelling}\nCalibrate with: studio calibrate FOLDER --board {board.spelling}",
     }
+
+
+def _kept(
+    found: Calibrated, session: Session | None, target: Path, stops: tuple[Finding, ...]
+) -> tuple[Path, ...]:
+    """Write what was found, into the session as its calibration if it is one's own; returns the files."""
+    if session is None or found.rig is None or stops:
+        if session is not None and target.exists():
+            # Only the report of what cannot be used: it must not pass for that of the calibration in use.
+            target = target.with_name("refused.toml")
+        if target.exists() and found.rig is not None and not stops:
+            target.replace(target.with_name(f"{target.stem}.before.toml"))
+        return write_calibrated(found, target, anyway=not stops)
+    fitted = fit_to_session(session, found.rig.cameras)
+    new = NewCalibration(
+        fitted.cameras, told_source(found), crops=fitted.crops, matching=fitted.matching, calibrated=found
+    )
+    change = replace_calibration(session, new)
+    for words in (*fitted.warnings, *change.notes):
+        note(words)
+    return tuple(sorted(path for path in target.parent.iterdir() if path.name.startswith("cameras.")))
+
+
+def _taken(session: Session | None, offsets: tuple[str, ...]) -> HowTaken:
+    """Offsets as typed, turns as the session has them. Raises CalibrationError."""
+    sources = session.manifest.footage.cameras if session is not None else ()
+    found: dict[str, int] = {}
+    for text in offsets:
+        name, _, number = text.partition("=")
+        if not name or not number.lstrip("-").isdigit():
+            raise CalibrationError(f"The offset '{text}' cannot be understood.", "Write cam2=3 (frames).")
+        found[name] = int(number)
+    return HowTaken(
+        found,
+        {source.name: source.turned for source in sources},
+        {source.name: (source.width, source.height) for source in sources},
+    )
 
 
 def _source(text: str) -> tuple[Path, Session | None]:

@@ -35,6 +35,7 @@ class SessionManifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
     to make footage and calibration fit (a crop, a unit, a frame rate). matching : footage to cameras. layout :
     whose folder layout the source was taken for. footage_changed : when offsets or turns were last changed (UTC, ISO
     8601, to the microsecond), "" if never; runs made before count the frames as they were then.
+    calibration_changed : likewise of the calibration.
     """
 
     schema: int = SCHEMA_VERSION
@@ -53,6 +54,7 @@ class SessionManifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
     matching: tuple[CameraMatch, ...] = ()
     layout: str = ""
     footage_changed: str = ""
+    calibration_changed: str = ""
 
     @property
     def fps(self) -> float:

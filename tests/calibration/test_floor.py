@@ -10,7 +10,7 @@ from calibrated_scenes import CHARUCO, ring, seen, true_lens, waved
 from studio.calibration.boards import Board
 from studio.calibration.extrinsics import Rig, moved, solve_rig
 from studio.calibration.floor import board_on_floor, floor_from_board, floor_from_points, triangulated
-from studio.calibration.floor_clicks import floor_from_clicks, read_clicks
+from studio.calibration.floor_clicks import clicked_floor, read_clicks
 from studio.errors import CalibrationError
 from studio.geometry.projection import project
 from studio.geometry.rigid import transform
@@ -56,7 +56,7 @@ def test_a_board_on_the_floor_sets_the_world(rig: Rig, thickness: float) -> None
 
 def test_clicked_points_without_places_give_a_level_floor(rig: Rig, tmp_path: Path) -> None:
     clicks = read_clicks(clicks_file(tmp_path / "floor.json", world=False))
-    placed = moved(rig, floor_from_clicks(clicks, rig))
+    placed = moved(rig, clicked_floor(clicks, rig.cameras).new_from_old)
     heights = [camera.centre[2] for camera in placed.cameras]
     np.testing.assert_allclose(heights, [camera.centre[2] for camera in CAMERAS], atol=10.0)
     pixels = {camera.name: project(camera, FLOOR_POINTS)[0] for camera in CAMERAS}
@@ -69,14 +69,14 @@ def test_clicked_points_without_places_give_a_level_floor(rig: Rig, tmp_path: Pa
 
 def test_clicked_points_with_places_give_their_world(rig: Rig, tmp_path: Path) -> None:
     clicks = read_clicks(clicks_file(tmp_path / "floor.json", world=True))
-    placed = moved(rig, floor_from_clicks(clicks, rig))
+    placed = moved(rig, clicked_floor(clicks, rig.cameras).new_from_old)
     for camera, solved in zip(CAMERAS, placed.cameras, strict=True):
         np.testing.assert_allclose(solved.centre, camera.centre, atol=15.0)
 
 
 def test_clicks_that_contradict_the_boards_scale_are_refused(rig: Rig, tmp_path: Path) -> None:
     with pytest.raises(CalibrationError, match=r"0\.8\d+ times as far apart"):
-        floor_from_clicks(read_clicks(clicks_file(tmp_path / "floor.json", world=True, scale=1.2)), rig)
+        clicked_floor(read_clicks(clicks_file(tmp_path / "floor.json", world=True, scale=1.2)), rig.cameras)
 
 
 def test_clicks_that_cannot_be_used(rig: Rig, tmp_path: Path) -> None:

@@ -1,0 +1,217 @@
+"""A session's calibration, made or given after the import: put in its place in one step, the one before kept.
+
+calibration/cameras.toml              the one in use
+calibration/original…                 the files it was read from, byte for byte
+calibration/cameras.report.json, …    what a board told of it
+calibration/earlier/<time>/           each one before, whole, named by when it was replaced (UTC)
+
+Runs keep their own copy; which of them were tracked with another one is computed from that.
+"""
+
+import dataclasses
+import datetime
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from studio.calibration.report import write_calibrated
+from studio.calibration.verbs import Calibrated
+from studio.capture.calibration_files import AssumedCrop, read_calibration, write_calibration
+from studio.capture.naming import listed
+from studio.errors import CalibrationError, NotFoundError, SessionError
+from studio.geometry.camera import Camera
+from studio.sessions import atomic_files, made_from
+from studio.sessions.manifest import CameraMatch, SessionManifest
+from studio.sessions.names import inside
+from studio.sessions.run_record import CAMERAS_NAME
+from studio.sessions.session import CAMERAS_PATH, THUMBNAIL_NAME, Session, described_anew
+
+EARLIER = "earlier"
+OWN_PARTS = ("original", "cameras.")
+MOVED_MM = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NewCalibration:
+    """What a session is to use. cameras : named and sized as its footage (`calibration_fit`). source : where from, in
+    words. originals : name → content of the files it was read from. crops, matching, notes : of the fit. calibrated :
+    what boards told, None for a file.
+    """
+
+    cameras: tuple[Camera, ...]
+    source: str
+    originals: Mapping[str, bytes] = field(default_factory=dict)
+    crops: Mapping[str, AssumedCrop] = field(default_factory=dict)
+    matching: tuple[CameraMatch, ...] = ()
+    notes: tuple[str, ...] = ()
+    calibrated: Calibrated | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationChange:
+    """A change that was made. session : as it is now. notes : what it means. stale_runs : runs with another
+    calibration. kept : where the one before lies, None if there was none.
+    """
+
+    session: Session
+    notes: tuple[str, ...]
+    stale_runs: tuple[str, ...]
+    kept: Path | None
+
+
+def replace_calibration(session: Session, new: NewCalibration) -> CalibrationChange:
+    """Let a session use another calibration from now on.
+
+    Raises SessionError while a run is being tracked, CalibrationError where a camera of the footage is missing.
+    """
+    for run in session.runs():
+        if run.summary().status == "tracking":
+            raise SessionError(
+                f"Run '{run.name}' of session '{session.name}' is being tracked.", "Stop it, or wait for it."
+            )
+    names = {camera.name for camera in new.cameras}
+    missing = [source.name for source in session.manifest.footage.cameras if source.name not in names]
+    if missing or not new.cameras:
+        raise CalibrationError(
+            f"The calibration has no camera {listed(missing)}.", "Give one of all cameras that have footage."
+        )
+    made_from.adopt(session)
+    place = session.path / CAMERAS_PATH
+    before = read_calibration(place).cameras if _readable(place) else ()
+    place.parent.mkdir(exist_ok=True)
+    kept = _keep(place.parent) if place.exists() else None
+    _write(place, new)
+    manifest = _described(session.manifest, new)
+    (session.path / THUMBNAIL_NAME).unlink(missing_ok=True)
+    changed = described_anew(session, manifest)
+    stale = stale_runs(changed)
+    return CalibrationChange(changed, tuple(_consequences(changed, before, new.cameras, stale)), stale, kept)
+
+
+def stale_runs(session: Session) -> tuple[str, ...]:
+    """Names of the runs that were tracked with another calibration than the session's."""
+    place = session.path / CAMERAS_PATH
+    if not place.is_file():
+        return ()
+    now = place.read_bytes()
+    return tuple(run.name for run in session.runs() if _content(run.folder / CAMERAS_NAME) not in (b"", now))
+
+
+def earlier_calibrations(session: Session) -> tuple[str, ...]:
+    """Names of those that were replaced, newest first."""
+    folder = session.path / CAMERAS_PATH.parent / EARLIER
+    if not folder.is_dir():
+        return ()
+    found = [path.name for path in folder.iterdir() if (path / CAMERAS_PATH.name).is_file()]
+    return tuple(sorted((name for name in found if name[0] != "."), reverse=True))
+
+
+def earlier_calibration(session: Session, name: str) -> Path:
+    """The folder of one that was replaced. Raises NotFoundError, NameRefused."""
+    folder = inside(session.path / CAMERAS_PATH.parent / EARLIER, name, "calibration")
+    if not (folder / CAMERAS_PATH.name).is_file():
+        raise NotFoundError(
+            f"Session '{session.name}' kept no calibration '{name}'.", "Choose one of its earlier ones."
+        )
+    return folder
+
+
+def _keep(folder: Path) -> Path:
+    """Copy everything of the calibration in use to a folder of its own."""
+    now = datetime.datetime.now(datetime.UTC)
+    place = folder / EARLIER / now.strftime("%Y%m%d-%H%M%S-%f")
+    made = atomic_files.new_folder_beside(place)
+    try:
+        for path in _own_parts(folder):
+            if path.is_dir():
+                shutil.copytree(path, made / path.name)
+            else:
+                shutil.copyfile(path, made / path.name)
+        atomic_files.move_into_place(made, place)
+    finally:
+        atomic_files.discard(made)
+    return place
+
+
+def _write(place: Path, new: NewCalibration) -> None:
+    """The canonical file takes the old one's place in one step; then what lies beside it."""
+    made = atomic_files.new_folder_beside(place)
+    try:
+        if new.calibrated is not None and new.calibrated.rig is not None:
+            rig = dataclasses.replace(new.calibrated.rig, cameras=new.cameras)
+            write_calibrated(
+                dataclasses.replace(new.calibrated, rig=rig), made / CAMERAS_PATH.name, anyway=True
+            )
+        write_calibration(new.cameras, made / CAMERAS_PATH.name, dict(new.crops))
+        single = len(new.originals) == 1
+        for name, content in new.originals.items():
+            ending = ".qca.txt" if name.lower().endswith(".qca.txt") else Path(name).suffix
+            target = made / f"original{ending}" if single else made / "original" / Path(name).name
+            target.parent.mkdir(exist_ok=True)
+            target.write_bytes(content)
+        atomic_files.write_bytes(place, (made / CAMERAS_PATH.name).read_bytes())
+        for path in _own_parts(place.parent):
+            if path.is_dir():
+                shutil.rmtree(path)
+            elif path != place:
+                path.unlink()
+        for path in made.iterdir():
+            if path.name != place.name:
+                path.rename(place.parent / path.name)
+    finally:
+        atomic_files.discard(made)
+
+
+def _own_parts(folder: Path) -> list[Path]:
+    """What belongs to the calibration in use: not board footage that lies beside it, nor earlier ones."""
+    return [path for path in folder.iterdir() if path.name.startswith(OWN_PARTS)]
+
+
+def _described(manifest: SessionManifest, new: NewCalibration) -> SessionManifest:
+    crops = tuple(crop.words(name) for name, crop in new.crops.items())
+    return msgspec.structs.replace(
+        manifest,
+        calibration_source=new.source,
+        calibration_changed=datetime.datetime.now(datetime.UTC).isoformat(),
+        assumptions=(*new.notes[:1], *crops),
+        matching=new.matching or manifest.matching,
+    )
+
+
+def _consequences(
+    session: Session, before: Sequence[Camera], after: Sequence[Camera], stale: tuple[str, ...]
+) -> list[str]:
+    """What the change means for what is there."""
+    notes: list[str] = []
+    if stale:
+        notes.append(
+            f"Run {listed(stale)} was tracked with another calibration: it keeps its poses and its own copy. Track"
+            " again to use the new one."
+        )
+    old = {camera.name: camera.centre for camera in before}
+    far = [float(np.linalg.norm(camera.centre - old[camera.name])) for camera in after if camera.name in old]
+    if not far or max(far) < MOVED_MM:
+        return notes
+    told = f"The cameras stand up to {max(far):.0f} mm from where they were"
+    if (session.path / made_from.FILES["start-pose"]).exists():
+        notes.append(f"{told}: look whether the start pose still fits, or find it again.")
+    if session.truth_path is not None:
+        notes.append(f"{told}: the truth stays in the world as it was.")
+    return notes
+
+
+def _readable(place: Path) -> bool:
+    if not place.is_file():
+        return False
+    try:
+        return bool(read_calibration(place).cameras)
+    except CalibrationError:
+        return False
+
+
+def _content(path: Path) -> bytes:
+    return path.read_bytes() if path.is_file() else b""
