@@ -21,6 +21,7 @@ from studio.capture.synchrony import MOST_SECONDS, Progress, Synchrony, estimate
 from studio.capture.timestamps import TimedOffsets, offsets_from_times, read_timestamps
 from studio.capture.video_probe import probe_video
 from studio.errors import FootageError, SessionError
+from studio.sessions.made_from import adopt
 from studio.sessions.run_record import FILE_NAME as RUN_FILE_NAME
 from studio.sessions.session import START_POSE_NAME, THUMBNAIL_NAME, Session, described_anew
 from studio.sessions.stored_run import StoredRun
@@ -52,10 +53,13 @@ def change_footage(
                 f"Run '{run.name}' of session '{session.name}' is being tracked.",
                 "Stop it first, or wait for it.",
             )
+    if not session.has_footage:
+        raise SessionError(f"Session '{session.name}' has no footage yet.", "Add it first.")
     before = session.manifest.footage
     after = _changed(session, before, dict(offsets or {}), dict(rotations or {}))
     if after == before:
         return FootageChange(session, ("Nothing changes.",), stale_runs(session))
+    adopt(session)
     manifest = msgspec.structs.replace(
         session.manifest, footage=after, footage_changed=datetime.datetime.now(datetime.UTC).isoformat()
     )
@@ -78,6 +82,8 @@ def synchrony_of(
 ) -> Synchrony:
     """Offsets of a session's cameras estimated from what moves in them; changes nothing. Raises FootageError."""
     source = session.manifest.footage
+    if not source.cameras:
+        raise SessionError(f"Session '{session.name}' has no footage yet.", "Add it first.")
     readers = [camera_reader(camera, session.path) for camera in source.cameras]
     try:
         return estimate_synchrony(source, lambda index: readers[index].read, progress, most_seconds)
@@ -113,11 +119,12 @@ def _changed(
         raise FootageError(
             f"Camera {far[0]} cannot be {placed[far[0]]} frames off.", "Give its offset in frames."
         )
-    least = min(placed.values())
-    sizes = {camera.name: (camera.width, camera.height) for camera in session.cameras()}
+    least = min(placed.values(), default=0)
+    known = session.cameras() if session.is_calibrated else ()
+    sizes = {camera.name: (camera.width, camera.height) for camera in known}
     cameras = tuple(
         dataclasses.replace(
-            _turned(camera, rotations.get(camera.name, camera.turned), sizes[camera.name]),
+            _turned(camera, rotations.get(camera.name, camera.turned), sizes.get(camera.name)),
             offset=placed[camera.name] - least,
         )
         for camera in source.cameras
@@ -156,8 +163,8 @@ def _masks_of(session: Session, camera: CameraSource) -> int:
     return len(list_pictures(place)) if place.is_dir() else probe_video(place).frame_count
 
 
-def _turned(camera: CameraSource, degrees: int, calibrated: tuple[int, int]) -> CameraSource:
-    """A camera's footage at another turn. Raises FootageError."""
+def _turned(camera: CameraSource, degrees: int, calibrated: tuple[int, int] | None) -> CameraSource:
+    """A camera's footage at another turn. calibrated : (width, height), None before. Raises FootageError."""
     turn = next((turn for turn in TURNS if turn == degrees % 360), None)
     if turn is None:
         raise FootageError(
@@ -167,7 +174,7 @@ def _turned(camera: CameraSource, degrees: int, calibrated: tuple[int, int]) -> 
     width, height = camera.width, camera.height
     if (turn - camera.turned) % 180:
         width, height = height, width
-    if (width, height) != calibrated:
+    if calibrated is not None and (width, height) != calibrated:
         raise FootageError(
             f"Turned by {turn} degrees, the pictures of camera {camera.name} are {width}x{height}, and its calibration"
             f" is for {calibrated[0]}x{calibrated[1]}.",

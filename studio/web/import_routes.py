@@ -17,19 +17,33 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query
 
 from studio.errors import NotFoundError, StudioError
-from studio.sessions.importers.catalogue import import_source
+from studio.runs.overlay_pictures import forget_composers
+from studio.sessions.importers.adding import AddedFootage, FootageWish, add_footage
+from studio.sessions.importers.catalogue import ImportReport, import_source
+from studio.sessions.importers.plan import Progress
 from studio.web.archives import unpack_zip
-from studio.web.doors import Doors, doors_of
+from studio.web.doors import Doors, doors_of, let_go
 from studio.web.error_responses import UnforeseenError, log
-from studio.web.import_schemas import FolderView, ImportRequest, ImportState, SampleRequest
+from studio.web.import_schemas import (
+    FolderView,
+    FootageAddition,
+    ImportRequest,
+    ImportState,
+    SampleRequest,
+    SourceWish,
+)
 from studio.web.safe_paths import PathRefused, folder_to_import, relative_path
 from studio.web.samples import install_sample
 from studio.web.schemas import CameraMatching, NewName
+from studio.web.session_routes import OpenSession
 from studio.web.upload_routes import forget, upload_folder
 
 router = APIRouter(prefix="/api", tags=["importing"])
 
 Door = Annotated[Doors, Depends(doors_of)]
+
+Taker = Callable[[Path, Progress, Callable[[], bool]], ImportReport | AddedFootage]
+"""take(folder, progress, cancelled) reads a source into the workspace."""
 
 KEPT = 50
 FOLDERS_SHOWN = 1000
@@ -38,21 +52,69 @@ FOLDERS_SHOWN = 1000
 @router.post("/imports", status_code=202)
 async def begin_import(wish: ImportRequest, doors: Door) -> ImportState:
     """Begin an import; the name must be free. Ask for its state, or wait for `import` events."""
+    into = await asyncio.to_thread(doors.workspace.place_for, wish.name)
+
+    def take(folder: Path, progress: Progress, cancelled: Callable[[], bool]) -> ImportReport:
+        return import_source(
+            folder,
+            into,
+            calibration=wish.calibration,
+            fps=wish.fps,
+            copy=wish.copy_footage or wish.upload is not None,
+            trial=wish.trial,
+            offsets=wish.offsets,
+            rotations=wish.rotations,
+            unit=wish.unit,
+            up=wish.up,
+            despite_findings=wish.despite_findings,
+            progress=progress,
+            cancelled=cancelled,
+        )
+
+    return await begin_taking(doors, wish.name, wish, take)
+
+
+@router.post("/sessions/{session}/footage", status_code=202)
+async def begin_adding(session: OpenSession, wish: FootageAddition, doors: Door) -> ImportState:
+    """Begin to add footage to a session that is there, like an import (`GET /api/imports/{identifier}`)."""
+    let_go(doors, session.name)
+    asked = FootageWish(
+        calibration=wish.calibration,
+        fps=wish.fps,
+        copy=wish.copy_footage or wish.upload is not None,
+        trial=wish.trial,
+        offsets=wish.offsets,
+        rotations=wish.rotations,
+        unit=wish.unit,
+        up=wish.up,
+        despite_findings=wish.despite_findings,
+        replaced=wish.replace,
+    )
+
+    def take(folder: Path, progress: Progress, cancelled: Callable[[], bool]) -> AddedFootage:
+        added = add_footage(session, folder, asked, progress=progress, cancelled=cancelled)
+        forget_composers()
+        return added
+
+    return await begin_taking(doors, session.name, wish, take)
+
+
+async def begin_taking(doors: Doors, name: str, wish: SourceWish, take: Taker) -> ImportState:
+    """Take a source in the background; how far it is can be asked for by the identifier."""
     if wish.calibration:
         relative_path(wish.calibration)
     if (wish.source is None) == (wish.upload is None):
         raise PathRefused("An import needs either 'source' or 'upload'.", "Give a folder, or upload one.")
-    into = await asyncio.to_thread(doors.workspace.place_for, wish.name)
     if wish.source is not None:
         source = await asyncio.to_thread(folder_to_import, wish.source, doors.footage_roots)
     else:
         source = upload_folder(doors, wish.upload or "")
-    state = ImportState(identifier=secrets.token_hex(8), name=wish.name, state="running", step="reading")
+    state = ImportState(identifier=secrets.token_hex(8), name=name, state="running", step="reading")
     doors.imports[state.identifier] = state
     doors.stops[state.identifier] = threading.Event()
     while len(doors.imports) > KEPT:
         doors.imports.pop(next(iter(doors.imports)))
-    job = asyncio.create_task(asyncio.to_thread(_import, doors, state.identifier, wish, source, into))
+    job = asyncio.create_task(asyncio.to_thread(_take, doors, state, wish, source, take))
     doors.jobs.add(job)
     job.add_done_callback(doors.jobs.discard)
     return state
@@ -109,34 +171,24 @@ def folders(
     )
 
 
-def _import(doors: Doors, identifier: str, wish: ImportRequest, source: Path, into: Path) -> None:
-    """Do the import in this thread, keeping its state up to date; never raises."""
+def _take(doors: Doors, begun: ImportState, wish: SourceWish, source: Path, take: Taker) -> None:
+    """Take the source in this thread, keeping its state up to date; never raises."""
+    identifier, name = begun.identifier, begun.name
     stop = doors.stops[identifier]
 
     def tell(**changes: object) -> None:
         state = doors.imports.get(identifier)
         if state is not None:
             doors.imports[identifier] = state = state.model_copy(update=changes)
-            message: dict[str, object] = {"type": "import", "session": wish.name, "run": ""}
+            message: dict[str, object] = {"type": "import", "session": name, "run": ""}
             doors.events.publish(message | state.model_dump())
+
+    def progress(step: str, done: int, total: int) -> None:
+        tell(step=step, done=done, total=total)
 
     try:
         folder = _unpacked(source, tell) if wish.upload else source
-        report = import_source(
-            folder,
-            into,
-            calibration=wish.calibration,
-            fps=wish.fps,
-            copy=wish.copy_footage or wish.upload is not None,
-            trial=wish.trial,
-            offsets=wish.offsets,
-            rotations=wish.rotations,
-            unit=wish.unit,
-            up=wish.up,
-            despite_findings=wish.despite_findings,
-            progress=lambda step, done, total: tell(step=step, done=done, total=total),
-            cancelled=stop.is_set,
-        )
+        report = take(folder, progress, stop.is_set)
     except StudioError as error:
         tell(state="failed", code=error.code, message=error.message, hint=error.hint)
         return
@@ -156,7 +208,7 @@ def _import(doors: Doors, identifier: str, wish: ImportRequest, source: Path, in
         layout=report.layout,
         matching=[CameraMatching.model_validate(match) for match in report.matching],
     )
-    doors.events.publish({"type": "sessions", "session": wish.name, "run": ""})
+    doors.events.publish({"type": "sessions", "session": name, "run": ""})
 
 
 def _unpacked(folder: Path, tell: Callable[..., None]) -> Path:

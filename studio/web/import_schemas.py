@@ -7,10 +7,9 @@ from pydantic import Field
 from studio.web.schemas import Answer, CameraMatching, Request, RunName
 
 
-class ImportRequest(Request):
-    """What is to be imported, from a folder of this machine or from an upload."""
+class SourceWish(Request):
+    """Footage of a folder of this machine or of an upload, and how it is to be read."""
 
-    name: RunName = Field(description="What the session will be called.")
     source: str | None = Field(None, max_length=4096, description="Folder on the server's machine.")
     upload: RunName | None = Field(None, description="Identifier of a finished upload.")
     calibration: str | None = Field(None, max_length=4096, description="Which file, if there are several.")
@@ -32,6 +31,18 @@ class ImportRequest(Request):
     )
     despite_findings: bool = Field(False, description="Import a calibration that would make results wrong.")
     copy_footage: bool = Field(True, alias="copy", description="False: refer to it where it lies.")
+
+
+class ImportRequest(SourceWish):
+    """What is to be imported."""
+
+    name: RunName = Field(description="What the session will be called.")
+
+
+class FootageAddition(SourceWish):
+    """What is to be added to a session."""
+
+    replace: bool = Field(False, description="Forget all cameras that the source does not name.")
 
 
 class ImportState(Answer):
