@@ -74,18 +74,19 @@ class ViewComposer:
         clouds: Sequence[LayerRecord] = (),
         limbs: Sequence[int] = (),
         height: int | None = None,
+        body: BodyModel | None = None,
     ) -> Bytes:
         """(h, w, 3) BGR picture of a camera as stored (not turned), with layers of `OVERLAYS` over it.
 
-        pose : (D,) whose limbs are projected, None for none. clouds : the layers whose particles are drawn,
-        at the far ends of `limbs` (indices of drawn limbs; none: all). height : of the result, None for the
-        stored size. Raises NotFoundError for a camera or frame that does not exist, StudioError for an
-        unknown layer.
+        pose : (D,) whose limbs are projected, None for none; body : whose, other than the session's. clouds : the
+        layers whose particles are drawn, at the far ends of `limbs` (indices of drawn limbs; none: all). height : of
+        the result, None for the stored size. Raises NotFoundError for a camera or frame that does not exist,
+        StudioError for an unknown layer.
         """
         _check_layers(layers)
         with self._lock:
             view = self._view(frame, camera, layers)
-            marks = self._marks(camera, frame, layers, pose, clouds, limbs)
+            marks = self._marks(camera, frame, layers, pose, clouds, limbs, body or self.body)
         scale = 1.0 if height is None else height / view.picture.shape[0]
         return draw_view(view, marks, tuple(layers), colour_tokens(dark=True), scale=scale)
 
@@ -117,16 +118,17 @@ class ViewComposer:
         pose: Array | None,
         clouds: Sequence[LayerRecord],
         limbs: Sequence[int],
+        body: BodyModel,
     ) -> ViewMarks:
         lens = self.cameras[camera]
         truth = self._truth_lines(lens, frame) if "truth" in layers else NO_MARKS.truth
         dots = self._dots(lens, clouds, limbs) if "particles" in layers else ()
         if pose is None or not {"outline", "mask", "samples"} & set(layers):
             return replace(NO_MARKS, clouds=dots, truth=truth)
-        seen = overlay_points(self.body, (lens,), pose, self._settings.weighting)[0]
+        seen = overlay_points(body, (lens,), pose, self._settings.weighting)[0]
         return ViewMarks(
             seen.contours,
-            tuple(limb.side for limb in self.body.drawn),
+            tuple(limb.side for limb in body.drawn),
             seen.edge_samples,
             seen.region_samples,
             dots,
@@ -171,11 +173,13 @@ def compose_view(
     height: int | None = None,
     turned: bool = True,
     settings: RunSettings | None = None,
+    body: BodyModel | None = None,
 ) -> Bytes:
     """(h, w, 3) BGR: what a camera saw in a frame, upright (`turned`), with layers of `OVERLAYS` over it.
 
     pose : (D,) instead of the run's stored answer. height : of the picture as shown. settings : other than
-    the run's, for masks and samples in the making. Raises StudioError for what does not exist.
+    the run's, for masks and samples in the making. body : that `pose` is of, other than the run's or session's. Raises
+    StudioError for what does not exist.
     """
     composer = _composer(session, run)
     composer.use(settings or _settings_of(session, run))
@@ -193,7 +197,9 @@ def compose_view(
     stored_height = None
     if height is not None:
         stored_height = round(height * lens.height / lens.width) if turns % 2 else height
-    picture = composer.compose(frame, camera, layers, pose=pose, clouds=records, height=stored_height)
+    picture = composer.compose(
+        frame, camera, layers, pose=pose, clouds=records, height=stored_height, body=body
+    )
     return upright(picture, turns)
 
 

@@ -35,8 +35,7 @@ class MaskQualityAnswer(Answer):
 
 
 class BackgroundCamera(Answer):
-    """One camera. given: what the studio was given of its empty room; excluded: whether regions of it do not count.
-    """
+    """One camera. given: what the studio was given of its empty room; excluded: whether regions of it do not count."""
 
     name: str
     given: Literal["", "plate", "clip"]

@@ -17,6 +17,7 @@ from fastapi import Request
 
 from studio.export.task import Writer
 from studio.runs.overlay_pictures import forget_composers
+from studio.runs.subject_fitting import FittedSubject
 from studio.sessions.workspace import Workspace
 from studio.web.background_schemas import BackgroundJob
 from studio.web.event_stream import EventStream
@@ -96,6 +97,51 @@ class Shown(Protocol):
     @property
     def follow(self) -> bool: ...
 
+    @property
+    def editing(self) -> bool: ...
+
+
+class EditedPose(Protocol):
+    """What is being edited in the scene (`scene.pose_desk.Editing`)."""
+
+    @property
+    def session(self) -> str: ...
+
+    @property
+    def run(self) -> str: ...
+
+    @property
+    def frame(self) -> int | None: ...
+
+    @property
+    def pose(self) -> Sequence[float]: ...
+
+    @property
+    def moved(self) -> bool: ...
+
+
+class ScenePoses(Protocol):
+    """Poses laid before the scene's viewers (`scene.scene_poses.ScenePoses`)."""
+
+    @property
+    def editing(self) -> EditedPose | None:
+        """What is being edited, None while nothing is."""
+        ...
+
+    def propose(self, session: str, pose: Sequence[float], said: str, frame: int | None = None) -> None:
+        """Show a start pose that was found for a session, and what is said of it."""
+        ...
+
+    def edit(
+        self, session: str, run: str = "", frame: int | None = None, pose: Sequence[float] | None = None
+    ) -> None:
+        """Let a session's start pose be edited, or the right pose of a run's frame."""
+        ...
+
+    def leave(self) -> None:
+        """Leave off editing."""
+        ...
+
 
 class Stage(Protocol):
     """The 3-D scene (`scene.stage.SceneStage`)."""
@@ -127,8 +173,9 @@ class Stage(Protocol):
         """Show a session, a run of it, a frame, a layer's cloud."""
         ...
 
-    def propose_pose(self, session: str, pose: Sequence[float], said: str, frame: int | None = None) -> None:
-        """Show a start pose that was found for a session, and what is said of it."""
+    @property
+    def poses(self) -> ScenePoses:
+        """Start poses that were found, and poses under a person's hands."""
         ...
 
     def show_frame(self, frame: int) -> None:
@@ -183,6 +230,7 @@ class Doors:
     imports: dict[str, ImportState] = field(default_factory=dict)
     initialisations: dict[str, InitialisationState] = field(default_factory=dict)
     subject_fits: dict[str, FitSubjectState] = field(default_factory=dict)
+    fitted_subjects: dict[str, FittedSubject] = field(default_factory=dict)
     background_setups: dict[str, BackgroundJob] = field(default_factory=dict)
     synchronies: dict[str, SynchronyState] = field(default_factory=dict)
     exports: dict[str, ExportState] = field(default_factory=dict)

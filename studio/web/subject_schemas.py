@@ -17,14 +17,32 @@ class SubjectRequest(Request):
     )
 
 
+class LimbDrawing(Answer):
+    """A drawn limb of the body as it stands upright. start, end: mm, x to the front, y to the left, z up. radii: at
+    both. dimension: the name of its length, "" where it has none.
+    """
+
+    name: str
+    side: str
+    start: list[float]
+    end: list[float]
+    radii: tuple[float, float]
+    dimension: str
+
+
 class SubjectAnswer(Answer):
-    """A session's person. dimensions: mm (ratios without unit), by the body's own names. source: of proportions."""
+    """A session's person. dimensions: mm (ratios without unit), by the body's own names. source: of proportions.
+    saved: whether the session has a subject at all; fitted: whether it was fitted to the footage.
+    """
 
     body: str
     height_mm: Number
     dimensions: dict[str, float]
     notes: list[str]
     source: str
+    limbs: list[LimbDrawing]
+    saved: bool = False
+    fitted: bool = False
 
 
 class FitSubjectRequest(Request):
@@ -53,7 +71,9 @@ class SizeLine(Answer):
 
 
 class FitSubjectState(Answer):
-    """How a fit stands; code, message and hint say why it failed. overlap: f_s of each frame's silhouettes."""
+    """How a fit stands; code, message and hint say why it failed. overlap: f_s of each frame's silhouettes.
+    limbs: of the body that was found. file: what it was kept as, "" where it is not.
+    """
 
     identifier: str
     session: str
@@ -71,4 +91,5 @@ class FitSubjectState(Answer):
     sizes: list[SizeLine] = Field(default_factory=list)
     overlap_before: Numbers | None = None
     overlap: Numbers | None = None
+    limbs: list[LimbDrawing] = Field(default_factory=list)
     file: str = ""
