@@ -100,22 +100,26 @@ class LearningDesk:
         process.start()
         # Only the process itself may hold this end: then the pipe ends when the process does.
         theirs.close()
+        end: dict[str, object] = {"state": "failed", "message": "Learning broke off.", "hint": "Try again."}
         try:
-            self._listen(ours, process)
+            end = self._listen(ours, process)
         finally:
             process.kill()
             process.join()
             ours.close()
             for left in models_folder(order.root).glob(f"*.{process.pid}.partial"):
                 left.unlink(missing_ok=True)
-            ended()
+            try:
+                ended()
+            finally:
+                # Told last: who hears it finds everything put away.
+                self._change(**end, seconds_left=None)
 
-    def _listen(self, pipe: Connection, process: BaseProcess) -> None:
-        """Hear the process out, until it is done or not wanted any more."""
+    def _listen(self, pipe: Connection, process: BaseProcess) -> dict[str, object]:
+        """Hear the process out, until it is done or not wanted any more. Returns how it ended."""
         while True:
             if self._stop.is_set():
-                self._change(state="cancelled", seconds_left=None)
-                return
+                return {"state": "cancelled"}
             if not pipe.poll(CHECK_SECONDS):
                 continue
             try:
@@ -125,16 +129,13 @@ class LearningDesk:
                 died = BehaviourError(
                     f"The process that learnt it {ending(process.exitcode)}.", "Try again with fewer frames."
                 )
-                self._change(state="failed", message=died.message, hint=died.hint, seconds_left=None)
-                return
+                return {"state": "failed", "message": died.message, "hint": died.hint}
             if kind == "step":
                 self._report(*told)
             elif kind == "failed":
-                self._change(state="failed", message=told[0], hint=told[1], seconds_left=None)
-                return
+                return {"state": "failed", "message": told[0], "hint": told[1]}
             else:
-                self._change(state="done", learnt=told[0], seconds_left=None)
-                return
+                return {"state": "done", "learnt": told[0]}
 
     def _report(self, step: str, done: int, total: int) -> None:
         assert self._state is not None

@@ -86,7 +86,7 @@ def test_delete_goes_to_the_trash_and_comes_back(studio: Studio, tracked: Stored
     [entry] = client.get("/api/trash").json()["entries"]
     assert (entry["id"], entry["name"], entry["kind"]) == (gone["id"], "take1", "session")
     back = client.post("/api/trash/restore", json={"entry": entry["id"]})
-    assert back.json() == {"name": "take1", "run": "", "comparison": ""}
+    assert back.json() == {"name": "take1", "run": "", "comparison": "", "model": ""}
     assert [run["name"] for run in sessions(studio)["take1"]["runs"]] == ["first"]
     assert client.post("/api/trash/restore", json={"entry": "none"}).status_code == 404
     assert client.post("/api/trash/restore", json={"entry": "../take1"}).status_code == 422
@@ -122,7 +122,7 @@ def test_a_run_is_renamed_and_deleted(studio: Studio, tracked: StoredRun) -> Non
     assert lost.status_code == 404
     client.patch("/api/sessions/moved", json={"name": "take1"})
     back = client.post("/api/trash/restore", json={"entry": gone["id"]}).json()
-    assert back == {"name": "take1", "run": "best-2", "comparison": ""}
+    assert back == {"name": "take1", "run": "best-2", "comparison": "", "model": ""}
     frames = client.get("/api/sessions/take1/runs/best-2/frames").json()["frames"]
     assert [entry["frame"] for entry in frames] == [0, 1]
     assert client.get("/api/trash").json()["entries"] == []
