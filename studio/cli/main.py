@@ -14,6 +14,9 @@ COMMANDS = {
     ),
     "serve": ("serving_commands", "serve", "Open the studio on a workspace: prints the address to open."),
     "import": ("session_commands", "import_command", "Make a session from footage and calibration."),
+    "new": ("way_commands", "new_command", "Make an empty session."),
+    "add-footage": ("way_commands", "add_footage_command", "Add footage to a session that is there."),
+    "way": ("way_commands", "way_command", "Tell how far a session is, and what is next."),
     "synchronise": (
         "footage_commands",
         "synchronise",
@@ -29,6 +32,11 @@ COMMANDS = {
         "background_commands",
         "background",
         "Choose where a session's masks come from, and see how well its views agree.",
+    ),
+    "align": (
+        "alignment_commands",
+        "align_command",
+        "Turn cameras a little so that the silhouettes of all views agree.",
     ),
     "subject": (
         "subject_commands",
@@ -47,6 +55,7 @@ COMMANDS = {
     ),
     "track": ("tracking_commands", "track", "Track a session and store the run."),
     "live": ("live_commands", "live", "Track a session as its pictures come, dropping what comes too fast."),
+    "record": ("recording_commands", "record", "Record live cameras all at once into a session."),
     "evaluate": ("evaluation_commands", "evaluate_command", "Measure a run against the true markers."),
     "refine": ("refine_commands", "refine", "Refine a run's poses on the silhouettes, kept beside them."),
     "smooth": ("refine_commands", "smooth_command", "Smooth a run's poses in time, fill short gaps."),

@@ -4,13 +4,18 @@ An estimate is only shown; `PATCH …/footage` with its offsets applies it.
 """
 
 import asyncio
+import tempfile
 import threading
+from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Depends, Query, Request, Response
 
+from studio.capture.timestamps import TIMESTAMP_NAMES
 from studio.errors import SessionError, StudioError
-from studio.sessions.footage_changes import change_footage, stale_runs, synchrony_of
+from studio.runs.footage_pictures import bare_picture
+from studio.runs.overlay_drawing import encode_jpeg
+from studio.sessions.footage_changes import change_footage, recorded_offsets, stale_runs, synchrony_of
 from studio.sessions.session import Session
 from studio.web.doors import Doors, doors_of, let_go
 from studio.web.error_responses import UnforeseenError, log
@@ -21,6 +26,7 @@ from studio.web.footage_schemas import (
     PairView,
     SynchronyState,
     SynchronyWish,
+    TimedAnswer,
 )
 from studio.web.session_routes import OpenSession
 
@@ -48,6 +54,29 @@ def change(session: OpenSession, wish: FootageWish, doors: Door) -> FootageState
     changed = change_footage(session, wish.offsets, wish.rotations)
     doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
     return _state(changed.session, list(changed.notes))
+
+
+@router.get("/sessions/{session}/footage/{camera}/{frame}.jpg", response_class=Response)
+def footage_picture(
+    session: OpenSession,
+    camera: str,
+    frame: int,
+    height: Annotated[int | None, Query(ge=16, le=4320, description="Empty: as stored.")] = None,
+) -> Response:
+    """A camera's picture with its offset and turn, as it is before any calibration (JPEG)."""
+    picture = bare_picture(session, camera, frame, height)
+    return Response(encode_jpeg(picture), media_type="image/jpeg", headers={"cache-control": "no-store"})
+
+
+@router.post("/sessions/{session}/footage/times")
+async def times(session: OpenSession, request: Request) -> TimedAnswer:
+    """Offsets by a recorder's times, the raw body of a `timestamps.csv`; nothing is changed."""
+    content = await request.body()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / TIMESTAMP_NAMES[0]
+        path.write_bytes(content)
+        found = await asyncio.to_thread(recorded_offsets, session, path)
+    return TimedAnswer(offsets=found.offsets, apart=found.apart, notes=list(found.notes))
 
 
 @router.post("/sessions/{session}/synchrony", status_code=202)

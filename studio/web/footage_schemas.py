@@ -50,6 +50,14 @@ class SynchronyWish(Request):
     within: float = Field(5.0, gt=0, le=600)
 
 
+class TimedAnswer(Answer):
+    """Offsets by a recorder's times; nothing of it is applied. apart: frames that they are apart at most after it."""
+
+    offsets: dict[str, int]
+    apart: float
+    notes: list[str]
+
+
 class PairView(Answer):
     """Two cameras by themselves: lag in frames, correlation there, peak over the next best, frames nearly as good."""
 

@@ -1,0 +1,36 @@
+"""Pictures of a session's footage by themselves, before there is a calibration."""
+
+import dataclasses
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.capture.footage import open_footage
+from studio.errors import NotFoundError
+from studio.sessions.session import Session
+
+Bytes = NDArray[np.uint8]
+
+
+def bare_picture(session: Session, camera: str, frame: int, height: int | None = None) -> Bytes:
+    """A camera's picture (h, w, 3) BGR with its offset and turn, shrunk to `height` where that is less.
+
+    Raises NotFoundError for a camera or frame that is not there, FootageError.
+    """
+    source = session.manifest.footage
+    found = [entry for entry in source.cameras if entry.name == camera]
+    if not found or not 0 <= frame < source.frame_count:
+        raise NotFoundError(
+            f"Session '{session.name}' has no frame {frame} of camera '{camera[:64]}'.",
+            f"It has {source.frame_count} frames of {', '.join(entry.name for entry in source.cameras) or 'no camera'}.",
+        )
+    footage = open_footage(dataclasses.replace(source, cameras=(found[0],)), session.path)
+    try:
+        picture = footage.picture(camera, frame)
+    finally:
+        footage.close()
+    if height is None or height >= picture.shape[0]:
+        return picture
+    width = max(1, round(picture.shape[1] * height / picture.shape[0]))
+    return np.asarray(cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
