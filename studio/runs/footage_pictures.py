@@ -21,9 +21,10 @@ def bare_picture(session: Session, camera: str, frame: int, height: int | None =
     source = session.manifest.footage
     found = [entry for entry in source.cameras if entry.name == camera]
     if not found or not 0 <= frame < source.frame_count:
+        names = ", ".join(entry.name for entry in source.cameras) or "no camera"
         raise NotFoundError(
             f"Session '{session.name}' has no frame {frame} of camera '{camera[:64]}'.",
-            f"It has {source.frame_count} frames of {', '.join(entry.name for entry in source.cameras) or 'no camera'}.",
+            f"It has {source.frame_count} frames of {names}.",
         )
     footage = open_footage(dataclasses.replace(source, cameras=(found[0],)), session.path)
     try:

@@ -70,6 +70,7 @@ def prepare_run(
     frame is searched for one, which takes a while. progress : told how far that is.
     """
     asked = request or RunRequest()
+    session.cameras()  # before anything else is found wrong with a session that has none yet
     tracker = asked.tracker or session.manifest.tracker or DEFAULT_TRACKER
     weighting = asked.weighting or session.manifest.weighting or usual_weighting(tracker)
     changes = live_changes(asked.changes) if asked.live else asked.changes
