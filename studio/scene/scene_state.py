@@ -3,9 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-import numpy as np
 import viser
-from numpy.typing import NDArray
 
 from studio.errors import StudioError
 from studio.runs.colour_tokens import colour_tokens
@@ -14,16 +12,15 @@ from studio.scene.opened_run import OpenedRun
 from studio.scene.panel import Panel, dress, tell
 from studio.scene.playback import nearest
 from studio.scene.player import Player
+from studio.scene.pose_desk import PoseDesk
 from studio.scene.presenter import Presenter
-from studio.scene.proposal import Proposal
+from studio.scene.proposal import EditWish, Proposal
 from studio.scene.scene_drawing import SceneDrawing
 from studio.scene.shown_run import ShownRun
 from studio.scene.view_options import Shown, ViewOptions
 from studio.scene.wishes import Control, Wishes
 from studio.sessions.workspace import Workspace
 from studio.worker.events import Event, FrameFinished, LayerFinished, SettingsApplied, StateChanged
-
-Array = NDArray[np.float64]
 
 _NEAR_THE_END = 3
 
@@ -48,13 +45,13 @@ class SceneState:
         self.player = Player()
         self.live = LiveSearch()
         self.run: ShownRun | None = None
-        self._edited: Array | None = None
         self._proposal: Proposal | None = None
         self._dress()
 
-    def attach(self, panel: Panel, presenter: Presenter) -> None:
-        """Take the panel that shows this state, and the presenter that draws it."""
-        self._panel, self._presenter = panel, presenter
+    def attach(self, panel: Panel, presenter: Presenter, posing: PoseDesk) -> None:
+        """Take the panel that shows this state, the presenter that draws it, and where poses are edited."""
+        self._panel, self._presenter, self._posing = panel, presenter, posing
+        posing.attach(panel, lambda: self.shown.frame)
 
     def show_run(self, session: str, run: str, frame: int | None, layer: int | None) -> None:
         """Show a session ("" : none) and one of its runs ("" : none), a frame (None: as it is), a layer."""
@@ -69,12 +66,18 @@ class SceneState:
         same_place = before is not None and before.opened.session.name == session
         if before is not None:
             before.close()
-        self.live, self._edited = LiveSearch(), None
+        self.live = LiveSearch()
         self.player.play(False)
         self.shown = Shown(follow=self.shown.follow)
         if not session:
+            self._posing.open(None)
             return
         place = self._workspace.session(session)
+        if not (place.has_footage and place.is_calibrated):
+            # Nothing to be placed in the room yet: the guided way says what is next.
+            self._posing.open(None)
+            self.shown = replace(self.shown, session=session)
+            return
         opened = OpenedRun(place, place.run(run) if run else None)
         drawing = SceneDrawing(self._server, opened, self.options.dark)
         self.run = current = ShownRun(drawing, opened, self._volume_made, self._refused)
@@ -86,7 +89,7 @@ class SceneState:
         self._panel.settings.show_settings(current.settings)
         self._panel.show.show_body(opened.body)
         self._panel.show.offer_blobs(current.has_blobs)
-        self._panel.pose.show_body(opened.body, opened.start_pose())
+        self._posing.open(opened)
         self._follow_shown()
         self._show_state()
         self._show_proposal()
@@ -151,21 +154,35 @@ class SceneState:
             self._dress()
         self._presenter.redraw()
 
-    def edit_pose(self, pose: Array | Proposal | None) -> None:
-        """Show a start pose being edited; None ends it.
-
-        One that was found is shown if it is one of the body that is shown. It stays when another run of its session is
-        opened, until a person saves it or ends the editing.
-        """
-        if isinstance(pose, Proposal):
-            self._propose(pose)
+    def edit(self, wish: EditWish) -> None:
+        """Let the start pose of a session be edited, or a frame of a run, or leave off."""
+        if not wish.editing:
+            self._posing.end()
             return
-        self._edited = pose
-        if pose is None:
+        if (wish.session, wish.run) != (self.shown.session, self.shown.run):
+            self._open(wish.session, wish.run)
+        self.player.play(False)
+        self.change_shown(False, follow=False)
+        if wish.frame is not None:
+            self.show_frame(wish.frame, True)
+        pose = wish.pose
+        if pose is None and wish.run and self.run is not None:
+            pose = self.run.moment(wish.frame, self.live, None, self.options.track).pose
+        self._posing.begin(pose, wish.frame if wish.run else None)
+
+    def pose_changed(self) -> None:
+        """The pose under a person's hands is another one, or no longer is one."""
+        editing = self._posing.pose is not None
+        if not editing:
             self._proposal = None
+        self.change_shown(True, editing=editing)
         self._presenter.redraw()
 
-    def _propose(self, proposal: Proposal) -> None:
+    def propose(self, proposal: Proposal) -> None:
+        """Show a start pose that was found, if it is one of the body that is shown.
+
+        It stays when another run of its session is opened, until a person saves it or ends the editing.
+        """
         tell(self._server, "Start pose found", proposal.said)
         self._proposal = proposal
         if self.shown.session != proposal.session:
@@ -179,19 +196,8 @@ class SceneState:
             self._proposal = None
             return
         if len(run.opened.body.parameters) == len(found.pose):
-            self._panel.pose.propose(found.pose)
-            self._edited = found.pose
+            self._posing.begin(found.pose)
             self.show_frame(found.frame, True)
-            self._presenter.redraw()
-
-    def save_pose(self, pose: Array) -> None:
-        """Store a start pose for the session."""
-        if self.run is None:
-            return
-        self.run.save_start_pose(pose)
-        self._proposal = None
-        self._panel.pose.saved()
-        tell(self._server, "Start pose saved", "Runs that are started from now on begin with it.")
 
     def heard(self, event: Event) -> None:
         """Take an event of the tracking process."""
@@ -263,18 +269,18 @@ class SceneState:
         """Bring everything but the pictures up to date."""
         if self.run is None:
             return
-        moment = self.run.moment(self.shown.frame, self.live, self._edited, self.options.track)
+        moment = self.run.moment(self.shown.frame, self.live, self._posing.pose, self.options.track)
         self._panel.show.offer_tracks(self.run.opened.tracks())
         self.run.draw(moment, self.options, self.shown.layer)
         tokens = colour_tokens(self.options.dark)
-        found = self._proposal.said if self._proposal is not None and self._edited is not None else ""
+        found = self._proposal.said if self._proposal is not None and self._posing.pose is not None else ""
         self._panel.run.show_mark(moment.tracking, tokens, found)
         self._panel.show.show_legend(tokens, max(1, moment.layer_count), moment.truth is not None)
 
     def draw_pictures(self) -> None:
         """Bring the pictures on the cameras up to date."""
         if self.run is not None and (self.options.pictures or self.shown.look_through):
-            moment = self.run.moment(self.shown.frame, self.live, self._edited, self.options.track)
+            moment = self.run.moment(self.shown.frame, self.live, self._posing.pose, self.options.track)
             self.run.hang(moment, self.options, self.shown.layer)
 
     def _dress(self) -> None:
