@@ -99,7 +99,7 @@ def _height_in(cameras: Sequence[Camera], views: Mapping[str, Bytes]) -> float |
     normal, right = np.zeros((3, 3)), np.zeros(3)
     for camera in seen:
         middle = np.mean(np.nonzero(views[camera.name]), axis=1)[::-1]
-        ahead = _rays(camera, middle[None])[0]
+        ahead = rays_of(camera, middle[None])[0]
         across = np.eye(3) - np.outer(ahead, ahead)
         normal += across
         right += across @ camera.centre
@@ -124,7 +124,7 @@ def _height_in(cameras: Sequence[Camera], views: Mapping[str, Bytes]) -> float |
     return float(np.median(tops) - np.median(bottoms)) if tops else None
 
 
-def _rays(camera: Camera, pixels: Array) -> Array:
+def rays_of(camera: Camera, pixels: Array) -> Array:
     """(K, 3) unit directions in the world."""
     flat = cv2.undistortPoints(pixels[:, None], camera.matrix, camera.distortion)[:, 0]
     ahead = np.column_stack([flat, np.ones(len(flat))]) @ camera.rotation
@@ -138,7 +138,7 @@ def _miss(one: Camera, two: Camera, first: Array, second: Array) -> float:
     if length < 1e-9:
         return CLIPPED
     axis = baseline / length
-    rays = _rays(one, first), _rays(two, second)
+    rays = rays_of(one, first), rays_of(two, second)
     middle = rays[0].mean(axis=0)
     middle = middle - (middle @ axis) * axis
     if np.linalg.norm(middle) < 1e-6:

@@ -1,0 +1,61 @@
+"""`studio align`."""
+
+import click
+
+from studio.cli.output import command, note, progress
+from studio.errors import RunError
+from studio.runs.aligning import align_cameras, keep_alignment
+from studio.sessions.workspace import Workspace
+
+
+@click.command(name="align")
+@click.argument("session")
+@click.option("--frames", default="", metavar="A,B,…", help="To look at; default: sixteen, evenly spread.")
+@click.option("--dry-run", is_flag=True, help="Only tell; change nothing.")
+@command
+def align_command(session: str, frames: str, dry_run: bool) -> dict[str, object]:
+    """Turn SESSION's cameras a little so that the silhouettes of all views agree.
+
+    For calibrations that are nearly right: a camera that was touched after it. Needs masks (studio background) of a
+    person who is whole in the pictures. The calibration before is kept; nothing is changed where the cameras agree.
+    """
+    opened = Workspace().resolve(session)
+    with progress(f"{opened.name}: cameras") as report:
+        aligned = align_cameras(opened, _numbers(frames), progress=report)
+    lines = list(aligned.in_words())
+    kept = aligned.needed and aligned.better and not dry_run
+    if kept:
+        change = keep_alignment(opened, aligned)
+        for line in change.notes:
+            note(line)
+        lines.append("The session uses the turned cameras from now on; the calibration before is kept.")
+    elif not aligned.needed:
+        lines.append("The cameras agree: nothing was changed.")
+    elif not aligned.better:
+        lines.append(
+            "Turning cameras does not explain it: nothing was changed. Look at masks and calibration."
+        )
+    return {
+        "session": opened.name,
+        "changed": kept,
+        "frames": list(aligned.found.frames),
+        "cameras": [
+            {
+                "camera": name,
+                "before_px": float(before),
+                "after_px": float(after),
+                "turn_degrees": float(turn),
+            }
+            for name, before, after, turn in zip(
+                aligned.names, aligned.found.before, aligned.found.after, aligned.found.turns, strict=True
+            )
+        ],
+        "text": "\n".join(lines),
+    }
+
+
+def _numbers(text: str) -> tuple[int, ...]:
+    try:
+        return tuple(int(word) for word in text.split(",") if word.strip())
+    except ValueError:
+        raise RunError(f"Frames '{text}' cannot be understood.", "Write numbers: 10,40,80.") from None

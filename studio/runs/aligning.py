@@ -1,0 +1,107 @@
+"""A session's cameras turned a little so that its silhouettes agree (`calibration.silhouette_alignment`)."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.calibration.silhouette_alignment import AlignedCameras, aligned_cameras
+from studio.calibration.silhouette_checks import outlines_of
+from studio.errors import CalibrationError
+from studio.evidence.backgrounds import Backgrounds
+from studio.evidence.pipeline import EvidenceMaker
+from studio.runs.mask_quality import spread_frames
+from studio.runs.session_settings import session_settings
+from studio.sessions.calibration_changes import CalibrationChange, NewCalibration, replace_calibration
+from studio.sessions.session import Session
+
+Bytes = NDArray[np.uint8]
+Progress = Callable[[str, int, int], None]
+
+FRAMES = 16
+WORTHWHILE = 3.0
+"""Pixels by which tangents miss (the worst camera's median) from which on aligning is advised."""
+BETTER = 0.8
+"""An alignment whose worst camera misses more than this share of before has found nothing."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SessionAlignment:
+    """What aligning found. names : of the cameras, as `found` has them. better : whether it explains the misses."""
+
+    names: tuple[str, ...]
+    found: AlignedCameras
+
+    @property
+    def needed(self) -> bool:
+        """Whether the cameras as they are miss by enough to matter."""
+        return bool(np.nanmax(self.found.before) > WORTHWHILE)
+
+    @property
+    def better(self) -> bool:
+        """Whether turning the cameras explains most of it."""
+        return bool(np.nanmax(self.found.after) < BETTER * np.nanmax(self.found.before))
+
+    def in_words(self) -> tuple[str, ...]:
+        """One line a camera."""
+        found = self.found
+        return tuple(
+            f"{name:12} silhouettes miss by {before:.1f} px, {after:.1f} px when turned by {turn:.2f}°"
+            for name, before, after, turn in zip(
+                self.names, found.before, found.after, found.turns, strict=True
+            )
+        )
+
+
+def align_cameras(
+    session: Session, frames: Sequence[int] = (), *, progress: Progress | None = None
+) -> SessionAlignment:
+    """How a session's cameras should be turned; nothing is written (`keep_alignment`).
+
+    frames : to look at; default: sixteen, evenly spread. Raises CalibrationError for a single camera or too few whole
+    silhouettes, FootageError, NotFoundError.
+    """
+    cameras = session.cameras()
+    if len(cameras) < 2:
+        raise CalibrationError(
+            f"Session '{session.name}' has one camera: there is nothing to align it with.",
+            "Look at the outlines instead.",
+        )
+    footage = session.footage()
+    try:
+        chosen = tuple(frames) or spread_frames(footage.frame_count, FRAMES)
+        settings = session_settings(session).evidence
+        maker = EvidenceMaker(cameras, footage, Backgrounds(footage), settings, "none")
+        masks: dict[int, dict[str, Bytes]] = {}
+        for done, frame in enumerate(chosen):
+            if progress is not None:
+                progress("looking at silhouettes", done, len(chosen))
+            masks[frame] = {view.camera: largest_piece(view.mask) for view in maker.evidence(frame).views}
+    finally:
+        footage.close()
+    found = aligned_cameras(cameras, outlines_of(cameras, masks))
+    if progress is not None:
+        progress("looking at silhouettes", len(chosen), len(chosen))
+    return SessionAlignment(tuple(camera.name for camera in cameras), found)
+
+
+def keep_alignment(session: Session, aligned: SessionAlignment) -> CalibrationChange:
+    """Let the session use the aligned cameras; the calibration before is kept. Raises SessionError while tracking."""
+    source = session.manifest.calibration_source
+    turned = ", ".join(
+        f"{name} {turn:.2f}°" for name, turn in zip(aligned.names, aligned.found.turns, strict=True)
+    )
+    note = f"Cameras turned by their silhouettes: {turned}."
+    new = NewCalibration(aligned.found.cameras, f"{source}, aligned by silhouettes", notes=(note,))
+    return replace_calibration(session, new)
+
+
+def largest_piece(mask: Bytes) -> Bytes:
+    """(H, W) the largest connected piece of a mask: specks would be touched first."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats((mask > 0).astype(np.uint8))
+    if count < 2:
+        return mask
+    largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+    return np.asarray(255 * (labels == largest), dtype=np.uint8)
