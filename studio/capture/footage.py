@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.capture.footage_source import CameraSource, FootageSource
+from studio.capture.numbered_pictures import NumberedReader, has_picture
 from studio.capture.pictures import PictureReader, read_picture
 from studio.capture.video import VideoReader
 from studio.errors import FootageError, NotFoundError
@@ -96,6 +97,21 @@ class Footage:
         entry = self._by_name[camera].background
         return self.folder / entry if entry else None
 
+    def absent(self, frame: int) -> frozenset[str]:
+        """Cameras without a picture of a frame that others have: live ones that had stopped. Nothing may be concluded
+        from what `picture` shows in its place.
+        """
+        numbered = [camera for camera in self.source.cameras if camera.kind == "numbered"]
+        if not numbered:
+            return frozenset()
+        index = self._checked(frame)
+        missing = {
+            camera.name
+            for camera in numbered
+            if not has_picture(self.folder / camera.path, index + camera.offset)
+        }
+        return frozenset(missing) if len(missing) < len(self.cameras) else frozenset()
+
     def exclusion(self, camera: str) -> Bytes | None:
         """(H, W) uint8, 255 where nothing that a camera sees counts, None where all does: `exclusions/<camera>.png`.
 
@@ -157,6 +173,8 @@ def camera_reader(source: CameraSource, session_folder: Path) -> Reader:
     path = session_folder / source.path
     if source.kind == "video":
         return VideoReader(path, source.frame_count)
+    if source.kind == "numbered":
+        return NumberedReader(path)
     return PictureReader(path, source.frame_count)
 
 

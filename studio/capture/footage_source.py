@@ -15,9 +15,10 @@ TURNS: tuple[Turn, ...] = (0, 90, 180, 270)
 class CameraSource:
     """One camera's footage.
 
-    name : the camera's name in `calibration/cameras.toml`. kind : a video file or a folder of pictures.
-    path, masks, background : relative to the session folder with forward slashes, or absolute where the
-    footage is referred to; masks (video or folder) and background (picture or clip) are "" if there is
+    name : the camera's name in `calibration/cameras.toml`. kind : a video file, a folder of pictures, or one of
+    pictures that are named by their frames' numbers, some of which the camera may not have ("numbered"). path, masks,
+    background : relative to the session folder with forward slashes, or absolute where the footage is referred to;
+    masks (video or folder) and background (picture or clip) are "" if there is
     none.
     width, height : pixels, as they are after turning. frame_count : frames that decode, whatever the file's header
     claims. offset : the file's frame that was taken at the session's frame 0. turned : degrees clockwise by which the
@@ -25,7 +26,7 @@ class CameraSource:
     """
 
     name: str
-    kind: Literal["video", "pictures"]
+    kind: Literal["video", "pictures", "numbered"]
     path: str
     width: int
     height: int

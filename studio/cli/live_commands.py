@@ -1,19 +1,26 @@
 """`studio live`."""
 
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+
 import click
 
 from studio.cli.output import command, note, progress
+from studio.cli.recording_commands import CAMERA_OPTION, addresses_of
 from studio.cli.tracking_commands import chosen_changes, knob_options
 from studio.errors import RunError
 from studio.runs.live_replay import prepare_replay
 from studio.runs.live_request import last_of
 from studio.runs.live_summary import LiveSummary, in_words, summary_of
 from studio.runs.new_run import RunRequest, prepare_run
+from studio.sessions.names import free_name
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
 from studio.tracking.catalogue import TRACKERS
 from studio.weighting.catalogue import WEIGHTINGS
+from studio.worker.camera_tracking import TakeWish, track_cameras
 from studio.worker.live_tracking import replay_live, track_live
 
 
@@ -34,6 +41,11 @@ from studio.worker.live_tracking import replay_live, track_live
 @click.option(
     "--replay", metavar="RUN", help="Track a live run's frames again, without the clock, and compare."
 )
+@CAMERA_OPTION
+@click.option("--into", metavar="SESSION", help="With --camera: the session that keeps what the cameras saw.")
+@click.option(
+    "--seek-start", is_flag=True, help="With --camera: search the start pose in the first pictures."
+)
 @command
 def live(
     session: str,
@@ -43,13 +55,28 @@ def live(
     resume: str | None,
     replay: str | None,
     changes: tuple[str, ...],
+    cameras: tuple[str, ...],
+    into: str | None,
+    seek_start: bool,
     **asked: str | None,
 ) -> dict[str, object]:
     """Track a SESSION as its pictures come: at the footage's own rate, dropping frames rather than falling behind.
 
+    With --camera live cameras are tracked with the session's calibration, empty room and person, and recorded at once
+    into a session of their own, where the run is tracked again bit for bit with --replay.
+
     Ctrl-C ends it and keeps what was tracked.
     """
     opened = Workspace().resolve(session)
+    if cameras:
+        if repeat or resume or replay or first:
+            raise RunError(
+                "Live cameras have no footage to begin in, repeat or go on with.", "Leave that out."
+            )
+        wish = TakeWish(_place(opened, into), seconds, keep_start=not seek_start)
+        return _from_cameras(opened, cameras, wish, _request(asked, changes))
+    if into or seek_start:
+        raise RunError("--into and --seek-start are for live cameras.", "Give them with --camera.")
     if replay:
         return _replayed(opened, opened.run(replay), asked["name"] or "")
     if repeat and seconds is None and not resume:
@@ -57,14 +84,10 @@ def live(
     if resume:
         run = opened.run(resume)
     else:
-        named = ("tracker", "weighting", "body", "behaviour", "seed", "name")
-        knobs = {key: value for key, value in asked.items() if value is not None and key not in named}
-        request = RunRequest(
-            **{key: asked[key] for key in named},  # pyright: ignore[reportArgumentType]
+        request = dataclasses.replace(
+            _request(asked, changes),
             first=first,
             last=last_of(opened, first, seconds, repeat),
-            changes=chosen_changes(changes) | knobs,
-            live=True,
             to_and_fro=repeat,
         )
         with progress(f"{opened.name}: getting ready") as report:
@@ -78,6 +101,48 @@ def live(
         note(f"{opened.name} / {run.name}: {_in_words(summary_of(run))}")
         raise
     return {**_told(run, found), "text": f"{opened.name} / {run.name}: {_in_words(found)}"}
+
+
+def _request(asked: Mapping[str, str | None], changes: tuple[str, ...]) -> RunRequest:
+    """What is asked of a live run, by the command's options."""
+    named = ("tracker", "weighting", "body", "behaviour", "seed", "name")
+    knobs = {key: value for key, value in asked.items() if value is not None and key not in named}
+    return RunRequest(
+        **{key: asked[key] for key in named},  # pyright: ignore[reportArgumentType]
+        changes=chosen_changes(changes) | knobs,
+        live=True,
+    )
+
+
+def _place(session: Session, into: str | None) -> Path:
+    """Where the take of live cameras is made: beside its session unless said otherwise."""
+    if into:
+        return Workspace().place_for(into)
+    taken = {path.name for path in session.path.parent.iterdir()}
+    return session.path.with_name(free_name(f"{session.name}-live", taken))
+
+
+def _from_cameras(
+    session: Session, cameras: tuple[str, ...], wish: TakeWish, request: RunRequest
+) -> dict[str, object]:
+    with progress(f"{wish.into.name}") as report:
+        found = track_cameras(session, addresses_of(cameras), wish, request, report)
+    for line in (*found.run.record.notes, *(notice.in_words for notice in found.standing.notices)):
+        note(line)
+    spreads = found.standing.spreads
+    return {
+        **_told(found.run, found.summary),
+        "sets": found.standing.sets,
+        "ended": found.standing.ended,
+        "spread_ms": {"median": spreads.median, "p95": spreads.most, "worst": spreads.worst},
+        "apart": spreads.apart,
+        "lagging": spreads.lagging,
+        "stopped": [
+            {"camera": one.camera, "state": one.state, "at": one.seconds, "noticed_after": one.silent}
+            for one in found.standing.notices
+        ],
+        "text": f"{found.session.name} / {found.run.name}: {_in_words(found.summary)}; {spreads.in_words}",
+    }
 
 
 def _replayed(session: Session, run: StoredRun, name: str) -> dict[str, object]:

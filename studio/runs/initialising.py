@@ -114,7 +114,7 @@ def initialise(
         tell("looking at the frame", 0, 1)
         evidence = problems.evidence(frame, settings)
         masks = problems.evidence(frame, session_settings(session, DEFAULT_TRACKER, WEIGHTING))
-        cameras = problems.cameras
+        cameras = problems.cameras_in(frame)
     finally:
         problems.close()
     if not anything_seen(masks):

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from studio.errors import NotFoundError
 from studio.sessions.stored_run import StoredRun
+from studio.sessions.takes import read_sets
 
 Array = NDArray[np.float64]
 
@@ -107,7 +108,10 @@ def summary_of(run: StoredRun) -> LiveSummary:
         tracked, over = results.frames(), results.ended() == "finished"
         _, times = results.arrivals()
     came = range(tracked[0], run.record.last if over else tracked[-1] + 1) if tracked else range(0)
-    known = set(tracked)
+    known, sets = set(tracked), read_sets(run.folder.parents[1]).sets
+    if sets and tracked:
+        # Of a take, the sets that live cameras gave: numbers between them tell only the time.
+        came = [one.frame for one in sets if one.frame >= tracked[0]]
     return LiveSummary(
         tracked=tuple(tracked),
         dropped=tuple(frame for frame in came if frame not in known),

@@ -24,7 +24,8 @@ from studio.weighting.catalogue import WEIGHTINGS
 
 KEPT_FRAMES = 4
 """Evidence kept: the frame at hand, the one made ready, and two to go back to."""
-KEPT_WEIGHERS = 2
+KEPT_WEIGHERS = 4
+"""For two settings, each with all cameras and without one that has stopped."""
 
 T = TypeVar("T")
 
@@ -77,7 +78,7 @@ class ProblemSource:
             found = _kept(self._evidence, key)
             if found is None:
                 maker = EvidenceMaker(
-                    self.cameras,
+                    self.cameras_in(frame),
                     self.footage,
                     self._backgrounds,
                     settings.evidence,
@@ -86,6 +87,11 @@ class ProblemSource:
                 )
                 found = _keep(self._evidence, key, maker.evidence(frame), KEPT_FRAMES)
             return found
+
+    def cameras_in(self, frame: int) -> tuple[Camera, ...]:
+        """The cameras that have a picture of the frame; the others are left out of evidence and weight."""
+        absent = self.footage.absent(frame)
+        return tuple(camera for camera in self.cameras if camera.name not in absent)
 
     def close(self) -> None:
         """Let go of the footage and of everything kept."""
@@ -107,15 +113,15 @@ class ProblemSource:
             return found
         evidence = self.evidence(frame, settings)
         with self._making:
-            weigher = self._weigher(settings)
+            weigher = self._weigher(settings, self.cameras_in(frame))
             return _keep(self._problems, key, weigher.problem(evidence), KEPT_FRAMES)
 
-    def _weigher(self, settings: RunSettings) -> Any:  # noqa: ANN401 - each weighting has a type of its own
-        key = (settings.weighting_name, settings.weighting)
+    def _weigher(self, settings: RunSettings, cameras: tuple[Camera, ...]) -> Any:  # noqa: ANN401 - as weightings are
+        key = (settings.weighting_name, settings.weighting, tuple(camera.name for camera in cameras))
         found = _kept(self._weighers, key)
         if found is None:
             weighting = WEIGHTINGS[settings.weighting_name]
-            made = weighting.prepare(self.body, self.cameras, settings.weighting)
+            made = weighting.prepare(self.body, cameras, settings.weighting)
             found = _keep(self._weighers, key, made, KEPT_WEIGHERS)
         return found
 

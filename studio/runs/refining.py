@@ -163,11 +163,19 @@ class _FrameRefiner:
     def refined(self, frame: int, pose: Array) -> tuple[Array, float, float | None]:
         """Pose, overlap of the silhouettes and gain of the log-weight (None where the pose was kept)."""
         evidence, problem = self._seen(frame)
-        found = self._refiner.refine(pose, silhouette_distances(evidence), problem)
+        refiner = self._refiner_of(tuple(view.camera for view in evidence.views))
+        found = refiner.refine(pose, silhouette_distances(evidence), problem)
         overlap = self._onlooker.sight(evidence, found.pose).overlap
         if overlap < self._refiner.settings.refinement_least_overlap:
             return pose, self._onlooker.sight(evidence, pose).overlap, None
         return found.pose, overlap, found.gain if found.moved else None
+
+    def _refiner_of(self, views: tuple[str, ...]) -> Refiner:
+        """For the views that a frame has: of a live camera that had stopped there is none."""
+        if len(views) == len(self._cameras):
+            return self._refiner
+        cameras = tuple(camera for camera in self._cameras if camera.name in views)
+        return Refiner(self._body, cameras, self._refiner.settings)
 
     def _seen(self, frame: int) -> tuple[FrameEvidence, FrameProblem]:
         entry = self._history.in_use(frame, 0)

@@ -220,7 +220,8 @@ class RunWatch:
         masks: FrameEvidence,
     ) -> ParticleSet:
         assert self._problems is not None
-        body, cameras = self._problems.body, self._problems.cameras
+        body, there = self._problems.body, {view.camera for view in masks.views}
+        cameras = tuple(camera for camera in self._problems.cameras if camera.name in there)
         hull, box, _ = hull_of(body, cameras, masks)
         prototypes = None if space.behaviour is None else space.behaviour.prototypes.poses
         problem = whole_problem(body, cameras, _seeking(settings), masks)

@@ -97,10 +97,11 @@ class Sight:
 
 
 class Onlooker:
-    """Compares poses with evidence; holds nothing that changes."""
+    """Compares poses with evidence, which may be of some of the cameras only."""
 
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...]) -> None:
-        self._projector = OutlineProjector.of_body(body, cameras)
+        self._body, self._cameras = body, {camera.name: camera for camera in cameras}
+        self._projectors = {tuple(self._cameras): OutlineProjector.of_body(body, cameras)}
 
     def sight(self, evidence: FrameEvidence, pose: Array, problem: FrameProblem | None = None) -> Sight:
         """How a pose (D,) agrees with a frame's evidence. problem : the frame's, told what was expected."""
@@ -113,11 +114,19 @@ class Onlooker:
             empty = isinstance(problem, SelfJudging) and problem.quality == -np.inf
             return Sight(float("nan"), seen=not empty, judged_lost=lost)
         silhouettes = Silhouettes(evidence, HALF)
-        areas = silhouettes.areas(self._projector.blocks(pose[None]), 1)
+        areas = silhouettes.areas(self._projector(evidence).blocks(pose[None]), 1)
         own = areas.projected[0] + areas.outside[0]
         shown = (areas.observed >= LEAST_AREA * own) & ~np.array(blank)
         overlap = float(areas.fitness()[0][~np.array(blank)].mean())
         return Sight(overlap, seen=bool((shown & (areas.observed > 0)).any()), judged_lost=lost)
+
+    def _projector(self, evidence: FrameEvidence) -> OutlineProjector:
+        names = tuple(view.camera for view in evidence.views)
+        found = self._projectors.get(names)
+        if found is None:
+            cameras = tuple(self._cameras[name] for name in names)
+            found = self._projectors[names] = OutlineProjector.of_body(self._body, cameras)
+        return found
 
 
 class WeightWatch:

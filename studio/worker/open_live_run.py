@@ -10,9 +10,11 @@ from studio.runs.live_problems import LiveProblems
 from studio.runs.live_run import LiveRun
 from studio.runs.problem_source import ProblemSource
 from studio.runs.run_footage import footage_of
+from studio.runs.take_following import TakeFollower
 from studio.runs.tracking_run import Stepped, TrackingRun
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
+from studio.sessions.takes import is_being_recorded
 from studio.worker.live_pipeline import LivePipeline
 from studio.worker.open_run import OpenRun
 
@@ -26,12 +28,13 @@ MakeSource = Callable[[StoredRun, int], LiveSource]
 class OpenLiveRun(OpenRun):
     """One live run, opened for tracking. Its clock runs from one `step_layer` to `rest`.
 
-    make_source : of its sets, for (run, number of cameras); by default its footage is replayed at its own rate.
+    make_source : of its sets, for (run, number of cameras); by default those of a take that is being recorded, else its
+    footage is replayed at its own rate.
     """
 
     def __init__(self, session_folder: str, run_folder: str, make_source: MakeSource | None = None) -> None:
         self._storing = ThreadPoolExecutor(1, thread_name_prefix="storing")
-        self._make_source = make_source or replayed
+        self._make_source = make_source or source_of
         self._pipeline: LivePipeline | None = None
         try:
             super().__init__(session_folder, run_folder)
@@ -107,8 +110,11 @@ class OpenLiveRun(OpenRun):
         return self.live
 
 
-def replayed(run: StoredRun, cameras: int) -> LiveSource:
-    """The footage of a run, replayed at its own rate."""
+def source_of(run: StoredRun, cameras: int) -> LiveSource:
+    """The sets of a run: live cameras' where its session is a take that is being recorded, else its footage's."""
+    session = run.folder.parents[1]
+    if is_being_recorded(session):
+        return TakeFollower(session)
     return ReplayClock(run.record.fps, run.record.last, cameras)
 
 

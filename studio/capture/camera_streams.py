@@ -1,0 +1,155 @@
+"""A live camera's stream opened and read: pictures as they come, by PyAV.
+
+The format is given, never guessed (a page that answers with a list of other addresses is not followed), only the
+protocols of cameras are spoken, and a read that takes too long is an error instead of a wait.
+"""
+
+import fractions
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import av
+import av.container
+import av.error
+import av.video
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.capture.camera_addresses import CameraAddress
+from studio.capture.video_probe import MAX_PIXELS, open_video, reason
+from studio.errors import FootageError
+
+Bytes = NDArray[np.uint8]
+
+SECONDS_TO_OPEN, SECONDS_TO_READ = 5.0, 2.0
+HUFFMAN_TABLES = b"\xff\xc4"
+"""Some devices leave these out of their JPEG; then the bytes cannot be kept as a picture."""
+FORMATS = {"http": "mpjpeg", "rtsp": "rtsp", "usb": "video4linux2"}
+OPTIONS = {
+    "http": {"protocol_whitelist": "http,https,tcp,tls,crypto", "fflags": "nobuffer", "probesize": "100000",
+             "reconnect": "0", "strict_mime_boundary": "0"},
+    "rtsp": {"protocol_whitelist": "rtsp,rtsps,rtp,srtp,tcp,tls,udp", "rtsp_transport": "tcp", "fflags": "nobuffer"},
+    "usb": {"input_format": "mjpeg"},
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shot:
+    """A picture of a stream. pixels : (H, W, 3) uint8 BGR. jpeg : its bytes where the stream was JPEG, else b"". came :
+    seconds of the clock at which it had arrived, before it was decoded.
+    """
+
+    pixels: Bytes
+    jpeg: bytes
+    came: float
+
+
+# Opens a camera: yields its pictures until the stream ends; raises FootageError where it breaks.
+OpenStream = Callable[[CameraAddress], Iterator[Shot]]
+# Waits so many seconds, or until whoever waits is told to stop: then it says True.
+Wait = Callable[[float], bool]
+
+
+def open_stream(
+    address: CameraAddress,
+    wait: Wait,
+    clock: Callable[[], float] = time.monotonic,
+    released: Callable[[], bool] = lambda: True,
+) -> Iterator[Shot]:
+    """The pictures of a camera as they come; released : whether a replayed video may go on from its first one.
+
+    Raises FootageError, also in the middle.
+    """
+    if address.kind == "replay":
+        yield from replayed_video(Path(address.url), wait, clock, released)
+        return
+    try:
+        with _opened(address) as container:
+            stream = container.streams.video[0]
+            stream.thread_type = "NONE"
+            stream.codec_context.options = {"max_pixels": str(MAX_PIXELS)}
+            yield from _shots(container, stream, clock)
+    except (av.error.FFmpegError, OSError, IndexError) as problem:
+        # A library's own words may hold the address with its password.
+        raise FootageError(
+            f"Camera {address.name} ({address.shown}) gives no pictures ({_why(problem)}).",
+            "Check that it is switched on, its address, and its name and password.",
+        ) from None
+
+
+def replayed_video(
+    path: Path,
+    wait: Wait,
+    clock: Callable[[], float] = time.monotonic,
+    released: Callable[[], bool] = lambda: True,
+) -> Iterator[Shot]:
+    """A video as if it were a camera: each picture when its time has come, the first one again and again until it is
+    released. Raises FootageError.
+    """
+    try:
+        with open_video(path) as container:
+            stream = container.streams.video[0]
+            step = float(1 / (stream.average_rate or stream.guessed_rate or fractions.Fraction(30)))
+            due = clock()
+            for number, frame in enumerate(container.decode(stream)):
+                pixels = _pixels(frame)
+                while True:
+                    if wait(max(0.0, due - clock())):
+                        return
+                    yield Shot(pixels, b"", clock())
+                    # A still picture need not be made up for.
+                    due = due + step if number else max(due + step, clock())
+                    if number or released():
+                        break
+    except av.error.FFmpegError as problem:
+        raise FootageError(
+            f"'{path.name}' cannot be replayed ({reason(problem)}).", "Copy or export the video again."
+        ) from None
+
+
+def _opened(address: CameraAddress) -> av.container.InputContainer:
+    given = {
+        "format": FORMATS[address.kind],
+        "timeout": (SECONDS_TO_OPEN, SECONDS_TO_READ),
+    }
+    try:
+        return av.open(address.url, options=OPTIONS[address.kind], **given)
+    except (av.error.FFmpegError, OSError):
+        if address.kind != "usb":
+            raise
+        # Not every device speaks JPEG.
+        return av.open(address.url, **given)
+
+
+def _shots(
+    container: av.container.InputContainer, stream: av.video.VideoStream, clock: Callable[[], float]
+) -> Iterator[Shot]:
+    """Decoded pictures; one that is damaged is left out, the next one is awaited."""
+    is_jpeg = stream.codec_context.name == "mjpeg"
+    for packet in container.demux(stream):
+        if not packet.size:
+            continue
+        came = clock()
+        try:
+            frames = packet.decode()
+        except av.error.InvalidDataError:
+            continue
+        content = bytes(packet) if is_jpeg else b""
+        for frame in frames:
+            if isinstance(frame, av.VideoFrame) and not frame.is_corrupt:
+                kept = content if HUFFMAN_TABLES in content else b""
+                yield Shot(_pixels(frame), kept, came)
+
+
+def _pixels(frame: av.VideoFrame) -> Bytes:
+    """(H, W, 3) uint8 BGR."""
+    return frame.to_ndarray(format="bgr24").astype(np.uint8, copy=False)
+
+
+def _why(problem: Exception) -> str:
+    """What a library says went wrong, without the address."""
+    if isinstance(problem, IndexError):
+        return "no video in it"
+    return str(getattr(problem, "strerror", "") or type(problem).__name__)

@@ -1,0 +1,108 @@
+"""What was recorded from live cameras, made a session like any other: offsets by the times at which pictures came."""
+
+import shutil
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.capture.calibration_files import read_calibration
+from studio.capture.camera_sets import APART, SpreadFigures, furthest, spread_figures
+from studio.capture.cut_recordings import mend_recording
+from studio.capture.timestamps import read_timestamps
+from studio.errors import FootageError
+from studio.sessions.importers.catalogue import ImportReport, import_source
+from studio.sessions.session import CAMERAS_PATH, Session, described_anew
+
+TIMES_NAME = "timestamps.csv"
+LATE_SECONDS = 1e-6
+
+
+def calibration_given(place: str | Path) -> Path:
+    """The calibration's file or folder; of a session its own. Raises FootageError."""
+    path = Path(place).expanduser()
+    if (path / CAMERAS_PATH).is_file():
+        return path / CAMERAS_PATH
+    if not path.exists():
+        raise FootageError(f"There is no calibration '{place}'.", "Give its file, or a session that has one.")
+    return path
+
+
+def check_cameras(calibration: Path, names: Sequence[str]) -> None:
+    """Raises FootageError where a camera to be recorded is not in the calibration; before an hour is recorded."""
+    known = [camera.name for camera in read_calibration(calibration).cameras]
+    for name in names:
+        if name not in known:
+            raise FootageError(
+                f"Camera {name} is not in '{calibration.name}'.",
+                f"Name cameras as it does: {', '.join(known)}.",
+            )
+
+
+def import_recording(
+    folder: Path,
+    into: Path,
+    calibration: Path,
+    notes: Sequence[str] = (),
+    progress: Callable[[str, int, int], None] | None = None,
+) -> tuple[ImportReport, SpreadFigures]:
+    """Make a session at `into` of a recording, which is then removed; a recording that was cut off is mended first.
+
+    Also how far apart the pictures of one frame were taken. Raises StudioError; then the recording stays.
+    """
+    for path in sorted((folder / "videos").glob("*.mp4")):
+        mend_recording(path)
+    place = folder / "calibration"
+    if place.exists():
+        shutil.rmtree(place)
+    if calibration.is_dir():
+        shutil.copytree(calibration, place)
+    else:
+        place.mkdir()
+        shutil.copyfile(calibration, place / calibration.name)
+    report = import_source(folder, into, calibration=None, progress=progress)
+    spreads = spreads_of(folder / TIMES_NAME, report.session)
+    shutil.copyfile(folder / TIMES_NAME, report.session.path / TIMES_NAME)
+    said = f"{spreads.in_words[0].upper()}{spreads.in_words[1:]}."
+    manifest = report.session.manifest
+    described = described_anew(
+        report.session,
+        msgspec.structs.replace(
+            manifest,
+            title=into.name,
+            imported_from="live cameras",
+            notes=(*manifest.notes, "Recorded from live cameras.", said),
+            warnings=(*manifest.warnings, *notes, *((said,) if spreads.apart else ())),
+        ),
+    )
+    shutil.rmtree(folder, ignore_errors=True)
+    found = ImportReport(
+        described, report.matching, (*report.notes, said), (*report.warnings, *notes), report.layout
+    )
+    return found, spreads
+
+
+def spreads_of(path: Path, session: Session) -> SpreadFigures:
+    """How far apart pictures of one frame were taken, by a recorder's times and the session's offsets."""
+    source = session.manifest.footage
+    times = read_timestamps(path)
+    cut = {
+        camera.name: times[camera.name][camera.offset : camera.offset + source.frame_count]
+        for camera in source.cameras
+        if camera.name in times
+    }
+    count = min(map(len, cut.values()), default=0)
+    return figures_of({name: moments[:count] for name, moments in cut.items()}, source.fps)
+
+
+def figures_of(times: dict[str, NDArray[np.float64]], fps: float) -> SpreadFigures:
+    """Figures of frames whose pictures came at these times (K,) by camera, seconds."""
+    rows = np.stack(list(times.values()), axis=1) if times else np.zeros((0, 1))
+    spreads = rows.max(axis=1) - rows.min(axis=1) if len(rows) else np.zeros(0)
+    late = [
+        furthest(dict(zip(times, row.tolist(), strict=True))) if spread > APART / fps + LATE_SECONDS else ""
+        for row, spread in zip(rows, spreads, strict=True)
+    ]
+    return spread_figures(spreads, late)

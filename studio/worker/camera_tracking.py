@@ -1,0 +1,111 @@
+"""Live cameras tracked and recorded at once, in this process: for commands and scripts."""
+
+import contextlib
+import math
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from studio.capture.camera_addresses import CameraAddress
+from studio.errors import RunError, StudioError
+from studio.runs.live_summary import LiveSummary
+from studio.runs.new_run import RunRequest, prepare_run
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.sessions.takes import begin_take
+from studio.worker.camera_readers import CameraReaders
+from studio.worker.live_tracking import Report, track_live
+from studio.worker.take_recording import TakeRecording, TakeStanding
+
+LONGEST_SECONDS = 3600.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackedCameras:
+    """session : the take. standing : of its recording, at the end."""
+
+    session: Session
+    run: StoredRun
+    summary: LiveSummary
+    standing: TakeStanding
+
+
+@dataclass(frozen=True, slots=True)
+class TakeWish:
+    """into : where the take is made. seconds : at most, None for an hour. fps : sets a second, 0 as measured.
+
+    keep_start : the person begins in the session's start pose; else that is searched in the first set.
+    """
+
+    into: Path
+    seconds: float | None = None
+    fps: float = 0.0
+    keep_start: bool = True
+
+
+def open_take(base: Session, readers: CameraReaders, wish: TakeWish) -> TakeRecording:
+    """Begin a take of cameras that run, its first set recorded. Raises StudioError; then nothing is left of it."""
+    seconds = LONGEST_SECONDS if wish.seconds is None else wish.seconds
+    if not (math.isfinite(seconds) and 0.0 < seconds <= 24 * LONGEST_SECONDS):
+        raise RunError(f"A take cannot last {seconds:g} seconds.", "Give a number above 0.")
+    readers.await_pictures()
+    fps = wish.fps or readers.await_rate()
+    names = readers.cameras.names
+    frames = math.ceil(seconds * fps) + 1
+    take = begin_take(base, wish.into, names, fps, frames, keep_start=wish.keep_start)
+    recording = TakeRecording(readers, take)
+    try:
+        recording.await_first()
+    except BaseException:
+        discard_take(recording)
+        raise
+    return recording
+
+
+def discard_take(recording: TakeRecording) -> None:
+    """End a take from which nothing came, and remove it."""
+    with contextlib.suppress(StudioError):
+        recording.close()
+    shutil.rmtree(recording.session.path, ignore_errors=True)
+
+
+def track_cameras(
+    base: Session,
+    addresses: Sequence[CameraAddress],
+    wish: TakeWish,
+    request: RunRequest,
+    report: Report,
+    *,
+    readers: CameraReaders | None = None,
+) -> TrackedCameras:
+    """Track what cameras see with a session's calibration, empty room and person, and keep it as a session of its own.
+
+    request : of the live run. report : told how it goes. readers : of cameras that are open already; they are closed at
+    the end. Raises StudioError; KeyboardInterrupt is passed on, what was tracked is kept.
+    """
+    with readers or CameraReaders(addresses) as opened:
+        report("waiting for the cameras", 0, 1)
+        recording = open_take(base, opened, wish)
+        try:
+            run = prepare_run(recording.session, request, report)
+        except BaseException:
+            discard_take(recording)
+            raise
+        said = _Words(recording, report)
+        try:
+            summary = track_live(recording.session, run, said)
+        finally:
+            session = recording.close()
+    return TrackedCameras(session, session.run(run.name), summary, recording.standing)
+
+
+class _Words:
+    """Reports of the tracker with what is to be said of the cameras."""
+
+    def __init__(self, recording: TakeRecording, report: Callable[[str, int, int], None]) -> None:
+        self._recording, self._report = recording, report
+
+    def __call__(self, step: str, done: int, total: int) -> None:
+        standing = self._recording.standing
+        self._report(f"{step} · {standing.in_words}" if standing.seconds else step, done, total)
