@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 
 from studio.body.branches import within_limits
 from studio.body.extremities import extremities
-from studio.body.forward_kinematics import limb_ends
+from studio.body.forward_kinematics import joint_frames, limb_ends
 from studio.body.inverse_kinematics import MM_PER_RADIAN
 from studio.body.model import BodyModel
 from studio.errors import BodyError
@@ -64,7 +64,8 @@ class Dragger:
         self._upper = np.array([entry.upper for entry in body.parameters])
         self._scale = np.array([1.0 if entry.kind == "angle" else MM_PER_RADIAN for entry in body.parameters])
         self._ends = extremities(body)
-        root = _moved_by(body, root_joint(body))
+        self._joint = root_joint(body)
+        root = _moved_by(body, self._joint)
         self._root = np.isin(np.arange(len(body.parameters)), root)
         self._chains = [self._chain(limb.joint) for limb in body.drawn]
         self.grips = tuple(
@@ -105,6 +106,33 @@ class Dragger:
             found = self._fitted(found, start, everything, self._whole_pull(), grip, wanted, self._ends)
             found = self._pulled(found, found, grip, wanted)
         return Dragged(found, self._left(found, grip, wanted))
+
+    def root_frame(self, pose: Array) -> Array | None:
+        """(3, 4) world from root, mm; None for a body that is fixed to the world."""
+        return None if self._joint < 0 else joint_frames(self.body, pose)[0, self._joint]
+
+    def with_root(self, pose: Array, frame: Array) -> Array:
+        """The pose with its root as near to `frame` (3, 4) as its parameters let it be; all else as it is."""
+        if self._joint < 0:
+            return np.asarray(pose, dtype=np.float64).copy()
+        free = np.flatnonzero(self._root)
+        scale = self._scale[free]
+        wanted = np.concatenate([frame[:, :3].T * MM_PER_RADIAN + frame[:, 3], frame[None, :, 3]])
+
+        def full(values: Array) -> Array:
+            poses = np.repeat(np.asarray(pose, dtype=np.float64)[None], len(values), axis=0)
+            poses[:, free] = values * scale
+            return poses
+
+        def residuals(values: Array) -> Array:
+            root = joint_frames(self.body, full(values[None]))[0, self._joint]
+            points = np.concatenate([root[:, :3].T * MM_PER_RADIAN + root[:, 3], root[None, :, 3]])
+            return (points - wanted).ravel()
+
+        begin = np.asarray(pose)[free] / scale
+        limits = (self._lower[free] / scale, self._upper[free] / scale)
+        answer = least_squares(residuals, begin, bounds=limits, max_nfev=MOST_STEPS)
+        return full(answer.x[None])[0]
 
     def _pulled(self, pose: Array, start: Array, grip: Grip, wanted: Array) -> Array:
         """Only the chain moves."""

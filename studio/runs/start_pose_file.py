@@ -1,4 +1,6 @@
-"""A start pose from a file: a CSV row of parameters, or a TRC whose markers are met by inverse kinematics."""
+"""A start pose from a file: a CSV row of parameters, or a TRC whose markers are met by inverse kinematics; and kept in
+the session.
+"""
 
 from pathlib import Path
 
@@ -10,11 +12,33 @@ from studio.body.model import BodyModel
 from studio.capture.trc import read_trc
 from studio.errors import RunError, TruthError
 from studio.runs.search_space import parameter_names
-from studio.sessions.named_rows import read_pose
+from studio.sessions.named_rows import read_pose, write_pose
+from studio.sessions.names import free_name
+from studio.sessions.session import START_POSE_NAME, Session
 
 Array = NDArray[np.float64]
 
 FEWEST_MARKERS = 4
+
+
+def keep_start_pose(session: Session, body: BodyModel, pose: Array) -> Path:
+    """Make a pose (D,) the session's start pose; returns the file. The one it had stays beside it as
+    start_pose-before.csv, numbered if there are more. Raises RunError for a pose of another body than the session's.
+    """
+    given = np.asarray(pose, dtype=np.float64)
+    if body.name != session.manifest.body or given.shape != (len(body.parameters),):
+        raise RunError(
+            f"A pose of body '{body.name}' is no start pose of session '{session.name}'.",
+            f"Its body is '{session.manifest.body}'; keep the pose with a run of the other one.",
+        )
+    if not np.isfinite(given).all():
+        raise RunError("The pose holds numbers that are not finite.", "Give radians and mm.")
+    own = session.path / START_POSE_NAME
+    if own.exists():
+        taken = {path.stem for path in session.path.glob("*.csv")}
+        own.rename(session.path / f"{free_name(f'{own.stem}-before', taken)}.csv")
+    write_pose(own, parameter_names(body), given)
+    return own
 
 
 def start_pose_from_file(path: Path, body: BodyModel, frame: int, fps: float) -> tuple[Array, str]:

@@ -4,22 +4,19 @@ at once.
 
 from collections.abc import Callable, Mapping
 
-import numpy as np
 import viser
-from numpy.typing import NDArray
 
 from studio.errors import StudioError
 from studio.knobs import Value
 from studio.scene.panel import Panel, tell
 from studio.scene.playback import stepped
+from studio.scene.pose_desk import PoseDesk
 from studio.scene.presenter import Presenter
-from studio.scene.proposal import Proposal
+from studio.scene.proposal import EditWish, Proposal
 from studio.scene.scene_state import SceneState
 from studio.scene.view_options import Shown
 from studio.scene.wishes import Control, Wishes
 from studio.sessions.workspace import Workspace
-
-Array = NDArray[np.float64]
 
 
 class Director:
@@ -48,7 +45,8 @@ class Director:
             draw_pictures=state.draw_pictures,
             failed=self.refused,
         )
-        state.attach(Panel(server, self), self._presenter)
+        self.posing = PoseDesk(server, self._presenter.post, state.pose_changed, self.refused)
+        state.attach(Panel(server, self), self._presenter, self.posing)
         server.on_client_connect(self._client_came)
 
     def start(self) -> None:
@@ -125,13 +123,13 @@ class Director:
         self.wishes.make_current(run.opened.session.path, run.opened.run.folder)
         self.wishes.reanneal(frame)
 
-    def edit_pose(self, pose: Array | Proposal | None) -> None:
-        """Show a start pose under the sliders, one that was found in its session and frame; None ends it."""
-        self._presenter.post(lambda: self.state.edit_pose(pose))
+    def propose(self, proposal: Proposal) -> None:
+        """Show a start pose that was found, in its session and frame."""
+        self._presenter.post(lambda: self.state.propose(proposal))
 
-    def save_pose(self, pose: Array) -> None:
-        """Store a start pose for the session."""
-        self._presenter.post(lambda: self.state.save_pose(pose))
+    def edit(self, wish: EditWish) -> None:
+        """Let a pose be edited, or leave off."""
+        self._presenter.post(lambda: self.state.edit(wish))
 
     def refused(self, problem: StudioError) -> None:
         """Tell every viewer about a refusal."""

@@ -19,6 +19,7 @@ class Moment:
     """frame : None while there is nothing. pose : (D,) drawn as the body. beside : (D,) the stored answer
     while a re-annealed one, or another track's, is shown. records : the layers whose clouds are drawn. layer_count :
     how many layers the frame takes. truth : (M, 3) mm. tracking : how a stored frame went, "" unknown.
+    edited : whether the pose is under a person's hands, and not an answer.
     """
 
     frame: int | None
@@ -28,6 +29,7 @@ class Moment:
     layer_count: int
     truth: Array | None
     tracking: str = ""
+    edited: bool = False
 
 
 def moment_of(
@@ -39,15 +41,15 @@ def moment_of(
     layers: int = 0,
     track: str = RAW,
 ) -> Moment:
-    """The moment at `frame`: stored, in progress, annealed again, or the start pose being edited.
+    """The moment at `frame`: stored, in progress, annealed again, or a pose being edited.
 
-    live : used where it is about this frame. edited : the start pose under the sliders, shown instead of an
+    live : used where it is about this frame. edited : the pose under a person's hands, shown instead of an
     answer. layers : how many layers a frame takes with the settings in use (for the colours of a frame in
     progress). track : whose poses are shown of stored frames, where it has one.
     """
     truth = None if frame is None else opened.truth_at(frame)
     if edited is not None:
-        return Moment(frame, edited, None, (), 0, truth)
+        return Moment(frame, edited, None, (), 0, truth, edited=True)
     if frame is not None and frame == live.frame and live.is_whole and not live.reannealed:
         # Heard whole, so it need not be read.
         assert live.result is not None

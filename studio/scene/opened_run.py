@@ -9,7 +9,7 @@ from studio.body.model import BodyModel
 from studio.capture.trc import MarkerMotion, read_trc
 from studio.errors import NotFoundError, SessionError, StudioError
 from studio.geometry.camera import Camera
-from studio.runs.tracks import RAW, read_track, track_names, track_stamp
+from studio.runs.tracks import RAW, Track, read_track, track_names, track_stamp
 from studio.sessions.results_store import ResultsReader
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -36,7 +36,7 @@ class OpenedRun:
         self.truth, self.truth_problem = _truth_of(session)
         self._results: OrderedDict[int, FrameResult] = OrderedDict()
         self._layers: OrderedDict[int, list[LayerRecord]] = OrderedDict()
-        self._track: tuple[tuple[str, int], dict[int, Array]] = (RAW, 0), {}
+        self._track: tuple[tuple[str, int], Track | None] = (RAW, 0), None
 
     @property
     def span(self) -> tuple[int, int]:
@@ -80,28 +80,42 @@ class OpenedRun:
             for known in [number for number in kept if number >= frame]:
                 del kept[known]
 
-    def poses(self) -> tuple[NDArray[np.int64], Array]:
-        """The finished frames (K,) and their poses (K, D)."""
+    def poses(self, track: str = RAW) -> tuple[NDArray[np.int64], Array]:
+        """The frames (K,) of a track and their poses (K, D); the search's own where there is no such track."""
         if self.results is None:
             return np.zeros(0, dtype=np.int64), np.zeros((0, len(self.body.parameters)))
-        return self.results.poses()
+        found = self._read_track(track)
+        return self.results.poses() if found is None else (found.frames, found.poses)
 
     def tracks(self) -> tuple[str, ...]:
         """The run's tracks, raw first."""
         return (RAW,) if self.run is None else track_names(self.run)
 
+    def track_key(self, track: str) -> tuple[str, int]:
+        """The track that is shown where `track` is asked for, and a number that changes when it is made anew."""
+        if self.run is None or track == RAW or track not in self.tracks():
+            return RAW, 0
+        return track, track_stamp(self.run, track)
+
     def pose_in(self, track: str, frame: int) -> Array | None:
         """(D,) the pose of a derived track at a frame; None in a gap of it, or where there is no such track."""
-        if self.run is None or track == RAW or track not in self.tracks():
+        found = self._read_track(track)
+        if found is None:
             return None
-        key = track, track_stamp(self.run, track)
+        row = int(np.searchsorted(found.frames, frame))
+        return found.poses[row] if row < len(found.frames) and found.frames[row] == frame else None
+
+    def _read_track(self, track: str) -> Track | None:
+        """A derived track, read again when it was made anew; None where there is none or it cannot be read."""
+        key = self.track_key(track)
+        if self.run is None or key[0] == RAW:
+            return None
         if self._track[0] != key:
             try:
-                found = read_track(self.run, track)
-                self._track = key, dict(zip(found.frames.tolist(), found.poses, strict=True))
+                self._track = key, read_track(self.run, track)
             except SessionError:
-                self._track = key, {}
-        return self._track[1].get(frame)
+                self._track = key, None
+        return self._track[1]
 
     def truth_at(self, frame: int) -> Array | None:
         """(M, 3) mm: the truth's markers at a frame (rows by time × fps, the first row being frame 0), else

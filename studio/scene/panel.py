@@ -7,18 +7,15 @@ from typing import Protocol
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
 from studio.errors import StudioError
 from studio.knobs import Value
 from studio.runs.colour_tokens import ColourTokens
-from studio.scene.pose_editor import PoseEditor
+from studio.scene.pose_editor import PoseEditor, PoseWishes
 from studio.scene.run_panel import RunPanel, Transport
 from studio.scene.settings_panel import SettingsPanel, SettingsTabs
 from studio.scene.show_panel import ShowPanel
 from studio.scene.wishes import Wishes
-
-Array = NDArray[np.float64]
 
 PANEL_WIDTH = 310
 
@@ -27,6 +24,11 @@ class Director(Transport, Protocol):
     """What the panel's callbacks post their wishes to."""
 
     wishes: Wishes
+
+    @property
+    def posing(self) -> PoseWishes:
+        """Where poses are edited."""
+        ...
 
     def change_settings(self, changes: dict[str, Value]) -> str:
         """Ask for knobs; the identifier of the answer. Raises StudioError if it cannot be asked."""
@@ -38,14 +40,6 @@ class Director(Transport, Protocol):
 
     def choose_layer(self, layer: int | None) -> None:
         """Show one layer's cloud, or all."""
-        ...
-
-    def edit_pose(self, pose: Array | None) -> None:
-        """Show a start pose under the sliders; None ends it."""
-        ...
-
-    def save_pose(self, pose: Array) -> None:
-        """Store a start pose for the session."""
         ...
 
     def refused(self, problem: StudioError) -> None:
@@ -74,7 +68,7 @@ class Panel:
             gui, SettingsTabs(search, weighting, masks), director.change_settings, director.refused
         )
         self.show = ShowPanel(gui, show, director.change_options, director.choose_layer)
-        self.pose = PoseEditor(gui, pose, director.edit_pose, director.save_pose)
+        self.pose = PoseEditor(gui, pose, director.posing)
 
 
 def dress(server: viser.ViserServer, tokens: ColourTokens) -> None:

@@ -1,57 +1,96 @@
-"""The start pose under sliders: six for the root, one for every angle, in degrees and mm; the overlays
-follow.
+"""The pose's tab: what is being edited, buttons for what is done to it whole, and sliders for every angle, in degrees
+and mm.
 """
 
 import math
-from collections.abc import Callable
+from typing import Protocol, cast
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
 
 from studio.body.model import BodyModel, Parameter
+from studio.scene.edited_pose import EditedPose
 
 Array = NDArray[np.float64]
 
 _REACH_MM = 3000.0
 _FREE_ANGLE_DEG = 180.0
 _STEP_DEG, _STEP_MM = 0.5, 5.0
+UNDO, RESET = "undo", "reset"
+MIRROR, ROUND = "mirror left / right", "turn round"
+NO_GRIP: str = "none"
+
+
+class PoseWishes(Protocol):
+    """What the tab asks for; called in viser's thread, each returns at once."""
+
+    def ask_editing(self, editing: bool) -> None:
+        """Begin or end editing."""
+        ...
+
+    def ask_value(self, index: int, value: float) -> None:
+        """Give an entry of the pose (radians or mm) another value."""
+        ...
+
+    def ask_change(self, what: str) -> None:
+        """Do something to the whole pose: UNDO, RESET, MIRROR, ROUND."""
+        ...
+
+    def ask_grip(self, name: str) -> None:
+        """Take hold of a limb's end; "" lets go."""
+        ...
+
+    def ask_refinement(self) -> None:
+        """Search around the pose, or stop searching."""
+        ...
+
+    def ask_saving(self) -> None:
+        """Make it the session's start pose."""
+        ...
 
 
 class PoseEditor:
-    """moved : called with the pose while it is edited, None when editing ends. save : stores a pose for the
-    session, raising StudioError; said : tells the person a sentence. original : where `reset` goes back to.
-    """
+    """The tab's controls. They show what they are told to and ask `wishes` for what a person does with them."""
 
-    def __init__(
-        self,
-        gui: viser.GuiApi,
-        tab: viser.GuiTabHandle,
-        moved: Callable[[Array | None], None],
-        save: Callable[[Array], None],
-    ) -> None:
-        self._gui = gui
-        self._tab = tab
-        self._moved = moved
-        self._save = save
+    def __init__(self, gui: viser.GuiApi, tab: viser.GuiTabHandle, wishes: PoseWishes) -> None:
+        self._gui, self._tab, self._wishes = gui, tab, wishes
         self._body: BodyModel | None = None
         self._folders: list[viser.GuiFolderHandle] = []
-        self._original = np.zeros(0)
-        self.pose = np.zeros(0)
         self.sliders: list[viser.GuiSliderHandle[float]] = []
         with tab:
             self.editing = gui.add_checkbox(
-                "edit the start pose", False, hint="Show it in the scene and on the pictures."
+                "edit the pose",
+                False,
+                hint="Show it in the scene and on the pictures; drag the balls on its limbs.",
             )
+            self.about = gui.add_markdown("", visible=False)
+            self.grip = gui.add_dropdown(
+                "drag",
+                (NO_GRIP,),
+                hint="The limb's end that carries the gizmo; or click a ball in the scene.",
+            )
+            self.back = gui.add_button_group("step", (UNDO, RESET), hint="One change back, or all of them.")
+            self.whole = gui.add_button_group(
+                "whole body",
+                (MIRROR, ROUND),
+                hint="Left and right exchanged where it stands, or facing the other way as well.",
+            )
+            self.refine = gui.add_button(
+                "Refine from here", hint="A short search around the pose in this frame's pictures."
+            )
+            self.progress = gui.add_progress_bar(0.0, visible=False)
             self.save = gui.add_button("Save as the session's start pose", disabled=True)
-            self.reset = gui.add_button("Back to the stored start pose", color="gray", disabled=True)
-        self.editing.on_update(self._editing_ticked)
+        self.editing.on_update(self._ticked)
+        self.grip.on_update(self._grip_chosen)
+        self.back.on_click(self._change_clicked)
+        self.whole.on_click(self._change_clicked)
+        self.refine.on_click(self._refine_clicked)
         self.save.on_click(self._save_clicked)
-        self.reset.on_click(self._reset_clicked)
 
-    def show_body(self, body: BodyModel, pose: Array) -> None:
-        """Offer the sliders of a body, standing at a pose (D,) in radians and mm."""
-        self._body, self._original, self.pose = body, pose.copy(), pose.copy()
+    def show_body(self, body: BodyModel, pose: Array, grips: tuple[str, ...], *, has_sides: bool) -> None:
+        """Offer the controls of a body, standing at a pose (D,) in radians and mm."""
+        self._body = body
         for folder in self._folders:
             folder.remove()
         self._folders, self.sliders = [], []
@@ -59,31 +98,47 @@ class PoseEditor:
         for index, parameter in enumerate(body.parameters):
             groups.setdefault(parameter.limb, []).append(index)
         with self._tab:
-            for number, (limb, indices) in enumerate(groups.items()):
-                folder = self._gui.add_folder(limb.replace("_", " "), expand_by_default=number == 0)
+            for limb, indices in groups.items():
+                folder = self._gui.add_folder(limb.replace("_", " "), expand_by_default=False)
                 self._folders.append(folder)
                 with folder:
                     for index in indices:
                         self.sliders.append(self._slider(body.parameters[index], index, float(pose[index])))
-        if self.editing.value:
-            self.editing.value = False
-        self._dress()
+        self._places = [index for indices in groups.values() for index in indices]
+        self.grip.options = (NO_GRIP, *grips)
+        self.whole.visible = has_sides
+        self.dress(EditedPose(pose), editing=False)
 
-    def show_pose(self, pose: Array) -> None:
-        """Put the sliders at a pose."""
-        self.pose = pose.copy()
+    def show(self, edited: EditedPose, *, editing: bool, about: str = "", grip: str = "") -> None:
+        """Put the controls at a pose. about : what is being edited, in words."""
         if self._body is None:
             return
-        for slider, parameter, value in zip(self.sliders, self._body.parameters, pose, strict=True):
-            shown = min(max(shown_value(parameter, float(value)), slider.min), slider.max)
+        for slider, place in zip(self.sliders, self._places, strict=True):
+            shown = shown_value(self._body.parameters[place], float(edited.pose[place]))
+            shown = min(max(shown, slider.min), slider.max)
             if abs(slider.value - shown) > 1e-9:
                 slider.value = shown
-        self._dress()
+        if self.grip.value != (grip or NO_GRIP):
+            self.grip.value = grip or NO_GRIP
+        if self.about.content != about:
+            self.about.content = about
+        self.dress(edited, editing=editing)
 
-    def propose(self, pose: Array) -> None:
-        """Put the sliders at a pose that somebody else found, ready to be looked at, changed and saved."""
-        self.show_pose(pose)
-        self._edited()
+    def dress(self, edited: EditedPose, *, editing: bool) -> None:
+        """Offer what can be done with the pose as it is."""
+        if self.editing.value != editing:
+            self.editing.value = editing
+        self.about.visible = editing and bool(self.about.content)
+        self.grip.visible = self.back.visible = self.refine.visible = editing
+        self.save.disabled = not edited.is_moved
+
+    def show_refining(self, share: float | None) -> None:
+        """Show how far the search around the pose is, 0 to 1; None: none is under way."""
+        self.progress.visible = share is not None
+        self.progress.value = 100.0 * (share or 0.0)
+        label = "Refine from here" if share is None else "Stop refining"
+        if self.refine.label != label:
+            self.refine.label = label
 
     def _slider(self, parameter: Parameter, index: int, value: float) -> viser.GuiSliderHandle[float]:
         shown = shown_value(parameter, value)
@@ -99,40 +154,29 @@ class PoseEditor:
         )
 
         async def updated(event: viser.GuiEvent) -> None:
-            wanted = stored_value(parameter, float(event.target.value))
-            held = min(max(shown_value(parameter, float(self.pose[index])), low), high)
-            if abs(float(event.target.value) - held) > 1e-6:
-                self.pose = self.pose.copy()
-                self.pose[index] = wanted
-                self._edited()
+            # Without a viewer it was this scene that moved it.
+            if event.client_id is not None:
+                self._wishes.ask_value(index, stored_value(parameter, float(event.target.value)))
 
         slider.on_update(updated)
         return slider
 
-    def _edited(self) -> None:
-        if not self.editing.value:
-            self.editing.value = True
-        self._moved(self.pose)
-        self._dress()
+    async def _ticked(self, event: viser.GuiEvent) -> None:
+        if event.client_id is not None:
+            self._wishes.ask_editing(bool(event.target.value))
 
-    async def _editing_ticked(self, event: viser.GuiEvent) -> None:
-        self._moved(self.pose if event.target.value else None)
+    async def _grip_chosen(self, event: viser.GuiEvent) -> None:
+        if event.client_id is not None:
+            self._wishes.ask_grip("" if event.target.value == NO_GRIP else event.target.value)
+
+    async def _change_clicked(self, event: viser.GuiEvent) -> None:
+        self._wishes.ask_change(event.target.value)
+
+    async def _refine_clicked(self, _: viser.GuiEvent) -> None:
+        self._wishes.ask_refinement()
 
     async def _save_clicked(self, _: viser.GuiEvent) -> None:
-        self._save(self.pose)
-
-    async def _reset_clicked(self, _: viser.GuiEvent) -> None:
-        self.show_pose(self._original)
-        self._edited()
-
-    def saved(self) -> None:
-        """Take note that the pose was stored: it is what `reset` goes back to now."""
-        self._original = self.pose.copy()
-        self._dress()
-
-    def _dress(self) -> None:
-        moved = len(self.pose) > 0 and not np.array_equal(self.pose, self._original)
-        self.save.disabled = self.reset.disabled = not moved
+        self._wishes.ask_saving()
 
 
 def shown_value(parameter: Parameter, value: float) -> float:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from studio.body.extremities import extremities
 from studio.body.forward_kinematics import limb_ends
 from studio.runs.colour_tokens import colour_tokens
+from studio.runs.tracks import RAW
 from studio.scene.body_view import BodyView
 from studio.scene.camera_views import CameraViews
 from studio.scene.floor_view import FloorView
@@ -31,6 +32,8 @@ _LEAST_DISTANCE, _MOST_DISTANCE = 2.6, 9.0
 _FIELD_OF_VIEW = 0.85
 _DOUBTFUL = 0.35
 """Opacity of a body that is held where it was last seen, or that the tracker knows to be elsewhere."""
+_EDITED = 0.6
+"""Opacity of a body under a person's hands: what is behind a limb can be seen and taken hold of."""
 _LOOK_HIGHER = np.array([0.0, 0.0, 0.2])
 
 
@@ -66,9 +69,8 @@ class SceneDrawing:
             self.recolour(options.dark)
         tokens = colour_tokens(options.dark)
         with self._server.atomic():
-            opacity = (
-                min(options.body_opacity, _DOUBTFUL) if moment.tracking in AWAY else options.body_opacity
-            )
+            most = _DOUBTFUL if moment.tracking in AWAY else _EDITED if moment.edited else 1.0
+            opacity = min(options.body_opacity, most)
             self.body.show(moment.pose if options.body else None, opacity)
             self.beside.show(moment.beside if options.stored else None, 0.35)
             if self.truth is not None:
@@ -101,9 +103,9 @@ class SceneDrawing:
         """Take the run's poses anew: some of them changed."""
         self.trails.clear()
 
-    def read_poses(self) -> None:
-        """Take the run's poses for the trails; only new ones are computed."""
-        self.trails.set_poses(*self._opened.poses())
+    def read_poses(self, track: str = RAW) -> None:
+        """Take a track's poses for the trails; only new ones are computed."""
+        self.trails.set_poses(*self._opened.poses(track))
 
     def chosen_limbs(self, options: ViewOptions) -> tuple[int, ...]:
         """Indices of the drawn limbs whose ends carry particles."""

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from studio.errors import StudioError
 from studio.knobs import Value
-from studio.runs.search_space import parameter_names
 from studio.runs.tracks import RAW
 from studio.scene.frame_volume import FrameVolumes, has_blobs
 from studio.scene.live_search import LiveSearch
@@ -17,8 +16,6 @@ from studio.scene.opened_run import OpenedRun
 from studio.scene.scene_drawing import SceneDrawing
 from studio.scene.view_options import ViewOptions
 from studio.scene.view_pictures import ViewPictures
-from studio.sessions.named_rows import write_pose
-from studio.sessions.session import START_POSE_NAME
 from studio.settings import changed_settings
 
 Array = NDArray[np.float64]
@@ -44,6 +41,7 @@ class ShownRun:
         self.frames: tuple[int, ...] = tuple(opened.frames())
         self._trails_read = float("-inf")
         self._trails_stale = True
+        self._trails_of: tuple[str, int] = (RAW, 0)
 
     def moment(self, frame: int | None, live: LiveSearch, edited: Array | None, track: str = RAW) -> Moment:
         """What there is to draw at a frame."""
@@ -55,13 +53,22 @@ class ShownRun:
 
     def draw(self, moment: Moment, options: ViewOptions, layer: int | None) -> None:
         """Bring everything but the pictures to a moment."""
-        now = time.monotonic()
-        if options.trails and self._trails_stale and now - self._trails_read >= _TRAIL_SECONDS:
-            self.drawing.read_poses()
-            self._trails_read, self._trails_stale = now, False
+        self._keep_trails(options)
         wanted = options.hull or (options.blobs and self.has_blobs)
         volume = self.volumes.of(moment, self.settings, blobs=options.blobs) if wanted else None
         self.drawing.draw(moment, options, layer, volume)
+
+    def _keep_trails(self, options: ViewOptions) -> None:
+        """Take the poses of the track that is shown, once they changed and not too often."""
+        if not options.trails:
+            return
+        now, track = time.monotonic(), self.opened.track_key(options.track)
+        if track != self._trails_of:
+            self.drawing.forget_poses()
+            self._trails_of, self._trails_stale, self._trails_read = track, True, float("-inf")
+        if self._trails_stale and now - self._trails_read >= _TRAIL_SECONDS:
+            self.drawing.read_poses(track[0])
+            self._trails_read, self._trails_stale = now, False
 
     def hang(self, moment: Moment, options: ViewOptions, layer: int | None) -> None:
         """Compose the pictures of a moment and hang them on the cameras."""
@@ -86,10 +93,6 @@ class ShownRun:
             if frame <= newest:
                 self.drawing.forget_poses()
         self._trails_stale = True
-
-    def save_start_pose(self, pose: Array) -> None:
-        """Store a pose as the session's start pose (radians and mm, under the parameters' names)."""
-        write_pose(self.opened.session.path / START_POSE_NAME, parameter_names(self.opened.body), pose)
 
     def close(self) -> None:
         """Take the run out of the scene and let go of its files."""

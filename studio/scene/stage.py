@@ -4,17 +4,15 @@ Started and stopped by the web application (building viser blocks for a moment: 
 may be called from any thread; they post what is wished to the scene's own thread and return.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import fields
-
-import numpy as np
 
 from studio.errors import SettingsError
 from studio.export.task import Writer
 from studio.scene.director import Director
 from studio.scene.guarded_server import GuardedServer
-from studio.scene.proposal import Proposal
 from studio.scene.recording import record_scene
+from studio.scene.scene_poses import ScenePoses
 from studio.scene.view_options import Shown, ViewOptions
 from studio.scene.wishes import Control
 from studio.sessions.workspace import Workspace
@@ -80,12 +78,10 @@ class SceneStage:
         if self._director is not None:
             self._director.show_run(session, run, frame, layer)
 
-    def propose_pose(self, session: str, pose: Sequence[float], said: str, frame: int | None = None) -> None:
-        """Show a start pose (D,) that was found for a session. said : how sure it is, for the viewers. frame : that it
-        was found in.
-        """
-        if self._director is not None:
-            self._director.edit_pose(Proposal(session, np.array(pose, dtype=np.float64), said, frame))
+    @property
+    def poses(self) -> ScenePoses:
+        """Start poses that were found, and poses under a person's hands."""
+        return ScenePoses(lambda: self._director)
 
     def show_frame(self, frame: int) -> None:
         """Show a stored frame; where it is not stored the nearest one."""

@@ -45,7 +45,7 @@ class Shown:
     """Which moment is shown. session, run : names ("" while none is open). frame : None while there is none.
 
     layer : one layer's cloud, None for all together. look_through : a camera's name, None for the free view.
-    follow : the shown frame moves on with the tracking.
+    follow : the shown frame moves on with the tracking. editing : a pose is under a person's hands.
     """
 
     session: str = ""
@@ -54,3 +54,4 @@ class Shown:
     layer: int | None = None
     look_through: str | None = None
     follow: bool = True
+    editing: bool = False

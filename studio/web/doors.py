@@ -20,6 +20,8 @@ from studio.runs.overlay_pictures import forget_composers
 from studio.runs.subject_fitting import FittedSubject
 from studio.sessions.workspace import Workspace
 from studio.web.background_schemas import BackgroundJob
+from studio.web.calibration_proposals import Proposals
+from studio.web.calibration_schemas import SolveState
 from studio.web.event_stream import EventStream
 from studio.web.export_schemas import ExportState
 from studio.web.footage_schemas import SynchronyState
@@ -215,7 +217,8 @@ class Doors:
     scene_port : of the inner viser server, 0 while it is not running. footage_roots : folders that may be
     imported from. presets : the studio's own. log_path : the server's log file. imports,
     initialisations, exports, track_jobs, uploads : those under way, by their identifiers; synchronies : estimates
-    of offsets, background_setups : set-ups of backgrounds, by session. desk : where comparisons are worked at,
+    of offsets, by session; calibration_jobs : solving under way; proposals : calibrations not in use yet;
+    background_setups : set-ups of backgrounds, by session. desk : where comparisons are worked at,
     learning : where behaviour models are learnt.
     """
 
@@ -233,6 +236,8 @@ class Doors:
     fitted_subjects: dict[str, FittedSubject] = field(default_factory=dict)
     background_setups: dict[str, BackgroundJob] = field(default_factory=dict)
     synchronies: dict[str, SynchronyState] = field(default_factory=dict)
+    calibration_jobs: dict[str, SolveState] = field(default_factory=dict)
+    proposals: Proposals = field(default_factory=Proposals)
     exports: dict[str, ExportState] = field(default_factory=dict)
     track_jobs: dict[str, TrackJobState] = field(default_factory=dict)
     uploads: dict[str, dict[str, int]] = field(default_factory=dict)

@@ -104,7 +104,7 @@ def _initialise(
     finally:
         doors.stops.pop(identifier, None)
     tell(state="done", file=place.name, **_answer(found))
-    doors.stage.propose_pose(session.name, found.pose.tolist(), found.source, found.frame)
+    doors.stage.poses.propose(session.name, found.pose.tolist(), found.source, found.frame)
     doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
 
 

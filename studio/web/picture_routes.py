@@ -3,7 +3,9 @@
 from typing import Annotated
 
 import msgspec
+import numpy as np
 from fastapi import APIRouter, Query, Response
+from numpy.typing import NDArray
 
 from studio.errors import NotFoundError, SettingsError
 from studio.runs.overlay_drawing import encode_jpeg
@@ -17,6 +19,7 @@ from studio.web.session_routes import OpenSession
 
 router = APIRouter(prefix="/api", tags=["pictures"])
 
+START = "start"
 VIEW = "/frames/{frame}/views/{camera}.jpg"
 Height = Annotated[
     int | None, Query(ge=16, le=4320, description="Of the picture as shown; empty: as stored.")
@@ -29,6 +32,14 @@ Knobs = Annotated[
     str, Query(max_length=4000, description='Knobs as a JSON object, such as {"mask_threshold": 6}.')
 ]
 
+Posed = Annotated[
+    str,
+    Query(
+        max_length=4000,
+        description="Whose outlines are drawn: start, the session's start pose, or numbers with commas.",
+    ),
+]
+
 
 @router.get("/sessions/{session}" + VIEW, response_class=Response)
 def picture(
@@ -38,13 +49,16 @@ def picture(
     show: Show = "",
     height: Height = None,
     settings: Knobs = "",
+    pose: Posed = "",
 ) -> Response:
     """What a camera saw in a frame; without a run, masks and edges are made with the session's settings, and with
     `settings` instead of these where given: a preview that changes nothing.
     """
     _check_view(session, frame, camera)
     wanted = session_settings(session, changes=knob_changes(settings))
-    picture = compose_view(session, None, frame, camera, _layers(show), height=height, settings=wanted)
+    picture = compose_view(
+        session, None, frame, camera, _layers(show), _posed(session, pose), height=height, settings=wanted
+    )
     return _jpeg(encode_jpeg(picture))
 
 
@@ -74,6 +88,22 @@ def knob_changes(text: str) -> dict[str, object]:
         raise SettingsError(
             "The settings are no JSON object of knobs.", 'Write them like {"mask_threshold": 6}.'
         ) from None
+
+
+def _posed(session: Session, text: str) -> NDArray[np.float64] | None:
+    """The pose that is meant, None for none. Raises SettingsError for what is neither."""
+    if text in ("", START):
+        return session.start_pose() if text else None
+    try:
+        pose = np.array([float(word) for word in text.split(",")])
+    except ValueError:
+        pose = np.zeros(0)
+    if len(pose) != len(session.body().parameters) or not np.isfinite(pose).all():
+        raise SettingsError(
+            "The pose is not one of the session's body.",
+            "Give its parameters in order, with commas, or 'start'.",
+        )
+    return pose
 
 
 def _layers(show: str) -> tuple[str, ...]:

@@ -80,6 +80,7 @@ def tell_moves(doors: Doors) -> None:
                 "layer": shown.layer,
                 "look_through": shown.look_through,
                 "follow": shown.follow,
+                "editing": shown.editing,
             }
         )
 

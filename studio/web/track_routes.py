@@ -1,9 +1,6 @@
 """Tracks of a run: listed, made in the background with progress as `track` events, downloaded; runs corrected."""
 
 import asyncio
-import secrets
-import threading
-import time
 from collections.abc import Callable
 from typing import Annotated, Any
 
@@ -11,7 +8,7 @@ import numpy as np
 from fastapi import APIRouter, Depends, Response
 
 from studio.capture.trc import read_trc
-from studio.errors import NotFoundError, SettingsError, StudioError
+from studio.errors import NotFoundError, SettingsError
 from studio.evaluation.errors import evaluate
 from studio.knobs import changed, knobs_of
 from studio.runs.correcting import prepare_correction, track_backwards
@@ -19,7 +16,6 @@ from studio.runs.refining import (
     REFINED,
     SMOOTHED,
     MadeTrack,
-    MakingCancelledError,
     check_making,
     jitter,
     refine_run,
@@ -32,10 +28,10 @@ from studio.sessions.stored_run import StoredRun
 from studio.tracking.refinement import RefinementSettings
 from studio.tracking.smoothing import SmoothingSettings
 from studio.web.doors import Doors, doors_of
-from studio.web.error_responses import UnforeseenError, log
 from studio.web.run_routes import RUN, OpenRun
 from studio.web.session_routes import OpenSession
 from studio.web.setting_views import knob_view
+from studio.web.track_jobs import Report, begin_job
 from studio.web.track_schemas import (
     CorrectionRequest,
     MakeTrackRequest,
@@ -47,11 +43,6 @@ from studio.web.track_schemas import (
 router = APIRouter(prefix="/api", tags=["tracks"])
 
 Door = Annotated[Doors, Depends(doors_of)]
-Report = Callable[[str, int, int], None]
-Work = Callable[[Report, Callable[[], bool]], dict[str, Any]]
-
-KEPT = 50
-SECONDS_BETWEEN = 0.2
 
 
 @router.get(RUN + "/tracks")
@@ -106,7 +97,7 @@ async def begin_refining(
             )
         )
 
-    return _begin(doors, "refine", session, run, work)
+    return begin_job(doors, "refine", session.name, run.name, work)
 
 
 @router.post(RUN + "/smooth", status_code=202)
@@ -121,7 +112,7 @@ async def begin_smoothing(
     def work(_report: Report, _cancelled: Callable[[], bool]) -> dict[str, Any]:
         return _answer(smooth_run(run, source=source, into=into, settings=settings, replace=wish.replace))
 
-    return _begin(doors, "smooth", session, run, work)
+    return begin_job(doors, "smooth", session.name, run.name, work)
 
 
 @router.post(RUN + "/correct", status_code=202)
@@ -143,7 +134,7 @@ async def begin_correction(
             return {"made_run": made.name, "moved": moved, "state": "cancelled" if cancelled() else "done"}
         return {"made_run": made.name}
 
-    return _begin(doors, "correct", session, run, work)
+    return begin_job(doors, "correct", session.name, run.name, work)
 
 
 @router.get("/track-jobs/{identifier}")
@@ -196,56 +187,3 @@ def _answer(made: MadeTrack) -> dict[str, Any]:
         "filled": len(made.filled),
         "left_out": len(made.left_out),
     }
-
-
-def _begin(doors: Doors, verb: Any, session: Session, run: StoredRun, work: Work) -> TrackJobState:  # noqa: ANN401
-    state = TrackJobState(
-        identifier=secrets.token_hex(8), verb=verb, session=session.name, run=run.name, state="running"
-    )
-    doors.track_jobs[state.identifier] = state
-    doors.stops[state.identifier] = threading.Event()
-    while len(doors.track_jobs) > KEPT:
-        doors.track_jobs.pop(next(iter(doors.track_jobs)))
-    job = asyncio.create_task(asyncio.to_thread(_make, doors, state, work))
-    doors.jobs.add(job)
-    job.add_done_callback(doors.jobs.discard)
-    return state
-
-
-def _make(doors: Doors, begun: TrackJobState, work: Work) -> None:
-    """Work in this thread, keeping the state up to date; never raises."""
-    stop, began, told = doors.stops[begun.identifier], time.monotonic(), 0.0
-
-    def tell(**changes: object) -> None:
-        state = doors.track_jobs.get(begun.identifier)
-        if state is not None:
-            # Validated, so that numbers that are none become null.
-            entries = {**state.model_dump(), **changes}
-            doors.track_jobs[begun.identifier] = state = TrackJobState.model_validate(entries)
-            doors.events.publish({"type": "track", **state.model_dump()})
-
-    def report(step: str, done: int, total: int) -> None:
-        nonlocal told
-        now = time.monotonic()
-        if now - told < SECONDS_BETWEEN and done < total:
-            return
-        told = now
-        left = (now - began) * (total - done) / done if done else None
-        tell(step=step, done=done, total=total, seconds_left=left)
-
-    try:
-        answer = work(report, stop.is_set)
-    except MakingCancelledError as error:
-        tell(state="cancelled", code=error.code, message=error.message, hint=error.hint)
-        return
-    except StudioError as error:
-        tell(state="failed", code=error.code, message=error.message, hint=error.hint)
-        return
-    except Exception as error:
-        log.exception("%s of '%s' of '%s' failed", begun.verb, begun.run, begun.session)
-        wrong = UnforeseenError(f"It failed: {type(error).__name__}.", f"See '{doors.log_path}'.")
-        tell(state="failed", code=wrong.code, message=wrong.message, hint=wrong.hint)
-        return
-    finally:
-        doors.stops.pop(begun.identifier, None)
-    tell(**{"state": "done", **answer})

@@ -59,11 +59,12 @@ class CorrectionRequest(Request):
 class TrackJobState(Answer):
     """How refining, smoothing or correcting stands; code, message and hint say why it failed.
 
-    made_run: the corrected run. track: the track that is made.
+    made_run: the corrected run. track: the track that is made. pose, gain, overlap_before, overlap: of a search around
+    a pose (verb pose; run is "" where it is the session's).
     """
 
     identifier: str
-    verb: Literal["refine", "smooth", "correct"]
+    verb: Literal["refine", "smooth", "correct", "pose"]
     session: str
     run: str
     state: Literal["running", "done", "failed", "cancelled"]
@@ -81,3 +82,7 @@ class TrackJobState(Answer):
     moved: int = 0
     filled: int = 0
     left_out: int = 0
+    pose: list[float] | None = None
+    gain: Number = None
+    overlap_before: Number = None
+    overlap: Number = None

@@ -7,6 +7,7 @@ from studio.body.catalogue import list_bodies, load_body
 from studio.body.dragging import REACHED, Dragger
 from studio.body.forward_kinematics import limb_ends, marker_points
 from studio.errors import BodyError
+from studio.geometry.rotations import rotation_from_vector
 
 PERSONS = ["human25", "human29", "human31", "human34"]
 
@@ -95,6 +96,20 @@ def test_every_limb_of_every_body_can_be_taken() -> None:
         for grip in dragger.grips:
             found = dragger.dragged(body.neutral, grip.name, points[grip.limb])
             assert found.left_mm < REACHED, (name, grip.name)
+
+
+@pytest.mark.parametrize("name", ["human25", "human31", "dog"])
+def test_the_root_goes_where_it_is_put(name: str) -> None:
+    body = load_body(name)
+    dragger = Dragger(body)
+    before = dragger.root_frame(body.neutral)
+    assert before is not None
+    turn = rotation_from_vector(np.array([0.2, -0.1, 0.9]))
+    wanted = np.column_stack([turn @ before[:, :3], before[:, 3] + [300.0, -200.0, 50.0]])
+    found = dragger.with_root(body.neutral, wanted)
+    np.testing.assert_allclose(dragger.root_frame(found), wanted, atol=1e-3)
+    assert np.array_equal(found[6:], body.neutral[6:])
+    assert Dragger(load_body("planar_arm4")).root_frame(np.zeros(4)) is None
 
 
 def test_what_does_not_fit_is_refused_in_words() -> None:

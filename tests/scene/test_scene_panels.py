@@ -15,7 +15,6 @@ from studio.knobs import knobs_of
 from studio.runs.colour_tokens import colour_tokens
 from studio.scene.guarded_server import GuardedServer
 from studio.scene.knob_input import knob_value, slider_range
-from studio.scene.pose_editor import PoseEditor
 from studio.scene.presets import PRESETS, offered
 from studio.scene.run_panel import RunPanel, Transport, clock, status_html
 from studio.scene.settings_panel import SettingsPanel, SettingsTabs
@@ -208,31 +207,6 @@ def test_the_show_tab_changes_options_and_follows_them(server: GuardedServer, hu
     panel.show_legend(colour_tokens(), 4, truth=True)
     assert "layer 4" in panel.legend.content
     assert "truth" in panel.legend.content
-
-
-def test_the_pose_editor_speaks_degrees_and_keeps_radians(server: GuardedServer, human: BodyModel) -> None:
-    moved: list[np.ndarray | None] = []
-    saved: list[np.ndarray] = []
-    editor = PoseEditor(server.gui, server.gui.add_tab_group().add_tab("Pose"), moved.append, saved.append)
-    pose = swaying_pose(human, 2)
-    editor.show_body(human, pose)
-    assert len(editor.sliders) == 31
-    settle(server)
-    assert moved == []
-    knee = 9
-    editor.sliders[knee].value = -30.0
-    settle(server)
-    assert moved[-1] is not None
-    assert moved[-1][knee] == pytest.approx(math.radians(-30.0))
-    others = np.delete(np.arange(31), knee)
-    np.testing.assert_array_equal(moved[-1][others], pose[others])
-    assert not editor.save.disabled
-    editor.saved()
-    assert editor.save.disabled
-    editor.show_pose(pose)
-    settle(server)
-    np.testing.assert_array_equal(editor.pose, pose)
-    assert editor.sliders[4].value == pytest.approx(pose[4], abs=0.05)
 
 
 class RunWishes:

@@ -66,6 +66,8 @@ def open_run(stage: SceneStage) -> None:
 
 
 def body_stands_at(stage: SceneStage, body: BodyModel, pose: np.ndarray) -> bool:
+    if stage._director.state.run is None:  # pyright: ignore[reportOptionalMemberAccess]
+        return False  # being opened
     places = limb_frames(body, pose)[0, :, :, 3] / 1000.0
     return np.allclose([handle.position for handle in drawing(stage).body.handles], places, atol=1e-9)
 
@@ -200,24 +202,6 @@ def test_the_theme_changes_every_colour(stage: SceneStage) -> None:
         stage.set_options(colour="red")
 
 
-def test_the_start_pose_under_the_sliders_is_shown_and_saved(
-    stage: SceneStage, human: BodyModel, workspace: Workspace
-) -> None:
-    open_run(stage)
-    editor = stage._director.state._panel.pose  # pyright: ignore[reportOptionalMemberAccess]
-    editor.sliders[9].value = -40.0
-    wanted = swaying_pose(human, 0)
-    wanted[9] = np.deg2rad(-40.0)
-    until(lambda: body_stands_at(stage, human, wanted))
-    stage._director.save_pose(editor.pose)  # pyright: ignore[reportOptionalMemberAccess]
-    until(lambda: editor.save.disabled)
-    stored = workspace.session("swaying").start_pose(human)
-    assert stored is not None
-    np.testing.assert_allclose(stored, wanted, atol=1e-12)
-    editor.editing.value = False
-    until(lambda: body_stands_at(stage, human, swaying_pose(human, FRAMES - 2)))
-
-
 def test_a_session_without_a_run_and_none_at_all(stage: SceneStage, human: BodyModel) -> None:
     stage.show_run("swaying")
     until(lambda: stage.shown.session == "swaying" and stage.shown.run == "")
@@ -332,7 +316,7 @@ def test_a_start_pose_that_was_found_is_shown_with_its_confidence_until_it_is_le
     found = swaying_pose(human, 5)
     stage.show_run("")
     until(lambda: stage.shown.session == "")
-    stage.propose_pose("swaying", found.tolist(), "found in frame 2, confidence 92 %", 2)
+    stage.poses.propose("swaying", found.tolist(), "found in frame 2, confidence 92 %", 2)
     until(lambda: stage.shown.session == "swaying" and body_stands_at(stage, human, found))
     state = stage._director.state  # pyright: ignore[reportOptionalMemberAccess]
     assert stage.shown.run == ""
@@ -342,9 +326,9 @@ def test_a_start_pose_that_was_found_is_shown_with_its_confidence_until_it_is_le
     stage.show_run("swaying", "run-1")
     until(lambda: stage.shown.run == "run-1" and body_stands_at(stage, human, found))
     assert stage.shown.frame == 2
-    stage._director.edit_pose(None)  # pyright: ignore[reportOptionalMemberAccess]
+    stage.poses.leave()
     until(lambda: body_stands_at(stage, human, swaying_pose(human, 2)))
     until(lambda: not state._panel.run.mark.visible)
-    stage.propose_pose("swaying", [0.0] * 4, "found in frame 1, confidence 50 %", 1)
+    stage.poses.propose("swaying", [0.0] * 4, "found in frame 1, confidence 50 %", 1)
     stage.show_frame(3)
     until(lambda: body_stands_at(stage, human, swaying_pose(human, 3)))

@@ -6,8 +6,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import SimpleNamespace
 
 import httpx
+import numpy as np
 import uvicorn
 from fastapi import FastAPI
 
@@ -77,6 +79,7 @@ class RecordingStage:
     headers: Mapping[str, str] = field(default_factory=dict)
     calls: list[tuple[object, ...]] = field(default_factory=list)
     moved: Callable[[object], None] | None = None
+    editing: SimpleNamespace | None = None
 
     def start(self) -> int:
         self.calls.append(("start",))
@@ -100,8 +103,9 @@ class RecordingStage:
     ) -> None:
         self.calls.append(("run", session, run, frame, layer))
 
-    def propose_pose(self, session: str, pose: Sequence[float], said: str, frame: int | None = None) -> None:
-        self.calls.append(("pose", session, tuple(pose), said, frame))
+    @property
+    def poses(self) -> "RecordingPoses":
+        return RecordingPoses(self)
 
     def show_frame(self, frame: int) -> None:
         self.calls.append(("frame", frame))
@@ -125,6 +129,31 @@ class RecordingStage:
         self.calls.append(("record", task.run.name))
         task.place.write_bytes(b"scene")
         return Written((task.place,), "read back")
+
+
+@dataclass
+class RecordingPoses:
+    """Poses that are laid before nobody."""
+
+    stage: RecordingStage
+
+    @property
+    def editing(self) -> SimpleNamespace | None:
+        return self.stage.editing
+
+    def propose(self, session: str, pose: Sequence[float], said: str, frame: int | None = None) -> None:
+        self.stage.calls.append(("pose", session, tuple(pose), said, frame))
+
+    def edit(
+        self, session: str, run: str = "", frame: int | None = None, pose: Sequence[float] | None = None
+    ) -> None:
+        given = np.zeros(4) if pose is None else np.array(pose)
+        self.stage.editing = SimpleNamespace(
+            session=session, run=run, frame=frame, pose=given, moved=pose is not None
+        )
+
+    def leave(self) -> None:
+        self.stage.editing = None
 
 
 @dataclass

@@ -1,0 +1,159 @@
+"""A pose set by hand made better: a short search around it with the session's weighting, then local refinement.
+
+The weighting judges: what comes out is never worse in its eyes than what was given.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.branches import within_limits
+from studio.errors import RunError
+from studio.evidence.distance_maps import silhouette_distances
+from studio.runs.problem_source import ProblemSource
+from studio.runs.search_space import search_space, session_sigma
+from studio.runs.session_settings import session_settings
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.settings import RunSettings, settings_from_values
+from studio.tracking.catalogue import TRACKERS
+from studio.tracking.frame_loop import search_frame
+from studio.tracking.loss_detection import Onlooker, anything_seen
+from studio.tracking.refinement import RefinementSettings, Refiner
+from studio.tracking.tracker import Carried, ParticleSet
+from studio.weighting.catalogue import WEIGHTINGS
+
+Array = NDArray[np.float64]
+
+TRACKER = "annealed"
+JUDGE = "edge-region-silhouette"
+"""Judges where the session's own weighting reads pictures instead of masks (blobs must be told what is expected)."""
+SHORT = {"particles": 150, "layers": 8, "start_repeats": 1}
+HAND_FPS = 15.0
+"""A hand is as far off as a body moves in one frame at that rate."""
+STEP = "searching around the pose"
+
+Progress = Callable[[str, int, int], None]
+
+
+class PoseSearchCancelledError(RunError):
+    """The search around a pose was cancelled."""
+
+    code = "cancelled"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BetterPose:
+    """pose : (D,). gain : of the weighting's log-weight, 0 where the given pose was best. overlap_before, overlap : of
+    the silhouettes, 0 to 1, NaN where none is seen.
+    """
+
+    pose: Array
+    gain: float
+    overlap_before: float
+    overlap: float
+
+
+def better_pose(
+    session: Session,
+    frame: int,
+    pose: Array,
+    *,
+    run: StoredRun | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> BetterPose:
+    """The best pose near a given one (D,) in a frame. run : whose body, cameras and weighting count; None: the
+    session's.
+
+    cancelled : asked before each layer; True ends it with PoseSearchCancelledError. Raises RunError where nothing is to
+    be seen in the frame or the pose does not fit the body.
+    """
+    body = run.body() if run else session.body()
+    given = np.asarray(pose, dtype=np.float64)
+    if given.shape != (len(body.parameters),) or not np.isfinite(given).all():
+        raise RunError(
+            f"A pose of {body.name} has {len(body.parameters)} finite numbers, the given one does not.",
+            "Give radians and mm in the order of the body's parameters.",
+        )
+    given = within_limits(body, given)
+    settings = _short_settings(session, run)
+    problems = ProblemSource(session, body, run.cameras() if run else None)
+    try:
+        evidence, problem = problems.evidence(frame, settings), problems.problem(frame, settings)
+    finally:
+        problems.close()
+    if not anything_seen(evidence):
+        raise RunError(
+            f"Nothing is to be seen of a body in frame {frame} of session '{session.name}'.",
+            "Choose a frame in which the person is in view, or check the masks.",
+        )
+    layers, done = int(SHORT["layers"]), 0
+
+    def checked(_: object) -> None:
+        nonlocal done
+        done += 1
+        _ask(cancelled)
+        if progress is not None:
+            progress(STEP, done, layers + 1)
+
+    _ask(cancelled)
+    space = search_space(body, session_sigma(session, body, min(HAND_FPS, session.manifest.fps)))
+    found = search_frame(
+        TRACKERS[TRACKER],
+        problem,
+        Carried(ParticleSet(given[None], np.zeros(1))),
+        space,
+        seed=seed,
+        frame=frame,
+        settings_source=lambda: (1, settings.tracker),
+        on_layer=checked,
+    )
+    searched = np.stack([given, found.estimate.pose, found.estimate.mode])
+    begin = searched[int(np.argmax(problem.weigh(searched)))]
+    refiner = Refiner(body, problems.cameras, RefinementSettings())
+    refined = refiner.refine(begin, silhouette_distances(evidence), problem).pose
+    weights = problem.weigh(np.stack([given, begin, refined]))
+    best = [given, begin, refined][int(np.argmax(weights))]
+    onlooker = Onlooker(body, problems.cameras)
+    if progress is not None:
+        progress(STEP, layers + 1, layers + 1)
+    return BetterPose(
+        pose=best,
+        gain=float(weights.max() - weights[0]),
+        overlap_before=onlooker.sight(evidence, given).overlap,
+        overlap=onlooker.sight(evidence, best).overlap,
+    )
+
+
+def _short_settings(session: Session, run: StoredRun | None) -> RunSettings:
+    """Settings of a short search with the weighting in use, or the judge where that reads no masks."""
+    weighting = run.record.weighting if run else session.manifest.weighting
+    if weighting not in WEIGHTINGS or WEIGHTINGS[weighting].reads_pictures:
+        weighting = JUDGE
+    settings = session_settings(session, TRACKER, weighting, SHORT)
+    if run is None or run.record.weighting != weighting:
+        return settings
+    with run.results() as results:
+        history = results.settings_history()
+    values = history[-1].values if history else run.record.settings
+    own = settings_from_values(run.record.tracker, weighting, values)
+    return RunSettings(
+        settings.tracker_name,
+        weighting,
+        settings.tracker,
+        own.weighting,
+        own.evidence,
+        settings.recovery,
+        settings.recording,
+    )
+
+
+def _ask(cancelled: Callable[[], bool] | None) -> None:
+    if cancelled is not None and cancelled():
+        raise PoseSearchCancelledError(
+            "The search around the pose was cancelled.", "Start it again when you like."
+        )

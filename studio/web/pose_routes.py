@@ -1,0 +1,175 @@
+"""Poses set by hand: start poses, dragging, mirroring, the search around a pose, and the editor in the scene."""
+
+import math
+from typing import Annotated, Any
+
+import numpy as np
+from fastapi import APIRouter, Depends
+from numpy.typing import NDArray
+
+from studio.body.dragging import Dragger
+from studio.body.mirroring import Mirror
+from studio.body.model import BodyModel
+from studio.errors import BodyError, SettingsError
+from studio.runs.new_run import checked_frames
+from studio.runs.pose_search import better_pose
+from studio.runs.start_pose_file import keep_start_pose
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.web.doors import Doors, doors_of
+from studio.web.pose_schemas import (
+    BetterPoseRequest,
+    DragRequest,
+    EditRequest,
+    EditState,
+    GripView,
+    MirrorRequest,
+    PoseRequest,
+    PoseView,
+    StartPoseRequest,
+)
+from studio.web.session_routes import OpenSession
+from studio.web.session_views import parameter_views
+from studio.web.track_jobs import Report, begin_job
+from studio.web.track_schemas import TrackJobState
+
+router = APIRouter(prefix="/api", tags=["poses"])
+
+Door = Annotated[Doors, Depends(doors_of)]
+Array = NDArray[np.float64]
+SESSION = "/sessions/{session}"
+
+
+@router.get(SESSION + "/start-pose")
+def start_pose(session: OpenSession) -> PoseView:
+    """The session's start pose, or its body's rest pose while it has none."""
+    body = session.body()
+    own = session.start_pose(body)
+    return _view(body, body.neutral if own is None else own, stored=own is not None)
+
+
+@router.put(SESSION + "/start-pose")
+def put_start_pose(session: OpenSession, wish: StartPoseRequest, doors: Door) -> PoseView:
+    """Make a pose the session's start pose; the one it had stays beside it."""
+    body = session.body()
+    pose = _fitting(body, wish.pose)
+    keep_start_pose(session, body, pose)
+    doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
+    return _view(body, pose, stored=True)
+
+
+@router.post(SESSION + "/pose/drag")
+def drag(session: OpenSession, wish: DragRequest) -> PoseView:
+    """The pose with a limb's end at a place; the rest of the body follows where it must."""
+    body = _body(session, wish)[0]
+    found = Dragger(body).dragged(_fitting(body, wish.pose), wish.limb, np.array(wish.target))
+    return _view(body, found.pose, left_mm=found.left_mm)
+
+
+@router.post(SESSION + "/pose/mirror")
+def mirror(session: OpenSession, wish: MirrorRequest) -> PoseView:
+    """The pose with left and right exchanged."""
+    body = _body(session, wish)[0]
+    found = Mirror(body)
+    pose = _fitting(body, wish.pose)
+    return _view(body, found.mirrored(pose) if wish.how == "in place" else found.turned_round(pose))
+
+
+@router.post(SESSION + "/pose/refine", status_code=202)
+async def begin_refining_pose(session: OpenSession, wish: BetterPoseRequest, doors: Door) -> TrackJobState:
+    """Begin a short search around the pose, with the weighting in use. It tells `track` events."""
+    checked_frames(session, wish.frame, wish.frame + 1)
+    body, run = _body(session, wish)
+    pose = _fitting(body, wish.pose)
+
+    def work(report: Report, cancelled: Any) -> dict[str, Any]:  # noqa: ANN401
+        found = better_pose(
+            session, wish.frame, pose, run=run, seed=wish.seed, progress=report, cancelled=cancelled
+        )
+        return {
+            "pose": found.pose.tolist(),
+            "gain": found.gain,
+            "overlap_before": found.overlap_before,
+            "overlap": found.overlap,
+        }
+
+    return begin_job(doors, "pose", session.name, "" if run is None else run.name, work)
+
+
+@router.get("/scene/edit")
+def editing(doors: Door) -> EditState:
+    """What is being edited in the scene, with the pose as it is now."""
+    found = doors.stage.poses.editing
+    if found is None:
+        return EditState()
+    return EditState(
+        editing=True,
+        session=found.session,
+        run=found.run or None,
+        frame=found.frame,
+        pose=[float(value) for value in found.pose],
+        moved=found.moved,
+    )
+
+
+@router.post("/scene/edit", status_code=202)
+def edit(wish: EditRequest, doors: Door) -> None:
+    """Let a start pose, or a frame of a run, be edited in the scene."""
+    session = doors.workspace.session(wish.session)
+    run = session.run(wish.run) if wish.run else None
+    if run is not None and wish.frame is None:
+        raise SettingsError(
+            "A correction needs a frame.", "Name the frame of the run that is to be corrected."
+        )
+    if wish.pose is not None:
+        _fitting(run.body() if run else session.body(), wish.pose)
+    if wish.frame is not None:
+        checked_frames(session, wish.frame, wish.frame + 1)
+    doors.stage.poses.edit(session.name, run.name if run else "", wish.frame, wish.pose)
+
+
+@router.delete("/scene/edit", status_code=202)
+def leave(doors: Door) -> None:
+    """Leave off editing; what was not saved is gone when another run is opened."""
+    doors.stage.poses.leave()
+
+
+def _body(session: Session, wish: PoseRequest) -> tuple[BodyModel, StoredRun | None]:
+    run = session.run(wish.run) if wish.run else None
+    return (run.body() if run else session.body()), run
+
+
+def _fitting(body: BodyModel, pose: list[float]) -> Array:
+    """The pose (D,) if it is one of the body. Raises SettingsError."""
+    if len(pose) != len(body.parameters) or not all(math.isfinite(value) for value in pose):
+        raise SettingsError(
+            f"A pose of {body.name} has {len(body.parameters)} finite numbers, the given one does not.",
+            "Give radians and mm in the order of the body's parameters.",
+        )
+    return np.array(pose)
+
+
+def _view(body: BodyModel, pose: Array, *, stored: bool = False, left_mm: float | None = None) -> PoseView:
+    dragger = Dragger(body)
+    places = dragger.points(pose)
+    grips = [
+        GripView(name=grip.name, side=grip.side, place=place.tolist())
+        for grip, place in zip(dragger.grips, places, strict=True)
+    ]
+    return PoseView(
+        body=body.name,
+        parameters=parameter_views(body),
+        pose=pose.tolist(),
+        grips=grips,
+        stored=stored,
+        left_mm=left_mm,
+        has_sides=_has_sides(body),
+    )
+
+
+def _has_sides(body: BodyModel) -> bool:
+    try:
+        Mirror(body)
+    except BodyError:
+        return False
+    return True
