@@ -1,0 +1,210 @@
+"""A session's calibration: what it is, files to take it from, its floor by clicks, its use and export, boards to print.
+
+Everything but `apply` leaves the session as it is.
+"""
+
+import asyncio
+import io
+import tempfile
+import zipfile
+from pathlib import Path
+from typing import Annotated, Literal
+from urllib.parse import quote
+
+import cv2
+from fastapi import APIRouter, Depends, Query, Response
+
+from studio.calibration.board_pdf import usual_board, write_board_pdf
+from studio.calibration.boards import board_from_text
+from studio.calibration.coverage import coverage_picture
+from studio.calibration.floor_clicks import Click
+from studio.calibration.world_picture import world_picture
+from studio.capture.calibration_files import (
+    CALIBRATION_WRITERS,
+    export_calibration,
+    find_calibrations,
+    read_calibration,
+)
+from studio.errors import CalibrationError, NotFoundError
+from studio.geometry.camera import Camera
+from studio.runs.overlay_drawing import encode_jpeg
+from studio.sessions.calibration_changes import earlier_calibration, replace_calibration
+from studio.sessions.session import CAMERAS_PATH, Session
+from studio.web.calibration_places import chosen_file, place_of
+from studio.web.calibration_proposals import Proposal, backdrop, proposal_in_use, proposal_of_file, with_floor
+from studio.web.calibration_schemas import (
+    ApplyRequest,
+    CalibrationFileRequest,
+    CalibrationView,
+    FloorRequest,
+    FootagePlace,
+    ProposalView,
+)
+from studio.web.calibration_views import calibration_view, proposal_view
+from studio.web.doors import Doors, doors_of, let_go
+from studio.web.session_routes import OpenSession
+
+router = APIRouter(prefix="/api", tags=["calibration"])
+
+Door = Annotated[Doors, Depends(doors_of)]
+
+HERE = "/sessions/{session}/calibration"
+CURRENT = "current"
+FILE_NAMES = {"pose2sim": "Calib_{}.toml", "aniposelib": "calibration.toml"}
+
+
+@router.get(HERE)
+def calibration(session: OpenSession) -> CalibrationView:
+    """The calibration in use with what speaks against it, and those before it."""
+    return calibration_view(session, ())
+
+
+@router.post(HERE + "/proposals", status_code=201)
+async def read_file(session: OpenSession, wish: CalibrationFileRequest, doors: Door) -> ProposalView:
+    """Read a calibration file: unit, up axis, cameras, findings. It is not used before it is applied."""
+    return proposal_view(doors.proposals.keep(await asyncio.to_thread(_read, session, wish, doors)))
+
+
+@router.get(HERE + "/proposals/{identifier}")
+def proposal(session: OpenSession, identifier: str, doors: Door) -> ProposalView:
+    """A calibration that was read or solved and is not in use yet."""
+    return proposal_view(_found(session, identifier, doors))
+
+
+@router.post(HERE + "/floor", status_code=201)
+def set_floor(session: OpenSession, wish: FloorRequest, doors: Door) -> ProposalView:
+    """The same cameras in the world that clicked points make: a new proposal with each point in space."""
+    base = _found(session, wish.proposal or CURRENT, doors)
+    points = [Click(point.pixels, point.world) for point in wish.points]
+    return proposal_view(doors.proposals.keep(with_floor(session, base, points)))
+
+
+@router.post(HERE + "/proposals/{identifier}/apply")
+def apply(session: OpenSession, identifier: str, wish: ApplyRequest, doors: Door) -> CalibrationView:
+    """Use a proposal from now on; the calibration before is kept, and what becomes stale is said. 422 with the first
+    finding that blocks, unless `anyway`; refused while a run of the session is being tracked.
+    """
+    new = _found(session, identifier, doors).checked_new(wish.anyway)
+    let_go(doors, session.name)
+    change = replace_calibration(session, new)
+    doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
+    return calibration_view(change.session, change.notes)
+
+
+@router.get(HERE + "/proposals/{identifier}/views/{camera}.jpg", response_class=Response)
+async def view(
+    session: OpenSession,
+    identifier: str,
+    camera: str,
+    doors: Door,
+    height: Annotated[int, Query(ge=64, le=2160)] = 720,
+    frame: Annotated[int, Query(ge=0)] = 0,
+    board: bool = True,
+) -> Response:
+    """Floor, axes and a pole drawn on a camera's picture, upright; identifier "current" for the one in use. board:
+    show the board's footage where the proposal has some.
+    """
+    found = _found(session, identifier, doors)
+    placed = _camera(found, camera)
+    picture = await asyncio.to_thread(backdrop, session, found, camera, board, frame)
+    points = found.clicked.points.tolist() if found.clicked is not None else []
+    drawn = world_picture(picture, placed, points, height)
+    return Response(encode_jpeg(drawn), media_type="image/jpeg", headers={"cache-control": "no-store"})
+
+
+@router.get(HERE + "/proposals/{identifier}/coverage/{camera}.png", response_class=Response)
+def coverage(session: OpenSession, identifier: str, camera: str, doors: Door) -> Response:
+    """Where in the picture the board's corners were seen: used ones white, those left out red."""
+    found = _found(session, identifier, doors)
+    name = _camera(found, camera).name
+    kept = session.path / CAMERAS_PATH.with_name(f"cameras.coverage-{name}.png")
+    if found.calibrated is None and identifier == CURRENT and kept.is_file():
+        content = kept.read_bytes()
+    elif found.calibrated is not None and name in found.calibrated.lenses:
+        lens = found.calibrated.lenses[name]
+        dropped = {residual.frame for residual in lens.residuals if residual.dropped}
+        seen = found.calibrated.sightings.get(name, ())
+        picture = coverage_picture(
+            lens.coverage,
+            [sighting for sighting in seen if sighting.frame not in dropped],
+            [sighting for sighting in seen if sighting.frame in dropped],
+        )
+        content = bytes(cv2.imencode(".png", picture)[1])
+    else:
+        raise NotFoundError(
+            f"Camera '{name}' was not calibrated from a board here.", "Calibrate it from boards."
+        )
+    return Response(content, media_type="image/png", headers={"cache-control": "no-store"})
+
+
+@router.get(HERE + "/export", response_class=Response)
+def export(
+    session: OpenSession, form: Annotated[Literal["pose2sim", "aniposelib", "opencv"], Query(alias="format")]
+) -> Response:
+    """The calibration in use for another tool; several files as a zip. What the format cannot hold is told in the
+    header x-studio-notes (percent-encoded lines).
+    """
+    cameras = proposal_in_use(session).cameras
+    with tempfile.TemporaryDirectory() as folder:
+        writer = CALIBRATION_WRITERS[form]
+        place = Path(folder) / FILE_NAMES.get(form, f"cameras{writer.suffix}").format(session.name)
+        written = export_calibration(cameras, place, form)
+        name, content = _packed(written.files, f"{session.name}-{form}.zip")
+    headers = {
+        "content-disposition": f'attachment; filename="{name}"',
+        "x-studio-notes": quote("\n".join(written.notes)),
+    }
+    return Response(content, media_type="application/octet-stream", headers=headers)
+
+
+@router.get("/calibration-boards.pdf", response_class=Response)
+def board_pdf(
+    kind: Literal["charuco", "chessboard"] = "charuco",
+    page: Literal["a4", "a3", "letter"] = "a4",
+    board: Annotated[str, Query(max_length=120, description="Empty: one that fills the page.")] = "",
+) -> Response:
+    """A board to print in true size; its spelling is in the file's name, and in the header x-studio-board."""
+    made = board_from_text(board) if board else usual_board(kind, page)
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder) / "board.pdf"
+        write_board_pdf(made, place, page)
+        content = place.read_bytes()
+    plain = made.spelling.replace(":", "-").replace(",", "-")
+    headers = {"content-disposition": f'attachment; filename="{plain}.pdf"', "x-studio-board": made.spelling}
+    return Response(content, media_type="application/pdf", headers=headers)
+
+
+def _read(session: Session, wish: CalibrationFileRequest, doors: Doors) -> Proposal:
+    if wish.earlier:
+        path = earlier_calibration(session, wish.earlier) / CAMERAS_PATH.name
+    elif not wish.path and wish.upload is None:
+        raise CalibrationError("No calibration was named.", "Choose a file.")
+    else:
+        place = place_of(doors, FootagePlace(path=wish.path, upload=wish.upload))
+        path = chosen_file(place, wish.file, find_calibrations(place) if place.is_dir() else ())
+    return proposal_of_file(session, read_calibration(path, wish.unit, wish.up))
+
+
+def _found(session: Session, identifier: str, doors: Doors) -> Proposal:
+    return (
+        proposal_in_use(session) if identifier == CURRENT else doors.proposals.find(session.name, identifier)
+    )
+
+
+def _camera(found: Proposal, name: str) -> Camera:
+    for camera in found.cameras:
+        if camera.name == name:
+            return camera
+    names = ", ".join(camera.name for camera in found.cameras)
+    raise NotFoundError(f"There is no calibrated camera '{name[:64]}'.", f"There are {names}.")
+
+
+def _packed(files: tuple[Path, ...], name: str) -> tuple[str, bytes]:
+    """The only file itself, or all in a zip of that name."""
+    if len(files) == 1:
+        return files[0].name, files[0].read_bytes()
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in files:
+            archive.write(path, path.name)
+    return name, packed.getvalue()

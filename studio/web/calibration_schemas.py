@@ -1,0 +1,170 @@
+"""Calibrating a session's cameras, as OpenAPI shows it. Lengths in mm, angles in degrees, pixels as stored."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from studio.web.schemas import Answer, CameraMatching, Number, Numbers, Request, RunName
+
+Pixel = tuple[float, float]
+Place = Annotated[str, Field(max_length=4096)]
+
+
+class FootagePlace(Request):
+    """Files of this machine or of an upload. path: a full path, or with an upload a path inside it."""
+
+    path: Place = ""
+    upload: RunName | None = None
+
+
+class CalibrationFileRequest(Request):
+    """A calibration to look at. Nothing is changed by it. file: which one of a folder or upload that holds several;
+    earlier: one that the session used before, instead of a path.
+    """
+
+    path: Place = ""
+    upload: RunName | None = None
+    file: Place = ""
+    earlier: str = Field("", max_length=64)
+    unit: Literal["", "mm", "m"] = Field("", description="Empty: what the file says, or its distances tell.")
+    up: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"
+
+
+class BoardRequest(Request):
+    """Board footage to solve the cameras from. intrinsics, extrinsics: folders with one video or folder of pictures a
+    camera; neither: those that lie in `footage`, or in the session. floor: "frame:N", or "" for none.
+    """
+
+    board: str = Field(max_length=120, description="charuco:5x7,40,30 or chessboard:4x7,60")
+    thickness_mm: float = Field(0.0, ge=0, le=200)
+    footage: FootagePlace | None = None
+    intrinsics: FootagePlace | None = None
+    extrinsics: FootagePlace | None = None
+    floor: str = Field("", max_length=24, pattern=r"^(frame:\d{1,7})?$")
+    floor_footage: FootagePlace | None = Field(
+        None, description="Pictures of the board on the floor, one a camera."
+    )
+    offsets: dict[str, int] = Field(
+        default_factory=dict, max_length=64, description="By camera: frames of the common footage, if unlike."
+    )
+    distances: list["DistanceWish"] = Field(default_factory=list, max_length=64)
+    refine_lenses: bool = False
+
+
+class DistanceWish(Request):
+    """A measured distance between two cameras' lenses."""
+
+    first: str = Field(max_length=64)
+    second: str = Field(max_length=64)
+    mm: float = Field(gt=0, le=1e6)
+
+
+class PointWish(Request):
+    """A point clicked in two cameras or more. world: where it is known to lie, mm; for all points or for none."""
+
+    pixels: dict[str, Pixel] = Field(min_length=2, max_length=64)
+    world: tuple[float, float, float] | None = None
+
+
+class FloorRequest(Request):
+    """Points of the floor: the first is the origin, the second lies on X. proposal: "" for the calibration in use."""
+
+    proposal: str = Field("", max_length=64)
+    points: list[PointWish] = Field(min_length=3, max_length=64)
+
+
+class ApplyRequest(Request):
+    """anyway: also if a finding says that results would be wrong."""
+
+    anyway: bool = False
+
+
+class FindingView(Answer):
+    """What a check found. blocks: results would be wrong."""
+
+    code: str
+    severity: Literal["blocks", "warns"]
+    message: str
+    remedy: str
+    cameras: list[str]
+
+
+class CalibratedCamera(Answer):
+    """A camera as it stands. forward: its optical axis; rms_px: of its board corners, null where no board was seen."""
+
+    name: str
+    width: int
+    height: int
+    focal_px: Numbers
+    centre_px: Numbers
+    position: Numbers
+    forward: Numbers
+    quarter_turns: int
+    rms_px: Number = None
+
+
+class ClickedPoint(Answer):
+    """A clicked point in space, mm, and how many pixels each camera's click misses it by."""
+
+    place: Numbers
+    missed_px: dict[str, Number]
+
+
+class Rig(Answer):
+    """Cameras with what speaks for and against them. report: as the command writes it, {} for files."""
+
+    source: str
+    cameras: list[CalibratedCamera]
+    notes: list[str] = Field(default_factory=list)
+    findings: list[FindingView] = Field(default_factory=list)
+    usable: bool = True
+    floor: str = ""
+    report: dict[str, object] = Field(default_factory=dict)
+    points: list[ClickedPoint] = Field(default_factory=list)
+
+
+class ProposalView(Rig):
+    """A calibration to look at before it is applied; it lives until the studio ends. unit_note: how the unit was
+    found. matching: the footage's cameras to the calibration's own names.
+    """
+
+    identifier: str
+    session: str
+    unit_note: str = ""
+    matching: list[CameraMatching] = Field(default_factory=list)
+
+
+class CalibrationView(Answer):
+    """The calibration in use, null while there is none. earlier: those before it, newest first. stale_runs: tracked
+    with another one. changed: when it was replaced (ISO 8601). board_footage: folders in the session, if any. notes:
+    what the change that was just made means.
+    """
+
+    session: str
+    present: Rig | None
+    changed: str = ""
+    earlier: list[str] = Field(default_factory=list)
+    stale_runs: list[str] = Field(default_factory=list)
+    board_footage: bool = False
+    footage: list[str] = Field(default_factory=list, description="Names of the cameras that have footage.")
+    formats: dict[str, str] = Field(default_factory=dict, description="Formats of the export.")
+    notes: list[str] = Field(default_factory=list)
+
+
+class SolveState(Answer):
+    """How a calibration from boards stands; code, message and hint say why it failed. share: of all, about, null while
+    unknown; proposal: what came of it.
+    """
+
+    identifier: str
+    session: str
+    state: Literal["running", "done", "failed", "cancelled"]
+    step: str = ""
+    done: int = 0
+    total: int = 0
+    share: Number = None
+    seconds_left: Number = None
+    code: str = ""
+    message: str = ""
+    hint: str = ""
+    proposal: str = ""
