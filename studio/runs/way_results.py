@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from studio.runs.tracks import track_names
+from studio.runs.checking import kept_check, usual_track
 from studio.runs.way_step import StepStatus, counted, enumerated
 from studio.sessions.footage_changes import stale_runs
 from studio.sessions.run_record import CAMERAS_NAME
@@ -52,10 +52,15 @@ def check_step(session: Session) -> StepStatus:
     run = newest_run(session)
     if run is None:
         return StepStatus("check", "blocked", "", "It needs a run.")
-    derived = [name for name in track_names(run) if name != "raw"]
-    if derived:
-        return StepStatus("check", "done", f"{run.name}: {enumerated(derived)}")
-    return StepStatus("check", "ready", f"look at {run.name}", optional=True)
+    name = usual_track(run)
+    check = kept_check(run, name)
+    if check is None:
+        return StepStatus("check", "ready", f"{run.name}, track {name}: not looked at yet")
+    words = f"{name}: {check.in_words()}"
+    changed = run_changes(session, run)
+    if changed:
+        return StepStatus("check", "stale", words, f"Measured before {enumerated(changed)} changed.")
+    return StepStatus("check", "done", words)
 
 
 def export_step(session: Session, exports: Sequence[str]) -> StepStatus:

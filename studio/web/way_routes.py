@@ -3,7 +3,7 @@
 import asyncio
 from typing import Annotated
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Depends, Query
 from starlette.responses import FileResponse, Response
 
 from studio.export.kept_exports import kept_exports
@@ -11,6 +11,7 @@ from studio.runs.way import Way, way_of
 from studio.runs.way_results import newest_run
 from studio.sessions.beginning import begin_session
 from studio.sessions.session import Session
+from studio.tracking.evaluations import knobs_for_evaluations
 from studio.web.doors import Doors, doors_of
 from studio.web.page_routes import assets_folder
 from studio.web.schemas import NewName
@@ -38,6 +39,12 @@ def begin(wish: NewSession, doors: Door) -> NewName:
     return NewName(name=session.name)
 
 
+@router.get("/api/evaluations")
+def evaluations(tracker: str, evaluations: Annotated[int, Query(ge=1, le=1_000_000)]) -> dict[str, int]:
+    """Knobs with which a tracker weighs about so many poses a frame."""
+    return knobs_for_evaluations(tracker, evaluations)
+
+
 @router.get("/api/sessions/{session}/way")
 async def way(session: OpenSession, doors: Door) -> WayAnswer:
     """Every step of the guided way: done, ready, blocked, stale (and why) or running."""
@@ -50,6 +57,7 @@ def running_steps(doors: Doors, session: Session) -> dict[str, str]:
     jobs = {
         "subject": doors.subject_fits.values(),
         "start-pose": doors.initialisations.values(),
+        "background": doors.background_setups.values(),
         "check": doors.track_jobs.values(),
         "export": doors.exports.values(),
     }

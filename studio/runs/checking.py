@@ -1,0 +1,224 @@
+"""How well a track fits its pictures, measured in every few frames and kept beside the run.
+
+`checks/<track>.json`: for each looked-at frame and camera the share of the model's pixels that lie in the mask, and of
+the mask's that the model covers; beside them frames that were lost, that are doubtful, in which the body turns round
+faster than people can, and how much the markers jitter.
+"""
+
+import contextlib
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.model import BodyModel
+from studio.errors import RunError
+from studio.evidence.backgrounds import Backgrounds
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.evidence.pipeline import EvidenceMaker
+from studio.geometry.camera import Camera
+from studio.runs.overlay_drawing import projected_silhouette
+from studio.runs.refining import REFINED, SMOOTHED, MakingCancelledError, jitter
+from studio.runs.run_footage import footage_of
+from studio.runs.tracks import RAW, Track, read_track, track_names, track_stamp
+from studio.sessions.record_files import read_record, write_record
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.settings import RunSettings, settings_from_values
+from studio.tracking.start_candidates import facing
+from studio.weighting.overlay import overlay_points
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, int, int], None]
+
+FOLDER = "checks"
+SCHEMA_VERSION = 1
+EVERY = 10
+GOOD_SHARE = 0.85
+"""Share of the model's pixels that lie in the masks of a frame, below which it does not fit."""
+DOUBTFUL = 0.6
+"""Agreement of the silhouettes (f_s) below which a frame is marked."""
+FASTEST_TURN = 2700.0
+"""Degrees a second about the vertical, beyond what people do; left and right changed places then."""
+LOST = ("lost", "no evidence")
+
+
+class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What was measured. track : its name; stamp, count : of the track then. frames : those looked at. inside, covered
+    : (F, V) shares, None where there is nothing to divide by. lost, doubtful, turned : numbers of frames. jitter_mm :
+    root mean square second difference of the markers.
+    """
+
+    schema: int = SCHEMA_VERSION
+    track: str
+    stamp: int
+    count: int
+    cameras: tuple[str, ...]
+    frames: tuple[int, ...]
+    inside: tuple[tuple[float | None, ...], ...]
+    covered: tuple[tuple[float | None, ...], ...]
+    lost: tuple[int, ...]
+    doubtful: tuple[int, ...]
+    turned: tuple[int, ...]
+    jitter_mm: float
+
+    @property
+    def poor(self) -> tuple[int, ...]:
+        """Frames whose views have too little of the model in the masks, on average."""
+        shares = [[share for share in row if share is not None] for row in self.inside]
+        return tuple(
+            frame
+            for frame, row in zip(self.frames, shares, strict=True)
+            if not row or sum(row) / len(row) < GOOD_SHARE
+        )
+
+    @property
+    def inside_mean(self) -> float:
+        """Share of the model's pixels in the masks, over all looked-at frames and cameras; NaN if there is none."""
+        known = [share for row in self.inside for share in row if share is not None]
+        return float(np.mean(known)) if known else float("nan")
+
+    @property
+    def good(self) -> bool:
+        """Whether nothing stands out."""
+        return not (self.poor or self.lost or self.turned)
+
+    def in_words(self) -> str:
+        """One line."""
+        parts = [f"{100 * self.inside_mean:.0f} % of the model in the masks"]
+        parts += [f"{len(self.poor)} of {len(self.frames)} looked-at frames do not fit"] if self.poor else []
+        parts += [f"{len(self.lost)} lost"] if self.lost else []
+        parts += [f"{len(self.turned)} sudden turns"] if self.turned else []
+        return ", ".join([*parts, f"jitter {self.jitter_mm:.1f} mm"])
+
+
+def usual_track(run: StoredRun) -> str:
+    """The track that is looked at and exported unless told otherwise: the smoothed one, else the refined, else raw."""
+    names = track_names(run)
+    return next((name for name in (SMOOTHED, REFINED) if name in names), RAW)
+
+
+def check_run(
+    session: Session,
+    run: StoredRun,
+    track: str = "",
+    every: int = EVERY,
+    *,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> RunCheck:
+    """Measure a track ("" for the usual one) in every so-many-th of its frames and keep that.
+
+    Raises RunError for a run without frames, NotFoundError, FootageError; MakingCancelledError when stopped.
+    """
+    chosen = read_track(run, track or usual_track(run))
+    if not len(chosen.frames):
+        raise RunError(f"Run '{run.name}' has no finished frame.", "Track it first.")
+    body, cameras = run.body(), run.cameras()
+    rows = range(0, len(chosen.frames), max(1, every))
+    settings = _settings(run)
+
+    def told(done: int) -> None:
+        if cancelled is not None and cancelled():
+            raise MakingCancelledError("The check was cancelled.", "Start it again when you like.")
+        if progress is not None:
+            progress("comparing with the masks", done, len(rows))
+
+    shares = []
+    with contextlib.closing(footage_of(session, run)) as footage:
+        maker = EvidenceMaker(cameras, footage, Backgrounds(footage), settings.evidence, "none")
+        for done, row in enumerate(rows):
+            told(done)
+            evidence = maker.evidence(int(chosen.frames[row]))
+            shares.append(frame_shares(body, cameras, chosen.poses[row], evidence, settings))
+    check = RunCheck(
+        track=chosen.name,
+        stamp=track_stamp(run, chosen.name),
+        count=len(chosen.frames),
+        cameras=tuple(camera.name for camera in cameras),
+        frames=tuple(int(chosen.frames[row]) for row in rows),
+        inside=tuple(found[0] for found in shares),
+        covered=tuple(found[1] for found in shares),
+        lost=_frames_where(chosen, np.isin(np.array(chosen.states), LOST)),
+        doubtful=_frames_where(chosen, chosen.confidence < DOUBTFUL),
+        turned=sudden_turns(body, chosen, run.record.fps),
+        jitter_mm=jitter(run, chosen),
+    )
+    (run.folder / FOLDER).mkdir(exist_ok=True)
+    write_record(_path(run, chosen.name), check)
+    return check
+
+
+def kept_check(run: StoredRun, track: str) -> RunCheck | None:
+    """What was measured of a track as it is now; None where it was not, or the track is another one since."""
+    path = _path(run, track)
+    if not path.is_file():
+        return None
+    check = read_record(
+        path,
+        RunCheck,
+        SCHEMA_VERSION,
+        missing=(f"Run '{run.name}' was not checked.", "Check it."),
+        what="what was measured of a track",
+        remedy="Check the run again.",
+    )
+    found = read_track(run, track)
+    same = (check.stamp, check.count) == (track_stamp(run, track), len(found.frames))
+    return check if same else None
+
+
+def frame_shares(
+    body: BodyModel, cameras: tuple[Camera, ...], pose: Array, evidence: FrameEvidence, settings: RunSettings
+) -> tuple[tuple[float | None, ...], tuple[float | None, ...]]:
+    """Of each camera: the share of the model's pixels in the mask, and of the mask's under the model."""
+    views = {view.camera: view for view in evidence.views}
+    inside: list[float | None] = []
+    covered: list[float | None] = []
+    for overlay in overlay_points(body, cameras, pose, settings.weighting):
+        view = views.get(overlay.camera)
+        if view is None:
+            inside.append(None)
+            covered.append(None)
+            continue
+        mask = view.mask > 0
+        model = projected_silhouette(overlay.contours, *mask.shape) > 0
+        both = int(np.count_nonzero(mask & model))
+        inside.append(_share(both, int(np.count_nonzero(model))))
+        covered.append(_share(both, int(np.count_nonzero(mask))))
+    return tuple(inside), tuple(covered)
+
+
+def sudden_turns(body: BodyModel, track: Track, fps: float) -> tuple[int, ...]:
+    """Frames in which the body faces another way than just before, faster than FASTEST_TURN about the vertical."""
+    if len(track.frames) < 2:
+        return ()
+    toward = facing(body, track.poses)[:, :2]
+    angle = np.unwrap(np.arctan2(toward[:, 1], toward[:, 0]))
+    length = np.linalg.norm(toward, axis=1)
+    apart = np.diff(track.frames)
+    rate = np.degrees(np.abs(np.diff(angle))) * fps / apart
+    # A body that lies down faces up: its direction over the floor says nothing.
+    upright = np.minimum(length[1:], length[:-1]) > 0.5
+    return tuple(int(frame) for frame in track.frames[1:][(rate > FASTEST_TURN) & upright])
+
+
+def _share(part: int, whole: int) -> float | None:
+    return part / whole if whole else None
+
+
+def _frames_where(track: Track, chosen: NDArray[np.bool_]) -> tuple[int, ...]:
+    return tuple(int(frame) for frame in track.frames[chosen])
+
+
+def _path(run: StoredRun, track: str) -> Path:
+    return run.folder / FOLDER / f"{track}.json"
+
+
+def _settings(run: StoredRun) -> RunSettings:
+    """The run's settings as they were last."""
+    with run.results() as results:
+        history = results.settings_history()
+    found = history[-1].values if history else run.record.settings
+    return settings_from_values(run.record.tracker, run.record.weighting, found)

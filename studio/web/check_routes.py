@@ -1,0 +1,59 @@
+"""How well a run's track fits its pictures: measured in the background (`track` events, verb "check"), and kept."""
+
+import asyncio
+from collections.abc import Callable
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends
+
+from studio.runs.checking import RunCheck, check_run, kept_check, usual_track
+from studio.runs.tracks import read_track
+from studio.web.check_schemas import CheckAnswer, CheckLine, CheckWish
+from studio.web.doors import Doors, doors_of
+from studio.web.run_routes import RUN, OpenRun
+from studio.web.session_routes import OpenSession
+from studio.web.track_routes import begin_job
+from studio.web.track_schemas import TrackJobState
+
+router = APIRouter(prefix="/api", tags=["tracks"])
+
+Door = Annotated[Doors, Depends(doors_of)]
+
+
+@router.get(RUN + "/check")
+def check(run: OpenRun, track: str = "") -> CheckAnswer:
+    """What was measured of a track as it is now (empty: the one that is exported unless told otherwise)."""
+    name = track or usual_track(run)
+    read_track(run, name)
+    found = kept_check(run, name)
+    return CheckAnswer(track=name, usual=usual_track(run), check=None if found is None else _line(found))
+
+
+@router.post(RUN + "/check", status_code=202)
+async def begin_check(session: OpenSession, run: OpenRun, wish: CheckWish, doors: Door) -> TrackJobState:
+    """Measure a track in every so-many-th frame."""
+    name = wish.track or usual_track(run)
+    await asyncio.to_thread(read_track, run, name)
+
+    def work(report: Callable[[str, int, int], None], cancelled: Callable[[], bool]) -> dict[str, Any]:
+        check_run(session, run, name, wish.every, progress=report, cancelled=cancelled)
+        return {"track": name}
+
+    return begin_job(doors, "check", session.name, run.name, work)
+
+
+def _line(found: RunCheck) -> CheckLine:
+    return CheckLine(
+        cameras=list(found.cameras),
+        frames=list(found.frames),
+        inside=[list(row) for row in found.inside],
+        covered=[list(row) for row in found.covered],
+        poor=list(found.poor),
+        lost=list(found.lost),
+        doubtful=list(found.doubtful),
+        turned=list(found.turned),
+        jitter_mm=found.jitter_mm,
+        inside_mean=found.inside_mean,
+        good=found.good,
+        words=found.in_words(),
+    )

@@ -1,0 +1,40 @@
+"""A check of a run's track, as OpenAPI shows it."""
+
+from pydantic import Field
+
+from studio.web.schemas import Answer, Number, Request, RunName
+
+
+class CheckWish(Request):
+    """What is to be measured. track: null for the one that is exported unless told otherwise; every: so-many-th."""
+
+    track: RunName | None = None
+    every: int = Field(10, ge=1, le=10_000)
+
+
+class CheckLine(Answer):
+    """What was measured. inside: per looked-at frame and camera, the share of the model's pixels that lie in the mask;
+    covered: of the mask's, under the model. poor: frames whose views have too little of it inside; turned: sudden
+    turns.
+    """
+
+    cameras: list[str]
+    frames: list[int]
+    inside: list[list[Number]]
+    covered: list[list[Number]]
+    poor: list[int]
+    lost: list[int]
+    doubtful: list[int]
+    turned: list[int]
+    jitter_mm: Number
+    inside_mean: Number
+    good: bool
+    words: str
+
+
+class CheckAnswer(Answer):
+    """track: the one that is asked for; usual: the one that is exported unless told otherwise; check: null before."""
+
+    track: str
+    usual: str
+    check: CheckLine | None
