@@ -10,12 +10,15 @@ import csv
 import fractions
 import io
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
 import av
 import av.container
+import av.error
 import av.video
 import cv2
 import numpy as np
@@ -115,8 +118,9 @@ class StreamWriter:
     def close(self) -> None:
         """End the file. Raises OSError where the disk refuses."""
         if self._container is not None:
-            self._container.close()
-            self._container = None
+            container, self._container = self._container, None
+            with _disk_errors():
+                container.close()
 
     def _open(self, size: tuple[int, int]) -> None:
         container = av.open(str(self._path), "w", format="mp4", options=FRAGMENTS)
@@ -133,7 +137,8 @@ class StreamWriter:
         packet.pts = packet.dts = number
         packet.duration = 1
         packet.is_keyframe = True
-        self._container.mux(packet)
+        with _disk_errors():
+            self._container.mux(packet)
 
 
 class TimesFile:
@@ -154,6 +159,15 @@ class TimesFile:
     def close(self) -> None:
         """End the file."""
         self._file.close()
+
+
+@contextmanager
+def _disk_errors() -> Iterator[None]:
+    """What the library says of a disk, as the system would."""
+    try:
+        yield
+    except av.error.FFmpegError as problem:
+        raise OSError(problem.errno, problem.strerror) from None
 
 
 def jpeg_of(shot: Shot) -> bytes:

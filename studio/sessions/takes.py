@@ -20,6 +20,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from studio.capture.calibration_files import write_calibration
 from studio.capture.camera_sets import PictureSet, SpreadFigures, spread_figures
 from studio.capture.footage_source import CameraSource, FootageSource
 from studio.capture.numbered_pictures import picture_path
@@ -143,10 +144,12 @@ def begin_take(
             raise FootageError(
                 f"Session '{base.name}' has no camera '{name}'.", f"Name them as it does: {', '.join(known)}."
             )
+    calibrated = {camera.name: camera for camera in base.cameras()}
     _check_backgrounds(base, [known[name] for name in cameras])
     folder = atomic_files.new_folder_beside(into)
     try:
         _copy_known(base, folder, keep_start)
+        write_calibration(tuple(calibrated[name] for name in cameras), folder / CAMERAS_PATH)
         sources = tuple(_source(base, folder, known[name], frame_count) for name in cameras)
         manifest = msgspec.structs.replace(
             base.manifest,
@@ -274,7 +277,6 @@ def _copy_known(base: Session, folder: Path, keep_start: bool) -> None:
             shutil.copytree(path, folder / entry)
         elif path.exists():
             shutil.copyfile(path, folder / entry)
-    assert (folder / CAMERAS_PATH).exists()
 
 
 def _source(base: Session, folder: Path, source: CameraSource, frame_count: int) -> CameraSource:

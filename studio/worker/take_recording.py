@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from studio.capture.camera_sets import PictureSet, SpreadFigures
 from studio.capture.live_cameras import CameraStanding
-from studio.errors import StudioError
+from studio.errors import FootageError, StudioError
 from studio.sessions.session import Session
 from studio.sessions.takes import TakeWriter, finish_take
 from studio.worker.camera_readers import CameraReaders
@@ -104,10 +104,10 @@ class TakeRecording:
         )
 
     def await_first(self, patience: float = 10.0) -> None:
-        """Return when the set is there that one gets ready with. Raises StudioError where none comes."""
+        """Return when the set is there that one gets ready with. Raises FootageError where none comes."""
         self._first_there.wait(patience)
         if not self._sets:
-            raise StudioError(self._ended or "The cameras gave no complete set.", "Look at their pictures.")
+            raise FootageError(self._ended or "The cameras gave no complete set.", "Look at their pictures.")
 
     def close(self) -> Session:
         """End it; returns the session with what came. Raises SessionError where nothing came."""
