@@ -28,6 +28,7 @@ from studio.runs.search_space import parameter_names
 from studio.runs.session_settings import session_settings
 from studio.runs.subject_frames import varied_frames
 from studio.runs.tracks import read_track
+from studio.sessions.calibration_changes import stale_runs
 from studio.sessions.names import free_name
 from studio.sessions.session import SUBJECT_NAME, Session
 from studio.tracking.loss_detection import anything_seen
@@ -203,8 +204,10 @@ def _first_poses(
 def _stored_poses(
     session: Session, body: BodyModel, wanted: str
 ) -> tuple[NDArray[np.int64], Array, str] | None:
-    """Frames, poses and name of the run asked for, or of the newest one of this body with any."""
-    runs = [session.run(wanted)] if wanted else list(reversed(session.runs()))
+    """Frames, poses and name of the run asked for, or of the newest one of this body and calibration with any."""
+    stale = stale_runs(session)
+    usual = [run for run in reversed(session.runs()) if run.name not in stale]
+    runs = [session.run(wanted)] if wanted else usual
     for run in runs:
         if run.record.parameters != parameter_names(body):
             continue
