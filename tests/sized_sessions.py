@@ -36,7 +36,13 @@ def make_sized_session(folder: Path, seed: int) -> tuple[Session, dict[str, floa
     write_calibration(cameras, folder / "calibration" / "cameras.toml")
     motion = _postures(skeleton)
     renderer = Renderer(
-        ROOMS["furnished"](0.0), cameras, motion, noise=1.5, samples=1, seed=seed, wardrobe=WARDROBES["striped"]
+        ROOMS["furnished"](0.0),
+        cameras,
+        motion,
+        noise=1.5,
+        samples=1,
+        seed=seed,
+        wardrobe=WARDROBES["striped"],
     )
     for frame in range(motion.frame_count):
         shadow = renderer.shadow(frame)

@@ -57,7 +57,7 @@ def background(session: OpenSession, doors: Door) -> BackgroundAnswer:
     """What masks are made of and with which knobs, and the set-up under way or the last one."""
     evidence = read_evidence(session)
     settings = session_settings(session)
-    knobs = knobs_of(settings.evidence)
+    knobs = knobs_of(type(settings.evidence))
     now = values(settings)
     sources = session.manifest.footage.cameras
     cameras = [
