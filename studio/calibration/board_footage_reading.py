@@ -1,5 +1,6 @@
 """Board footage of several cameras: one video, or one folder of pictures, or one picture a camera."""
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +21,9 @@ Progress = Callable[[str, int, int], None]
 
 LENS_FRAMES, RIG_FRAMES = 60, 120
 LENS_PICTURES = 30
+AFFIXES = re.compile(
+    r"^(int|ext|intrinsics?|extrinsics?|calib|calibration|board)[_-]|[_-](int|ext|img|imgs|images|calib|calibration|board)$"
+)
 BLURRED = 0.5
 """Pictures less sharp than this share of the median are passed over where there are many."""
 
@@ -92,6 +96,14 @@ def by_camera(footage: Sequence[BoardFootage], names: Sequence[str]) -> dict[str
     matches = match_names([entry.name for entry in footage], names, "board recordings", CalibrationError)
     found = {match.camera: entry for match, entry in zip(matches, footage, strict=True)}
     return {name: found[name] for name in names if name in found}
+
+
+def plain_names(names: Sequence[str]) -> tuple[str, ...]:
+    """Cameras' names from those of their board footage: without words that tell what it is for ("ext_cam1_img" is
+    "cam1"), where names stay apart.
+    """
+    plain = tuple(AFFIXES.sub("", name) or name for name in names)
+    return plain if len(set(plain)) == len(plain) else tuple(names)
 
 
 def look_for_lens(

@@ -15,6 +15,7 @@ from studio.calibration.board_footage_reading import (
     list_footage,
     look_for_lens,
     look_together,
+    plain_names,
 )
 from studio.calibration.boards import Board
 from studio.calibration.checks import check_calibration
@@ -107,7 +108,7 @@ def calibrate(
 def _names(folder: Path | None) -> tuple[str, ...]:
     if folder is None:
         return ()
-    return tuple(sorted((entry.name for entry in list_footage(folder)), key=natural_key))
+    return tuple(sorted(plain_names([entry.name for entry in list_footage(folder)]), key=natural_key))
 
 
 def _floor_frame(floor: str | None) -> int | None:

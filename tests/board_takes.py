@@ -1,0 +1,45 @@
+"""Small board footage of two cameras with known truth, as folders of pictures; in the last common ones the board lies
+on the floor.
+"""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from studio.calibration.boards import Board
+from studio.synthesis.board_footage import BoardRenderer, close_boards, floor_board, waved_boards
+from studio.synthesis.cameras import placed_camera
+
+BOARD = Board("charuco", 6, 5, 120.0, 90.0, "DICT_4X4_50")
+SIZE = (640, 480)
+PLACES = ((2600.0, -900.0, 1500.0), (2600.0, 900.0, 1900.0))
+CAMERAS = tuple(
+    placed_camera(
+        f"cam{number + 1}",
+        place,
+        (0.0, 0.0, 700.0),
+        size=SIZE,
+        focal_px=560.0 + 12.0 * number,
+        distortion=(-0.1, 0.03, 0.0005, -0.0003, 0.0),
+    )
+    for number, place in enumerate(PLACES)
+)
+COMMON, LENS_PICTURES = 10, 11
+FLOOR_FRAME = COMMON
+FLOOR_PLACE = (-250.0, 200.0)
+
+
+def render_takes(folder: Path) -> Path:
+    """Write intrinsics/ and extrinsics/ into `folder`."""
+    rng = np.random.default_rng(4)
+    renderer = BoardRenderer(BOARD, CAMERAS)
+    common = [*waved_boards(rng, BOARD, CAMERAS, COMMON, reach=450.0), floor_board(FLOOR_PLACE)]
+    for number, camera in enumerate(CAMERAS):
+        lens = close_boards(rng, BOARD, camera, LENS_PICTURES)
+        for place, poses in (("intrinsics", lens), ("extrinsics", common)):
+            pictures = folder / place / f"{place[:3]}_{camera.name}_img"
+            pictures.mkdir(parents=True)
+            for frame, pose in enumerate(poses):
+                cv2.imwrite(str(pictures / f"{frame:03d}.png"), renderer.picture(number, frame, pose))
+    return folder
