@@ -12,6 +12,7 @@ from fastapi import APIRouter, Depends, Query, Response
 
 from studio.errors import NotFoundError, StudioError
 from studio.runs.live_summary import summary_of
+from studio.runs.tracks import RAW
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.tracking.tracker import LayerRecord
@@ -43,8 +44,12 @@ MOMENTS = (
 
 
 @router.get(RUN + "/frames")
-def frames(session: OpenSession, run: OpenRun) -> FramesSummary:
-    """Weight, time and (with truth) error of every finished frame, and where settings changed."""
+def frames(
+    session: OpenSession,
+    run: OpenRun,
+    track: Annotated[str, Query(max_length=64, description="Whose poses the errors are of.")] = RAW,
+) -> FramesSummary:
+    """Weight, time and (with truth) error of every finished frame, where settings changed, what was corrected."""
     record = run.record
     with run.results() as results:
         timeline, partial = results.timeline(), results.partial()
@@ -70,8 +75,12 @@ def frames(session: OpenSession, run: OpenRun) -> FramesSummary:
         settings_changes=changes_of(history_of(run)),
         partial=partial.frame if partial else None,
         mean_milliseconds=float(times.mean()) if len(times) else None,
+        made_from=record.made_from or None,
+        corrected=record.corrected,
+        backwards_to=record.backwards_to,
+        track=track,
     )
-    return _with_errors(summary, session, run)
+    return _with_errors(summary, session, run, track)
 
 
 @router.get(RUN + "/live")
@@ -188,10 +197,12 @@ def evaluation(session: OpenSession, run: OpenRun) -> EvaluationView:
     return EvaluationView.model_validate(measured)
 
 
-def _with_errors(summary: FramesSummary, session: Session, run: StoredRun) -> FramesSummary:
+def _with_errors(summary: FramesSummary, session: Session, run: StoredRun, track: str) -> FramesSummary:
     """The summary with each frame's error; a truth that cannot be used is named, not fatal."""
     try:
-        measured = evaluation_of(session, run)
+        measured = evaluation_of(session, run, track)
+    except NotFoundError:
+        raise
     except StudioError as error:
         return summary.model_copy(update={"truth_problem": str(error)})
     if measured is None:

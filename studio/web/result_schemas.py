@@ -53,6 +53,10 @@ class FramesSummary(Answer):
     worst_mm: Number = None
     mean_milliseconds: Number = None
     truth_problem: str = ""
+    made_from: str | None = Field(None, description="The run that this one corrects.")
+    corrected: int | None = Field(None, description="The frame whose pose was given.")
+    backwards_to: int | None = Field(None, description="The last frame tracked backwards; null: onwards.")
+    track: str = Field("raw", description="Whose poses the errors are of.")
 
 
 class LayerView(Answer):

@@ -7,38 +7,40 @@ from pathlib import Path
 
 from studio.capture.trc import MarkerMotion, read_trc
 from studio.evaluation.errors import Evaluation, evaluate
+from studio.runs.tracks import RAW, read_track, track_stamp
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
 KEPT = 64
 
 _lock = threading.Lock()
-_evaluations: OrderedDict[tuple[Path, int, int], Evaluation] = OrderedDict()
+_evaluations: OrderedDict[tuple[Path, int, int, str, int], Evaluation] = OrderedDict()
 
 
-def evaluation_of(session: Session, run: StoredRun) -> Evaluation | None:
-    """The errors of all finished frames; None without a truth or before the first frame.
+def evaluation_of(session: Session, run: StoredRun, track: str = RAW) -> Evaluation | None:
+    """The errors of all frames of a track (the search's own: the finished ones); None without a truth or before the
+    first frame.
 
-    Raises TruthError, BodyError.
+    Raises TruthError, BodyError, NotFoundError where there is no such track.
     """
     path = session.truth_path
     if path is None:
         return None
     stamp = path.stat().st_mtime_ns
-    with run.results() as results:
-        frames, poses = results.poses()
+    found = read_track(run, track)
+    frames, poses = found.frames, found.poses
     if not len(frames):
         return None
-    key = (run.folder, len(frames), stamp)
+    key = (run.folder, len(frames), stamp, track, track_stamp(run, track))
     with _lock:
         if key in _evaluations:
             return _evaluations[key]
-    found = evaluate(poses, frames, run.body(), _truth(path, stamp), run.record.fps)
+    measured = evaluate(poses, frames, run.body(), _truth(path, stamp), run.record.fps)
     with _lock:
-        _evaluations[key] = found
+        _evaluations[key] = measured
         if len(_evaluations) > KEPT:
             _evaluations.popitem(last=False)
-    return found
+    return measured
 
 
 def mean_error(session: Session, run: StoredRun, done: int) -> float | None:

@@ -15,7 +15,7 @@ let age = 0;  // rises when a frame got another answer, so that its pictures are
 /** A view's address: of the run's frame, or, before there is a run, the session's first picture. */
 function source(camera, height) {
   const place = get("run") ? `${runPath(get("session"), get("run"))}/frames/${get("frame")}` : `${sessionPath(get("session"))}/frames/0`;
-  return `${place}/views/${encodeURIComponent(camera.name)}.jpg?show=${[...shown].join(",")}&height=${height}${age ? `&age=${age}` : ""}`;
+  return `${place}/views/${encodeURIComponent(camera.name)}.jpg?show=${[...shown].join(",")}&height=${height}${get("run") && get("track") !== "raw" ? `&track=${encodeURIComponent(get("track"))}` : ""}${age ? `&age=${age}` : ""}`;
 }
 
 /** Swap a picture only when the next one is decoded, so that nothing flickers; the newest wish wins. */
@@ -95,7 +95,7 @@ export function startCameras() {
     }
     build();
   });
-  watch(["frame", "run", "summary"], refresh);
+  watch(["frame", "run", "summary", "track"], refresh);
   onEvent("frame", (event, here) => {
     const seen = get("summary")?.frames.at(-1)?.frame ?? -1;
     if (here && !event.reannealed && event.frame <= seen) { age += 1; refresh(); }

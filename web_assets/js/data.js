@@ -30,8 +30,9 @@ async function loadSummary() {
   if (!run) return;
   arrived = [];
   try {
-    const summary = await fetchJson(`${runPath(session, run)}/frames`);
-    if (!isShown(session, run)) return;
+    const track = get("track");
+    const summary = await fetchJson(`${runPath(session, run)}/frames?track=${encodeURIComponent(track)}`);
+    if (!isShown(session, run) || track !== get("track")) return;
     const last = summary.frames.at(-1)?.frame ?? -1;
     summary.frames.push(...arrived.filter((line) => line.frame > last));
     const newest = summary.frames.at(-1)?.frame ?? null;
@@ -143,6 +144,8 @@ export function startData() {
   const sceneLater = paced(showInScene, SCENE_MILLISECONDS);
   const sessionsLater = paced(refreshSessions, SESSIONS_MILLISECONDS);
   watch(["session", "run"], () => { loadRun(); loadSummary(); });
+  let shownTrack = get("track");
+  watch(["track"], () => { if (get("track") !== shownTrack) { shownTrack = get("track"); if (get("summary")) loadSummary(); } });
   watch(["session", "run", "frame"], detailLater);
   watch(["session", "run", "frame", "layer", "follow"], sceneLater);
   onEvent("frame", (event, here) => {

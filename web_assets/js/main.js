@@ -1,6 +1,7 @@
 // The page starts here: its parts are wired to the state, the state to the server.
 
 import { startCameras } from "./cameras.js";
+import { startCorrecting } from "./correcting.js";
 import { startCurtain } from "./curtain.js";
 import { startData } from "./data.js";
 import { startExporting } from "./exporting.js";
@@ -17,6 +18,7 @@ import { startSurvival } from "./survival.js";
 import { startTabs } from "./tabs.js";
 import { startTheme } from "./theme.js";
 import { startTimeline } from "./timeline.js";
+import { startTracks } from "./tracks.js";
 import { startVariance } from "./variance.js";
 import { startWeights } from "./weights.js";
 import { startWhatIf } from "./what_if.js";
@@ -39,6 +41,8 @@ async function start() {
   startCurtain();
   startWhatIf();
   startData();
+  startTracks();
+  startCorrecting();
   startLive();
   startSceneFrame();
   await refreshSessions();

@@ -9,6 +9,7 @@ import { newRunForm } from "./new_run.js";
 import { startPoseForm } from "./start_pose.js";
 import { get, set, watch } from "./state.js";
 import { showPanel } from "./tabs.js";
+import { makeTrackForm } from "./tracks.js";
 
 const list = document.getElementById("sessions");
 
@@ -33,13 +34,13 @@ export function openSession(session, run) {
   const entry = get("sessions")?.find((one) => one.name === session);
   const chosen = run || entry?.runs?.[0]?.name || null;
   if (session === get("session") && chosen === get("run")) return;
-  set({ session, run: chosen, summary: null, detail: null, parameters: null, layerCount: null, settings: null, whatIf: null, frame: null, layer: null, follow: true });
+  set({ session, run: chosen, track: "raw", summary: null, detail: null, parameters: null, layerCount: null, settings: null, whatIf: null, frame: null, layer: null, follow: true });
   document.body.classList.remove("rail-open");
 }
 
 /** Open a session without any of its runs. */
 export function openSessionAlone(session) {
-  set({ session, run: null, summary: null, detail: null, parameters: null, layerCount: null, settings: null, whatIf: null, frame: null, layer: null, follow: true });
+  set({ session, run: null, track: "raw", summary: null, detail: null, parameters: null, layerCount: null, settings: null, whatIf: null, frame: null, layer: null, follow: true });
   document.body.classList.remove("rail-open");
 }
 
@@ -98,6 +99,8 @@ function runMenu(button, entry, run) {
   const path = runPath(entry.name, run.name);
   const open = get("session") === entry.name && get("run") === run.name;
   openMenu(button, [
+    ["Refine…", () => makeTrackForm(entry.name, run.name, "refine")],
+    ["Smooth…", () => makeTrackForm(entry.name, run.name, "smooth")],
     ["Export…", () => { openSession(entry.name, run.name); showPanel("export"); }],
     ["Poses as CSV", () => { location.href = `${path}/poses.csv`; }],
     ["New run like this…", () => newRunForm(entry, run)],

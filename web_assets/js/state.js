@@ -4,6 +4,7 @@ const values = {
   sessions: null,      // [{name, title, thumbnail, runs: [...]}], null while unknown
   session: null,       // name of the open session
   run: null,           // name of the open run
+  track: "raw",        // whose poses are shown: as searched, refined, smoothed …
   summary: null,       // the run's frames: weights, errors, settings changes
   frame: null,         // frame that is shown
   layer: null,         // layer that is shown, null = all together

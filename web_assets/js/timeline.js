@@ -33,7 +33,8 @@ export function goTo(frame) {
 
 /** Where the marks of the run begin: frames of which something is to be said that is not said of the one before. */
 export function marks(frames) {
-  return frames.filter((entry, at) => STATES[entry.tracking] && frames[at - 1]?.tracking !== entry.tracking).map((entry) => entry.frame);
+  const corrected = get("summary")?.corrected;
+  return frames.filter((entry, at) => entry.frame === corrected || (STATES[entry.tracking] && frames[at - 1]?.tracking !== entry.tracking)).map((entry) => entry.frame);
 }
 
 /** Show the next mark, or (by < 0) the one before. */
@@ -87,6 +88,7 @@ function drawTimeline() {
   curve(pen, frames, "error_mm", token("layer-7"), width, height, true);
   pen.fillStyle = token("warn");
   for (const change of summary.settings_changes ?? []) pen.fillRect(position(change.frame, width) - 0.5, 0, 1.5, 7);
+  markCorrection(pen, summary, width, height);
   explain(pen, frames);
   if (get("frame") !== null) {
     const at = position(get("frame"), width);
@@ -97,6 +99,19 @@ function drawTimeline() {
     pen.fill();
   }
 }
+
+/** Where a person put the run right: a diamond, and the line of the frames that were tracked backwards from it. */
+function markCorrection(pen, summary, width, height) {
+  if (!isCorrected(summary)) return;
+  const at = position(summary.corrected, width);
+  pen.fillStyle = token("accent");
+  if (summary.backwards_to !== null) pen.fillRect(position(summary.backwards_to, width), height - 8, at - position(summary.backwards_to, width), 2);
+  pen.beginPath();
+  for (const [x, y] of [[0, -6], [5, 0], [0, 6], [-5, 0]]) pen.lineTo(at + x, height - 7 + y);
+  pen.fill();
+}
+
+const isCorrected = (summary) => summary?.corrected !== null && summary?.corrected !== undefined;
 
 /** A band along the top: where the tracker was lost, blind, or found the body again. */
 function markStates(pen, frames, width) {
@@ -114,7 +129,7 @@ function markStates(pen, frames, width) {
 function legend(frames) {
   const measured = frames.some((entry) => entry.error_mm !== null && entry.error_mm !== undefined);
   const states = Object.keys(STATES).filter((name) => frames.some((entry) => entry.tracking === name));
-  return [["weight", "text-quiet"], ...(measured ? [["error", "layer-7"]] : []), ...states.map((name) => [name, STATES[name][0]])];
+  return [["weight", "text-quiet"], ...(isCorrected(get("summary")) ? [["corrected", "accent"]] : []), ...(measured ? [["error", "layer-7"]] : []), ...states.map((name) => [name, STATES[name][0]])];
 }
 
 /** What curves and bands are, at the free end of the line. */
@@ -160,8 +175,10 @@ function frameAt(event) {
 
 /** What the pointer stands on, where the tracker has something to say of it. */
 function toldOf(frame) {
-  const entry = get("summary")?.frames.find((one) => one.frame === frame);
+  const summary = get("summary");
+  const entry = summary?.frames.find((one) => one.frame === frame);
   const state = STATES[entry?.tracking];
+  if (isCorrected(summary) && frame === summary.corrected) return `frame ${frame}: put right by hand in ${summary.made_from}, tracked ${summary.backwards_to === null ? "on" : `backwards to ${summary.backwards_to}`} from it`;
   return state ? `frame ${frame}: ${entry.tracking} – ${state[1]}` : "";
 }
 
