@@ -26,7 +26,7 @@ import numpy as np
 from studio.capture.camera_streams import Bytes, Shot
 from studio.errors import FootageError
 
-QUALITY = 95
+QUALITY, PREVIEW_QUALITY = 95, 80
 FRAGMENT_MICROSECONDS = 500_000
 TOLERANCE = 0.6
 """A picture may come so many frames late or early before one is put in or left out."""
@@ -185,3 +185,14 @@ def jpeg_of_pixels(pixels: Bytes, quality: int = QUALITY) -> bytes:
             f"A picture of {pixels.shape[1]}x{pixels.shape[0]} pixels cannot be kept.", "Check the camera."
         )
     return content.tobytes()
+
+
+def preview_jpeg(shot: Shot, height: int | None = None) -> bytes:
+    """A picture to look at as JPEG, at most so many pixels high."""
+    tall, wide = shot.pixels.shape[:2]
+    if height is None or height >= tall:
+        return jpeg_of(shot)
+    size = (max(1, round(wide * height / tall)), height)
+    return jpeg_of_pixels(
+        cv2.resize(shot.pixels, size, interpolation=cv2.INTER_AREA).astype(np.uint8), PREVIEW_QUALITY
+    )

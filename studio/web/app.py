@@ -21,6 +21,7 @@ from studio.web import (
     behaviour_routes,
     calibration_routes,
     calibration_solving,
+    camera_routes,
     check_routes,
     comparison_routes,
     document_pages,
@@ -68,6 +69,7 @@ ROUTERS = (
     import_routes.router,
     upload_routes.router,
     footage_routes.router,
+    camera_routes.router,
     calibration_routes.router,
     calibration_solving.router,
     initialisation_routes.router,
@@ -148,6 +150,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         await import_routes.end_imports(doors)
         await asyncio.to_thread(doors.desk.close)
         await asyncio.to_thread(doors.learning.close)
+        await asyncio.to_thread(doors.cameras.close)
         await doors.events.stop()
         await asyncio.to_thread(forget_composers)
         ends = (asyncio.to_thread(doors.stage.stop), asyncio.to_thread(doors.control.close))

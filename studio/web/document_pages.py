@@ -33,6 +33,7 @@ class DocumentPage:
 PAGES = (
     DocumentPage("comparisons", "Comparisons", rail=True, new=True),
     DocumentPage("behaviours", "Behaviours", rail=True, new=True),
+    DocumentPage("recording", "Live cameras"),
     DocumentPage("reports", "Reports"),
 )
 PLACES = (("/", "Studio"), *((f"/{page.name}", page.title) for page in PAGES), ("/guide", "Guide"))
@@ -48,6 +49,12 @@ def comparisons_page() -> HTMLResponse:
 def behaviours_page() -> HTMLResponse:
     """The page of behaviour models."""
     return _answer("behaviours")
+
+
+@router.get("/recording")
+def recording_page() -> HTMLResponse:
+    """The page of live cameras."""
+    return _answer("recording")
 
 
 @router.get("/reports")

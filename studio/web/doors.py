@@ -30,6 +30,7 @@ from studio.web.initialisation_schemas import InitialisationState
 from studio.web.presets import Preset
 from studio.web.subject_schemas import FitSubjectState
 from studio.web.track_schemas import TrackJobState
+from studio.worker.camera_desk import CameraDesk, DeskRecording
 from studio.worker.commands import Close, Command
 from studio.worker.comparison_desk import ComparisonDesk, ComparisonState
 from studio.worker.events import StateChanged
@@ -219,7 +220,7 @@ class Doors:
     initialisations, exports, track_jobs, uploads : those under way, by their identifiers; synchronies : estimates
     of offsets, by session; calibration_jobs : solving under way; proposals : calibrations not in use yet;
     background_setups : set-ups of backgrounds, by session. desk : where comparisons are worked at,
-    learning : where behaviour models are learnt.
+    learning : where behaviour models are learnt, cameras : where live ones are looked at and recorded.
     """
 
     workspace: Workspace
@@ -245,11 +246,13 @@ class Doors:
     jobs: set[asyncio.Task[None]] = field(default_factory=set)
     desk: ComparisonDesk = field(init=False)
     learning: LearningDesk = field(init=False)
+    cameras: CameraDesk = field(init=False)
 
     def __post_init__(self) -> None:
         """Give comparisons and learning their desks, which tell all watchers how far they are."""
         self.desk = ComparisonDesk(self._tell_comparison)
         self.learning = LearningDesk(self._tell_learning)
+        self.cameras = CameraDesk(self._tell_recording)
 
     @property
     def state_folder(self) -> Path:
@@ -262,6 +265,11 @@ class Doors:
     def _tell_learning(self, state: LearningState) -> None:
         told = {name: value for name, value in dataclasses.asdict(state).items() if name != "learnt"}
         self.events.publish({"type": "learning", "session": "", "run": "", **told})
+
+    def _tell_recording(self, recording: DeskRecording) -> None:
+        self.events.publish({"type": "recording", **dataclasses.asdict(recording)})
+        if recording.state == "done" or (recording.run and recording.state == "getting ready"):
+            self.events.publish({"type": "sessions", "session": recording.session, "run": ""})
 
 
 def doors_of(request: Request) -> Doors:

@@ -73,6 +73,10 @@ class CameraReaders:
         for camera in self.cameras.cameras:
             camera.release()
 
+    def stop(self) -> None:
+        """Tell all readers to end, and wait for none."""
+        self.cameras.stop()
+
     def close(self) -> None:
         """End all readers; one that hangs in a read is left to its time-out."""
         self.cameras.stop()

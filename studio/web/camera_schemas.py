@@ -1,0 +1,94 @@
+"""Live cameras and their recordings, as OpenAPI shows them."""
+
+from typing import Literal
+
+from pydantic import Field
+
+from studio.web.schemas import Answer, Number, Request, RunName
+
+Knob = bool | int | float | str
+
+
+class CameraWish(Request):
+    """A camera: its name in the calibration, and http://… (MJPEG), rtsp://…, /dev/video0 or the path of a video to be
+    replayed. Names and passwords in it are neither shown nor logged.
+    """
+
+    name: str = Field(min_length=1, max_length=40)
+    address: str = Field(min_length=1, max_length=2000)
+
+
+class PreviewWish(Request):
+    """The cameras to look at, instead of those before; none closes all."""
+
+    cameras: list[CameraWish] = Field(max_length=16)
+
+
+class LiveCameraView(Answer):
+    """A camera now. state: connecting, running, stopped, ended. age: seconds since its last picture."""
+
+    name: str
+    shown: str
+    state: Literal["connecting", "running", "stopped", "ended"]
+    seconds: float
+    age: Number
+    fps: float
+    pictures: int
+    width: int
+    height: int
+    message: str
+    attempts: int
+
+
+class SpreadView(Answer):
+    """How far apart the pictures of the last sets came, ms. apart: sets of more than half a frame, of `sets`."""
+
+    median: Number
+    most: Number
+    worst: Number
+    apart: int
+    sets: int
+    lagging: str
+
+
+class RecordingView(Answer):
+    """A recording. kind: record or track. state: getting ready, recording, importing, done, failed."""
+
+    kind: str
+    session: str
+    state: str
+    seconds: float
+    limit: float | None
+    run: str
+    words: str
+    notes: list[str]
+    message: str
+    hint: str
+
+
+class CamerasView(Answer):
+    """The cameras that are open, and the last recording."""
+
+    cameras: list[LiveCameraView]
+    spread: SpreadView
+    fps: float
+    recording: RecordingView | None
+
+
+class RecordingWish(Request):
+    """name: of the session that is made. calibration: a session whose calibration is taken. seconds: at most; empty:
+    until stopped. track: follow the body at once, with that session's person and empty room; then tracker, weighting,
+    body, behaviour and settings are the run's. keep_start: the person begins in the session's start pose.
+    """
+
+    name: RunName
+    calibration: str
+    seconds: float | None = Field(None, gt=0, le=86400)
+    track: bool = False
+    keep_start: bool = True
+    tracker: str = ""
+    weighting: str = ""
+    body: str = ""
+    behaviour: str = ""
+    seed: int = 0
+    settings: dict[str, Knob] = Field(default_factory=dict)
