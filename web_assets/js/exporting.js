@@ -151,6 +151,12 @@ function hear(told) {
   refresh();
 }
 
+/** Offer this track first, where nobody chose another. */
+export function preferTrack(name) {
+  if (name !== "raw") state.wish.track ??= name;
+  draw();
+}
+
 /** Wire the panel. */
 export function startExporting() {
   watch(["session", "run"], () => { state.going = state.failed = null; state.wish = {}; refresh(); });

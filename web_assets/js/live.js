@@ -25,6 +25,9 @@ export const onEvent = (type, handler) => {
   handlers[type] = (event) => { before?.(event); handler(event, isHere(event)); };
 };
 
+/** Hand an event on that came another way. */
+export const tell = (event) => handlers[event.type]?.(event);
+
 /** Whether the studio that answers here still knows this browser; one that was started anew does not. */
 async function isKnown() {
   const answer = await fetch("/api/worker").catch(() => null);

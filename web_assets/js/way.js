@@ -87,6 +87,7 @@ function drawHead() {
   const head = panel.querySelector(".step-head");
   const status = statusOf(shown);
   if (!head || !status) return;
+  panel.dataset.state = status.state;
   head.replaceChildren(element("h1", { textContent: WORDS[shown].name }), element("p", { className: "lead", textContent: WORDS[shown].lead }),
     status.why && element("p", { className: "notice", textContent: status.why }));
 }
@@ -184,7 +185,8 @@ function takeKey(event) {
     go(steps[at].step);
     stepper.querySelector(`[data-step="${steps[at].step}"]`)?.focus();
   } else if (event.key === "Enter" && !(event.target.closest?.("button, a, summary") && !event.target.closest("#stepper"))) {
-    const primary = [...panel.querySelectorAll("button.primary")].find((one) => one.offsetParent && !one.disabled);
+    const own = [...panel.querySelectorAll("button.primary")].find((one) => one.offsetParent && !one.disabled);
+    const primary = own ?? (panel.dataset.state === "done" ? panel.querySelector(".next-step") : null);
     if (!primary) return;
     event.preventDefault();
     primary.click();
