@@ -64,7 +64,7 @@ class TrackJobState(Answer):
     """
 
     identifier: str
-    verb: Literal["refine", "smooth", "correct", "pose"]
+    verb: Literal["refine", "smooth", "correct", "pose", "check"]
     session: str
     run: str
     state: Literal["running", "done", "failed", "cancelled"]
