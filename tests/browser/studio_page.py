@@ -1,5 +1,6 @@
 """The studio's page as a person uses it, and the page's own state to wait on."""
 
+import re
 from pathlib import Path
 
 from page_watch import PageWatch
@@ -28,7 +29,10 @@ class StudioPage:
         self.watch = PageWatch(self.page, studio.origin)
         self.wire = SceneWire(self.page)
         if not with_scene:
-            self.page.route("**/scene/**", lambda route: route.fulfill(body="", content_type="text/html"))
+            self.page.route(
+                re.compile(r"^https?://[^/]+/scene/"),
+                lambda route: route.fulfill(body="", content_type="text/html"),
+            )
         self.page.goto(open_at or studio.address)
 
     @property
