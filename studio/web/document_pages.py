@@ -36,7 +36,12 @@ PAGES = (
     DocumentPage("recording", "Live cameras"),
     DocumentPage("reports", "Reports"),
 )
-PLACES = (("/", "Studio"), *((f"/{page.name}", page.title) for page in PAGES), ("/guide", "Guide"))
+PLACES = (
+    ("/", "Studio"),
+    ("/way", "Guided way"),
+    *((f"/{page.name}", page.title) for page in PAGES),
+    ("/guide", "Guide"),
+)
 
 
 @router.get("/comparisons")

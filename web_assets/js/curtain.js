@@ -4,7 +4,7 @@ import { post, runPath } from "./api.js";
 import { importForm } from "./importing.js";
 import { complain } from "./messages.js";
 import { newRunForm } from "./new_run.js";
-import { refreshSessions, openSession } from "./rail.js";
+import { lacks, openSession, refreshSessions, wayPath } from "./rail.js";
 import { get, watch } from "./state.js";
 
 const curtain = document.getElementById("curtain");
@@ -37,6 +37,12 @@ function banner(text) {
 
 /** A session without runs: the scene stays free, because its start pose is set there. */
 function invite(entry) {
+  if (entry.next_step) {
+    const go = Object.assign(document.createElement("button"), { textContent: "Guided way", className: "primary small", onclick: () => { location.href = wayPath(entry); } });
+    invitation.replaceChildren(`${entry.name}: ${lacks(entry)}.`, go);
+    invitation.hidden = false;
+    return;
+  }
   const button = Object.assign(document.createElement("button"), { textContent: "New run", className: "primary small", onclick: () => newRunForm(entry) });
   invitation.replaceChildren("No run yet. Set where the search begins under “Pose” if the session has no start pose, then", button);
   invitation.hidden = false;
@@ -59,7 +65,7 @@ function draw() {
   document.body.classList.toggle("disconnected", get("connected") === false);
   if (get("stranger")) return card("The studio was started again", "This page belongs to the one before. Open the address that the new one printed in its terminal.");
   if (get("connected") === false) return banner("Disconnected. What is shown is the last state; trying to reach the studio again …");
-  if (sessions?.length === 0) return card("Nothing here yet", "Import the footage of your cameras, or start with the bundled walk.", [["Open the sample", addSample, true], ["Import footage", importForm]]);
+  if (sessions?.length === 0) return card("Nothing here yet", "Import the footage of your cameras, or start with the bundled walk.", [["Open the sample", addSample, true], ["From my own cameras", () => { location.href = "/way?new"; }], ["Import footage", importForm]]);
   if (work?.state === "lost" && work.session === get("session")) {
     const resume = () => post(`${runPath(work.session, work.run)}/start`).catch(complain);
     return card("The tracking process ended", `${work.message} What was tracked is kept. ${work.hint}`, [["Resume", resume, true]]);

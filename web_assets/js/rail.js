@@ -81,13 +81,20 @@ function closeWhatIsGone() {
 /** The page of a session's comparisons; the form of a first one where there is none. */
 const comparisonsPath = (entry) => `/comparisons?session=${encodeURIComponent(entry.name)}${entry.comparisons ? "" : "&new"}`;
 
+/** The guided way of a session, at its next step. */
+export const wayPath = (entry) => `/way?session=${encodeURIComponent(entry.name)}`;
+
+/** What a session that cannot be tracked yet says of itself. */
+export const lacks = (entry) => ({ footage: "no footage yet", calibration: "not calibrated yet" })[entry.next_step] ?? "";
+
 function sessionMenu(button, entry) {
   const path = sessionPath(entry.name);
   const open = get("session") === entry.name;
   const run = get("run") ?? undefined;
   openMenu(button, [
-    ["New run…", () => newRunForm(entry)],
-    ["Find the start pose…", () => startPoseForm(entry)],
+    ["Guided way", () => { location.href = wayPath(entry); }],
+    ...(entry.next_step ? [] : [["New run…", () => newRunForm(entry)]]),
+    ...(entry.next_step ? [] : [["Find the start pose…", () => startPoseForm(entry)]]),
     ...(entry.has_truth ? [["Compare trackers…", () => { location.href = comparisonsPath(entry); }]] : []),
     ["Rename…", () => renameForm("session", path, entry.name, open, async (name) => { await refreshSessions(); if (open) openSession(name, run); })],
     ["Duplicate", async () => { try { const made = await post(`${path}/duplicate`); await refreshSessions(); say(`${entry.name} is copied as ${made.name}.`); } catch (error) { complain(error); } }],
@@ -139,7 +146,7 @@ function sessionBlock(entry) {
   const picture = Object.assign(document.createElement("img"), { src: `${sessionPath(entry.name)}/thumbnail.jpg`, alt: "", loading: "lazy" });
   picture.onerror = () => picture.replaceWith(element("span", "no-picture"));
   const words = element("div", "");
-  words.append(element("div", "name", entry.name), element("div", "facts", entry.problem || `${entry.cameras} ${entry.cameras === 1 ? "camera" : "cameras"} · ${entry.frame_count} frames`));
+  words.append(element("div", "name", entry.name), element("div", "facts", entry.problem || lacks(entry) || `${entry.cameras} ${entry.cameras === 1 ? "camera" : "cameras"} · ${entry.frame_count} frames`));
   const more = element("button", "more", "⋯");
   more.setAttribute("aria-label", `More for ${entry.name}`);
   more.onclick = (event) => { event.stopPropagation(); sessionMenu(more, entry); };
@@ -148,8 +155,8 @@ function sessionBlock(entry) {
   head.onkeydown = (event) => { if (event.key === "Enter" && event.target === head) head.onclick(); };
   const runs = element("div", "runs");
   runs.setAttribute("role", "group");
-  const fresh = element("button", "new-run quiet small", "+ New run");
-  fresh.onclick = () => newRunForm(entry);
+  const fresh = element("button", "new-run quiet small", entry.next_step ? "Go on in the guided way" : "+ New run");
+  fresh.onclick = entry.next_step ? () => { location.href = wayPath(entry); } : () => newRunForm(entry);
   const compare = element("a", "compare", entry.comparisons ? `${entry.comparisons} ${entry.comparisons === 1 ? "comparison" : "comparisons"}` : "Compare trackers");
   compare.href = comparisonsPath(entry);
   const last = element("div", "last-line");
@@ -212,6 +219,7 @@ async function drawTrash() {
 /** Wire the rail. */
 export function startRail() {
   document.getElementById("import-open").onclick = importForm;
+  document.getElementById("way-new").onclick = () => { location.href = "/way?new"; };
   list.addEventListener("keydown", takeArrow);
   watch(["sessions", "session", "run"], draw);
   watch(["sessions"], () => { closeWhatIsGone(); drawTrash(); });
