@@ -1,4 +1,4 @@
-"""`/guide`: the packaged text, with a table of every knob made from the declarations."""
+"""`/guide`: the packaged text, with a table of every knob made from the declarations; `/guide/python`: examples."""
 
 import html
 import itertools
@@ -24,7 +24,7 @@ PLACE_OF_KNOBS = "{{knobs}}"
 # The summary.md of a full `studio reproduce all`, as it was written.
 PLACE_OF_SUMMARY, SUMMARY = "{{reproduction}}", "reproduction.md"
 PAGE = (
-    '<!doctype html>\n<html lang="en">\n<head><meta charset="utf-8"><title>Guide · Capture studio</title>\n'
+    '<!doctype html>\n<html lang="en">\n<head><meta charset="utf-8"><title>{title} · Capture studio</title>\n'
     '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
     '<link rel="icon" href="/assets/icon.svg" type="image/svg+xml">\n'
     '<link rel="stylesheet" href="/assets/tokens.css"><link rel="stylesheet" href="/assets/page.css">\n'
@@ -39,18 +39,25 @@ COLUMNS = ("Name", "What it does", "Range", "Default", "Unit", "Takes effect")
 @router.get("/guide")
 def guide() -> HTMLResponse:
     """The guide as a page."""
-    return HTMLResponse(rendered(), headers={"cache-control": "no-cache"})
+    return HTMLResponse(rendered("guide.md", "Guide"), headers={"cache-control": "no-cache"})
+
+
+@router.get("/guide/python")
+def python_examples() -> HTMLResponse:
+    """The page of examples for scripts and notebooks."""
+    return HTMLResponse(rendered("python.md", "Python"), headers={"cache-control": "no-cache"})
 
 
 @cache
-def rendered() -> str:
-    """The whole page, made once."""
+def rendered(name: str, title: str) -> str:
+    """A whole page, made once. name : of its text among the guide's."""
     markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
     folder = assets_folder() / "guide"
-    summary = (folder / SUMMARY).read_text(encoding="utf-8")
-    text = (folder / "guide.md").read_text(encoding="utf-8").replace(PLACE_OF_SUMMARY, summary)
+    text = (folder / name).read_text(encoding="utf-8")
+    if PLACE_OF_SUMMARY in text:
+        text = text.replace(PLACE_OF_SUMMARY, (folder / SUMMARY).read_text(encoding="utf-8"))
     tokens = markdown.parse(text)
-    contents: list[str] = []
+    contents: list[str] = [] if name == "guide.md" else ['<a href="/guide">Guide</a>']
     for opening, inline in itertools.pairwise(tokens):
         if opening.type == "heading_open" and opening.tag == "h2":
             anchor = anchor_of(inline.content)
@@ -58,8 +65,10 @@ def rendered() -> str:
             contents.append(f'<a href="#{anchor}">{html.escape(inline.content)}</a>')
     # Lines within a table's cell are the one thing that the text cannot say without HTML.
     content = markdown.renderer.render(tokens, markdown.options, {}).replace("&lt;br&gt;", "<br>")
-    content = content.replace(f"<p>{PLACE_OF_KNOBS}</p>", all_knob_tables())
-    return PAGE.replace("{contents}", "".join(contents)).replace("{content}", content)
+    if PLACE_OF_KNOBS in text:
+        content = content.replace(f"<p>{PLACE_OF_KNOBS}</p>", all_knob_tables())
+    page = PAGE.replace("{title}", title).replace("{contents}", "".join(contents))
+    return page.replace("{content}", content)
 
 
 def anchor_of(heading: str) -> str:

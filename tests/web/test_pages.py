@@ -67,6 +67,18 @@ def test_the_guide_has_every_knob_with_its_range(studio: Studio) -> None:
         assert f'id="{anchor}"' in text
 
 
+def test_the_guide_links_to_the_page_of_python_examples(studio: Studio) -> None:
+    assert 'href="/guide/python"' in studio.client.get("/guide").text
+    answer = studio.client.get("/guide/python")
+    assert answer.status_code == 200
+    assert "<title>Python · Capture studio</title>" in answer.text
+    assert 'href="/guide"' in answer.text
+    assert "studio.track(session" in answer.text
+    assert "{" + "{" not in answer.text
+    for anchor in re.findall(r'<a href="#([^"]+)"', answer.text):
+        assert f'id="{anchor}"' in answer.text
+
+
 def test_anchors_are_plain_words() -> None:
     assert anchor_of("Survival & β: α wanted") == "survival-β-α-wanted"
 

@@ -1,0 +1,160 @@
+"""The verbs for Python on a session of a planar arm: what goes in, what comes back, what is refused."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from toy_session import BODY, true_poses
+
+import studio
+from studio.body.catalogue import load_body
+from studio.notebook.progress import told
+from studio.sessions.session import Session
+
+FEW = {"particles": 20, "layers": 2}
+
+
+def test_importing_studio_imports_no_room_until_a_verb_is_asked_for() -> None:
+    code = (
+        "import sys, studio; before = [name for name in sys.modules if name.startswith('studio.')]; "
+        "studio.StudioError; print(before, 'studio.errors' in sys.modules, 'numba' in sys.modules)"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[] True False"
+
+
+def test_all_verbs_are_there_with_a_docstring() -> None:
+    for name in dir(studio):
+        assert getattr(studio, name).__doc__, name
+    with pytest.raises(AttributeError, match="no attribute 'trak'"):
+        studio.trak  # noqa: B018  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_sessions_and_runs_go_by_name_folder_or_value(session_on_disk: Session) -> None:
+    assert studio.list_sessions() == ("toy",)
+    for named in ("toy", session_on_disk.path, str(session_on_disk.path), session_on_disk):
+        assert studio.open_session(named).path == session_on_disk.path
+    run = studio.track("toy", last=2, start_pose=true_poses()[0], knobs=FEW, name="one")
+    folder = session_on_disk.path / "runs" / "one"
+    for named in ("toy/one", f"{session_on_disk.path}/one", folder, str(folder), run, run.run):
+        assert studio.open_run(named).folder == folder
+    assert [entry.name for entry in studio.list_runs("toy")] == ["one"]
+
+
+@pytest.mark.parametrize("name", ["one", "", "/one"])
+def test_what_names_no_run_is_refused(name: str) -> None:
+    with pytest.raises(studio.StudioError, match="names no run") as refusal:
+        studio.open_run(name)
+    assert "SESSION/RUN" in refusal.value.hint
+
+
+def test_a_session_or_run_that_is_not_there(session_on_disk: Session) -> None:
+    with pytest.raises(studio.StudioError, match="no session 'gone'"):
+        studio.track("gone")
+    with pytest.raises(studio.StudioError, match="no run 'gone'"):
+        studio.read_track("toy/gone")
+
+
+def test_track_gives_arrays_and_the_same_again_for_a_seed(session_on_disk: Session) -> None:
+    start = true_poses()[0]
+    runs = [
+        studio.track(session_on_disk, last=4, seed=7, start_pose=start, knobs=FEW, progress=False)
+        for _ in range(2)
+    ]
+    first, second = runs
+    assert first.run.name != second.run.name
+    assert first.names == tuple(entry.name for entry in load_body(BODY).parameters)
+    assert first.poses.shape == (4, 4)
+    assert np.array_equal(first.poses, second.poses)
+    assert np.abs(first.poses - true_poses()[:4]).max() < 0.3
+    assert first.run.record.start_source == "given"
+    assert np.array_equal(studio.read_track(first).poses, first.poses)
+    motion = studio.markers(first)
+    assert motion.positions.shape == (4, len(load_body(BODY).markers), 3)
+    assert motion.times.tolist() == [frame / first.run.record.fps for frame in range(4)]
+
+
+def test_interrupted_tracking_is_kept_and_goes_on(session_on_disk: Session) -> None:
+    def stop(_step: str, done: int, _total: int) -> None:
+        if done == 2:
+            raise KeyboardInterrupt
+
+    start = true_poses()[0]
+    whole = studio.track("toy", last=4, start_pose=start, knobs=FEW, name="whole")
+    with pytest.raises(KeyboardInterrupt):
+        studio.track("toy", last=4, start_pose=start, knobs=FEW, name="cut", progress=stop)
+    (summary,) = [entry for entry in studio.list_runs("toy") if entry.name == "cut"]
+    assert (summary.status, summary.done) == ("cancelled", 2)
+    done: list[tuple[int, int]] = []
+    run = studio.go_on("toy/cut", progress=lambda _, at, total: done.append((at, total)))
+    assert np.array_equal(run.poses, whole.poses)
+    assert done[-1] == (4, 4)
+
+
+def test_a_run_is_corrected_smoothed_and_exported(session_on_disk: Session, tmp_path: Path) -> None:
+    truth = true_poses()
+    run = studio.track("toy", last=6, start_pose=truth[0], knobs=FEW)
+    with pytest.raises(studio.StudioError, match="needs a pose"):
+        studio.correct(run, 3)
+    with pytest.raises(studio.StudioError, match="needs a pose"):
+        studio.correct(run, 3, truth[3], from_track="raw")
+    fixed = studio.correct(run, 3, truth[3], name="fixed")
+    assert np.array_equal(fixed.poses[:3], run.poses[:3])
+    assert fixed.frames.tolist() == list(range(6))
+    back = studio.correct(run, 3, truth[3], back_to=1, name="back")
+    assert np.array_equal(back.poses[4:], run.poses[4:])
+    assert back.poses.shape == run.poses.shape
+    made = studio.smooth(run, knobs={"least_confidence": 0.0})
+    assert made.track.poses.shape == (6, 4)
+    with pytest.raises(studio.StudioError, match="smoothed"):
+        studio.smooth(run)
+    report = studio.export_run(run, tmp_path / "arm.npz", track="smoothed")
+    assert report.files == (tmp_path / "arm.npz",)
+    with pytest.raises(studio.StudioError, match="no truth"):
+        studio.evaluate(run)
+    with pytest.raises(studio.StudioError, match="wings"):
+        studio.export_run(run, tmp_path / "arm.npz", wings=2)
+    with pytest.raises(studio.StudioError, match=r"\.doc"):
+        studio.export_run(run, tmp_path / "arm.doc")
+
+
+def test_knobs_that_do_not_exist_are_named(session_on_disk: Session) -> None:
+    for verb in (
+        lambda: studio.track("toy", knobs={"partikles": 3}),
+        lambda: studio.smooth(studio.track("toy", last=1, knobs=FEW), knobs={"partikles": 3}),
+        lambda: studio.learn(["walk"], "steps", knobs={"partikles": 3}),
+    ):
+        with pytest.raises(studio.StudioError, match="partikles"):
+            verb()
+
+
+def test_exclusions_are_painted_and_taken_back(session_on_disk: Session) -> None:
+    place = session_on_disk.path / "exclusions" / "front.png"
+    studio.background("toy", "median", exclude={"front": [(0, 0), (40, 0), (40, 40), (0, 40)]}, tune=False)
+    assert place.exists()
+    studio.background("toy", "median", exclude={"front": None}, tune=False)
+    assert not place.exists()
+
+
+def test_a_height_in_metres_is_refused(session_on_disk: Session) -> None:
+    with pytest.raises(studio.StudioError, match="no person's"):
+        studio.subject("toy", 1.76)
+    assert studio.subject("toy").name == BODY
+
+
+def test_cameras_of_a_session_are_not_replaced_unasked(session_on_disk: Session) -> None:
+    with pytest.raises(studio.StudioError, match="there already"):
+        studio.calibrate("toy", "chessboard:4x7,60", extrinsics="anywhere")
+    with pytest.raises(studio.StudioError, match="no session and no folder"):
+        studio.calibrate("nowhere", "chessboard:4x7,60")
+
+
+def test_nobody_looks_at_a_bar_in_a_log_and_a_bar_can_be_asked_for(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for wish, shown in ((None, False), (False, False), (True, True)):
+        with told(wish, "Rendering") as report:
+            report("frames", 1, 2)
+        assert ("frames" in capsys.readouterr().err) == shown
