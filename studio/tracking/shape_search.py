@@ -37,6 +37,9 @@ RIDGE = 0.02
 KEPT = 0.25
 """Share of the layers, the last ones, that make the answer."""
 STEP = 1e-4
+SEEKING_ROUNDS, SEEKING, NEARER = 2, ((1.0, 1.0), (0.3, 0.25), (0.1, 0.25)), 0.01
+"""How often each limb is looked for anew, in which shares of its range and with which shares of the tries, and what of
+f_s a place a whole range away from rest must gain."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +47,7 @@ class ShapeSearchSettings:
     """How much is searched. particles : M. layers : in all. survival : share of particles that survive a layer.
 
     length_spread, radius_spread : the prior's standard deviations, as shares. height_spread : mm. pose_steps : how
-    often the poses of a layer are improved.
+    often the poses of a layer are improved. sought : places that are tried of each limb at first, 0 for none.
     """
 
     particles: int = 24
@@ -54,6 +57,7 @@ class ShapeSearchSettings:
     radius_spread: float = 0.15
     height_spread: float = 15.0
     pose_steps: int = 2
+    sought: int = 4096
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,9 +118,9 @@ class ShapeSearch:
         """The shape and the poses, from poses (F, D) of the space's own body."""
         rules, rng = self._settings, self._rng
         count = rules.particles
+        before = self._fitness(np.zeros((1, len(self._sigma))), poses[None, :, None])[0, :, 0]
+        poses = self.sought(poses)
         first = _Population(np.zeros((count, len(self._sigma))), np.repeat(poses[None], count, axis=0))
-        before = self._fitness(first.shapes[:1], poses[None, :, None])[0, :, 0]
-        first.poses = self._settled(first, 0)
         now = first
         kept: list[tuple[Array, Array]] = []
         for layer in range(rules.layers):
@@ -205,11 +209,32 @@ class ShapeSearch:
         now.poses = np.take_along_axis(tried, best[..., None, None], axis=2)[:, :, 0]
         now.fitness = np.take_along_axis(fitness, best[..., None], axis=2)[..., 0]
 
-    def _settled(self, now: _Population, steps: int) -> Array:
-        """The population's poses after some improvements of the poses alone."""
-        for _ in range(steps):
-            self._improve(now, 1.0)
-        return now.poses
+    def sought(self, poses: Array) -> Array:
+        """(F, D) the poses with each limb where it fits best among many places, one limb after the other.
+
+        A first pose often has an arm hidden in the trunk's silhouette, from where small steps lead nowhere. Of places
+        that fit alike, the one nearer to the rest pose is taken.
+        """
+        found, rest = poses.copy(), self._space.body.neutral
+        reach = np.where(np.isfinite(self._limits).all(axis=0), self._limits[1] - self._limits[0], np.inf)
+        free = [own for own in self._limbs if len(own) > 2 and np.isfinite(reach[own]).all()]
+        for own in SEEKING_ROUNDS * free:
+            for spread, share in SEEKING:
+                bodies = round(share * self._settings.sought) // POSES
+                if not bodies:
+                    continue
+                shapes = np.zeros((bodies, len(self._sigma)))
+                tried = np.repeat(found[None], bodies * POSES, axis=0)
+                drawn = self._rng.random((*tried.shape[:2], len(own))) - 0.5
+                around = found[None][..., own] if spread < 1.0 else self._limits[:, own].mean(axis=0)
+                tried[1:, :, own] = (around + spread * drawn * reach[own])[1:]
+                tried = self._within(tried)
+                by_body = tried.reshape(bodies, POSES, *found.shape).swapaxes(1, 2)
+                fits = self._fitness(shapes, by_body).swapaxes(1, 2).reshape(len(tried), -1)
+                away = np.square((tried[..., own] - rest[own]) / reach[own]).mean(axis=2)
+                best = np.argmax(fits - NEARER * away, axis=0)
+                found = tried[best, np.arange(len(found))]
+        return found
 
     def _fitness(self, shapes: Array, poses: Array) -> Array:
         """(M, F, K) of poses (M, F, K, D), K at most sixteen."""

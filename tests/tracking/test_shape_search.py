@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sized_people import MEASURED, DrawnPerson, drawn_person
 
-from studio.body.forward_kinematics import limb_ends
+from studio.body.forward_kinematics import limb_ends, marker_points
 from studio.body.shape_space import shape_space
 from studio.tracking.shape_search import (
     FoundShape,
@@ -51,7 +51,7 @@ def person() -> DrawnPerson:
 
 
 def test_silhouettes_agree_better_afterwards_and_a_seed_repeats(person: DrawnPerson) -> None:
-    settings = ShapeSearchSettings(particles=12, layers=10)
+    settings = ShapeSearchSettings(particles=12, layers=10, sought=64)
     found = search_of(person, settings).run(person.poses)
     again = search_of(person, settings).run(person.poses)
     assert (found.fitness > found.before + 0.02).all()
@@ -81,6 +81,22 @@ def test_the_prior_knows_the_height(person: DrawnPerson) -> None:
     usual, tall = search.log_prior(np.array([0.0 * taller, taller]))
     assert usual == pytest.approx(0.0, abs=0.1)
     assert tall < usual - 5.0
+
+
+def test_an_arm_that_was_lost_is_found_again(person: DrawnPerson) -> None:
+    """Small steps do not bring an arm back from behind the trunk: a runner's here, 0.7 m away."""
+    names = [entry.name for entry in person.body.parameters]
+    lost = person.poses.copy()
+    lost[:, names.index("left_shoulder_ry")] += 1.2
+    lost[:, names.index("left_elbow_ry")] = -0.2
+    search = search_of(person, ShapeSearchSettings(sought=1024))
+    found = search.sought(lost)
+    wrist = [marker.name for marker in person.body.markers].index("LWrist")
+    there = marker_points(person.body, person.poses)[:, wrist]
+    before = np.linalg.norm(marker_points(person.body, lost)[:, wrist] - there, axis=1)
+    after = np.linalg.norm(marker_points(person.body, found)[:, wrist] - there, axis=1)
+    assert (before > 200.0).all()
+    assert after[0] < 0.2 * before[0]
 
 
 def test_weights_are_tempered_to_the_survival_rate() -> None:

@@ -93,14 +93,16 @@ def test_a_failure_leaves_backgrounds_as_they_were(studio: Studio, monkeypatch: 
 
 
 def test_uploaded_plates_are_matched_by_name_or_as_said(studio: Studio) -> None:
-    source = studio.workspace.session("take1").manifest.footage.cameras[0]
+    sources = studio.workspace.session("take1").manifest.footage.cameras
+    source = sources[0]
     picture = np.full((source.height, source.width, 3), 90, np.uint8)
-    upload = plate_upload(studio, f"{source.name}.png", picture)
-    told = studio.client.post(f"{PLACE}/backgrounds", json={"upload": upload})
-    assert told.status_code == 200, told.text
-    assert told.json()["cameras"][0]["given"] == "plate"
+    for camera in sources:
+        upload = plate_upload(studio, f"empty_{camera.name}.png", picture)
+        told = studio.client.post(f"{PLACE}/backgrounds", json={"upload": upload})
+        assert told.status_code == 200, told.text
+        assert studio.client.get(f"/api/uploads/{upload}").status_code == 404
+    assert [camera["given"] for camera in told.json()["cameras"]] == ["plate"] * len(sources)
     assert "plate" in told.json()["possible"]
-    assert studio.client.get(f"/api/uploads/{upload}").status_code == 404
     named = plate_upload(studio, "whatever.png", picture)
     wish = {"upload": named, "files": {source.name: "whatever.png"}}
     assert studio.client.post(f"{PLACE}/backgrounds", json=wish).status_code == 200
