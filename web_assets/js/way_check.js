@@ -155,8 +155,11 @@ export function mount(place, way) {
     state.job = null;
     if (state.stopped || !ended) return;
     if (ended.state === "failed") state.failed = ended;
-    await load(ended.verb !== "check" && ended.track ? ended.track : state.track);
+    const made = ended.state === "done" && ended.verb !== "check" ? ended.track : "";
+    await load(made || state.track);
     await way.refresh();
+    // What was made is looked at straight away: whether it is better is the next question.
+    if (made) await begin("check", { track: made });
   }
 
   async function load(wanted = "") {
