@@ -8,6 +8,9 @@ import cv2
 import numpy as np
 
 from studio.calibration.boards import Board
+from studio.capture.footage_source import CameraSource, FootageSource
+from studio.sessions.manifest import SessionManifest, now, write_manifest
+from studio.sessions.session import Session
 from studio.synthesis.board_footage import BoardRenderer, close_boards, floor_board, waved_boards
 from studio.synthesis.cameras import placed_camera
 
@@ -43,3 +46,23 @@ def render_takes(folder: Path) -> Path:
             for frame, pose in enumerate(poses):
                 cv2.imwrite(str(pictures / f"{frame:03d}.png"), renderer.picture(number, frame, pose))
     return folder
+
+
+def session_of_takes(place: Path, folder: Path) -> Session:
+    """A session without a calibration, whose footage are the common pictures where they lie."""
+    sources = tuple(
+        CameraSource(
+            camera.name, "pictures", str(folder / "extrinsics" / f"ext_{camera.name}_img"), *SIZE, COMMON + 1
+        )
+        for camera in CAMERAS
+    )
+    place.mkdir(parents=True)
+    manifest = SessionManifest(
+        name=place.name,
+        title="Board",
+        created=now(),
+        body="human31",
+        footage=FootageSource(30.0, COMMON + 1, sources),
+    )
+    write_manifest(place, manifest)
+    return Session(place)

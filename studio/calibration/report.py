@@ -54,7 +54,9 @@ def told_source(calibrated: Calibrated) -> str:
     off = (
         math.sqrt(sum(value**2 for value in rig.rms.values()) / len(rig.rms)) if rig is not None else math.nan
     )
-    told = f"board {calibrated.board.spelling}"
+    board = calibrated.board
+    kind = "ChArUco board" if board.kind == "charuco" else "chessboard"
+    told = f"{kind} {board.columns}x{board.rows}"
     return f"{told}, {off:.2f} px" if math.isfinite(off) else told
 
 

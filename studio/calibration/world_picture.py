@@ -21,16 +21,24 @@ FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
 def world_picture(
-    picture: Bytes, camera: Camera, points: Sequence[Sequence[float]] = (), height: int = 720
+    picture: Bytes,
+    camera: Camera,
+    points: Sequence[Sequence[float]] = (),
+    height: int = 720,
+    *,
+    bare: bool = False,
 ) -> Bytes:
     """(h, w, 3) BGR upright: a grid of half metres on the floor, 1 m of each axis (X red, Y green, Z blue), a pole of
-    1.8 m at the origin, and `points` (mm) with their numbers. picture : (H, W, 3) BGR of the camera's own size.
+    1.8 m at the origin, and `points` (mm) with their numbers; `bare` draws nothing. picture : (H, W, 3) BGR of
+    the camera's own size.
     """
     across = camera.height if camera.quarter_turns % 2 == 0 else camera.width
     scale = height / across
     size = (max(1, round(camera.width * scale)), max(1, round(camera.height * scale)))
     drawn = cv2.resize(picture, size, interpolation=cv2.INTER_AREA if scale < 1.0 else cv2.INTER_LINEAR)
     pen = _Pen(np.array(drawn, dtype=np.uint8), camera, scale)
+    if bare:
+        return np.ascontiguousarray(np.rot90(pen.picture, -camera.quarter_turns))
     for at in np.arange(-REACH_MM, REACH_MM + 1.0, STEP_MM):
         pen.line((at, -REACH_MM, 0.0), (at, REACH_MM, 0.0), GREY, 1)
         pen.line((-REACH_MM, at, 0.0), (REACH_MM, at, 0.0), GREY, 1)
@@ -60,12 +68,11 @@ class _Pen:
         share = np.linspace(0.0, 1.0, PIECES)[:, None]
         points = (1.0 - share) * np.array(start) + share * np.array(end)
         pixels, seen = self._pixels(points)
-        for first in range(PIECES - 1):
-            if seen[first] and seen[first + 1]:
-                a, b = (pixels[first + k].round().astype(int).tolist() for k in (0, 1))
-                if width > 1:
-                    cv2.line(self.picture, a, b, HALO, width + 2, cv2.LINE_AA)
-                cv2.line(self.picture, a, b, colour, width, cv2.LINE_AA)
+        whole = pixels.round().astype(int).tolist()
+        pieces = [pair for pair in range(PIECES - 1) if seen[pair] and seen[pair + 1]]
+        for shade, wide in ((HALO, width + 2), (colour, width))[width == 1 :]:
+            for first in pieces:
+                cv2.line(self.picture, whole[first], whole[first + 1], shade, wide, cv2.LINE_AA)
 
     def upright(self, point: Array) -> tuple[int, int] | None:
         """Where a point lies in the upright picture, None if it is not seen."""

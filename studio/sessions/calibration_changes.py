@@ -31,6 +31,7 @@ from studio.sessions.run_record import CAMERAS_NAME
 from studio.sessions.session import CAMERAS_PATH, THUMBNAIL_NAME, Session, described_anew
 
 EARLIER = "earlier"
+REPORT_NAME = "cameras.report.json"
 OWN_PARTS = ("original", "cameras.")
 MOVED_MM = 1.0
 
@@ -39,7 +40,7 @@ MOVED_MM = 1.0
 class NewCalibration:
     """What a session is to use. cameras : named and sized as its footage (`calibration_fit`). source : where from, in
     words. originals : name → content of the files it was read from. crops, matching, notes : of the fit. calibrated :
-    what boards told, None for a file.
+    what boards told, None for a file. floor : how the floor of the cameras in use was set anew, "" for other cameras.
     """
 
     cameras: tuple[Camera, ...]
@@ -49,6 +50,7 @@ class NewCalibration:
     matching: tuple[CameraMatch, ...] = ()
     notes: tuple[str, ...] = ()
     calibrated: Calibrated | None = None
+    floor: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +156,9 @@ def _write(place: Path, new: NewCalibration) -> None:
             target.parent.mkdir(exist_ok=True)
             target.write_bytes(content)
         atomic_files.write_bytes(place, (made / CAMERAS_PATH.name).read_bytes())
+        if new.floor:
+            _correct_report(place.with_name(REPORT_NAME), new)
+            return
         for path in _own_parts(place.parent):
             if path.is_dir():
                 shutil.rmtree(path)
@@ -164,6 +169,21 @@ def _write(place: Path, new: NewCalibration) -> None:
                 path.rename(place.parent / path.name)
     finally:
         atomic_files.discard(made)
+
+
+def _correct_report(path: Path, new: NewCalibration) -> None:
+    """What boards told of the same cameras, with their places in the new world."""
+    try:
+        report = msgspec.json.decode(path.read_bytes(), type=dict[str, object])
+    except (OSError, msgspec.DecodeError):
+        return
+    places = {camera.name: np.round(camera.centre, 3).tolist() for camera in new.cameras}
+    entries = report.get("cameras")
+    for entry in entries if isinstance(entries, list) else []:
+        if isinstance(entry, dict) and entry.get("name") in places:
+            entry["position_mm"] = places[str(entry["name"])]
+    report["floor"] = new.floor
+    atomic_files.write_bytes(path, msgspec.json.format(msgspec.json.encode(report), indent=2))
 
 
 def _own_parts(folder: Path) -> list[Path]:

@@ -34,7 +34,8 @@ Bytes = NDArray[np.uint8]
 @dataclass(frozen=True, slots=True, eq=False)
 class Proposal:
     """A calibration of a session, as it would be used. originals : name → content of the file it is of. pictures :
-    camera → its picture of a moment of the board footage. clicked : the points that its floor was set by.
+    camera → its picture of a moment of the board footage.
+    in_use : made of the session's own. clicked : the points that its floor was set by.
     """
 
     identifier: str
@@ -50,6 +51,7 @@ class Proposal:
     calibrated: Calibrated | None = None
     pictures: Mapping[str, Bytes] = field(default_factory=dict)
     clicked: ClickedFloor | None = None
+    in_use: bool = False
 
     def checked_new(self, anyway: bool) -> NewCalibration:
         """What the session is to use. Raises CalibrationError with the first finding that blocks, unless `anyway`."""
@@ -64,6 +66,7 @@ class Proposal:
             self.matching,
             tuple(note for note in (self.unit_note, *self.notes) if note),
             self.calibrated,
+            f"{len(self.clicked.points)} clicked points" if self.in_use and self.clicked is not None else "",
         )
 
 
@@ -161,6 +164,7 @@ def proposal_in_use(session: Session) -> Proposal:
         check_calibration(cameras),
         crops=read.crops,
         matching=session.manifest.matching,
+        in_use=True,
     )
 
 

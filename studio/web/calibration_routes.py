@@ -100,15 +100,16 @@ async def view(
     height: Annotated[int, Query(ge=64, le=2160)] = 720,
     frame: Annotated[int, Query(ge=0)] = 0,
     board: bool = True,
+    axes: bool = True,
 ) -> Response:
     """Floor, axes and a pole drawn on a camera's picture, upright; identifier "current" for the one in use. board:
-    show the board's footage where the proposal has some.
+    show the board's footage where the proposal has some; axes: false leaves the picture bare.
     """
     found = _found(session, identifier, doors)
     placed = _camera(found, camera)
     picture = await asyncio.to_thread(backdrop, session, found, camera, board, frame)
     points = found.clicked.points.tolist() if found.clicked is not None else []
-    drawn = world_picture(picture, placed, points, height)
+    drawn = world_picture(picture, placed, points, height, bare=not axes)
     return Response(encode_jpeg(drawn), media_type="image/jpeg", headers={"cache-control": "no-store"})
 
 

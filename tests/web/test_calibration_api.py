@@ -181,7 +181,7 @@ def test_boards_give_cameras_pictures_and_a_calibration(fresh: Studio, takes: Pa
     around = drawn[end[1] - 4 : end[1] + 5, end[0] - 4 : end[0] + 5]
     assert (around[..., 2] - around[..., 0]).max() > 100, "the X axis is red there"
     applied = fresh.client.post(f"{here}/apply", json={}).json()
-    assert applied["present"]["source"].startswith(f"board {BOARD.spelling}, 0.")
+    assert applied["present"]["source"].startswith("ChArUco board 6x5, 0.")
     folder = fresh.workspace.session("fresh").path / "calibration"
     assert (folder / "cameras.report.json").exists()
     assert fresh.client.get(f"{FRESH}/proposals/current/coverage/cam2.png").status_code == 200
@@ -248,7 +248,9 @@ def test_solving_can_be_stopped_and_failures_are_in_words(
     lacking = fresh.client.post(f"{FRESH}/solve", json={"board": BOARD.spelling})
     assert lacking.status_code == 422
     assert "no board footage" in lacking.json()["message"]
-    other = solved(fresh, {"board": "charuco:5x4,30,20,DICT_5X5_100", "extrinsics": {"path": str(takes / "extrinsics")}})
+    other = solved(
+        fresh, {"board": "charuco:5x4,30,20,DICT_5X5_100", "extrinsics": {"path": str(takes / "extrinsics")}}
+    )
     assert other["state"] == "failed"
     assert "found in no picture" in other["message"]
 

@@ -7,6 +7,7 @@ const NS = "http://www.w3.org/2000/svg";
 const PERSON_MM = 250;
 const STEPS = [100, 250, 500, 1000, 2000, 5000, 10000, 20000, 50000];
 const ARROW = 16;
+const side = (across) => (Math.abs(across) < 0.4 ? "middle" : across < 0 ? "start" : "end");
 
 /** A number with digits after the point; "–" for none. */
 export const plainNumbers = (value, digits = 1) => (value === null || value === undefined ? "–" : value.toFixed(digits));
@@ -46,8 +47,8 @@ export function rigFromAbove(rig) {
     const told = shape("title", {}, `${camera.name}: ${(camera.position[2] / 1000).toFixed(2)} m over the floor`);
     return [shape("polygon", { points: `${x},${y} ${ray(-half)} ${ray(half)}`, fill: seriesColour(index), "fill-opacity": 0.28, stroke: seriesColour(index) }, told),
       shape("circle", { cx: x, cy: y, r: 4, fill: seriesColour(index) }),
-      shape("text", { x: x - ux * ARROW - 14, y: y - uy * ARROW + 4, class: "name" }, camera.name),
-      shape("text", { x: x - ux * ARROW - 14, y: y - uy * ARROW + 16, class: "quiet" }, `${(camera.position[2] / 1000).toFixed(2)} m high`)];
+      shape("text", { x: x - ux * 10, y: y - uy * ARROW, "text-anchor": side(ux), class: "name" }, camera.name),
+      shape("text", { x: x - ux * 10, y: y - uy * ARROW + 12, "text-anchor": side(ux), class: "quiet" }, `${(camera.position[2] / 1000).toFixed(2)} m high`)];
   });
   const person = [shape("ellipse", { cx: ox, cy: oy, rx: Math.max(PERSON_MM * scale, 2), ry: Math.max(0.55 * PERSON_MM * scale, 1.2), class: "person" }, shape("title", {}, "A person for scale: shoulders 0.5 m wide")),
     shape("circle", { cx: ox, cy: oy, r: Math.max(0.36 * PERSON_MM * scale, 1), class: "person" })];

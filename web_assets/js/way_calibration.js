@@ -7,6 +7,7 @@ import { findingList, plainNumbers, rigFromAbove, residualBars } from "./calibra
 import { clickFloor } from "./calibration_points.js";
 
 const WAYS = { file: "From a file", boards: "From a board", used: "In use" };
+const DICTIONARIES = ["DICT_4X4_50", "DICT_4X4_100", "DICT_4X4_250", "DICT_5X5_50", "DICT_5X5_100", "DICT_5X5_250", "DICT_6X6_100", "DICT_6X6_250", "DICT_7X7_250", "DICT_ARUCO_ORIGINAL"];
 const PAGES = { a4: "A4", a3: "A3", letter: "Letter" };
 
 /** A text, select or number field with its label. */
@@ -89,19 +90,24 @@ export function mount(place, way) {
     const square = number(kept.square);
     const marker = number(kept.marker);
     const markerField = field("Marker mm", marker, "Side of a marker as measured on the print");
+    const dictionary = select(Object.fromEntries(DICTIONARIES.map((name) => [name, name.replace("DICT_", "").replaceAll("_", " ").toLowerCase()])));
+    dictionary.value = kept.dictionary ?? "DICT_4X4_250";
+    const legacy = element("input", { type: "checkbox", checked: Boolean(kept.legacy) });
+    const markers = element("div", { className: "step-row" }, field("Markers", dictionary, "The dictionary that the markers are of"),
+      element("label", { className: "check", title: "Boards drawn by OpenCV before 4.6 with an even number of rows" }, legacy, "old pattern"));
     const count = element("span", { className: "hint" });
     const settle = () => {
-      markerField.hidden = kind.value === "chessboard";
+      markerField.hidden = markers.hidden = kind.value === "chessboard";
       count.textContent = kind.value === "chessboard" ? "Columns and rows count inner corners." : "Columns and rows count squares.";
     };
     kind.onchange = settle;
     settle();
     const spelling = () => {
-      localStorage.setItem("calibration-board", JSON.stringify({ kind: kind.value, columns: columns.value, rows: rows.value, square: square.value, marker: marker.value }));
+      localStorage.setItem("calibration-board", JSON.stringify({ kind: kind.value, columns: columns.value, rows: rows.value, square: square.value, marker: marker.value, dictionary: dictionary.value, legacy: legacy.checked }));
       const sizes = `${columns.value}x${rows.value},${square.value}`;
-      return kind.value === "chessboard" ? `chessboard:${sizes}` : `charuco:${sizes},${marker.value}`;
+      return kind.value === "chessboard" ? `chessboard:${sizes}` : `charuco:${sizes},${marker.value},${dictionary.value}${legacy.checked ? ",legacy" : ""}`;
     };
-    const rowsOf = [element("div", { className: "step-row board-sizes" }, field("Board", kind), field("Columns", columns), field("Rows", rows), field("Square mm", square, "As measured on the print"), markerField), count];
+    const rowsOf = [element("div", { className: "step-row board-sizes" }, field("Board", kind), field("Columns", columns), field("Rows", rows), field("Square mm", square, "As measured on the print"), markerField), markers, count];
     return { rowsOf, spelling };
   }
 
@@ -121,14 +127,14 @@ export function mount(place, way) {
     const board = boardFields();
     const path = text({ placeholder: state.view.board_footage ? "found in the session" : "full path of the folder", value: state.boards ?? "" });
     const upload = files({ webkitdirectory: true, multiple: true });
-    const floor = number("", { step: 1, placeholder: "not set" });
-    const thickness = number(0);
+    const floor = number(state.floor ?? "", { step: 1, placeholder: "not set" });
+    const thickness = number(state.thickness ?? 0);
     const own = element("input", { type: "checkbox" });
     const solve = async () => {
       state.said = [];
       state.proposal = null;
       try {
-        state.boards = path.value;
+        Object.assign(state, { boards: path.value, floor: floor.value, thickness: thickness.value });
         const wish = { board: board.spelling(), thickness_mm: Number(thickness.value), floor: floor.value === "" ? "" : `frame:${floor.value}` };
         if (upload.files.length) wish.footage = { upload: await uploaded(upload) };
         else if (path.value) wish.footage = { path: path.value };
@@ -204,6 +210,12 @@ export function mount(place, way) {
     draw();
   }
 
+  function pointWords(points) {
+    const off = Math.max(...points.flatMap((point) => Object.values(point.missed_px)));
+    const high = Math.max(...points.map((point) => Math.abs(point.place[2])));
+    return `${points.length} points: the clicks miss them by up to ${plainNumbers(off)} px, and they lie within ${plainNumbers(high, 0)} mm of one plane.`;
+  }
+
   function proposalBox() {
     const made = state.proposal;
     const warned = made.findings.some((one) => one.severity === "blocks");
@@ -214,6 +226,7 @@ export function mount(place, way) {
     return element("section", { className: "proposal" }, element("h2", { textContent: made.source }),
       made.unit_note && element("p", { className: "hint", textContent: made.unit_note }),
       ...made.notes.map((note) => element("p", { className: "hint", textContent: note })),
+      made.points.length > 0 && element("p", { className: "hint", textContent: pointWords(made.points) }),
       warned && element("label", { className: "check" }, sure, "Use it although results would be wrong"),
       element("div", { className: "step-actions" }, use, button("Leave it", () => { state.proposal = null; draw(); }, "quiet")));
   }
@@ -221,7 +234,7 @@ export function mount(place, way) {
   function startClicking() {
     state.clicking = clickFloor(way.aside, {
       cameras: shown().cameras,
-      picture: (camera) => `${here}/proposals/${identifier()}/views/${encodeURIComponent(camera)}.jpg?height=720&board=${state.board}`,
+      picture: (camera) => `${here}/proposals/${identifier()}/views/${encodeURIComponent(camera)}.jpg?height=720&board=${state.board}&axes=false`,
       send: async (points) => { const base = state.proposal?.identifier ?? ""; state.proposal = await way.api.post(`${here}/floor`, { proposal: base, points }); state.clicking = null; draw(); },
       stop: () => { state.clicking = null; draw(); },
     });
