@@ -21,6 +21,7 @@ from studio.runs.behaviour_models import fitting, model_folders, model_path
 from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import parameter_names, search_space, session_sigma
 from studio.runs.session_settings import session_settings
+from studio.sessions.made_from import note
 from studio.sessions.named_rows import write_pose
 from studio.sessions.names import free_name
 from studio.sessions.session import START_POSE_NAME, Session
@@ -165,6 +166,7 @@ def keep_pose(session: Session, found: InitialPose, replace: bool = False) -> Pa
         if own.exists():
             own.rename(session.path / _free(f"{own.stem}-before", taken))
         write_pose(own, found.names, found.pose)
+        note(session, "start-pose", f"found in frame {found.frame}, confidence {100 * found.confidence:.0f} %")
         return own
     place = session.path / _free(f"{own.stem}-frame-{found.frame}", taken)
     write_pose(place, found.names, found.pose)

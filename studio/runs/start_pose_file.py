@@ -12,6 +12,7 @@ from studio.body.model import BodyModel
 from studio.capture.trc import read_trc
 from studio.errors import RunError, TruthError
 from studio.runs.search_space import parameter_names
+from studio.sessions.made_from import note
 from studio.sessions.named_rows import read_pose, write_pose
 from studio.sessions.names import free_name
 from studio.sessions.session import START_POSE_NAME, Session
@@ -38,6 +39,7 @@ def keep_start_pose(session: Session, body: BodyModel, pose: Array) -> Path:
         taken = {path.stem for path in session.path.glob("*.csv")}
         own.rename(session.path / f"{free_name(f'{own.stem}-before', taken)}.csv")
     write_pose(own, parameter_names(body), given)
+    note(session, "start-pose", "set by hand")
     return own
 
 
