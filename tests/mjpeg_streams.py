@@ -1,7 +1,7 @@
 """Cameras that send MJPEG over HTTP, on loopback: a thread a connection, each picture when its time has come.
 
 Until they are let go they send their first picture again and again; one that is silenced keeps its connection open and
-says nothing more, one that is cut closes it.
+says nothing more, one that is cut closes it, one that is locked asks for name and password.
 """
 
 import threading
@@ -23,6 +23,7 @@ class Streams:
         self.going, self.over = threading.Event(), threading.Event()
         self.silent: set[str] = set()
         self.cut: set[str] = set()
+        self.locked: set[str] = set()
         self.port = 0
         self.passwords: list[str | None] = []
 
@@ -55,6 +56,11 @@ def served(pictures: dict[str, Sequence[bytes]], fps: float = 30.0) -> Iterator[
             streams.passwords.append(self.headers.get("Authorization"))
             if name not in streams.pictures or name in streams.cut:
                 self.send_error(404)
+                return
+            if name in streams.locked and self.headers.get("Authorization") is None:
+                self.send_response(401)
+                self.send_header("WWW-Authenticate", 'Basic realm="camera"')
+                self.end_headers()
                 return
             self.send_response(200)
             self.send_header("Content-Type", f"multipart/x-mixed-replace; boundary={BOUNDARY}")

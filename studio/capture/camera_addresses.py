@@ -61,8 +61,8 @@ def camera_address(name: str, place: str, *, replays: bool = False) -> CameraAdd
         parts = _split(name, place)
         return CameraAddress(name, SCHEMES[scheme], _without_secrets(parts), place)
     if replays and not scheme and Path(place).expanduser().is_file():
-        path = str(Path(place).expanduser().resolve())
-        return CameraAddress(name, "replay", path, path)
+        path = Path(place).expanduser().resolve()
+        return CameraAddress(name, "replay", path.name, str(path))
     if replays and not scheme:
         raise FootageError(f"There is no video '{place}' for camera {name}.", REMEDY)
     raise FootageError(f"Camera {name} cannot be reached by '{scheme or place[:60]}'.", REMEDY)

@@ -152,4 +152,6 @@ def _why(problem: Exception) -> str:
     """What a library says went wrong, without the address."""
     if isinstance(problem, IndexError):
         return "no video in it"
+    if isinstance(problem, av.error.ExitError):
+        return f"nothing came for {SECONDS_TO_READ:g} s"
     return str(getattr(problem, "strerror", "") or type(problem).__name__)

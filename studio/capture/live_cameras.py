@@ -110,7 +110,8 @@ class LiveCamera:
                     if self._stopping.is_set():
                         return
                     self._take(shot)
-                said = f"Camera {self.name} ({self.address.shown}) ended its stream."
+                ended = "its video is over" if self.address.kind == "replay" else "ended its stream"
+                said = f"Camera {self.name} ({self.address.shown}): {ended}."
             except FootageError as problem:
                 said = problem.message
             except (

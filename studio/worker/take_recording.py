@@ -67,7 +67,10 @@ class TakeStanding:
     @property
     def in_words(self) -> str:
         """As a status line says it."""
-        words = [f"{self.sets} sets", f"{self.spreads.median:.0f} ms apart" if self.spreads.sets else ""]
+        words = [
+            f"{self.sets} set{'s' if self.sets != 1 else ''}",
+            f"{self.spreads.median:.0f} ms apart" if self.spreads.sets else "",
+        ]
         words += [one.in_words for one in self.stopped]
         return " · ".join(word for word in words if word)
 
