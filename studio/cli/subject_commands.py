@@ -5,12 +5,11 @@ from pathlib import Path
 
 import click
 
-from studio.body.catalogue import load_body
-from studio.body.subject import Subject, fit_subject, write_subject
+from studio.body.subject import Subject
 from studio.cli.output import command, note, progress
 from studio.errors import BodyError, RunError
+from studio.runs.subject_choice import body_of_choice, choose_subject, keep_fitted
 from studio.runs.subject_fitting import COUNT, FitRequest, FittedSubject, fit_session_subject, keep_subject
-from studio.sessions.session import SUBJECT_NAME
 from studio.sessions.workspace import Workspace
 
 
@@ -23,22 +22,19 @@ from studio.sessions.workspace import Workspace
 )
 @command
 def subject(session: str, height: float | None, body: str, lengths: Sequence[str]) -> dict[str, object]:
-    """Write down who is in front of SESSION's cameras, or show it.
+    """Write down who is in front of SESSION's cameras (new runs then have that body), or show it.
 
     With nothing but a height every length, hands and feet included, is its published share of it (sources: the body
     file).
     """
     opened = Workspace().resolve(session)
     name = body or opened.manifest.body
-    tree = load_body(name, opened.body_folders)
     if height is None and not lengths:
         found, notes = opened.body_with_notes(body or None)
     else:
-        if height is not None and not 300.0 <= height <= 3000.0:
-            raise BodyError(f"A height of {height:g} mm is no person's.", "Give millimetres, such as 1800.")
         wanted = Subject(body=name, height_mm=height, lengths_mm=_pairs(lengths))
-        found, notes = fit_subject(tree, wanted, opened.body_folders)
-        write_subject(wanted, opened.path / SUBJECT_NAME)
+        found, notes = body_of_choice(opened, wanted)
+        choose_subject(opened, wanted)
     for line in notes:
         note(line)
     lines = [f"{key:28} {value:8.1f}" for key, value in found.dimensions.items()]
@@ -99,7 +95,7 @@ def fit_subject_command(
     )
     with progress(f"{opened.name}: subject") as report:
         found = fit_session_subject(opened, request, progress=report)
-    place = keep_subject(opened, found, into)
+    place = keep_fitted(opened, found) if into is None else keep_subject(opened, found, into)
     return {
         "session": opened.name,
         "body": found.body.name,

@@ -1,4 +1,4 @@
-"""Issue 5, Show 4, from pictures alone: masks cut by the studio, poses searched by it, a height within 3 cm, the fit."""
+"""Issue 5, Show 4, from pictures alone: the studio's own masks and first poses, a height within 3 cm, the fit."""
 
 from pathlib import Path
 
