@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from studio.notebook.preparing import mask_quality as mask_quality
     from studio.notebook.preparing import subject as subject
     from studio.notebook.preparing import synthesize as synthesize
+    from studio.notebook.recording import record as record
     from studio.notebook.results import evaluate as evaluate
     from studio.notebook.results import export_run as export_run
     from studio.notebook.results import list_tracks as list_tracks
@@ -42,6 +43,7 @@ _PLACES = {
     ),
     "notebook.solving_cameras": ("calibrate",),
     "notebook.tracking": ("correct", "go_on", "refine", "smooth", "track"),
+    "notebook.recording": ("record",),
     "notebook.results": ("evaluate", "export_run", "list_tracks", "markers", "read_track"),
     "notebook.learning": ("learn",),
 }  # fmt: skip

@@ -59,7 +59,7 @@ def test_the_page_runs_from_top_to_bottom(
     assert studio.evaluate("walk/first", track="refined").mean_mm < 60.0
     assert studio.list_tracks("walk/first") == ("raw", "refined", "smoothed")
     assert [entry.name for entry in studio.list_runs("walk")] == ["first", "fixed"]
-    assert len(read_bvh(tmp_path / "walk.bvh").values) == 8  # pyright: ignore[reportAttributeAccessIssue]
+    assert len(read_bvh(tmp_path / "walk.bvh").turns) == 8
     told = capsys.readouterr().out
     assert "There is no session 'run'" in told
     assert "Traceback" not in told

@@ -76,6 +76,7 @@ def errors_in(session: Session, frames: range, seed: int) -> list[float]:
     return errors
 
 
+@pytest.mark.timeout(900)
 def test_people_in_random_moments_and_headings_are_found(people: Session) -> None:
     assert max(errors_in(people, range(3), seed=2)) <= 80.0
 
