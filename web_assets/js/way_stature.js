@@ -6,7 +6,8 @@ const SPACE = "http://www.w3.org/2000/svg";
 const COLOURS = { left: "var(--limb-left)", right: "var(--limb-right)", middle: "var(--limb-middle)" };
 const MARGIN = 90;
 const LABEL_ROOM = 620;
-const LINE = 78;
+const LINE = 88;
+const BULGE = 0.4;        // of a radius: how far a limb's end is rounded, so that cones look like limbs
 
 function shape(tag, values, text) {
   const made = document.createElementNS(SPACE, tag);
@@ -21,9 +22,10 @@ function outline({ start, end, radii }) {
   const along = [b[0] - a[0], b[1] - a[1]];
   const length = Math.hypot(...along) || 1;
   const across = [-along[1] / length, along[0] / length];
+  const bulge = (point, radius, sign) => point.map((value, axis) => (value + sign * BULGE * radius * (along[axis] / length)).toFixed(1)).join(" ");
   const at = (point, radius) => [point[0] + across[0] * radius, point[1] + across[1] * radius];
   const [p, q, r, s] = [at(a, radii[0]), at(b, radii[1]), at(b, -radii[1]), at(a, -radii[0])].map((point) => point.map((value) => value.toFixed(1)).join(" "));
-  return `M${p}L${q}A${radii[1]} ${radii[1]} 0 0 0 ${r}L${s}A${radii[0]} ${radii[0]} 0 0 0 ${p}Z`;
+  return `M${p}L${q}Q${bulge(b, radii[1], 1)} ${r}L${s}Q${bulge(a, radii[0], -1)} ${p}Z`;
 }
 
 /** Labels at the right, one a line, none over another: [y wanted] -> [y]. */
@@ -60,7 +62,7 @@ export function drawStature(place, told, compared, words) {
     const change = before ? Math.round(length(limb) - length(before)) : 0;
     svg.append(shape("polyline", { class: "leader", fill: "none", points: `${middle[0]},${middle[1]} ${right - 30},${y} ${right},${y}` }),
       shape("text", { x: right + 14, y: y + 9 }, `${Math.round(length(limb))} mm${change ? `  (${change > 0 ? "+" : "−"}${Math.abs(change)})` : ""}`),
-      shape("text", { class: "name", x: right + 14, y: y + 37 }, limb.name.replace(/^left /, "")));
+      shape("text", { class: "name", x: right + 14, y: y + 40 }, limb.name.replace(/^left /, "")));
   });
   const height = Math.round(top - low);
   svg.append(shape("line", { class: "leader", x1: left - 40, x2: left - 40, y1: -low, y2: -top }), shape("text", { x: left - 54, y: -(top + low) / 2, "text-anchor": "end" }, `${(height / 1000).toFixed(2)} m`));
