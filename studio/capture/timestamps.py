@@ -93,8 +93,7 @@ def offsets_from_times(times: dict[str, Array]) -> TimedOffsets:
     if any(moments[-1] <= start for moments in times.values()):
         raise FootageError("The times of the cameras do not overlap.", "Give footage of the same take.")
     offsets = {name: int(np.argmin(np.abs(moments - start))) for name, moments in times.items()}
-    least = min(offsets.values())
-    offsets = {name: offset - least for name, offset in offsets.items()}
+    offsets = _nearest_throughout(times, offsets, fps)
     apart = _apart(times, offsets) * fps
     notes: list[str] = []
     if apart > APART:
@@ -103,6 +102,24 @@ def offsets_from_times(times: dict[str, Array]) -> TimedOffsets:
             " frames were lost."
         )
     return TimedOffsets(offsets, fps, apart, tuple(notes))
+
+
+def _nearest_throughout(times: dict[str, Array], offsets: dict[str, int], fps: float) -> dict[str, int]:
+    """Offsets by which pictures lie nearest over the whole take, not only at its begin, where they may have come late;
+    the smallest is 0. Cameras are compared with the middle one of them.
+    """
+    count = min(len(times[name]) - offset for name, offset in offsets.items())
+    cut = np.stack([times[name][offset : offset + count] for name, offset in offsets.items()])
+    late = np.median(cut - np.median(cut, axis=0), axis=1) * fps
+    late = np.median(cut - cut[np.argmin(np.abs(late))], axis=1) * fps
+    moved = {
+        name: offset - round(float(frames))
+        for (name, offset), frames in zip(offsets.items(), late, strict=True)
+    }
+    least = min(moved.values())
+    moved = {name: offset - least for name, offset in moved.items()}
+    # An offset must leave frames to compare.
+    return moved if all(offset < len(times[name]) for name, offset in moved.items()) else offsets
 
 
 def _apart(times: dict[str, Array], offsets: dict[str, int]) -> float:

@@ -89,3 +89,11 @@ def test_rates_and_takes_that_do_not_belong_together() -> None:
         offsets_from_times({"a": np.arange(60) / 30.0, "b": np.arange(60) / 25.0})
     with pytest.raises(FootageError, match="do not overlap"):
         offsets_from_times({"a": np.arange(60) / 30.0, "b": 100.0 + np.arange(60) / 30.0})
+
+
+def test_a_first_picture_that_came_late_does_not_decide() -> None:
+    even = np.arange(40) / 30.0
+    late = even + 0.001
+    late[0] += 0.020
+    assert offsets_from_times({"cam1": even, "cam2": late}).offsets == {"cam1": 0, "cam2": 0}
+    assert offsets_from_times({"cam1": even, "cam2": late + 1.0 / 30.0}).offsets == {"cam1": 1, "cam2": 0}
