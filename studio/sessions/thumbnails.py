@@ -15,18 +15,18 @@ QUALITY = 5
 
 
 def thumbnail_of(session: "Session") -> bytes | None:
-    """JPEG bytes, at most 320 pixels on the longer side; None if the footage or calibration cannot be
+    """JPEG bytes, at most 320 pixels on the longer side; None if the footage or a calibration cannot be
     read."""
     try:
-        camera = session.cameras()[0]
+        turns = session.cameras()[0].quarter_turns if session.is_calibrated else 0
         footage = session.footage()
         try:
-            picture = footage.picture(camera.name, footage.frame_count // 2)
+            picture = footage.picture(footage.cameras[0], footage.frame_count // 2)
         finally:
             footage.close()
     except (StudioError, IndexError):
         return None
-    return jpeg(np.rot90(picture, -camera.quarter_turns))
+    return jpeg(np.rot90(picture, -turns))
 
 
 def jpeg(picture: np.ndarray, longest: int = WIDTH) -> bytes:

@@ -143,7 +143,7 @@ function sessionBlock(entry) {
   head.dataset.key = entry.name;
   head.setAttribute("role", "treeitem");
   head.setAttribute("aria-expanded", String(entry.name === get("session")));
-  const picture = Object.assign(document.createElement("img"), { src: `${sessionPath(entry.name)}/thumbnail.jpg`, alt: "", loading: "lazy" });
+  const picture = entry.next_step === "footage" ? element("span", "no-picture") : Object.assign(document.createElement("img"), { src: `${sessionPath(entry.name)}/thumbnail.jpg`, alt: "", loading: "lazy" });
   picture.onerror = () => picture.replaceWith(element("span", "no-picture"));
   const words = element("div", "");
   words.append(element("div", "name", entry.name), element("div", "facts", entry.problem || lacks(entry) || `${entry.cameras} ${entry.cameras === 1 ? "camera" : "cameras"} · ${entry.frame_count} frames`));

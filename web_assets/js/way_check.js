@@ -39,6 +39,7 @@ export function mount(place, way) {
     if (at >= 0) picker.value = at;
     wall.show({ run: run.name, frame, track: state.track === "raw" ? "" : state.track, show: "outline" });
     const check = state.told?.check;
+    for (const camera of way.detail.cameras) wall.note(camera.name, "");
     const row = check?.frames.indexOf(frame) ?? -1;
     check?.cameras.forEach((camera, view) => {
       const inside = row >= 0 ? check.inside[row][view] : null;
