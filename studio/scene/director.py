@@ -45,7 +45,7 @@ class Director:
             draw_pictures=state.draw_pictures,
             failed=self.refused,
         )
-        self.posing = PoseDesk(server, self._presenter.post, state.pose_changed, self.refused)
+        self.posing = PoseDesk(server, self._presenter.post, self.refused)
         state.attach(Panel(server, self), self._presenter, self.posing)
         server.on_client_connect(self._client_came)
 

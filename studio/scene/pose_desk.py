@@ -41,18 +41,16 @@ class Editing:
 
 
 class PoseDesk:
-    """post : does something in the scene's thread. changed : told there after each change. refused : tells the
-    person.
-    """
+    """post : does something in the scene's thread. refused : tells the person."""
 
     def __init__(
         self,
         server: viser.ViserServer,
         post: Callable[[Callable[[], None]], None],
-        changed: Callable[[], None],
         refused: Callable[[StudioError], None],
     ) -> None:
-        self._server, self._post, self._changed, self._refused = server, post, changed, refused
+        self._server, self._post, self._refused = server, post, refused
+        self._changed: Callable[[], None] = lambda: None
         self._panel: Panel | None = None
         self._opened: OpenedRun | None = None
         self._dragger: Dragger | None = None
@@ -62,11 +60,13 @@ class PoseDesk:
         self._refining: PoseRefining | None = None
         self._active = False
         self._frame: int | None = None
-        self.shown_frame: Callable[[], int | None] = lambda: None
+        self._shown_frame: Callable[[], int | None] = lambda: None
 
-    def attach(self, panel: Panel, shown_frame: Callable[[], int | None]) -> None:
-        """Take the panel, and who knows which frame is shown."""
-        self._panel, self.shown_frame = panel, shown_frame
+    def attach(
+        self, panel: Panel, shown_frame: Callable[[], int | None], changed: Callable[[], None]
+    ) -> None:
+        """Take the panel, who knows which frame is shown, and who is told after each change."""
+        self._panel, self._shown_frame, self._changed = panel, shown_frame, changed
 
     @property
     def pose(self) -> Array | None:
@@ -211,7 +211,7 @@ class PoseDesk:
         if self._refining is not None:
             self._stop_refining()
             return
-        frame = self.shown_frame() if self._frame is None else self._frame
+        frame = self._shown_frame() if self._frame is None else self._frame
         if self._opened is None:
             raise RunError("No session is open.", "Open one first.")
         span = self._opened.span

@@ -3,7 +3,7 @@ and mm.
 """
 
 import math
-from typing import Protocol, cast
+from typing import Protocol
 
 import numpy as np
 import viser

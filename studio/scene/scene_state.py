@@ -51,7 +51,7 @@ class SceneState:
     def attach(self, panel: Panel, presenter: Presenter, posing: PoseDesk) -> None:
         """Take the panel that shows this state, the presenter that draws it, and where poses are edited."""
         self._panel, self._presenter, self._posing = panel, presenter, posing
-        posing.attach(panel, lambda: self.shown.frame)
+        posing.attach(panel, lambda: self.shown.frame, self._pose_changed)
 
     def show_run(self, session: str, run: str, frame: int | None, layer: int | None) -> None:
         """Show a session ("" : none) and one of its runs ("" : none), a frame (None: as it is), a layer."""
@@ -170,7 +170,7 @@ class SceneState:
             pose = self.run.moment(wish.frame, self.live, None, self.options.track).pose
         self._posing.begin(pose, wish.frame if wish.run else None)
 
-    def pose_changed(self) -> None:
+    def _pose_changed(self) -> None:
         """The pose under a person's hands is another one, or no longer is one."""
         editing = self._posing.pose is not None
         if not editing:
