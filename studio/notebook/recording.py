@@ -7,7 +7,7 @@ from pathlib import Path
 
 from studio.capture.camera_addresses import address_from_text, check_names
 from studio.errors import FootageError
-from studio.notebook.opening import SessionName
+from studio.notebook.opening import SessionName, open_session
 from studio.notebook.progress import Report, Told, told
 from studio.sessions.recordings import SpreadFigures, calibration_given, check_cameras, import_recording
 from studio.sessions.session import Session
@@ -44,7 +44,7 @@ def record(
     FootageError, SessionError.
     """
     place = Workspace().place_for(into)
-    known = calibration_given(calibration.path if isinstance(calibration, Session) else calibration)
+    known = _calibration(calibration)
     if not cameras:
         raise FootageError(
             "No camera was given.", "Give each by its name in the calibration, with its address."
@@ -65,6 +65,13 @@ def record(
                 standing = recording.close()
         found, spread = import_recording(folder, place, known, standing.notes, report)
     return Recorded(found.session, spread, (*found.notes, *found.warnings))
+
+
+def _calibration(given: SessionName) -> Path:
+    """The calibration's file: of a session by name or value, else as it is given."""
+    if not isinstance(given, Session) and Path(given).exists():
+        return calibration_given(given)
+    return calibration_given(open_session(given).path)
 
 
 def _until(recording: StreamRecording, seconds: float | None, report: Report) -> None:

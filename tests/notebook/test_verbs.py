@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from toy_session import BODY, true_poses
+from toy_footage import write_video
+from toy_session import BODY, HEIGHT, WIDTH, true_poses
 
 import studio
 from studio.body.catalogue import load_body
@@ -158,3 +159,19 @@ def test_nobody_looks_at_a_bar_in_a_log_and_a_bar_can_be_asked_for(
         with told(wish, "Rendering") as report:
             report("frames", 1, 2)
         assert ("frames" in capsys.readouterr().err) == shown
+
+
+def test_a_replayed_camera_is_recorded_into_a_session(session_on_disk: Session, tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    pictures = [rng.integers(60, 190, (HEIGHT, WIDTH, 3), dtype=np.uint8) for _ in range(30)]
+    video = write_video(tmp_path / "front.mp4", pictures, fps=30)
+    steps: list[str] = []
+    taken = studio.record(
+        {"front": str(video)}, "take", "toy", fps=30.0, progress=lambda step, *_: steps.append(step)
+    )
+    assert taken.session.name == "take"
+    assert [camera.name for camera in taken.session.cameras()] == ["front"]
+    assert 1 <= taken.session.manifest.footage.frame_count <= 30
+    assert steps
+    with pytest.raises(studio.StudioError, match="No camera"):
+        studio.record({}, "other", "toy")

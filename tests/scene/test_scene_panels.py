@@ -5,9 +5,7 @@ import math
 from types import SimpleNamespace
 from typing import cast
 
-import numpy as np
 import pytest
-from conftest import swaying_pose
 
 from studio.body.model import BodyModel
 from studio.errors import RunError, StudioError
