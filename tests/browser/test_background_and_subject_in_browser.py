@@ -164,7 +164,7 @@ def test_a_height_becomes_a_body_and_the_body_is_fitted(
     page.wait_for_function("() => document.querySelector('.fitted img').naturalWidth > 0")
     shoot(page, artefacts / "way-subject-fitted.png")
     save.click()
-    expect(page.get_by_text("Saved.")).to_be_visible()
+    expect(page.get_by_text("What was there before stays")).to_be_visible()
     told = studio.get("/api/sessions/person/subject")
     assert told["fitted"]
     rows = page.locator(".sizes tr").filter(has_text="thigh")

@@ -210,11 +210,13 @@ export function mount(place, way) {
   /** Paint what does not count of a camera, over its picture. */
   function paint(camera) {
     const lens = way.detail.cameras.find((one) => one.name === camera);
-    brush(way, { ...lens, frame: pictures.frame }, async (saved) => {
-      pictures.show();
-      if (!saved) return;
+    const { excluded } = state.told.cameras.find((one) => one.name === camera);
+    brush(way, { ...lens, frame: pictures.frame, excluded }, async (saved) => {
+      if (!saved) return pictures.show();
       state.quality = null;
       await ask().catch(complain);
+      pictures.mark(state.told.cameras);
+      pictures.show();
       drawQuality();
       way.refresh().catch(complain);
     });

@@ -8,7 +8,8 @@ const UNDONE = 30;
 const PICTURE_HEIGHT = 1080;
 const HELP = "Paint what is not the person. Keys: arrows move, space paints, x paints or erases, [ and ] change the size, ctrl z undoes, enter keeps, escape leaves.";
 
-/** Edit what is excluded of `lens` (name, picture_width, picture_height, quarter_turns, frame); `done(saved)` when left. */
+/** Edit what is excluded of `lens` (name, picture_width, picture_height, quarter_turns, frame, excluded: whether there is
+ * something already); `done(saved)` when left. */
 export function brush(way, lens, done) {
   const place = `${way.api.sessionPath(way.session)}/exclusions/${encodeURIComponent(lens.name)}`;
   const turns = ((lens.quarter_turns % 4) + 4) % 4;
@@ -157,7 +158,7 @@ export function brush(way, lens, done) {
   setErasing(false);
   const tools = element("div", { className: "mask-bar" }, element("b", { textContent: lens.name }), element("label", { className: "check" }, "size", size), erase, undo, clear, element("span", { className: "spring" }), leave, keep);
   way.aside.replaceChildren(tools, element("div", { className: "brush-room" }, sheet), element("p", { className: "hint brush-help", textContent: HELP }));
-  load().catch(complain);
+  if (lens.excluded) load().catch(complain);
   canvas.focus();
   drawRing();
 }
