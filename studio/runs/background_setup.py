@@ -39,15 +39,15 @@ TRIED_FRAMES = 3
 TRIALS: tuple[dict[str, Knob], ...] = (
     {},
     {"mask_shadow_test": False},
-    {"mask_shadow_test": False, "mask_keep_components": 1},
+    {"mask_shadow_test": False, "mask_keep_components": 3},
     {
         "mask_shadow_darkest": 0.75,
         "mask_shadow_colour": 0.03,
         "mask_threshold": 5.0,
-        "mask_keep_components": 1,
+        "mask_keep_components": 3,
     },
 )
-"""Knobs that are tried, beside what the session or the person has."""
+"""Knobs that are tried, beside what the session or the person has. Three pieces: legs may be cut off by a gap."""
 
 Progress = Callable[[str, int, int], None]
 
