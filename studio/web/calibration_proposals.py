@@ -27,6 +27,12 @@ from studio.sessions.session import CAMERAS_PATH, Session
 
 KEPT = 12
 WITHOUT_FLOOR = "no-floor"
+WITHOUT_PLACES = Finding(
+    "no-places",
+    "blocks",
+    "The lenses were solved, but there is no common footage to place the cameras from.",
+    "Add footage (or one picture) of the board that all cameras took at once.",
+)
 
 Bytes = NDArray[np.uint8]
 
@@ -129,11 +135,13 @@ def proposal_of_file(session: Session, read: Calibration) -> Proposal:
 def proposal_of_boards(
     session: Session, found: Calibrated, folder: Path | None, floor: str, taken: HowTaken
 ) -> Proposal:
-    """What boards give a session; folder : the common footage, for pictures. Raises CalibrationError."""
+    """What boards give a session; folder : the common footage, for pictures. Lenses alone give no cameras, and a
+    finding that blocks. Raises CalibrationError.
+    """
     if found.rig is None:
-        raise CalibrationError(
-            "The lenses were solved, but there is no common footage to place the cameras from.",
-            "Add footage (or one picture) of the board that all cameras took at once.",
+        findings = (WITHOUT_PLACES, *found.findings)
+        return Proposal(
+            secrets.token_hex(8), session.name, told_source(found), (), findings, calibrated=found
         )
     fitted = fit_to_session(session, found.rig.cameras)
     return Proposal(

@@ -117,12 +117,13 @@ async def view(
 def coverage(session: OpenSession, identifier: str, camera: str, doors: Door) -> Response:
     """Where in the picture the board's corners were seen: used ones white, those left out red."""
     found = _found(session, identifier, doors)
-    name = _camera(found, camera).name
+    lenses = found.calibrated.lenses if found.calibrated is not None else {}
+    name = camera if camera in lenses else _camera(found, camera).name
     kept = session.path / CAMERAS_PATH.with_name(f"cameras.coverage-{name}.png")
     if found.calibrated is None and identifier == CURRENT and kept.is_file():
         content = kept.read_bytes()
-    elif found.calibrated is not None and name in found.calibrated.lenses:
-        lens = found.calibrated.lenses[name]
+    elif found.calibrated is not None and name in lenses:
+        lens = lenses[name]
         dropped = {residual.frame for residual in lens.residuals if residual.dropped}
         seen = found.calibrated.sightings.get(name, ())
         picture = coverage_picture(

@@ -277,3 +277,27 @@ def test_a_board_to_print(studio: Studio) -> None:
     large = studio.client.get("/api/calibration-boards.pdf", params={"board": "chessboard:9x6,200"})
     assert large.status_code == 422
     assert "does not fit" in large.json()["message"]
+
+
+@pytest.mark.real_data
+def test_lenses_of_the_balancing_mans_cameras(studio: Studio, real_data: Path) -> None:
+    """Few and hard pictures: the focal length is within 3 % of the given one, or what is shown says why not."""
+    folder = real_data / "pose2sim-balance" / "calibration"
+    given = {camera.name[-2:]: camera for camera in read_calibration(folder / "Calib_qualisys.toml").cameras}
+    begin_session(studio.workspace.place_for("fresh"))
+    doors = studio.app.state.doors
+    doors.footage_roots = (*doors.footage_roots, folder.resolve())
+    told = solved(studio, {"board": "chessboard:4x7,60", "intrinsics": {"path": str(folder / "intrinsics")}})
+    assert told["state"] == "done", told
+    here = f"{FRESH}/proposals/{told['proposal']}"
+    made = studio.client.get(here).json()
+    assert made["findings"][0]["code"] == "no-places"
+    assert studio.client.post(f"{here}/apply", json={}).status_code == 422
+    assert [lens["name"] for lens in made["report"]["cameras"]] == ["cam01", "cam02", "cam03", "cam04"]
+    for lens in made["report"]["cameras"]:
+        true = given[lens["name"][-2:]].matrix[0, 0]
+        said = {finding["code"] for finding in made["findings"] if lens["name"] in finding["cameras"]}
+        assert abs(lens["focal_px"][0] / true - 1.0) < 0.03 or said & {"coverage", "few-pictures"}
+        assert "few-pictures" in said
+        assert len(lens["pictures"]) >= 6
+        assert studio.client.get(f"{here}/coverage/{lens['name']}.png").status_code == 200

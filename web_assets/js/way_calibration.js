@@ -227,7 +227,7 @@ export function mount(place, way) {
       made.unit_note && element("p", { className: "hint", textContent: made.unit_note }),
       ...made.notes.map((note) => element("p", { className: "hint", textContent: note })),
       made.points.length > 0 && element("p", { className: "hint", textContent: pointWords(made.points) }),
-      warned && element("label", { className: "check" }, sure, "Use it although results would be wrong"),
+      warned && made.cameras.length > 0 && element("label", { className: "check" }, sure, "Use it although results would be wrong"),
       element("div", { className: "step-actions" }, use, button("Leave it", () => { state.proposal = null; draw(); }, "quiet")));
   }
 
@@ -255,9 +255,9 @@ export function mount(place, way) {
     const coverage = lenses.filter((lens) => lens.pictures.length).map((lens) => element("figure", { className: "picture coverage" },
       element("img", { alt: `Where the board was seen by ${lens.name}`, src: `${address}/coverage/${encodeURIComponent(lens.name)}.png` }),
       element("figcaption", {}, element("b", { textContent: `${lens.name}: ${Math.round(100 * lens.coverage)} % covered` }), residualBars(lens), element("span", { textContent: lens.verdict }))));
-    const head = element("div", { className: "aside-actions" }, button("Set the floor by clicks", startClicking, "small"),
+    const head = element("div", { className: "aside-actions" }, rig.cameras.length > 1 && button("Set the floor by clicks", startClicking, "small"),
       state.proposal && lenses.length > 0 && way.detail.cameras?.length > 0 && button(state.board ? "Show the take" : "Show the board", () => { state.board = !state.board; drawAside(); }, "small quiet"));
-    way.aside.replaceChildren(element("div", { className: "calibrated" }, head, rigFromAbove(rig), element("div", { className: "pictures" }, ...figures),
+    way.aside.replaceChildren(element("div", { className: "calibrated" }, head, rig.cameras.length > 0 && rigFromAbove(rig), element("div", { className: "pictures" }, ...figures),
       coverage.length > 0 && element("h2", { textContent: "What the board told" }), element("div", { className: "pictures" }, ...coverage)));
   }
 
