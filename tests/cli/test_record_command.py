@@ -1,0 +1,90 @@
+"""`studio record` and `studio live --camera`, on streams from loopback."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from mjpeg_streams import jpeg, served
+
+from studio.cli.main import main
+from studio.sessions.session import Session
+from studio.web.samples import sample_folder
+
+FPS = 30.0
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory: pytest.TempPathFactory) -> Session:
+    place = tmp_path_factory.mktemp("recording") / "walk"
+    shutil.copytree(sample_folder(), place)
+    return Session(place)
+
+
+@pytest.fixture(scope="module")
+def pictures(walk: Session) -> dict[str, list[bytes]]:
+    footage = walk.footage()
+    found = {name: [jpeg(footage.picture(name, 2 * k)) for k in range(20)] for name in ("cam1", "cam2")}
+    footage.close()
+    return found
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(main, list(arguments), catch_exceptions=False)
+
+
+def test_cameras_are_recorded_at_once(
+    walk: Session, pictures: dict[str, list[bytes]], tmp_path: Path
+) -> None:
+    with served(pictures, FPS) as streams:
+        streams.going.set()
+        cameras = [part for name in pictures for part in ("--camera", f"{name}={streams.address(name)}")]
+        into = ("--into", str(tmp_path / "take"), "--calibration", str(walk.path))
+        result = run("record", *cameras, "--seconds", "0.8", *into, "--json")
+        assert result.exit_code == 0, result.stderr
+        told = json.loads(result.stdout)
+        assert set(told["cameras"]) == {"cam1", "cam2"}
+        assert told["frames"] >= 10
+        assert told["spread_ms"]["median"] <= told["spread_ms"]["worst"]
+        made = Session(tmp_path / "take")
+        assert made.manifest.frame_count == told["frames"]
+        again = run("record", *cameras, *into)
+        assert again.exit_code == 2
+        assert "something at" in again.stderr
+
+
+def test_live_cameras_are_tracked(walk: Session, pictures: dict[str, list[bytes]], tmp_path: Path) -> None:
+    quick = ("--tracker", "annealed", "--weighting", "edge-region", "--particles", "30", "--layers", "2")
+    with served(pictures, FPS) as streams:
+        cameras = [part for name in pictures for part in ("--camera", f"{name}={streams.address(name)}")]
+        place = ("--into", str(tmp_path / "take"), "--seconds", "1", "--json")
+        result = run("live", str(walk.path), *cameras, *quick, *place)
+        refused = run("live", str(walk.path), *cameras, "--repeat")
+    assert result.exit_code == 0, result.stderr
+    told = json.loads(result.stdout)
+    assert (told["session"], told["ended"], told["stopped"]) == ("take", "its time was over", [])
+    assert told["frames"] >= 1
+    assert told["frames"] + len(told["dropped"]) <= told["sets"]
+    again = json.loads(run("live", str(tmp_path / "take"), "--replay", told["run"], "--json").stdout)
+    assert (again["frames"], again["different"]) == (told["frames"], [])
+    assert refused.exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((), "No camera was given"),
+        (("--camera", "cam1"), "without its name"),
+        (("--camera", "cam1=file:///etc/passwd"), "cannot be reached by 'file'"),
+        (("--camera", "cam1=/dev/video0", "--camera", "cam1=/dev/video1"), "given twice"),
+        (("--camera", "left=/dev/video0"), "Camera left is not in"),
+    ],
+)
+def test_what_cannot_be_recorded_is_said_at_once(
+    walk: Session, tmp_path: Path, arguments: tuple[str, ...], said: str
+) -> None:
+    result = run("record", *arguments, "--into", str(tmp_path / "take"), "--calibration", str(walk.path))
+    assert result.exit_code == 2
+    assert said in " ".join(result.stderr.split())
+    assert not (tmp_path / "take").exists()
