@@ -33,7 +33,7 @@ def seen(cameras: tuple[Camera, ...], points: Array) -> dict[str, Array]:
         turn, _ = cv2.Rodrigues(one.rotation)
         pixels, _ = cv2.projectPoints(points, turn, one.translation, one.matrix, one.distortion)
         corners = cv2.convexHull(pixels.astype(np.float32), returnPoints=False)
-        found[one.name] = pixels[corners.ravel(), 0]
+        found[one.name] = np.asarray(pixels, dtype=np.float64)[np.asarray(corners).ravel(), 0]
     return found
 
 
