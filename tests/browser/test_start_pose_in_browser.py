@@ -1,0 +1,55 @@
+"""The guided way's start pose: made better from the page, edited by hand, shown in every view."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser
+from studio_page import StudioPage
+from studio_server import StudioServer
+from toy_session import make_session, true_poses
+
+pytestmark = pytest.mark.browser
+
+POSE = "/api/sessions/toy/start-pose"
+
+
+@pytest.fixture
+def studio(tmp_path: Path) -> Iterator[StudioServer]:
+    """`studio serve` on the toy arm, whose start pose is a little off."""
+    workspace = tmp_path / "workspace"
+    workspace.mkdir()
+    make_session(workspace / "toy")
+    made = StudioServer("serve", workspace)
+    off = true_poses()[0] + np.array([0.12, -0.1, 0.1, -0.08])
+    made.post(POSE, {"pose": off.tolist()}, "PUT")
+    yield made
+    made.stop()
+
+
+def test_a_start_pose_is_made_better_and_edited(browser: Browser, studio: StudioServer) -> None:
+    window = StudioPage(browser, studio, with_scene=False)
+    page = window.page
+    page.goto(f"{studio.origin}/way?session=toy&step=start-pose")
+    page.get_by_text("The session has a start pose.").wait_for()
+    page.get_by_alt_text("front, frame 0, start pose").wait_for()
+    before = studio.get(POSE)["pose"]
+    page.get_by_role("button", name="Refine from here").click()
+    page.get_by_text("Made better").wait_for()
+    better = studio.get(POSE)["pose"]
+    assert better != before
+    page.get_by_role("button", name="Edit by hand").click()
+    use = page.get_by_role("button", name="Use this pose")
+    use.wait_for()
+    wanted = true_poses()[0].tolist()
+    studio.post("/api/scene/edit", {"session": "toy", "frame": 0, "pose": wanted})
+    for _ in range(500):
+        told = studio.get("/api/scene/edit")
+        if told["editing"] and told["pose"] == wanted:
+            break
+        page.wait_for_timeout(20)
+    use.click()
+    use.wait_for(state="detached")
+    assert studio.get(POSE)["pose"] == pytest.approx(wanted)
+    window.close()
