@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import limb_ends
 from studio.body.shape_space import ShapeSpace
+from studio.tracking.lost_limbs import lost_limbs_found
 from studio.weighting.shape_silhouettes import POSES, ShapeSilhouettes
 
 Array = NDArray[np.float64]
@@ -37,9 +38,6 @@ RIDGE = 0.02
 KEPT = 0.25
 """Share of the layers, the last ones, that make the answer."""
 STEP = 1e-4
-SEEKING_ROUNDS, SEEKING, NEARER = 2, ((1.0, 1.0), (0.3, 0.25), (0.1, 0.25)), 0.01
-"""How often each limb is looked for anew, in which shares of its range and with which shares of the tries, and what of
-f_s a place a whole range away from rest must gain."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,31 +208,16 @@ class ShapeSearch:
         now.fitness = np.take_along_axis(fitness, best[..., None], axis=2)[..., 0]
 
     def sought(self, poses: Array) -> Array:
-        """(F, D) the poses with each limb where it fits best among many places, one limb after the other.
+        """(F, D) the poses with each limb where it fits best among many places (`lost_limbs`)."""
+        shape = np.zeros((1, len(self._sigma)))
 
-        A first pose often has an arm hidden in the trunk's silhouette, from where small steps lead nowhere. Of places
-        that fit alike, the one nearer to the rest pose is taken.
-        """
-        found, rest = poses.copy(), self._space.body.neutral
-        reach = np.where(np.isfinite(self._limits).all(axis=0), self._limits[1] - self._limits[0], np.inf)
-        free = [own for own in self._limbs if len(own) > 2 and np.isfinite(reach[own]).all()]
-        for own in SEEKING_ROUNDS * free:
-            for spread, share in SEEKING:
-                bodies = round(share * self._settings.sought) // POSES
-                if not bodies:
-                    continue
-                shapes = np.zeros((bodies, len(self._sigma)))
-                tried = np.repeat(found[None], bodies * POSES, axis=0)
-                drawn = self._rng.random((*tried.shape[:2], len(own))) - 0.5
-                around = found[None][..., own] if spread < 1.0 else self._limits[:, own].mean(axis=0)
-                tried[1:, :, own] = (around + spread * drawn * reach[own])[1:]
-                tried = self._within(tried)
-                by_body = tried.reshape(bodies, POSES, *found.shape).swapaxes(1, 2)
-                fits = self._fitness(shapes, by_body).swapaxes(1, 2).reshape(len(tried), -1)
-                away = np.square((tried[..., own] - rest[own]) / reach[own]).mean(axis=2)
-                best = np.argmax(fits - NEARER * away, axis=0)
-                found = tried[best, np.arange(len(found))]
-        return found
+        def fitness(tried: Array) -> Array:
+            by_body = tried.reshape(-1, POSES, *poses.shape).swapaxes(1, 2)
+            shapes = np.repeat(shape, len(by_body), axis=0)
+            return self._fitness(shapes, by_body).swapaxes(1, 2).reshape(len(tried), -1)
+
+        rest, tries = self._space.body.neutral, self._settings.sought
+        return lost_limbs_found(self._rng, fitness, poses, self._limbs, self._limits, rest, tries)
 
     def _fitness(self, shapes: Array, poses: Array) -> Array:
         """(M, F, K) of poses (M, F, K, D), K at most sixteen."""
