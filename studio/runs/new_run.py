@@ -70,7 +70,6 @@ def prepare_run(
     frame is searched for one, which takes a while. progress : told how far that is.
     """
     asked = request or RunRequest()
-    session.cameras()  # before anything else is found wrong with a session that has none yet
     tracker = asked.tracker or session.manifest.tracker or DEFAULT_TRACKER
     weighting = asked.weighting or session.manifest.weighting or usual_weighting(tracker)
     changes = live_changes(asked.changes) if asked.live else asked.changes
@@ -122,6 +121,7 @@ def checked_frames(
     """The frames of a run, half open. endless : the last may lie behind the footage's end. Raises RunError if any lies
     outside the footage, or there are none.
     """
+    session.cameras()  # what a session lacks altogether is said first
     count = session.manifest.frame_count
     end = count if last is None else last
     if not 0 <= first < (min(end, count) if endless else end) <= count:
