@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from studio.errors import StudioError as StudioError
+    from studio.notebook.exporting import export_run as export_run
     from studio.notebook.learning import learn as learn
     from studio.notebook.opening import list_runs as list_runs
     from studio.notebook.opening import list_sessions as list_sessions
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from studio.notebook.preparing import synthesize as synthesize
     from studio.notebook.recording import record as record
     from studio.notebook.results import evaluate as evaluate
-    from studio.notebook.results import export_run as export_run
     from studio.notebook.results import list_tracks as list_tracks
     from studio.notebook.results import markers as markers
     from studio.notebook.results import read_track as read_track
@@ -44,7 +44,8 @@ _PLACES = {
     "notebook.solving_cameras": ("calibrate",),
     "notebook.tracking": ("correct", "go_on", "refine", "smooth", "track"),
     "notebook.recording": ("record",),
-    "notebook.results": ("evaluate", "export_run", "list_tracks", "markers", "read_track"),
+    "notebook.exporting": ("export_run",),
+    "notebook.results": ("evaluate", "list_tracks", "markers", "read_track"),
     "notebook.learning": ("learn",),
 }  # fmt: skip
 _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}

@@ -3,20 +3,15 @@
 from pathlib import Path
 
 import click
-import numpy as np
-from numpy.typing import NDArray
 
 from studio.cli.output import command, note, progress
 from studio.errors import RunError
+from studio.notebook.tracking import corrected_pose
 from studio.runs.correcting import prepare_correction, track_backwards
-from studio.runs.start_pose_file import start_pose_from_file
-from studio.runs.tracks import pose_in_track
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
 from studio.worker.batch import Report, track_to_end
-
-Array = NDArray[np.float64]
 
 
 @click.command()
@@ -44,7 +39,9 @@ def correct(
     """
     opened = Workspace().resolve(session)
     old = opened.run(run)
-    given, source = _pose(old, frame, pose, from_track)
+    if (pose is None) == (not from_track):
+        raise RunError("A corrected frame needs a pose.", "Give one with --pose FILE or --from-track NAME.")
+    given, source = corrected_pose(old, frame, pose, from_track)
     corrected = prepare_correction(opened, old, frame, given, source=source, backwards_to=back_to, name=name)
     with progress(f"{opened.name} / {corrected.name}") as report:
         if back_to is None:
@@ -80,12 +77,3 @@ def _backwards(session: Session, run: StoredRun, report: Report) -> int:
             f"{session.name} / {run.name}: {done[0]} frames tracked backwards, the others are the old run's."
         )
         raise
-
-
-def _pose(run: StoredRun, frame: int, file: Path | None, track: str) -> tuple[Array, str]:
-    """The pose (D,), and in words where it came from. Raises RunError unless exactly one was named."""
-    if (file is None) == (not track):
-        raise RunError("A corrected frame needs a pose.", "Give one with --pose FILE or --from-track NAME.")
-    if file is not None:
-        return start_pose_from_file(file, run.body(), frame, run.record.fps)
-    return pose_in_track(run, track, frame), f"track {track}"

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import click
 
-from studio.body.subject import Subject
 from studio.cli.output import command, note, progress
 from studio.errors import BodyError, RunError
-from studio.runs.subject_choice import body_of_choice, choose_subject, keep_fitted
+from studio.notebook.preparing import subject_with_notes
+from studio.runs.subject_choice import keep_fitted
 from studio.runs.subject_fitting import COUNT, FitRequest, FittedSubject, fit_session_subject, keep_subject
 from studio.sessions.workspace import Workspace
 
@@ -28,13 +28,7 @@ def subject(session: str, height: float | None, body: str, lengths: Sequence[str
     file).
     """
     opened = Workspace().resolve(session)
-    name = body or opened.manifest.body
-    if height is None and not lengths:
-        found, notes = opened.body_with_notes(body or None)
-    else:
-        wanted = Subject(body=name, height_mm=height, lengths_mm=_pairs(lengths))
-        found, notes = body_of_choice(opened, wanted)
-        choose_subject(opened, wanted)
+    found, notes = subject_with_notes(opened, height, lengths_mm=_pairs(lengths), body=body)
     for line in notes:
         note(line)
     lines = [f"{key:28} {value:8.1f}" for key, value in found.dimensions.items()]

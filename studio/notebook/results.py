@@ -1,4 +1,4 @@
-"""What a run holds: poses and markers as arrays, errors against the truth, files for other programs."""
+"""What a run holds: poses and markers as arrays, and errors against the truth."""
 
 from pathlib import Path
 
@@ -9,14 +9,9 @@ from studio.capture.trc import MarkerMotion, read_trc
 from studio.errors import TruthError
 from studio.evaluation.errors import Evaluation
 from studio.evaluation.errors import evaluate as evaluate_poses
-from studio.export.exporting import ExportReport
-from studio.export.exporting import export_run as write_run
-from studio.export.formats import format_of_file
 from studio.notebook.opening import RunName, open_run, session_of
-from studio.notebook.progress import Told, told
 from studio.runs.tracks import RAW, Track, track_names
 from studio.runs.tracks import read_track as read_stored_track
-from studio.scene.recording import record_scene
 
 
 def list_tracks(run: RunName) -> tuple[str, ...]:
@@ -51,17 +46,3 @@ def evaluate(run: RunName, *, truth: str | Path | None = None, track: str = RAW)
         raise TruthError(f"Session '{opened.name}' has no truth.", "Give one with --truth FILE.trc.")
     chosen = read_stored_track(stored, track)
     return evaluate_poses(chosen.poses, chosen.frames, stored.body(), read_trc(path), stored.record.fps)
-
-
-def export_run(run: RunName, to: str | Path, *, progress: Told = None, **options: object) -> ExportReport:
-    """Write the motion to a file that other programs open; its ending is the format.
-
-    .bvh .trc .c3d .glb .csv .parquet .npz .mp4 .viser. options : as of the command, such as track="smoothed", fps=30,
-    unit="m", names="mixamo". The file is read back before it takes its place. Raises ExportError, SettingsError.
-    """
-    place = Path(to)
-    stored, form = open_run(run), format_of_file(place)
-    with told(progress, f"{stored.session_name} / {stored.name}: {form.title}") as report:
-        return write_run(
-            session_of(stored), stored, form, options, place, progress=report, record_scene=record_scene
-        )
