@@ -60,6 +60,13 @@ def solved(studio: Studio, wish: dict, session: str = "fresh") -> dict:
     raise AssertionError("the calibration did not end")
 
 
+def decoded(content: bytes) -> np.ndarray:
+    """The picture of a file's content."""
+    picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
+    assert picture is not None
+    return picture
+
+
 def turned_up(session: Session, axis: str = "y") -> bytes:
     """The session's calibration in metres with another axis up, as another tool would write it."""
     turn = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
@@ -169,10 +176,10 @@ def test_boards_give_cameras_pictures_and_a_calibration(fresh: Studio, takes: Pa
     assert len(pictures) >= 10
     assert all(entry["rms_px"] < 1.0 or entry["dropped"] for entry in pictures if entry["rms_px"] is not None)
     coverage = fresh.client.get(f"{here}/coverage/cam1.png")
-    assert cv2.imdecode(np.frombuffer(coverage.content, np.uint8), cv2.IMREAD_COLOR).shape[1] == 480
+    assert decoded(coverage.content).shape[1] == 480
     # The axes lie where the truth has the board on the floor.
     seen = fresh.client.get(f"{here}/views/cam1.jpg", params={"height": 480}).content
-    drawn = cv2.imdecode(np.frombuffer(seen, np.uint8), cv2.IMREAD_COLOR).astype(int)
+    drawn = decoded(seen).astype(int)
     end = (
         project(CAMERAS[0], np.array([[FLOOR_PLACE[0] + 600.0, FLOOR_PLACE[1], 0.0]]))[0][0]
         .round()
