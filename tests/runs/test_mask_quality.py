@@ -103,3 +103,17 @@ def test_without_one_camera_leaves_the_others_as_they_are() -> None:
     changed = quality.without(evidence, 0)
     assert (changed.views[0].mask == 255).all()
     assert dataclasses.replace(changed, views=changed.views[1:]).views == evidence.views[1:]
+
+
+def test_the_camera_to_look_at_is_named() -> None:
+    def view(name: str, agreement: float, denied: float = 0.0) -> quality.ViewQuality:
+        return quality.ViewQuality(name, agreement, agreement, denied, ())
+
+    good = quality.MaskQuality((0,), (view("a", 0.95), view("b", 0.92)), (80.0,))
+    assert good.worst == ""
+    assert "0.92" in good.in_words()
+    poor = quality.MaskQuality((0,), (view("a", 0.7), view("b", 0.85)), (80.0,))
+    assert poor.worst == "a"
+    denying = quality.MaskQuality((0,), (view("a", 0.7), view("b", 0.85, denied=0.2)), (80.0,))
+    assert denying.worst == "b"
+    assert "camera b" in denying.in_words()
