@@ -107,7 +107,9 @@ def test_the_root_goes_where_it_is_put(name: str) -> None:
     turn = rotation_from_vector(np.array([0.2, -0.1, 0.9]))
     wanted = np.column_stack([turn @ before[:, :3], before[:, 3] + [300.0, -200.0, 50.0]])
     found = dragger.with_root(body.neutral, wanted)
-    np.testing.assert_allclose(dragger.root_frame(found), wanted, atol=1e-3)
+    after = dragger.root_frame(found)
+    assert after is not None
+    np.testing.assert_allclose(after, wanted, atol=1e-3)
     assert np.array_equal(found[6:], body.neutral[6:])
     assert Dragger(load_body("planar_arm4")).root_frame(np.zeros(4)) is None
 

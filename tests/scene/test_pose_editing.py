@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from studio.scene import pose_refining
 from studio.scene.edited_pose import EditedPose
 from studio.scene.guarded_server import GuardedServer
 from studio.scene.pose_desk import PoseDesk
-from studio.scene.pose_editor import MIRROR, RESET, ROUND, UNDO, PoseEditor
+from studio.scene.pose_editor import MIRROR, RESET, ROUND, UNDO, PoseEditor, PoseWishes
 from studio.scene.stage import SceneStage
 from studio.sessions.workspace import Workspace
 
@@ -54,7 +55,7 @@ def drag(gizmo, place: np.ndarray, phase: str = "update") -> None:
 
 @pytest.fixture
 def stage(workspace: Workspace) -> Iterator[SceneStage]:
-    made = SceneStage(workspace, FakeControl("swaying", "run-1", "paused"))
+    made = SceneStage(workspace, cast("Any", FakeControl("swaying", "run-1", "paused")))
     made.start()
     made.show_run("swaying", "run-1")
     until(lambda: made.shown.run == "run-1" and len(editor_of(made).sliders) == 31)
@@ -93,7 +94,7 @@ class Wishes:
 
 def test_the_tab_speaks_degrees_and_asks_in_radians(server: GuardedServer, human: BodyModel) -> None:
     wishes = Wishes()
-    editor = PoseEditor(server.gui, server.gui.add_tab_group().add_tab("Pose"), wishes)
+    editor = PoseEditor(server.gui, server.gui.add_tab_group().add_tab("Pose"), cast("PoseWishes", wishes))
     pose = swaying_pose(human, 2)
     editor.show_body(human, pose, ("left forearm",), has_sides=True)
     assert len(editor.sliders) == 31
@@ -166,18 +167,18 @@ def test_a_dragged_ball_takes_the_limb_along_and_only_the_newest_place_counts(
     assert not handles.gizmo.visible
     at = Dragger(human).grip("left forearm").limb
     for callback in handles.balls[at]._impl.click_cb:
-        callback.callback(SimpleNamespace())
+        callback.callback(cast("Any", SimpleNamespace()))
     until(lambda: handles.gizmo.visible and not handles.balls[at].visible)
     start = swaying_pose(human, 0)
     place = Dragger(human).points(start)[at]
     np.testing.assert_allclose(handles.gizmo.position, place / 1000.0, atol=1e-6)
     # The scene's thread is busy while the hand moves on: the places in between are never solved for.
     gate, solved = threading.Event(), []
-    desk._post(lambda: gate.wait(5.0))
+    desk._post(cast("Any", lambda: gate.wait(5.0)))
     dragger = desk._dragger
     assert dragger is not None
     plain = dragger.dragged
-    dragger.dragged = lambda *given: solved.append(given[2]) or plain(*given)
+    cast("Any", dragger).dragged = lambda *given: solved.append(given[2]) or plain(*given)
     for step in range(1, 9):
         drag(handles.gizmo, place + step * np.array([-10.0, 5.0, 12.0]))
     target = place + np.array([-90.0, 45.0, 110.0])
