@@ -97,6 +97,7 @@ def test_the_background_is_set_up_and_the_views_agree(
 
 
 def test_a_region_is_painted_by_mouse_and_keyboard(page: Page, studio: StudioServer, artefacts: Path) -> None:
+    step(page, studio, "background")
     camera = studio.get("/api/sessions/person/background")["cameras"][0]
     page.get_by_role("button", name=f"Exclude regions of {camera['name']}", exact=True).click()
     canvas = page.locator(".brush-canvas")
