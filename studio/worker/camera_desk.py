@@ -211,7 +211,9 @@ class CameraDesk:
             recording.close()
         standing = recording.standing
         notes = tuple(notice.in_words for notice in standing.notices)
-        self._change(state="done", words=f"{standing.sets} sets of pictures; {standing.spreads.in_words}", notes=notes)
+        self._change(
+            state="done", words=f"{standing.sets} sets of pictures; {standing.spreads.in_words}", notes=notes
+        )
 
     # ------------------------------------------------------------------ state
 
