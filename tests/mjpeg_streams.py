@@ -5,7 +5,7 @@ says nothing more, one that is cut closes it, one that is locked asks for name a
 """
 
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
@@ -18,7 +18,7 @@ BOUNDARY = "frame"
 class Streams:
     """What is sent, by name. fps : pictures a second."""
 
-    def __init__(self, pictures: dict[str, Sequence[bytes]], fps: float) -> None:
+    def __init__(self, pictures: Mapping[str, Sequence[bytes]], fps: float) -> None:
         self.pictures, self.fps = pictures, fps
         self.going, self.over = threading.Event(), threading.Event()
         self.silent: set[str] = set()
@@ -46,7 +46,7 @@ def jpeg(picture: np.ndarray) -> bytes:
 
 
 @contextmanager
-def served(pictures: dict[str, Sequence[bytes]], fps: float = 30.0) -> Iterator[Streams]:
+def served(pictures: Mapping[str, Sequence[bytes]], fps: float = 30.0) -> Iterator[Streams]:
     """A server of these streams until the block ends."""
     streams = Streams(pictures, fps)
 
