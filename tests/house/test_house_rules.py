@@ -27,7 +27,13 @@ def test_file_is_short_and_says_what_it_is(path: Path) -> None:
 def test_classes_and_functions_stay_small(path: Path) -> None:
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.ClassDef):
-            public = [item for item in node.body if isinstance(item, ast.FunctionDef) and item.name[0] != "_"]
+            public = [
+                item
+                for item in node.body
+                if isinstance(item, ast.FunctionDef)
+                and item.name[0] != "_"
+                and not any(isinstance(how, ast.Name) and how.id == "property" for how in item.decorator_list)
+            ]
             assert len(public) <= 14, f"{node.name} has {len(public)} public methods"
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             assert (node.end_lineno or 0) - node.lineno <= 80, f"{node.name} is too long"
