@@ -87,7 +87,9 @@ def test_another_camera_joins_at_the_same_rate_only(empty, raw, tmp_path):
 
 def test_a_calibrated_session_refuses_footage_of_another_size(made, raw, tmp_path):
     for path in (raw / "pictures" / "front").iterdir():
-        cv2.imwrite(str(path), cv2.resize(cv2.imread(str(path)), (80, 60)))
+        picture = cv2.imread(str(path))
+        assert picture is not None
+        cv2.imwrite(str(path), cv2.resize(picture, (80, 60)))
     shutil.rmtree(raw / "masks")
     with pytest.raises((CalibrationError, FootageError)):
         add_footage(made, raw, FootageWish(fps=60.0))
