@@ -32,8 +32,7 @@ def seen(cameras: tuple[Camera, ...], points: Array) -> dict[str, Array]:
     for one in cameras:
         turn, _ = cv2.Rodrigues(one.rotation)
         pixels, _ = cv2.projectPoints(points, turn, one.translation, one.matrix, one.distortion)
-        corners = cv2.convexHull(pixels.astype(np.float32), returnPoints=False)
-        found[one.name] = np.asarray(pixels, dtype=np.float64)[np.asarray(corners).ravel(), 0]
+        found[one.name] = cv2.convexHull(pixels.astype(np.float32))[:, 0].astype(np.float64)
     return found
 
 
