@@ -118,7 +118,8 @@ def test_most_of_the_model_lies_in_the_masks(way: Way) -> None:
 
 
 @pytest.mark.xfail(
-    reason="Measured 0.85 on average, 0.69 at worst: the search leaves a raised arm in a corner of the shoulder's limits, the guess of"
+    reason="Measured 0.85 on average, 0.69 at worst:"
+    " the search leaves a raised arm in a corner of the shoulder's limits, the guess of"
     " 1.80 m (he is about 1.72 m) is mended only partly, and the body's ankles are fixed.",
     strict=False,
 )
