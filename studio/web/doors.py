@@ -8,7 +8,7 @@ brings them together.
 import asyncio
 import dataclasses
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
@@ -117,7 +117,7 @@ class EditedPose(Protocol):
     def frame(self) -> int | None: ...
 
     @property
-    def pose(self) -> Sequence[float]: ...
+    def pose(self) -> Iterable[float]: ...
 
     @property
     def moved(self) -> bool: ...
