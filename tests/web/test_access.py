@@ -219,4 +219,5 @@ def test_pages_need_nothing_inline(studio: Studio) -> None:
         assert "<script>" not in text
         assert "style=" not in text
         assert "onclick" not in text
-        assert "http://" not in text
+        assert 'src="http' not in text
+        assert 'href="http' not in text
