@@ -45,8 +45,8 @@ def distances_of(mask: Bytes, most: int = MOST_POINTS) -> SilhouetteDistances:
     signed = np.asarray(
         np.where(
             inside > 0,
-            0.5 - cv2.distanceTransform(inside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE),
-            cv2.distanceTransform(1 - inside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) - 0.5,
+            0.5 - _distances(inside),
+            _distances(1 - inside) - 0.5,
         ),
         dtype=np.float32,
     )
@@ -66,3 +66,13 @@ def distances_of(mask: Bytes, most: int = MOST_POINTS) -> SilhouetteDistances:
     ).astype(np.float64)
     outward = slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
     return SilhouetteDistances(signed, points.astype(np.float64), outward)
+
+
+def _distances(mask: Bytes) -> Array:
+    """(H, W) from every pixel's centre to that of the nearest pixel that is 0.
+
+    OpenCV's last bits depend on where in memory the mask happens to lie, and a descent makes millimetres of them.
+    Squared distances between pixels are whole numbers, so what was meant is known.
+    """
+    found = cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE).astype(np.float64)
+    return np.sqrt(np.rint(found * found))

@@ -154,6 +154,7 @@ def test_markers_move_smoothly(way: Way) -> None:
     assert way.check.jitter_mm <= 5.0
 
 
+@pytest.mark.filterwarnings("ignore:No analog data found")
 def test_exports_open_in_other_readers(way: Way, tmp_path: Path) -> None:
     made = {
         ending: studio.export_run(way.run, tmp_path / f"man.{ending}", track="smoothed")
