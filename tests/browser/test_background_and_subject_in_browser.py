@@ -124,10 +124,11 @@ def test_a_region_is_painted_by_mouse_and_keyboard(page: Page, studio: StudioSer
     assert painted[round(0.5 * height), round(0.6 * width)] == 0
     before = np.count_nonzero(painted)
     page.get_by_role("button", name=f"Exclude regions of {camera['name']}", exact=True).click()
-    page.wait_for_function(
+    page.locator(".brush-canvas").wait_for()
+    assert page.evaluate(
         "() => { const c = document.querySelector('.brush-canvas');"
         " return c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some((v) => v); }"
-    )
+    ), "what was kept is there before the first stroke"
     page.locator(".brush-canvas").focus()
     page.keyboard.down(" ")
     for _ in range(4):

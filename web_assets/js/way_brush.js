@@ -9,8 +9,9 @@ const PICTURE_HEIGHT = 1080;
 const HELP = "Paint what is not the person. Keys: arrows move, space paints, x paints or erases, [ and ] change the size, ctrl z undoes, enter keeps, escape leaves.";
 
 /** Edit what is excluded of `lens` (name, picture_width, picture_height, quarter_turns, frame, excluded: whether there is
- * something already); `done(saved)` when left. */
-export function brush(way, lens, done) {
+ * something already, shown before a stroke can be made: one that came after would undo what was painted meanwhile);
+ * `done(saved)` when left. */
+export async function brush(way, lens, done) {
   const place = `${way.api.sessionPath(way.session)}/exclusions/${encodeURIComponent(lens.name)}`;
   const turns = ((lens.quarter_turns % 4) + 4) % 4;
   const stored = [lens.picture_width, lens.picture_height];
@@ -121,7 +122,7 @@ export function brush(way, lens, done) {
   /** Show what is excluded now. */
   async function load() {
     const answer = await fetch(place);
-    if (!answer.ok) return;
+    if (!answer.ok) throw new Error(`What is excluded of ${lens.name} could not be read. Open the brush again.`);
     const picture = await createImageBitmap(await answer.blob());
     const [out] = turned(picture, turns, [width, height]);
     const read = out.getContext("2d").getImageData(0, 0, width, height);
@@ -157,8 +158,14 @@ export function brush(way, lens, done) {
   undo.disabled = true;
   setErasing(false);
   const tools = element("div", { className: "mask-bar" }, element("b", { textContent: lens.name }), element("label", { className: "check" }, "size", size), erase, undo, clear, element("span", { className: "spring" }), leave, keep);
+  try {
+    if (lens.excluded) await load();
+  } catch (error) {
+    complain(error);
+    await done(false);
+    return;
+  }
   way.aside.replaceChildren(tools, element("div", { className: "brush-room" }, sheet), element("p", { className: "hint brush-help", textContent: HELP }));
-  if (lens.excluded) load().catch(complain);
   canvas.focus();
   drawRing();
 }
