@@ -12,12 +12,11 @@ from typing import ParamSpec
 import click
 import msgspec
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from studio.errors import StudioError
+from studio.notebook.progress import Report, bar
 
 P = ParamSpec("P")
-ProgressCallback = Callable[[str, int, int], None]
 
 CANCELLED = 130
 WRONG_INPUT = 2
@@ -106,7 +105,7 @@ def note(text: str) -> None:
 
 
 @contextmanager
-def progress(title: str) -> Iterator[ProgressCallback]:
+def progress(title: str) -> Iterator[Report]:
     """Progress on standard error with the time that is left; yields `report(step in words, done, total)`.
 
     A bar on a terminal; in a log file a line now and then.
@@ -114,25 +113,11 @@ def progress(title: str) -> Iterator[ProgressCallback]:
     if not messages.is_terminal:
         yield progress_lines(title)
         return
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[speed]}"),
-    )
-    with Progress(*columns, console=messages) as bar:
-        task = bar.add_task(title, total=None, speed="")
-
-        def report(step: str, done: int, total: int) -> None:
-            finished = bar.tasks[task]
-            speed = f"{finished.speed:.1f}/s" if finished.speed else ""
-            bar.update(task, description=step or title, completed=done, total=total, speed=speed)
-
+    with bar(messages, title) as report:
         yield report
 
 
-def progress_lines(title: str, seconds_between: float = 10.0) -> ProgressCallback:
+def progress_lines(title: str, seconds_between: float = 10.0) -> Report:
     """A reporter that prints a line at most every so many seconds."""
     began = said = time.monotonic()
 
