@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from studio.errors import StudioError as StudioError
+    from studio.notebook.aligning import align as align
+    from studio.notebook.aligning import unalign as unalign
     from studio.notebook.exporting import export_run as export_run
     from studio.notebook.learning import learn as learn
     from studio.notebook.opening import list_runs as list_runs
@@ -41,6 +43,7 @@ _PLACES = {
     "notebook.preparing": (
         "background", "fit_subject", "import_footage", "initialise", "mask_quality", "subject", "synthesize",
     ),
+    "notebook.aligning": ("align", "unalign"),
     "notebook.solving_cameras": ("calibrate",),
     "notebook.tracking": ("correct", "go_on", "refine", "smooth", "track"),
     "notebook.recording": ("record",),

@@ -4,7 +4,9 @@ import click
 
 from studio.cli.output import command, note, progress
 from studio.errors import RunError
-from studio.runs.aligning import align_cameras, keep_alignment
+from studio.runs.aligning import align_cameras
+from studio.runs.turned_cameras import remember_alignment, turn_back, turn_cameras
+from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 
 
@@ -12,23 +14,29 @@ from studio.sessions.workspace import Workspace
 @click.argument("session")
 @click.option("--frames", default="", metavar="A,B,…", help="To look at; default: sixteen, evenly spread.")
 @click.option("--dry-run", is_flag=True, help="Only tell; change nothing.")
+@click.option("--undo", is_flag=True, help="Use the calibration again that the cameras were turned from.")
 @command
-def align_command(session: str, frames: str, dry_run: bool) -> dict[str, object]:
+def align_command(session: str, frames: str, dry_run: bool, undo: bool) -> dict[str, object]:
     """Turn SESSION's cameras a little so that the silhouettes of all views agree.
 
     For calibrations that are nearly right: a camera that was touched after it. Needs masks (studio background) of a
     person who is whole in the pictures. The calibration before is kept; nothing is changed where the cameras agree.
     """
     opened = Workspace().resolve(session)
+    if undo:
+        return _undone(opened)
     with progress(f"{opened.name}: cameras") as report:
         aligned = align_cameras(opened, _numbers(frames), progress=report)
     lines = list(aligned.in_words())
     kept = aligned.needed and aligned.better and not dry_run
+    remember_alignment(opened, aligned)
     if kept:
-        change = keep_alignment(opened, aligned)
+        change = turn_cameras(opened, aligned)
         for line in change.notes:
             note(line)
-        lines.append("The session uses the turned cameras from now on; the calibration before is kept.")
+        lines.append(
+            "The session uses the turned cameras from now on; the calibration before is kept (--undo)."
+        )
     elif not aligned.needed:
         lines.append("The cameras agree: nothing was changed.")
     elif not aligned.better:
@@ -52,6 +60,14 @@ def align_command(session: str, frames: str, dry_run: bool) -> dict[str, object]
         ],
         "text": "\n".join(lines),
     }
+
+
+def _undone(session: Session) -> dict[str, object]:
+    change = turn_back(session)
+    for line in change.notes:
+        note(line)
+    text = "The session uses the calibration again that its cameras were turned from."
+    return {"session": session.name, "changed": True, "text": text}
 
 
 def _numbers(text: str) -> tuple[int, ...]:

@@ -1,5 +1,6 @@
 """The steps of the guided way before tracking: footage, calibration, background, subject, start pose."""
 
+from studio.runs.turned_cameras import misses_in_words
 from studio.runs.way_step import StepName, StepStatus, counted, enumerated
 from studio.sessions.background_files import read_evidence
 from studio.sessions.made_from import changed_inputs, origin_of
@@ -45,7 +46,9 @@ def calibration_step(session: Session) -> StepStatus:
             words,
             f"The footage of camera {enumerated(other)} is of another size now.",
         )
-    return StepStatus("calibration", "done", f"{words}, {source}" if source else words)
+    return StepStatus(
+        "calibration", "done", f"{words}, {source}" if source else words, misses_in_words(session)
+    )
 
 
 def background_step(session: Session) -> StepStatus:
@@ -68,8 +71,15 @@ def background_step(session: Session) -> StepStatus:
     stale = _stale(session, "background", words, "Measured with")
     if stale is not None:
         return stale
-    why = "" if known.good else "Some views do not agree in the hull: look at the masks."
+    why = "" if known.good else f"Some views do not agree in the hull: {_what_to_look_at(session)}."
     return StepStatus("background", "done" if known.good else "ready", words, why)
+
+
+def _what_to_look_at(session: Session) -> str:
+    """Masks disagree because they are poor, or because the cameras are not where the calibration has them."""
+    if misses_in_words(session):
+        return "the cameras miss, see step Calibration"
+    return "look at the masks, and ask whether the cameras agree"
 
 
 def subject_step(session: Session) -> StepStatus:

@@ -94,6 +94,27 @@ def replace_calibration(session: Session, new: NewCalibration) -> CalibrationCha
     return CalibrationChange(changed, tuple(_consequences(changed, before, new.cameras, stale)), stale, kept)
 
 
+def restore_calibration(session: Session, name: str, source: str) -> CalibrationChange:
+    """Let a session use an earlier calibration again, byte for byte with all that lay beside it; the one in use is kept.
+
+    name : one of `earlier_calibrations`. source : where it came from, in words. Raises NotFoundError, SessionError while
+    a run is being tracked, CalibrationError where it lacks a camera of the footage.
+    """
+    folder = earlier_calibration(session, name)
+    place = session.path / CAMERAS_PATH
+    before = read_calibration(place).cameras if _readable(place) else ()
+    read = read_calibration(folder / CAMERAS_PATH.name)
+    change = replace_calibration(session, NewCalibration(read.cameras, source, crops=read.crops))
+    for path in _own_parts(folder):
+        if path.is_dir():
+            shutil.copytree(path, place.parent / path.name, dirs_exist_ok=True)
+        else:
+            atomic_files.write_bytes(place.parent / path.name, path.read_bytes())
+    stale = stale_runs(change.session)
+    notes = tuple(_consequences(change.session, before, read.cameras, stale))
+    return dataclasses.replace(change, stale_runs=stale, notes=notes)
+
+
 def stale_runs(session: Session) -> tuple[str, ...]:
     """Names of the runs that were tracked with another calibration than the session's."""
     place = session.path / CAMERAS_PATH

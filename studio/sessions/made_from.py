@@ -1,8 +1,8 @@
 """What a session's parts were made from: digests, so that a change of one says which others are stale.
 
-`made_from.json` holds, for a part that was made here (the start pose, the fitted subject, the measured masks), its own
-digest and those of what it was made from. A part that was given (imported, typed in) has no entry and is never stale;
-neither is one whose file was replaced by hand since.
+`made_from.json` holds, for a part that was made here (the start pose, the fitted subject, the measured masks, how
+far the silhouettes miss), its own digest and those of what it was made from. A part that was given (imported, typed in)
+has no entry and is never stale; neither is one whose file was replaced by hand since.
 """
 
 import hashlib
@@ -24,6 +24,7 @@ INPUTS = {
     "background": ("footage", "calibration", "masks"),
     "subject": ("footage", "calibration"),
     "start-pose": ("footage", "calibration", "subject"),
+    "alignment": ("footage", "calibration", "masks"),
 }
 """Part to what it is made from."""
 

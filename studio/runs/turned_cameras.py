@@ -1,0 +1,128 @@
+"""Cameras that were turned by their silhouettes (`runs.aligning`): what was measured is remembered for the guided way,
+and the calibration before comes back when it is asked for, byte for byte.
+
+calibration/cameras.alignment.json     which calibration the one in use was turned from
+"""
+
+import hashlib
+
+import msgspec
+import numpy as np
+
+from studio.errors import CalibrationError, NotFoundError
+from studio.runs.aligning import SessionAlignment, keep_alignment
+from studio.sessions.atomic_files import write_bytes
+from studio.sessions.calibration_changes import CalibrationChange, earlier_calibration, restore_calibration
+from studio.sessions.made_from import changed_inputs, note, origin_of
+from studio.sessions.session import CAMERAS_PATH, Session
+
+RECORD_PATH = CAMERAS_PATH.with_name("cameras.alignment.json")
+PART = "alignment"
+SAME_DEGREES, SAME_MM = 1e-3, 0.1
+"""Files keep cameras to fewer digits than memory does."""
+
+
+class Turned(msgspec.Struct, frozen=True):
+    """Beside turned cameras. before : name of the earlier calibration that they were turned from; source : where that
+    came from, in words; content : digest of the turned cameras' file, which says whether it is still the one in use.
+    """
+
+    before: str
+    source: str
+    content: str
+
+
+def remember_alignment(session: Session, aligned: SessionAlignment) -> None:
+    """Let the guided way say how far the silhouettes miss with the calibration that is in use now."""
+    note(session, PART, alignment_words(aligned), not aligned.needed)
+
+
+def alignment_words(aligned: SessionAlignment) -> str:
+    """How far the silhouettes miss, and what helps: a sentence."""
+    found = aligned.found
+    worst, most = int(np.nanargmax(found.before)), float(np.nanmax(found.before))
+    missed = f"The silhouettes miss by up to {most:.1f} px ({aligned.names[worst]})"
+    if not aligned.needed:
+        return f"{missed}: the cameras agree."
+    if not aligned.better:
+        return f"{missed}, and turning cameras does not explain it: look at the masks and the calibration."
+    turn, after = float(np.nanmax(found.turns)), float(np.nanmax(found.after))
+    return (
+        f"{missed}; with cameras turned by up to {turn:.2f}° they would miss by {after:.1f} px: turn them"
+        " (step Background, “Do the cameras agree?”)."
+    )
+
+
+def misses_in_words(session: Session) -> str:
+    """Why the calibration in use does not fit the silhouettes, as it was measured last; "" where it does, or where
+    footage, masks or calibration are other ones since.
+    """
+    known = origin_of(session, PART)
+    return "" if known is None or known.good or changed_inputs(session, PART) else known.words
+
+
+def turn_cameras(session: Session, aligned: SessionAlignment) -> CalibrationChange:
+    """Let the session use the turned cameras from now on. Raises SessionError while a run is being tracked, and
+    CalibrationError where the calibration is another one than that which was aligned.
+    """
+    if not _is_of(session, aligned):
+        raise CalibrationError(
+            "The calibration is another one than that which was looked at.", "Measure the cameras again."
+        )
+    source = session.manifest.calibration_source
+    change = keep_alignment(session, aligned)
+    if change.kept is not None:
+        turned = Turned(change.kept.name, source, _content(change.session))
+        write_bytes(change.session.path / RECORD_PATH, msgspec.json.encode(turned))
+    found = aligned.found
+    worst, most = int(np.nanargmax(found.after)), float(np.nanmax(found.after))
+    words = (
+        f"The silhouettes miss by up to {most:.1f} px ({aligned.names[worst]}) since the cameras were turned."
+    )
+    note(change.session, PART, words)
+    return change
+
+
+def turned_from(session: Session) -> str:
+    """Name of the earlier calibration that the cameras in use were turned from; "" where they were not."""
+    found = _turned(session)
+    return "" if found is None else found.before
+
+
+def turn_back(session: Session) -> CalibrationChange:
+    """Let the session use the calibration again that it had before its cameras were turned. Raises NotFoundError where
+    they were not, SessionError while a run is being tracked.
+    """
+    found = _turned(session)
+    if found is None:
+        raise NotFoundError(
+            f"The cameras of session '{session.name}' were not turned by their silhouettes.",
+            "Choose one of the earlier calibrations in step Calibration.",
+        )
+    return restore_calibration(session, found.before, found.source)
+
+
+def _is_of(session: Session, aligned: SessionAlignment) -> bool:
+    """Whether the cameras in use are those that were looked at: as far from the turned ones as these were turned by."""
+    now, found = session.cameras(), aligned.found
+    if tuple(camera.name for camera in now) != aligned.names:
+        return False
+    for camera, turned, angle in zip(now, found.cameras, found.turns, strict=True):
+        cosine = (np.trace(turned.rotation @ camera.rotation.T) - 1.0) / 2.0
+        apart = float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+        if abs(apart - angle) > SAME_DEGREES or np.linalg.norm(camera.centre - turned.centre) > SAME_MM:
+            return False
+    return True
+
+
+def _turned(session: Session) -> Turned | None:
+    try:
+        found = msgspec.json.decode((session.path / RECORD_PATH).read_bytes(), type=Turned)
+        earlier_calibration(session, found.before)
+    except (OSError, msgspec.DecodeError, NotFoundError):
+        return None
+    return found if found.content == _content(session) else None
+
+
+def _content(session: Session) -> str:
+    return hashlib.sha256((session.path / CAMERAS_PATH).read_bytes()).hexdigest()[:24]
