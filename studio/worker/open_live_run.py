@@ -9,7 +9,6 @@ from studio.capture.frame_clock import LiveSource, ReplayClock
 from studio.runs.live_problems import LiveProblems
 from studio.runs.live_run import LiveRun
 from studio.runs.problem_source import ProblemSource
-from studio.runs.run_footage import footage_of
 from studio.runs.take_following import TakeFollower
 from studio.runs.tracking_run import Stepped, TrackingRun
 from studio.sessions.session import Session
@@ -31,6 +30,8 @@ class OpenLiveRun(OpenRun):
     make_source : of its sets, for (run, number of cameras); by default those of a take that is being recorded, else its
     footage is replayed at its own rate.
     """
+
+    makes_ahead = False
 
     def __init__(self, session_folder: str, run_folder: str, make_source: MakeSource | None = None) -> None:
         self._storing = ThreadPoolExecutor(1, thread_name_prefix="storing")
@@ -93,16 +94,6 @@ class OpenLiveRun(OpenRun):
         elif self._pipeline.over:
             self.live.end()
         return ready is not None
-
-    def _problem_source(self, last: int) -> ProblemSource:
-        return ProblemSource(
-            self.session,
-            self.stored.body(),
-            self.stored.cameras(),
-            last=last,
-            views=self._views,
-            footage=footage_of(self.session, self.stored),
-        )
 
     def _tracking_run(self, problems: ProblemSource) -> TrackingRun:
         self.live_problems = LiveProblems(problems)

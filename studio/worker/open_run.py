@@ -11,6 +11,7 @@ from studio.errors import StudioError
 from studio.runs.behaviour_models import check_prediction
 from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
+from studio.runs.run_footage import footage_of
 from studio.runs.tracking_run import Stepped, TrackingRun
 from studio.sessions.run_log import append_to_log
 from studio.sessions.session import Session
@@ -25,15 +26,17 @@ class OpenRun:
     """One run, opened for tracking. Closing it saves it whole and frees its memory.
 
     keep_answer : the question's answer becomes the run's own. ask_again : ask once more with newer settings.
+    makes_ahead : whether the next frame is made ready while this one is searched.
     """
+
+    makes_ahead = True
 
     def __init__(self, session_folder: str, run_folder: str) -> None:
         self.session = Session(Path(session_folder))
         self.stored = self.session.run(Path(run_folder).name)
-        record = self.stored.record
         self._ahead = ThreadPoolExecutor(1, thread_name_prefix="next-frame")
         self._views = ThreadPoolExecutor(VIEW_THREADS, thread_name_prefix="view")
-        self._problems = self._problem_source(record.last)
+        self._problems = self._problem_source()
         try:
             self.tracking = self._tracking_run(self._problems)
         except StudioError:
@@ -131,15 +134,16 @@ class OpenRun:
         finally:
             self._close_problems()
 
-    def _problem_source(self, last: int) -> ProblemSource:
-        """The run's frames, the next one made ready while this one is searched."""
+    def _problem_source(self) -> ProblemSource:
+        record = self.stored.record
         return ProblemSource(
             self.session,
             self.stored.body(),
             self.stored.cameras(),
-            last=last,
-            executor=self._ahead,
+            last=record.last,
+            executor=self._ahead if self.makes_ahead else None,
             views=self._views,
+            footage=footage_of(self.session, self.stored),
         )
 
     def _tracking_run(self, problems: ProblemSource) -> TrackingRun:
