@@ -117,11 +117,13 @@ def _told(session: Session, found: MaskQuality | None) -> dict[str, object]:
         f"  {view.in_words()}".rstrip()
         for view in found.views
     ]
+    lines += [f"The calibration is in doubt: {finding}" for finding in found.doubts]
     return {
         "session": session.name,
         "frames": list(found.frames),
         "cameras": views,
         "usable": found.usable,
+        "doubts": [msgspec.to_builtins(finding) for finding in found.doubts],
         "hull_litres": list(found.hull_litres),
         "settings": knobs,
         "text": "\n".join(lines),

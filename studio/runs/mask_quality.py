@@ -13,12 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.calibration.findings import Finding, blocking
 from studio.errors import RunError
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
+from studio.runs.silhouette_doubts import height_of, person_alone, silhouette_doubts
 from studio.sessions.session import Session
 from studio.volume.hull import Hull
 from studio.volume.hull_pieces import chosen_voxels, piece_numbers
@@ -87,23 +89,26 @@ class ViewQuality:
 
 @dataclass(frozen=True, slots=True)
 class MaskQuality:
-    """All cameras' masks in some frames. hull_litres : the hull's volume in each."""
+    """All cameras' masks in some frames. hull_litres : the hull's volume in each. doubts : what the silhouettes say
+    against the calibration.
+    """
 
     frames: tuple[int, ...]
     views: tuple[ViewQuality, ...]
     hull_litres: tuple[float, ...]
+    doubts: tuple[Finding, ...] = ()
 
     @property
     def usable(self) -> bool:
-        """Whether every camera's masks are."""
-        return all(view.usable for view in self.views)
+        """Whether every camera's masks are, and no fault of the calibration is seen in them."""
+        return all(view.usable for view in self.views) and not blocking(self.doubts)
 
     @property
     def worst(self) -> str:
         """The camera to look at first, "" where all are usable: one that denies what the others see is the cause of
         their poor agreement, else the one that agrees least.
         """
-        if self.usable:
+        if all(view.usable for view in self.views):
             return ""
         denying = max(self.views, key=lambda view: view.denied)
         if denying.denied > BLAMED:
@@ -112,6 +117,8 @@ class MaskQuality:
 
     def in_words(self) -> str:
         """How the worst camera agrees, for a line."""
+        if stops := blocking(self.doubts):
+            return f"the calibration is in doubt: {stops[0].message}"
         least = min(float(np.nan_to_num(view.agreement)) for view in self.views)
         if self.usable:
             return f"every view agrees by {least:.2f} or more"
@@ -130,8 +137,8 @@ def mask_quality(
     """The quality of a session's masks in some frames (default: five, evenly spread).
 
     backgrounds : already fitted, of this session's footage. blame : find out what each camera denies, which takes most
-    of the time (else 0). Raises RunError for a single camera, FootageError,
-    NotFoundError.
+    of the time (else 0), and whether the silhouettes speak against the calibration. Raises RunError for a single
+    camera, FootageError, NotFoundError.
     """
     cameras = session.cameras()
     if len(cameras) < 2:
@@ -143,15 +150,18 @@ def mask_quality(
     try:
         chosen = tuple(frames) or spread_frames(footage.frame_count, FRAMES)
         maker = EvidenceMaker(cameras, footage, backgrounds or Backgrounds(footage), settings, "none")
-        counted = []
+        counted, people = [], {}
         for done, frame in enumerate(chosen):
             if progress is not None:
                 progress("comparing masks", done, len(chosen))
-            counted.append(count_frame(maker.evidence(frame), cameras, blame))
+            evidence = maker.evidence(frame)
+            counted.append(count_frame(evidence, cameras, blame))
+            people[frame] = person_alone(evidence) if blame else {}
     finally:
         footage.close()
-    names = tuple(camera.name for camera in cameras)
-    return summed(chosen, names, counted)
+    found = summed(chosen, tuple(camera.name for camera in cameras), counted)
+    doubts = silhouette_doubts(cameras, people, height_of(session)) if blame else ()
+    return dataclasses.replace(found, doubts=doubts)
 
 
 def spread_frames(count: int, wanted: int) -> tuple[int, ...]:

@@ -13,6 +13,7 @@ from studio.runs.session_settings import session_settings
 from studio.sessions.background_files import exclusion_path, read_evidence, set_exclusion, write_evidence
 from studio.sessions.made_from import note
 from studio.web.background_schemas import MaskQualityAnswer, ViewQualityLine
+from studio.web.calibration_schemas import FindingView
 from studio.web.picture_routes import Knobs, knob_changes
 from studio.web.schemas import Answer, Value
 from studio.web.session_routes import OpenSession
@@ -107,4 +108,5 @@ def quality_answer(found: MaskQuality) -> MaskQualityAnswer:
         usable=found.usable,
         hull_litres=list(found.hull_litres),
         worst=found.worst,
+        doubts=[FindingView.model_validate(finding) for finding in found.doubts],
     )

@@ -4,6 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from studio.web.calibration_schemas import FindingView
 from studio.web.schemas import Answer, Number, Request, RunName, Value
 from studio.web.setting_schemas import KnobView
 
@@ -25,13 +26,16 @@ class ViewQualityLine(Answer):
 
 
 class MaskQualityAnswer(Answer):
-    """All cameras' masks in some frames. worst: the camera to look at first, "" where all are usable."""
+    """All cameras' masks in some frames. worst: the camera to look at first, "" where all are usable. doubts: what the
+    silhouettes say against the calibration.
+    """
 
     frames: list[int]
     cameras: list[ViewQualityLine]
     usable: bool
     hull_litres: list[Number]
     worst: str = ""
+    doubts: list[FindingView] = Field(default_factory=list)
 
 
 class BackgroundCamera(Answer):

@@ -1,5 +1,6 @@
 // How far the views' masks agree in the hull: a bar a camera with words, and the camera to look at first.
 
+import { findingList } from "./calibration_drawing.js";
 import { button, element } from "./elements.js";
 
 const USABLE = 0.9;
@@ -21,7 +22,8 @@ export function qualityList(quality, paint) {
   const told = worst
     ? element("div", { className: "notice" }, element("p", { textContent: remedy(worst) }), button(`Exclude regions of ${worst.camera}…`, () => paint(worst.camera), "small"))
     : element("p", { className: "hint", textContent: `Every view agrees with the others; ${quality.frames.length} frames were compared.` });
-  return [element("ul", { className: "agree" }, ...rows), told];
+  const doubts = quality.doubts.length > 0 && element("div", {}, element("p", { className: "notice", textContent: "The silhouettes speak against the calibration:" }), findingList({ findings: quality.doubts }));
+  return [element("ul", { className: "agree" }, ...rows), worst || !doubts ? told : null, doubts].filter(Boolean);
 }
 
 function remedy(line) {

@@ -1,0 +1,59 @@
+"""What a session's own silhouettes say against its calibration: a mirrored video, cameras exchanged, half the
+resolution, metres for millimetres. A calibration file alone cannot show these, and without a board nothing else does.
+"""
+
+import dataclasses
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.calibration.checks import Masks, check_calibration
+from studio.calibration.findings import Finding
+from studio.errors import StudioError
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.evidence.masks import cleaned
+from studio.evidence.settings import EvidenceSettings
+from studio.geometry.camera import Camera
+from studio.sessions.session import Session
+
+Bytes = NDArray[np.uint8]
+
+PERSON_ALONE = EvidenceSettings(
+    mask_opening=0, mask_closing=0, mask_fill_holes=0, mask_min_component=0, mask_keep_components=1
+)
+UNEXPLAINED = "views-disagree"
+SIZES = ("scale", "square-size")
+
+
+def person_alone(evidence: FrameEvidence) -> dict[str, Bytes]:
+    """Camera → the largest piece of its mask: specks would be touched first."""
+    return {view.camera: cleaned(view.mask, PERSON_ALONE) for view in evidence.views}
+
+
+def silhouette_doubts(
+    cameras: tuple[Camera, ...], masks: Mapping[int, Mapping[str, Bytes]], height_mm: float | None
+) -> tuple[Finding, ...]:
+    """Faults of a calibration that the silhouettes name; none where they agree, or where nothing explains them (poor
+    masks disagree too, and are told of camera by camera). masks : frame → camera → (H, W).
+
+    A wrong size only warns where a height is given: who crouches or stretches is of another height than told.
+    """
+    known = {finding.code for finding in check_calibration(cameras)}
+    seen: Masks = masks
+    found = []
+    for finding in check_calibration(cameras, masks=seen, height_mm=height_mm):
+        if finding.code in known or finding.code == UNEXPLAINED:
+            continue
+        by_height = finding.code in SIZES and height_mm is not None
+        found.append(dataclasses.replace(finding, severity="warns") if by_height else finding)
+    return tuple(found)
+
+
+def height_of(session: Session) -> float | None:
+    """The person's height as the session has it; None where nobody said, or it cannot be read."""
+    try:
+        subject = session.subject()
+    except StudioError:
+        return None
+    return subject.height_mm if subject is not None else None

@@ -1,0 +1,100 @@
+"""A calibration that does not belong to its footage is told by the footage's own silhouettes, by name."""
+
+import dataclasses
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drawn_people import drawn_mask, ring_of_cameras
+
+from studio.body.catalogue import load_body
+from studio.capture.calibration_files import write_calibration
+from studio.geometry.camera import Camera
+from studio.runs.mask_quality import mask_quality
+from studio.runs.session_settings import session_settings
+from studio.runs.silhouette_doubts import silhouette_doubts
+from studio.sessions.session import CAMERAS_PATH, Session
+from studio.web.samples import sample_folder
+
+FRAMES = (5, 20, 35, 50)
+HEIGHT = 1750.0
+
+
+def exchanged(cameras: tuple[Camera, ...], one: int, two: int) -> tuple[Camera, ...]:
+    """Two cameras that carry each other's names."""
+    changed = list(cameras)
+    changed[one] = dataclasses.replace(cameras[two], name=cameras[one].name)
+    changed[two] = dataclasses.replace(cameras[one], name=cameras[two].name)
+    return tuple(changed)
+
+
+@pytest.fixture(scope="module")
+def rig() -> tuple[Camera, ...]:
+    return ring_of_cameras(4)
+
+
+@pytest.fixture(scope="module")
+def masks(rig: tuple[Camera, ...]) -> dict[int, dict[str, np.ndarray]]:
+    """A person in four places and headings, arms lifted sideways as they never are in the next."""
+    body, rng = load_body("human31"), np.random.default_rng(3)
+    at = {entry.name: number for number, entry in enumerate(body.parameters)}
+    found = {}
+    for frame in range(4):
+        pose = np.array(body.neutral, dtype=np.float64)
+        pose[[at["pelvis_x"], at["pelvis_y"]]] = rng.uniform(-400.0, 400.0, 2)
+        pose[at["pelvis_rz"]] = rng.uniform(-np.pi, np.pi)
+        pose[at["left_shoulder_rx"]] += rng.uniform(0.3, 1.2)
+        found[frame] = {camera.name: drawn_mask(body, pose, camera) for camera in rig}
+    return found
+
+
+def test_a_sound_calibration_raises_nothing(rig: tuple[Camera, ...], masks: dict) -> None:
+    assert silhouette_doubts(rig, masks, None) == ()
+    assert silhouette_doubts(rig, masks, HEIGHT) == ()
+
+
+def test_cameras_that_were_exchanged_are_named(rig: tuple[Camera, ...], masks: dict) -> None:
+    (found,) = silhouette_doubts(exchanged(rig, 0, 1), masks, HEIGHT)
+    assert (found.code, found.severity, found.cameras) == ("swapped-cameras", "blocks", ("cam1", "cam2"))
+
+
+def test_a_mirrored_video_is_named(rig: tuple[Camera, ...], masks: dict) -> None:
+    mirrored = {
+        frame: {name: mask[:, ::-1] if name == "cam3" else mask for name, mask in views.items()}
+        for frame, views in masks.items()
+    }
+    (found,) = silhouette_doubts(rig, mirrored, None)
+    assert (found.code, found.cameras) == ("mirrored-video", ("cam3",))
+
+
+def test_a_wrong_size_blocks_unless_it_is_only_the_told_height(rig: tuple[Camera, ...], masks: dict) -> None:
+    larger = tuple(dataclasses.replace(camera, translation=1.3 * camera.translation) for camera in rig)
+    (told,) = silhouette_doubts(larger, masks, HEIGHT)
+    assert (told.code, told.severity) == ("square-size", "warns")
+    giant = tuple(dataclasses.replace(camera, translation=2.0 * camera.translation) for camera in rig)
+    (unseen,) = silhouette_doubts(giant, masks, None)
+    assert unseen.severity == "blocks"
+
+
+def test_what_the_file_alone_shows_is_not_said_twice(rig: tuple[Camera, ...], masks: dict) -> None:
+    in_metres = tuple(dataclasses.replace(camera, translation=camera.translation / 1000.0) for camera in rig)
+    assert silhouette_doubts(in_metres, masks, HEIGHT) == ()
+
+
+@pytest.fixture
+def walk(tmp_path: Path) -> Session:
+    """The bundled walk, its calibration not yet spoilt."""
+    return Session(Path(shutil.copytree(sample_folder("walk"), tmp_path / "walk")))
+
+
+def test_measuring_the_masks_tells_of_exchanged_cameras(walk: Session) -> None:
+    """From a session's videos: the walk's own masks, and two of its cameras under each other's names."""
+    cameras = walk.cameras()
+    write_calibration(exchanged(cameras, 0, 2), walk.path / CAMERAS_PATH)
+    spoilt = Session(walk.path)
+    found = mask_quality(spoilt, session_settings(spoilt).evidence, FRAMES)
+    assert [doubt.code for doubt in found.doubts] == ["swapped-cameras"]
+    assert found.doubts[0].cameras == (cameras[0].name, cameras[2].name)
+    assert not found.usable
+    assert "in doubt" in found.in_words()
