@@ -1,11 +1,16 @@
-// Uploading files: one after the other, each in one streamed request that goes on where it broke.
+// Uploading files: one after the other, piece by piece, so that it can be said how far it is; a piece that breaks goes on
+// where it broke.
 
 import { fetchJson, post, remove } from "./api.js";
+import { duration } from "./elements.js";
 
+const PIECE = 16 << 20;
 const TRIES = 4;
 const PAUSE_MILLISECONDS = 1500;
+const WORTH_TELLING = 2;
 
 const pause = (milliseconds) => new Promise((resolve) => setTimeout(resolve, milliseconds));
+const megabytes = (bytes) => (bytes < 1e8 ? (bytes / 1e6).toFixed(1) : Math.round(bytes / 1e6));
 
 /** How much of a file has arrived, after the connection broke. */
 async function arrivedOf(identifier, path) {
@@ -13,21 +18,28 @@ async function arrivedOf(identifier, path) {
   return told.files[path] ?? 0;
 }
 
-async function sendFile(identifier, file, path, signal) {
+/** Send a file; `arrived(bytes)` tells how much of it is there. */
+async function sendFile(identifier, file, path, arrived, signal) {
   let offset = 0;
-  for (let attempt = 1; ; attempt += 1) {
+  let failures = 0;
+  for (;;) {
     let answer;
     try {
-      answer = await fetch(`/api/uploads/${identifier}/files?path=${encodeURIComponent(path)}&offset=${offset}`, { method: "PUT", body: offset ? file.slice(offset) : file, signal });
+      answer = await fetch(`/api/uploads/${identifier}/files?path=${encodeURIComponent(path)}&offset=${offset}`, { method: "PUT", body: file.slice(offset, offset + PIECE), signal });
     } catch (cause) {
-      if (cause.name === "AbortError" || attempt === TRIES) throw cause.name === "AbortError" ? cause : Object.assign(new Error(`The upload of ${path} broke off.`), { hint: "Look whether the studio still runs, and try again." });
-      await pause(PAUSE_MILLISECONDS * attempt);
+      failures += 1;
+      if (cause.name === "AbortError") throw cause;
+      if (failures === TRIES) throw Object.assign(new Error(`The upload of ${path} broke off.`), { hint: "Look whether the studio still runs, and try again." });
+      await pause(PAUSE_MILLISECONDS * failures);
       offset = await arrivedOf(identifier, path).catch(() => 0);
       continue;
     }
-    if (answer.ok) return;
     const told = await answer.json().catch(() => ({}));
-    throw Object.assign(new Error(told.message ?? `The upload of ${path} failed.`), { hint: told.hint ?? "" });
+    if (!answer.ok) throw Object.assign(new Error(told.message ?? `The upload of ${path} failed.`), { hint: told.hint ?? "" });
+    failures = 0;
+    offset = told.received;
+    arrived(offset);
+    if (offset >= file.size) return;
   }
 }
 
@@ -35,11 +47,18 @@ async function sendFile(identifier, file, path, signal) {
 export async function uploadFiles(files, report, signal = undefined) {
   const { identifier } = await post("/api/uploads");
   const total = [...files].reduce((sum, file) => sum + file.size, 0) || 1;
+  const begun = performance.now();
   let sent = 0;
+  const tell = (at, bytes) => {
+    const seconds = (performance.now() - begun) / 1000;
+    const left = bytes ? (seconds * (total - bytes)) / bytes : 0;
+    const words = [`Uploading ${Math.round((100 * bytes) / total)} % of ${megabytes(total)} MB`, files.length > 1 ? `file ${at + 1} of ${files.length}` : "", left > WORTH_TELLING ? `${duration(left)} left` : ""];
+    report(words.filter(Boolean).join(" · "), bytes / total);
+  };
   try {
     for (const [at, file] of [...files].entries()) {
-      report(`Uploading ${Math.round((100 * sent) / total)} %${files.length > 1 ? ` (${at + 1} of ${files.length})` : ""}`, sent / total);
-      await sendFile(identifier, file, file.webkitRelativePath || file.name, signal);
+      tell(at, sent);
+      await sendFile(identifier, file, file.webkitRelativePath || file.name, (bytes) => tell(at, sent + bytes), signal);
       sent += file.size;
     }
   } catch (error) {
