@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
 
-.PHONY: env browser demo test test-slow check bench lock wheel-test clean
+.PHONY: env browser demo test test-slow test-opencv-4 check bench lock wheel-test clean
 
 env: $(READY)
 
@@ -28,6 +28,13 @@ test: env browser
 
 test-slow: env browser
 	$(BIN)/pytest -m slow --timeout 3600
+
+# The oldest OpenCV that is supported, beside the locked one, under everything that calls it.
+test-opencv-4: env
+	$(BIN)/python -m pip install --quiet --no-deps --upgrade --target .venv/opencv-4 opencv-python-headless==4.10.0.84
+	PYTHONPATH=.venv/opencv-4 $(BIN)/python -c "import cv2; assert cv2.__version__ == '4.10.0'"
+	PYTHONPATH=.venv/opencv-4 $(BIN)/pytest -m "not slow and not browser" tests/calibration tests/capture \
+	  tests/evidence tests/runs tests/sessions tests/export
 
 check: env
 	$(BIN)/ruff check
