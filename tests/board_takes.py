@@ -9,37 +9,53 @@ import numpy as np
 
 from studio.calibration.boards import Board
 from studio.capture.footage_source import CameraSource, FootageSource
+from studio.geometry.camera import Camera
 from studio.sessions.manifest import SessionManifest, now, write_manifest
 from studio.sessions.session import Session
 from studio.synthesis.board_footage import BoardRenderer, close_boards, floor_board, waved_boards
 from studio.synthesis.cameras import placed_camera
 
 BOARD = Board("charuco", 6, 5, 120.0, 90.0, "DICT_4X4_50")
-SIZE = (640, 480)
 PLACES = ((2600.0, -900.0, 1500.0), (2600.0, 900.0, 1900.0))
-CAMERAS = tuple(
-    placed_camera(
-        f"cam{number + 1}",
-        place,
-        (0.0, 0.0, 700.0),
-        size=SIZE,
-        focal_px=560.0 + 12.0 * number,
-        distortion=(-0.1, 0.03, 0.0005, -0.0003, 0.0),
+
+
+def two_cameras(size: tuple[int, int], focal_px: tuple[float, float]) -> tuple[Camera, ...]:
+    """Beside one another, with distorted pictures."""
+    return tuple(
+        placed_camera(
+            f"cam{number + 1}",
+            place,
+            (0.0, 0.0, 700.0),
+            size=size,
+            focal_px=focal_px[number],
+            distortion=(-0.1, 0.03, 0.0005, -0.0003, 0.0),
+        )
+        for number, place in enumerate(PLACES)
     )
-    for number, place in enumerate(PLACES)
-)
+
+
+SIZE = (640, 480)
+CAMERAS = two_cameras(SIZE, (560.0, 572.0))
 COMMON, LENS_PICTURES = 10, 11
 FLOOR_FRAME = COMMON
 FLOOR_PLACE = (-250.0, 200.0)
 
 
-def render_takes(folder: Path) -> Path:
-    """Write intrinsics/ and extrinsics/ into `folder`."""
+def render_takes(
+    folder: Path,
+    cameras: tuple[Camera, ...] = CAMERAS,
+    common_count: int = COMMON,
+    lens_count: int = LENS_PICTURES,
+) -> Path:
+    """Write intrinsics/ and extrinsics/ into `folder`, a folder of pictures a camera.
+
+    common_count : boards seen by all, after which one lies on the floor. lens_count : boards for each lens.
+    """
     rng = np.random.default_rng(4)
-    renderer = BoardRenderer(BOARD, CAMERAS)
-    common = [*waved_boards(rng, BOARD, CAMERAS, COMMON, reach=450.0), floor_board(FLOOR_PLACE)]
-    for number, camera in enumerate(CAMERAS):
-        lens = close_boards(rng, BOARD, camera, LENS_PICTURES)
+    renderer = BoardRenderer(BOARD, cameras)
+    common = [*waved_boards(rng, BOARD, cameras, common_count, reach=450.0), floor_board(FLOOR_PLACE)]
+    for number, camera in enumerate(cameras):
+        lens = close_boards(rng, BOARD, camera, lens_count)
         for place, poses in (("intrinsics", lens), ("extrinsics", common)):
             pictures = folder / place / f"{place[:3]}_{camera.name}_img"
             pictures.mkdir(parents=True)

@@ -13,7 +13,7 @@ from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
 from studio.synthesis.cameras import RIGS
 from studio.synthesis.motions import make_motion
-from studio.synthesis.person import Skeleton, marker_lengths, marker_motion, skeleton_of_height
+from studio.synthesis.person import PersonMotion, Skeleton, marker_lengths, marker_motion, skeleton_of_height
 from studio.synthesis.renderer import Renderer
 from studio.synthesis.rooms import ROOMS
 from studio.synthesis.wardrobes import WARDROBES
@@ -67,28 +67,31 @@ def drawn_skeleton(rng: np.random.Generator) -> Skeleton:
     return replace(found, height=found.standing_hip_height + found.trunk + found.head)
 
 
+def drawn_and_seen(rng: np.random.Generator) -> tuple[Skeleton, float, tuple[Camera, ...]]:
+    """A person, the height as it is told (± 3 cm), mm, and four cameras around."""
+    skeleton = drawn_skeleton(rng)
+    told = skeleton.height + float(rng.uniform(-30.0, 30.0))
+    return skeleton, told, RIGS["corners"](SIZE, rng)
+
+
+def renderer_of(cameras: tuple[Camera, ...], motion: PersonMotion, seed: int, noise: float) -> Renderer:
+    """The person in stripes, in a furnished room. noise : of the pictures, grey levels."""
+    room, wardrobe = ROOMS["furnished"](0.0), WARDROBES["striped"]
+    return Renderer(room, cameras, motion, noise=noise, samples=1, seed=seed, wardrobe=wardrobe)
+
+
 def drawn_person(
     seed: int, body_name: str = "human31", *, jitter: float = 0.05, postures: int = len(POSTURES)
 ) -> DrawnPerson:
     """The person of a seed. jitter : radians by which the angles of `poses` are off."""
     rng = np.random.default_rng(np.random.SeedSequence((seed, 0xD2A)))
-    skeleton = drawn_skeleton(rng)
-    told = skeleton.height + float(rng.uniform(-30.0, 30.0))
-    cameras = RIGS["corners"](SIZE, rng)
+    skeleton, told, cameras = drawn_and_seen(rng)
     body, _ = fit_subject(load_body(body_name), Subject(body=body_name, height_mm=told))
     frames, poses, lengths = [], [], {}
     for number, (motion_name, at) in enumerate(POSTURES[:postures]):
         motion = make_motion(motion_name, skeleton, at + 2, 60.0, {})
         lengths = marker_lengths(motion)
-        renderer = Renderer(
-            ROOMS["furnished"](0.0),
-            cameras,
-            motion,
-            noise=0.0,
-            samples=1,
-            seed=seed,
-            wardrobe=WARDROBES["striped"],
-        )
+        renderer = renderer_of(cameras, motion, seed, noise=0.0)
         shadow = renderer.shadow(at)
         views = []
         for index, camera in enumerate(cameras):

@@ -5,18 +5,14 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from sized_people import MEASURED, SIZE, drawn_skeleton
+from sized_people import MEASURED, SIZE, drawn_and_seen, renderer_of
 
 from studio.capture.calibration_files import write_calibration
 from studio.capture.footage_source import CameraSource, FootageSource
 from studio.sessions.manifest import SessionManifest, now, write_manifest
 from studio.sessions.session import Session
-from studio.synthesis.cameras import RIGS
 from studio.synthesis.motions import make_motion
 from studio.synthesis.person import PersonMotion, Skeleton, marker_lengths
-from studio.synthesis.renderer import Renderer
-from studio.synthesis.rooms import ROOMS
-from studio.synthesis.wardrobes import WARDROBES
 
 POSTURES = (("walk", 40), ("run", 12), ("box", 70), ("run", 26), ("box", 96))
 """Motions and frames of them at 60 Hz, one frame of the session each."""
@@ -26,24 +22,14 @@ FPS = 60.0
 def make_sized_session(folder: Path, seed: int) -> tuple[Session, dict[str, float], float]:
     """A session of the person of a seed, the true lengths by group, and the height as it was told (± 3 cm), mm."""
     rng = np.random.default_rng(np.random.SeedSequence((seed, 0xE2E)))
-    skeleton = drawn_skeleton(rng)
-    told = skeleton.height + float(rng.uniform(-30.0, 30.0))
-    cameras = RIGS["corners"](SIZE, rng)
+    skeleton, told, cameras = drawn_and_seen(rng)
     for camera in cameras:
         (folder / "pictures" / camera.name).mkdir(parents=True)
     for name in ("calibration", "background"):
         (folder / name).mkdir()
     write_calibration(cameras, folder / "calibration" / "cameras.toml")
     motion = _postures(skeleton)
-    renderer = Renderer(
-        ROOMS["furnished"](0.0),
-        cameras,
-        motion,
-        noise=1.5,
-        samples=1,
-        seed=seed,
-        wardrobe=WARDROBES["striped"],
-    )
+    renderer = renderer_of(cameras, motion, seed, noise=1.5)
     for frame in range(motion.frame_count):
         shadow = renderer.shadow(frame)
         for index, camera in enumerate(cameras):

@@ -6,48 +6,24 @@ import cv2
 import msgspec
 import numpy as np
 import pytest
+from board_takes import BOARD, FLOOR_PLACE, render_takes, two_cameras
 from click.testing import CliRunner
 
-from studio.calibration.boards import Board
 from studio.calibration.verbs import calibrate
 from studio.capture.calibration_files import read_calibration
 from studio.cli.main import main
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
 from studio.geometry.rigid import best_fit, transform
-from studio.synthesis.board_footage import BoardRenderer, close_boards, floor_board, waved_boards
-from studio.synthesis.cameras import placed_camera
 
-BOARD = Board("charuco", 6, 5, 120.0, 90.0, "DICT_4X4_50")
-SIZE = (800, 600)
-PLACES = ((2600.0, -900.0, 1500.0), (2600.0, 900.0, 1900.0))
-CAMERAS = tuple(
-    placed_camera(
-        f"cam{number + 1}",
-        place,
-        (0.0, 0.0, 700.0),
-        size=SIZE,
-        focal_px=690.0 + 15.0 * number,
-        distortion=(-0.1, 0.03, 0.0005, -0.0003, 0.0),
-    )
-    for number, place in enumerate(PLACES)
-)
+CAMERAS = two_cameras((800, 600), (690.0, 705.0))
+FLOOR = "frame:13"
 
 
 @pytest.fixture(scope="module")
 def footage(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """intrinsics/ and extrinsics/ with a folder of pictures each; in the last common ones the board is on the floor."""
-    folder = tmp_path_factory.mktemp("footage")
-    rng = np.random.default_rng(4)
-    renderer = BoardRenderer(BOARD, CAMERAS)
-    common = [*waved_boards(rng, BOARD, CAMERAS, 13, reach=450.0), floor_board((-250.0, 200.0))]
-    for number, camera in enumerate(CAMERAS):
-        for place, poses in (("intrinsics", close_boards(rng, BOARD, camera, 14)), ("extrinsics", common)):
-            pictures = folder / place / f"{place[:3]}_{camera.name}_img"
-            pictures.mkdir(parents=True)
-            for frame, pose in enumerate(poses):
-                cv2.imwrite(str(pictures / f"{frame:03d}.png"), renderer.picture(number, frame, pose))
-    return folder
+    return render_takes(tmp_path_factory.mktemp("footage"), CAMERAS, common_count=13, lens_count=14)
 
 
 def same_rig(solved: tuple[Camera, ...]) -> float:
@@ -62,7 +38,7 @@ def test_two_cameras_from_folders_with_the_floor_board(footage: Path) -> None:
         BOARD,
         intrinsics=footage / "intrinsics",
         extrinsics=footage / "extrinsics",
-        floor="frame:13",
+        floor=FLOOR,
         names=("cam1", "cam2"),
         progress=lambda step, done, total: steps.append(step),
     )
@@ -70,7 +46,7 @@ def test_two_cameras_from_folders_with_the_floor_board(footage: Path) -> None:
     assert [finding.code for finding in found.findings if finding.severity == "blocks"] == []
     for camera, solved in zip(CAMERAS, found.rig.cameras, strict=True):
         np.testing.assert_allclose(solved.matrix[0, 0], camera.matrix[0, 0], rtol=5e-3)
-        np.testing.assert_allclose(solved.centre, camera.centre - [-250.0, 200.0, 0.0], atol=20.0)
+        np.testing.assert_allclose(solved.centre, camera.centre - [*FLOOR_PLACE, 0.0], atol=20.0)
     assert same_rig(found.rig.cameras) < 10.0
     assert any("cam2" in step for step in steps)
     assert "Adjusting all together" in steps
@@ -133,7 +109,7 @@ def test_the_intrinsics_alone_give_lenses(footage: Path, tmp_path: Path) -> None
         BOARD,
         intrinsics=tmp_path / "rig.lenses.toml",
         extrinsics=footage / "extrinsics",
-        floor="frame:13",
+        floor=FLOOR,
         names=("cam1", "cam2"),
     )
     assert placed.rig is not None
