@@ -147,7 +147,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         yield
     finally:
         doors.scene_port = 0
-        await import_routes.end_imports(doors)
+        await doors.jobs.end()
         await asyncio.to_thread(doors.desk.close)
         await asyncio.to_thread(doors.learning.close)
         await asyncio.to_thread(doors.cameras.close)

@@ -5,6 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from studio.web.calibration_schemas import FindingView
+from studio.web.job_schemas import SessionJob
 from studio.web.schemas import Answer, Number, Request, RunName, Value
 from studio.web.setting_schemas import KnobView
 
@@ -50,19 +51,10 @@ class BackgroundCamera(Answer):
     height: int
 
 
-class BackgroundJob(Answer):
-    """How a set-up stands. seconds_left: of this step. code, message and hint say why it failed."""
+class BackgroundJob(SessionJob):
+    """How a set-up stands."""
 
-    session: str
     source: Source
-    state: Literal["running", "done", "failed", "cancelled"]
-    step: str = ""
-    done: int = 0
-    total: int = 0
-    seconds_left: Number = None
-    code: str = ""
-    message: str = ""
-    hint: str = ""
     notes: list[str] = Field(default_factory=list)
     knobs: dict[str, Value] = Field(default_factory=dict)
     quality: MaskQualityAnswer | None = None

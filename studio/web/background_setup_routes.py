@@ -3,9 +3,6 @@ events), with the masks' quality at its end.
 """
 
 import asyncio
-import threading
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -23,6 +20,7 @@ from studio.sessions.background_files import exclusion_path, read_evidence, set_
 from studio.sessions.made_from import note
 from studio.sessions.session import Session
 from studio.settings import values
+from studio.web.background_jobs import Job
 from studio.web.background_routes import quality_answer
 from studio.web.background_schemas import (
     BackgroundAnswer,
@@ -32,7 +30,7 @@ from studio.web.background_schemas import (
     PlatesWish,
 )
 from studio.web.doors import Doors, doors_of
-from studio.web.error_responses import UnforeseenError, log
+from studio.web.job_kinds import BACKGROUND
 from studio.web.safe_paths import place_in, relative_path
 from studio.web.session_routes import OpenSession
 from studio.web.setting_views import knob_view
@@ -41,15 +39,6 @@ from studio.web.upload_routes import forget, upload_folder
 router = APIRouter(prefix="/api/sessions/{session}", tags=["masks"])
 
 Door = Annotated[Doors, Depends(doors_of)]
-
-KEPT = 50
-SECONDS_BETWEEN = 0.2
-
-
-class SetupStoppedError(RunError):
-    """The set-up of a background was cancelled."""
-
-    code = "cancelled"
 
 
 @router.get("/background")
@@ -85,7 +74,7 @@ def background(session: OpenSession, doors: Door) -> BackgroundAnswer:
             "knobs": [knob_view(entry) for entry in knobs],
             "settings": {entry.name: now[entry.name] for entry in knobs},
             "own": evidence.knobs,
-            "job": doors.background_setups.get(session.name),
+            "job": doors.jobs.known(BACKGROUND, session.name),
         }
     )
 
@@ -117,89 +106,45 @@ async def begin_setup(session: OpenSession, wish: BackgroundWish, doors: Door) -
     """Begin to set the background up. Ask `GET …/background` how it stands, or wait for `background` events."""
     _check_free(doors, session.name)
     session_settings(session, changes=wish.knobs)
-    state = BackgroundJob(session=session.name, source=wish.source, state="running")
-    doors.background_setups.pop(session.name, None)
-    doors.background_setups[session.name] = state
-    doors.stops[_stop_name(session.name)] = threading.Event()
-    while len(doors.background_setups) > KEPT:
-        doors.background_setups.pop(next(iter(doors.background_setups)))
-    job = asyncio.create_task(asyncio.to_thread(_set_up, doors, session, wish))
-    doors.jobs.add(job)
-    job.add_done_callback(doors.jobs.discard)
-    return state
+
+    def work(job: Job) -> dict[str, object]:
+        try:
+            made = set_up_background(
+                session,
+                wish.source,
+                knobs=wish.knobs,
+                tune=wish.tune,
+                exclude_unused=wish.exclude_unused,
+                progress=job.report_or_stop,
+                cancelled=job.cancelled,
+            )
+            quality = _measured(Session(session.path), job)
+        finally:
+            forget_composers()
+        answer = quality_answer(quality) if quality is not None else None
+        return {"notes": list(made.notes), "knobs": made.knobs, "quality": answer}
+
+    return doors.jobs.begin(BACKGROUND, BackgroundJob(session=session.name, source=wish.source), work)
 
 
 @router.delete("/background", status_code=202)
 def cancel_setup(session: OpenSession, doors: Door) -> BackgroundAnswer:
     """Stop the set-up; the background stays as it was."""
-    stop = doors.stops.get(_stop_name(session.name))
-    if stop is not None:
-        stop.set()
+    if doors.jobs.known(BACKGROUND, session.name) is not None:
+        doors.jobs.cancel(BACKGROUND, session.name)
     return background(session, doors)
 
 
-def _set_up(doors: Doors, session: Session, wish: BackgroundWish) -> None:
-    """Set up in this thread, keeping the state up to date; never raises."""
-    stop, told, begun, last_step = doors.stops[_stop_name(session.name)], 0.0, time.monotonic(), ""
-
-    def tell(**changes: object) -> None:
-        state = doors.background_setups[session.name].model_copy(update=changes)
-        doors.background_setups[session.name] = state
-        doors.events.publish({"type": "background", "run": "", **state.model_dump()})
-
-    def report(step: str, done: int, total: int) -> None:
-        nonlocal told, begun, last_step
-        if stop.is_set():
-            raise SetupStoppedError("Setting up the background was cancelled.", "Start it again.")
-        now = time.monotonic()
-        if done == 0 and step != last_step:
-            begun = now
-        if step == last_step and now - told < SECONDS_BETWEEN and done < total:
-            return
-        told, last_step = now, step
-        left = (now - begun) * (total - done) / done if done else None
-        tell(step=step, done=done, total=total, seconds_left=left)
-
-    try:
-        made = set_up_background(
-            session,
-            wish.source,
-            knobs=wish.knobs,
-            tune=wish.tune,
-            exclude_unused=wish.exclude_unused,
-            progress=report,
-            cancelled=stop.is_set,
-        )
-        quality = _measured(Session(session.path), report, stop)
-    except StudioError as error:
-        ended = "cancelled" if stop.is_set() else "failed"
-        tell(state=ended, code=error.code, message=error.message, hint=error.hint)
-        return
-    except Exception as error:
-        log.exception("the background of '%s' failed", session.name)
-        wrong = UnforeseenError(f"The set-up failed: {type(error).__name__}.", f"See '{doors.log_path}'.")
-        tell(state="failed", code=wrong.code, message=wrong.message, hint=wrong.hint)
-        return
-    finally:
-        doors.stops.pop(_stop_name(session.name), None)
-        forget_composers()
-    answer = quality_answer(quality) if quality is not None else None
-    tell(state="done", notes=list(made.notes), knobs=made.knobs, quality=answer, seconds_left=0.0)
-    doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
-
-
-def _measured(
-    session: Session, report: Callable[[str, int, int], None], stop: threading.Event
-) -> MaskQuality | None:
+def _measured(session: Session, job: Job) -> MaskQuality | None:
     """The quality of the masks that are in use now, remembered; None where views cannot be compared, or nobody waits
     for it any more.
     """
     if len(session.manifest.footage.cameras) < 2 or not session.is_calibrated:
         return None
     try:
-        found = mask_quality(session, session_settings(session).evidence, progress=report)
+        found = mask_quality(session, session_settings(session).evidence, progress=job.report_or_stop)
     except StudioError:
-        if stop.is_set():
+        if job.cancelled():
             return None
         raise
     note(session, "background", found.in_words(), found.usable)
@@ -207,13 +152,8 @@ def _measured(
 
 
 def _check_free(doors: Doors, name: str) -> None:
-    known = doors.background_setups.get(name)
-    if known is not None and known.state == "running":
+    if doors.jobs.running(BACKGROUND, name):
         raise RunError(f"The background of '{name}' is being set up.", "Wait until it is done, or cancel it.")
-
-
-def _stop_name(name: str) -> str:
-    return f"background of {name}"
 
 
 def _kind(path: str) -> Literal["", "plate", "clip"]:

@@ -1,10 +1,9 @@
 """Learning a behaviour model, as OpenAPI shows it."""
 
-from typing import Literal
-
 from pydantic import Field
 
 from studio.training.sources import FPS
+from studio.web.job_schemas import Progress
 from studio.web.schemas import Answer, Request, RunName, Value
 from studio.web.setting_schemas import KnobView
 
@@ -27,20 +26,13 @@ class LearningRequest(Request):
     settings: dict[str, Value] = Field(default_factory=dict)
 
 
-class LearningProgress(Answer):
-    """How the learning stands. done, total: of the step. seconds_left: of the step, null before an estimate. learnt:
-    frames, clusters, states, entropies and the frames that fitted badly, when it is done.
+class LearningProgress(Progress):
+    """How the learning stands. learnt: frames, clusters, states, entropies and the frames that fitted badly, when it is
+    done.
     """
 
     name: str
     body: str
-    state: Literal["running", "done", "cancelled", "failed"]
-    step: str = ""
-    done: int = 0
-    total: int = 0
-    seconds_left: float | None = None
-    message: str = ""
-    hint: str = ""
     learnt: dict[str, object] = Field(default_factory=dict)
 
 

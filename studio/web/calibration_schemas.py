@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from studio.web.job_schemas import NumberedJob
 from studio.web.schemas import Answer, CameraMatching, Number, Numbers, Request, RunName
 
 Pixel = tuple[float, float]
@@ -151,20 +152,10 @@ class CalibrationView(Answer):
     notes: list[str] = Field(default_factory=list)
 
 
-class SolveState(Answer):
-    """How a calibration from boards stands; code, message and hint say why it failed. share: of all, about, null while
-    unknown; proposal: what came of it.
+class SolveState(NumberedJob):
+    """How a calibration from boards stands. share: of all, about, null while unknown; seconds_left: of all; proposal:
+    what came of it.
     """
 
-    identifier: str
-    session: str
-    state: Literal["running", "done", "failed", "cancelled"]
-    step: str = ""
-    done: int = 0
-    total: int = 0
     share: Number = None
-    seconds_left: Number = None
-    code: str = ""
-    message: str = ""
-    hint: str = ""
     proposal: str = ""

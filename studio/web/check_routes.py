@@ -1,18 +1,18 @@
 """How well a run's track fits its pictures: measured in the background (`track` events, verb "check"), and kept."""
 
 import asyncio
-from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Depends
 
 from studio.runs.checking import RunCheck, check_run, kept_check, usual_track
 from studio.runs.tracks import read_track
+from studio.web.background_jobs import Job
 from studio.web.check_schemas import CheckAnswer, CheckLine, CheckWish
 from studio.web.doors import Doors, doors_of
 from studio.web.run_routes import RUN, OpenRun
 from studio.web.session_routes import OpenSession
-from studio.web.track_routes import begin_job
+from studio.web.track_jobs import begin_job
 from studio.web.track_schemas import TrackJobState
 
 router = APIRouter(prefix="/api", tags=["tracks"])
@@ -35,11 +35,11 @@ async def begin_check(session: OpenSession, run: OpenRun, wish: CheckWish, doors
     name = wish.track or usual_track(run)
     await asyncio.to_thread(read_track, run, name)
 
-    def work(report: Callable[[str, int, int], None], cancelled: Callable[[], bool]) -> dict[str, Any]:
-        check_run(session, run, name, wish.every, progress=report, cancelled=cancelled)
+    def work(job: Job) -> dict[str, object]:
+        check_run(session, run, name, wish.every, progress=job.report, cancelled=job.cancelled)
         return {"track": name}
 
-    return begin_job(doors, "check", session.name, run.name, work)
+    return begin_job(doors, "check", session, run, work)
 
 
 def _line(found: RunCheck) -> CheckLine:

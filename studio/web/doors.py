@@ -5,9 +5,7 @@ lie.
 brings them together.
 """
 
-import asyncio
 import dataclasses
-import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,19 +15,11 @@ from fastapi import Request
 
 from studio.export.task import Writer
 from studio.runs.overlay_pictures import forget_composers
-from studio.runs.subject_fitting import FittedSubject
 from studio.sessions.workspace import Workspace
-from studio.web.background_schemas import BackgroundJob
+from studio.web.background_jobs import BackgroundJobs
 from studio.web.calibration_proposals import Proposals
-from studio.web.calibration_schemas import SolveState
 from studio.web.event_stream import EventStream
-from studio.web.export_schemas import ExportState
-from studio.web.footage_schemas import SynchronyState
-from studio.web.import_schemas import ImportState
-from studio.web.initialisation_schemas import InitialisationState
 from studio.web.presets import Preset
-from studio.web.subject_schemas import FitSubjectState
-from studio.web.track_schemas import TrackJobState
 from studio.worker.camera_desk import CameraDesk, DeskRecording
 from studio.worker.commands import Close, Command
 from studio.worker.comparison_desk import ComparisonDesk, ComparisonState
@@ -216,11 +206,10 @@ class Doors:
     """Everything a route may use, kept in `app.state.doors`.
 
     scene_port : of the inner viser server, 0 while it is not running. footage_roots : folders that may be
-    imported from. presets : the studio's own. log_path : the server's log file. imports,
-    initialisations, exports, track_jobs, uploads : those under way, by their identifiers; synchronies : estimates
-    of offsets, by session; calibration_jobs : solving under way; proposals : calibrations not in use yet;
-    background_setups : set-ups of backgrounds, by session. desk : where comparisons are worked at,
-    learning : where behaviour models are learnt, cameras : where live ones are looked at and recorded.
+    imported from. presets : the studio's own. log_path : the server's log file. proposals :
+    calibrations not in use yet. uploads : those under way, by their identifiers. jobs : work in the background. desk :
+    where comparisons are worked at, learning : where behaviour models are learnt, cameras : where live ones are looked
+    at and recorded.
     """
 
     workspace: Workspace
@@ -231,25 +220,16 @@ class Doors:
     presets: Sequence[Preset] = ()
     log_path: Path | None = None
     scene_port: int = 0
-    imports: dict[str, ImportState] = field(default_factory=dict)
-    initialisations: dict[str, InitialisationState] = field(default_factory=dict)
-    subject_fits: dict[str, FitSubjectState] = field(default_factory=dict)
-    fitted_subjects: dict[str, FittedSubject] = field(default_factory=dict)
-    background_setups: dict[str, BackgroundJob] = field(default_factory=dict)
-    synchronies: dict[str, SynchronyState] = field(default_factory=dict)
-    calibration_jobs: dict[str, SolveState] = field(default_factory=dict)
     proposals: Proposals = field(default_factory=Proposals)
-    exports: dict[str, ExportState] = field(default_factory=dict)
-    track_jobs: dict[str, TrackJobState] = field(default_factory=dict)
     uploads: dict[str, dict[str, int]] = field(default_factory=dict)
-    stops: dict[str, threading.Event] = field(default_factory=dict)
-    jobs: set[asyncio.Task[None]] = field(default_factory=set)
+    jobs: BackgroundJobs = field(init=False)
     desk: ComparisonDesk = field(init=False)
     learning: LearningDesk = field(init=False)
     cameras: CameraDesk = field(init=False)
 
     def __post_init__(self) -> None:
-        """Give comparisons and learning their desks, which tell all watchers how far they are."""
+        """Give all work beside the routes its place, which tells all watchers how far it is."""
+        self.jobs = BackgroundJobs(self.events.publish, self.log_path)
         self.desk = ComparisonDesk(self._tell_comparison)
         self.learning = LearningDesk(self._tell_learning)
         self.cameras = CameraDesk(self._tell_recording)

@@ -1,9 +1,8 @@
 """Exports of runs, as OpenAPI shows them."""
 
-from typing import Literal
-
 from pydantic import Field
 
+from studio.web.job_schemas import NumberedJob
 from studio.web.schemas import Answer, Request, Value
 from studio.web.setting_schemas import KnobView
 
@@ -49,21 +48,11 @@ class ExportLine(Answer):
     options: dict[str, Value]
 
 
-class ExportState(Answer):
-    """How an export stands; code, message and hint say why it failed. result: of one that is done."""
+class ExportState(NumberedJob):
+    """How an export stands. result: of one that is done."""
 
-    identifier: str
-    session: str
     run: str
     format: str
-    state: Literal["running", "done", "failed", "cancelled"]
-    step: str = ""
-    done: int = 0
-    total: int = 0
-    seconds_left: float | None = None
-    code: str = ""
-    message: str = ""
-    hint: str = ""
     result: ExportLine | None = None
 
 

@@ -5,40 +5,32 @@ An estimate is only shown; `PATCH …/footage` with its offsets applies it.
 
 import asyncio
 import tempfile
-import threading
 from pathlib import Path
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 
 from studio.capture.timestamps import TIMESTAMP_NAMES
-from studio.errors import SessionError, StudioError
 from studio.runs.footage_pictures import bare_picture
 from studio.runs.overlay_drawing import encode_jpeg
 from studio.sessions.footage_changes import change_footage, recorded_offsets, stale_runs, synchrony_of
 from studio.sessions.session import Session
+from studio.web.background_jobs import Job
 from studio.web.doors import Doors, doors_of, let_go
-from studio.web.error_responses import UnforeseenError, log
 from studio.web.footage_schemas import (
     FootageCamera,
     FootageState,
     FootageWish,
-    PairView,
     SynchronyState,
     SynchronyWish,
     TimedAnswer,
 )
+from studio.web.job_kinds import SYNCHRONY
 from studio.web.session_routes import OpenSession
 
 router = APIRouter(prefix="/api", tags=["footage"])
 
 Door = Annotated[Doors, Depends(doors_of)]
-
-KEPT = 50
-
-
-class _EstimateStopped(SessionError):
-    code = "cancelled"
 
 
 @router.get("/sessions/{session}/footage")
@@ -86,73 +78,36 @@ async def begin_synchrony(
     """Begin to estimate the offsets from what moves in the pictures. Ask for its state, or wait for `synchrony`
     events.
     """
-    known = doors.synchronies.get(session.name)
+    known = doors.jobs.known(SYNCHRONY, session.name)
     if known is not None and known.state == "running":
         return known
-    state = SynchronyState(session=session.name, state="running", step="reading")
-    doors.synchronies[session.name] = state
-    doors.stops[_stop_name(session.name)] = threading.Event()
-    while len(doors.synchronies) > KEPT:
-        doors.synchronies.pop(next(iter(doors.synchronies)))
     within = (wish or SynchronyWish.model_validate({})).within
-    job = asyncio.create_task(asyncio.to_thread(_estimate, doors, session, within))
-    doors.jobs.add(job)
-    job.add_done_callback(doors.jobs.discard)
-    return state
+
+    def work(job: Job) -> dict[str, object]:
+        found = synchrony_of(session, job.report_or_stop, within)
+        return {
+            "offsets": found.offsets,
+            "confidence": found.confidence,
+            "spread": found.within,
+            "sure": found.sure,
+            "notes": list(found.notes),
+            "pairs": list(found.pairs),
+        }
+
+    return doors.jobs.begin(SYNCHRONY, SynchronyState(session=session.name, step="reading"), work)
 
 
 @router.get("/sessions/{session}/synchrony")
 def synchrony(session: OpenSession, doors: Door) -> SynchronyState:
     """How the estimate stands and what it found; state "none" where it was not begun."""
-    return doors.synchronies.get(session.name) or SynchronyState(session=session.name, state="none")
+    return doors.jobs.known(SYNCHRONY, session.name) or SynchronyState(session=session.name, state="none")
 
 
 @router.delete("/sessions/{session}/synchrony", status_code=202)
 def cancel_synchrony(session: OpenSession, doors: Door) -> SynchronyState:
     """Stop an estimate."""
-    stop = doors.stops.get(_stop_name(session.name))
-    if stop is not None:
-        stop.set()
-    return synchrony(session, doors)
-
-
-def _estimate(doors: Doors, session: Session, within: float) -> None:
-    """Estimate in this thread, keeping the state up to date; never raises."""
-    stop = doors.stops[_stop_name(session.name)]
-
-    def tell(**changes: object) -> None:
-        state = doors.synchronies.get(session.name)
-        if state is not None:
-            doors.synchronies[session.name] = state = state.model_copy(update=changes)
-            message: dict[str, object] = {"type": "synchrony", "run": ""}
-            doors.events.publish(message | state.model_dump())
-
-    def report(step: str, done: int, total: int) -> None:
-        if stop.is_set():
-            raise _EstimateStopped("The estimate was cancelled.", "Start it again when you like.")
-        tell(step=step, done=done, total=total)
-
-    try:
-        found = synchrony_of(session, report, within)
-    except StudioError as error:
-        tell(state="failed", code=error.code, message=error.message, hint=error.hint)
-        return
-    except Exception as error:
-        log.exception("synchrony of '%s' failed", session.name)
-        wrong = UnforeseenError(f"The estimate failed: {type(error).__name__}.", f"See '{doors.log_path}'.")
-        tell(state="failed", code=wrong.code, message=wrong.message, hint=wrong.hint)
-        return
-    finally:
-        doors.stops.pop(_stop_name(session.name), None)
-    tell(
-        state="done",
-        offsets=found.offsets,
-        confidence=found.confidence,
-        spread=found.within,
-        sure=found.sure,
-        notes=list(found.notes),
-        pairs=[PairView.model_validate(pair) for pair in found.pairs],
-    )
+    known = synchrony(session, doors)
+    return known if known.state == "none" else doors.jobs.cancel(SYNCHRONY, session.name)
 
 
 def _state(session: Session, notes: list[str]) -> FootageState:
@@ -179,8 +134,3 @@ def _state(session: Session, notes: list[str]) -> FootageState:
         stale_runs=list(stale_runs(session)),
         notes=notes,
     )
-
-
-def _stop_name(session: str) -> str:
-    """Where the event that stops a session's estimate is kept."""
-    return f"synchrony of {session}"

@@ -4,6 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from studio.web.job_schemas import SessionJob
 from studio.web.schemas import Answer, Request
 
 MOST_OFFSET = 1_000_000
@@ -70,19 +71,13 @@ class PairView(Answer):
     sure: bool
 
 
-class SynchronyState(Answer):
+class SynchronyState(SessionJob):
     """How an estimate of the offsets stands, and what it found; nothing of it is applied. confidence: peak over second
-    peak; spread: frames that it may be off; code, message and hint say why it failed.
+    peak; spread: frames that it may be off. state: "none" where none was begun.
     """
 
-    session: str
-    state: Literal["none", "running", "done", "failed"]
-    step: str = ""
-    done: int = 0
-    total: int = 0
-    code: str = ""
-    message: str = ""
-    hint: str = ""
+    # One state more than other jobs have: it is asked for before there is any.
+    state: Literal["none", "running", "done", "failed", "cancelled"] = "running"  # pyright: ignore[reportIncompatibleVariableOverride]
     offsets: dict[str, int] = Field(default_factory=dict)
     confidence: dict[str, float] = Field(default_factory=dict)
     spread: dict[str, int] = Field(default_factory=dict)

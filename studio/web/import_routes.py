@@ -7,23 +7,21 @@ of it was read.
 """
 
 import asyncio
-import secrets
 import shutil
-import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query
 
-from studio.errors import NotFoundError, StudioError
+from studio.errors import StudioError
 from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.importers.adding import AddedFootage, FootageWish, add_footage
 from studio.sessions.importers.catalogue import ImportReport, import_source
 from studio.sessions.importers.plan import Progress
 from studio.web.archives import unpack_zip
+from studio.web.background_jobs import Job
 from studio.web.doors import Doors, doors_of, let_go
-from studio.web.error_responses import UnforeseenError, log
 from studio.web.import_schemas import (
     FolderView,
     FootageAddition,
@@ -32,9 +30,10 @@ from studio.web.import_schemas import (
     SampleRequest,
     SourceWish,
 )
+from studio.web.job_kinds import IMPORT
 from studio.web.safe_paths import PathRefused, folder_to_import, relative_path
 from studio.web.samples import install_sample
-from studio.web.schemas import CameraMatching, NewName
+from studio.web.schemas import NewName
 from studio.web.session_routes import OpenSession
 from studio.web.upload_routes import forget, upload_folder
 
@@ -45,7 +44,6 @@ Door = Annotated[Doors, Depends(doors_of)]
 Taker = Callable[[Path, Progress, Callable[[], bool]], ImportReport | AddedFootage]
 """take(folder, progress, cancelled) reads a source into the workspace."""
 
-KEPT = 50
 FOLDERS_SHOWN = 1000
 
 
@@ -109,40 +107,32 @@ async def begin_taking(doors: Doors, name: str, wish: SourceWish, take: Taker) -
         source = await asyncio.to_thread(folder_to_import, wish.source, doors.footage_roots)
     else:
         source = upload_folder(doors, wish.upload or "")
-    state = ImportState(identifier=secrets.token_hex(8), name=name, state="running", step="reading")
-    doors.imports[state.identifier] = state
-    doors.stops[state.identifier] = threading.Event()
-    while len(doors.imports) > KEPT:
-        doors.imports.pop(next(iter(doors.imports)))
-    job = asyncio.create_task(asyncio.to_thread(_take, doors, state, wish, source, take))
-    doors.jobs.add(job)
-    job.add_done_callback(doors.jobs.discard)
-    return state
+
+    def work(job: Job) -> dict[str, object]:
+        folder = _unpacked(source, job) if wish.upload else source
+        report = take(folder, job.report, job.cancelled)
+        if wish.upload:
+            forget(doors, wish.upload)
+        return {
+            "notes": list(report.notes),
+            "warnings": list(report.warnings),
+            "layout": report.layout,
+            "matching": list(report.matching),
+        }
+
+    return doors.jobs.begin(IMPORT, ImportState(session=name, name=name, step="reading"), work)
 
 
 @router.get("/imports/{identifier}")
 def import_state(identifier: str, doors: Door) -> ImportState:
     """How an import stands."""
-    state = doors.imports.get(identifier)
-    if state is None:
-        raise NotFoundError(f"There is no import '{identifier[:40]}'.", "Begin a new one.")
-    return state
+    return doors.jobs.state(IMPORT, identifier)
 
 
 @router.delete("/imports/{identifier}", status_code=202)
 def cancel_import(identifier: str, doors: Door) -> ImportState:
     """Stop an import; nothing of it is kept."""
-    state = import_state(identifier, doors)
-    if identifier in doors.stops:
-        doors.stops[identifier].set()
-    return state
-
-
-async def end_imports(doors: Doors) -> None:
-    """Stop all imports and wait for their threads."""
-    for stop in doors.stops.values():
-        stop.set()
-    await asyncio.gather(*doors.jobs, return_exceptions=True)
+    return doors.jobs.cancel(IMPORT, identifier)
 
 
 @router.post("/samples", status_code=201)
@@ -171,51 +161,11 @@ def folders(
     )
 
 
-def _take(doors: Doors, begun: ImportState, wish: SourceWish, source: Path, take: Taker) -> None:
-    """Take the source in this thread, keeping its state up to date; never raises."""
-    identifier, name = begun.identifier, begun.name
-    stop = doors.stops[identifier]
-
-    def tell(**changes: object) -> None:
-        state = doors.imports.get(identifier)
-        if state is not None:
-            doors.imports[identifier] = state = state.model_copy(update=changes)
-            message: dict[str, object] = {"type": "import", "session": name, "run": ""}
-            doors.events.publish(message | state.model_dump())
-
-    def progress(step: str, done: int, total: int) -> None:
-        tell(step=step, done=done, total=total)
-
-    try:
-        folder = _unpacked(source, tell) if wish.upload else source
-        report = take(folder, progress, stop.is_set)
-    except StudioError as error:
-        tell(state="failed", code=error.code, message=error.message, hint=error.hint)
-        return
-    except Exception as error:
-        log.exception("import of '%s' failed", source)
-        wrong = UnforeseenError(f"The import failed: {type(error).__name__}.", f"See '{doors.log_path}'.")
-        tell(state="failed", code=wrong.code, message=wrong.message, hint=wrong.hint)
-        return
-    finally:
-        doors.stops.pop(identifier, None)
-    if wish.upload:
-        forget(doors, wish.upload)
-    tell(
-        state="done",
-        notes=list(report.notes),
-        warnings=list(report.warnings),
-        layout=report.layout,
-        matching=[CameraMatching.model_validate(match) for match in report.matching],
-    )
-    doors.events.publish({"type": "sessions", "session": name, "run": ""})
-
-
-def _unpacked(folder: Path, tell: Callable[..., None]) -> Path:
+def _unpacked(folder: Path, job: Job) -> Path:
     """The uploaded folder itself: out of its zip, and without the folders that only wrap it."""
     files = [path for path in folder.rglob("*") if path.is_file()]
     if len(files) == 1 and files[0].suffix.lower() == ".zip":
-        tell(step="unpacking")
+        job.tell(step="unpacking")
         unpacked = folder / "unpacked"
         unpacked.mkdir()
         try:

@@ -4,6 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from studio.web.job_schemas import NumberedJob
 from studio.web.schemas import Answer, CameraMatching, Request, RunName
 
 
@@ -45,18 +46,10 @@ class FootageAddition(SourceWish):
     replace: bool = Field(False, description="Forget all cameras that the source does not name.")
 
 
-class ImportState(Answer):
-    """How an import stands; code, message and hint say why it failed. layout: whose the source was taken for."""
+class ImportState(NumberedJob):
+    """How an import stands. name: of the session. layout: whose the source was taken for."""
 
-    identifier: str
     name: str
-    state: Literal["running", "done", "failed"]
-    step: str = ""
-    done: int = 0
-    total: int = 0
-    code: str = ""
-    message: str = ""
-    hint: str = ""
     notes: list[str] = Field(default_factory=list)
     warnings: list[str] = Field(default_factory=list)
     matching: list[CameraMatching] = Field(default_factory=list)

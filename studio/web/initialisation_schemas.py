@@ -1,10 +1,9 @@
 """Finding a start pose, as OpenAPI shows it."""
 
-from typing import Literal
-
 from pydantic import Field
 
-from studio.web.schemas import Answer, Number, Numbers, Request, RunName
+from studio.web.job_schemas import NumberedJob
+from studio.web.schemas import Number, Numbers, Request, RunName
 
 
 class InitialisationRequest(Request):
@@ -20,24 +19,15 @@ class InitialisationRequest(Request):
     replace: bool = False
 
 
-class InitialisationState(Answer):
-    """How the search stands; code, message and hint say why it failed.
+class InitialisationState(NumberedJob):
+    """How the search stands.
 
     pose: radians and mm, in the order of `parameters`. confidence: 0 to 1, that the body stands so and faces so.
     margin: log weight by which the best pose that faces the other way is beaten, null without one. overlap: of the
     silhouettes. file: that it was written to, in the session's folder.
     """
 
-    identifier: str
-    session: str
     frame: int
-    state: Literal["running", "done", "failed"]
-    step: str = ""
-    done: int = 0
-    total: int = 0
-    code: str = ""
-    message: str = ""
-    hint: str = ""
     body: str = ""
     parameters: list[str] = Field(default_factory=list)
     pose: Numbers | None = None

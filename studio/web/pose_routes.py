@@ -1,7 +1,7 @@
 """Poses set by hand: start poses, dragging, mirroring, the search around a pose, and the editor in the scene."""
 
 import math
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from fastapi import APIRouter, Depends
@@ -16,6 +16,7 @@ from studio.runs.pose_search import better_pose
 from studio.runs.start_pose_file import keep_start_pose
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
+from studio.web.background_jobs import Job
 from studio.web.doors import Doors, doors_of
 from studio.web.pose_schemas import (
     BetterPoseRequest,
@@ -30,7 +31,7 @@ from studio.web.pose_schemas import (
 )
 from studio.web.session_routes import OpenSession
 from studio.web.session_views import parameter_views
-from studio.web.track_jobs import Report, begin_job
+from studio.web.track_jobs import begin_job
 from studio.web.track_schemas import TrackJobState
 
 router = APIRouter(prefix="/api", tags=["poses"])
@@ -45,7 +46,8 @@ def start_pose(session: OpenSession) -> PoseView:
     """The session's start pose, or its body's rest pose while it has none."""
     body = session.body()
     own = session.start_pose(body)
-    return _view(body, body.neutral if own is None else own, stored=own is not None)
+    pose = body.neutral if own is None else own
+    return _view(body, pose, stored=own is not None, frame=session.start_pose_frame())
 
 
 @router.put(SESSION + "/start-pose")
@@ -53,9 +55,9 @@ def put_start_pose(session: OpenSession, wish: StartPoseRequest, doors: Door) ->
     """Make a pose the session's start pose; the one it had stays beside it."""
     body = session.body()
     pose = _fitting(body, wish.pose)
-    keep_start_pose(session, body, pose)
+    keep_start_pose(session, body, pose, wish.frame)
     doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
-    return _view(body, pose, stored=True)
+    return _view(body, pose, stored=True, frame=session.start_pose_frame())
 
 
 @router.post(SESSION + "/pose/drag")
@@ -82,9 +84,15 @@ async def begin_refining_pose(session: OpenSession, wish: BetterPoseRequest, doo
     body, run = _body(session, wish)
     pose = _fitting(body, wish.pose)
 
-    def work(report: Report, cancelled: Any) -> dict[str, Any]:  # noqa: ANN401
+    def work(job: Job) -> dict[str, object]:
         found = better_pose(
-            session, wish.frame, pose, run=run, seed=wish.seed, progress=report, cancelled=cancelled
+            session,
+            wish.frame,
+            pose,
+            run=run,
+            seed=wish.seed,
+            progress=job.report,
+            cancelled=job.cancelled,
         )
         return {
             "pose": found.pose.tolist(),
@@ -93,7 +101,7 @@ async def begin_refining_pose(session: OpenSession, wish: BetterPoseRequest, doo
             "overlap": found.overlap,
         }
 
-    return begin_job(doors, "pose", session.name, "" if run is None else run.name, work)
+    return begin_job(doors, "pose", session, run, work)
 
 
 @router.get("/scene/edit")
@@ -149,7 +157,9 @@ def _fitting(body: BodyModel, pose: list[float]) -> Array:
     return np.array(pose)
 
 
-def _view(body: BodyModel, pose: Array, *, stored: bool = False, left_mm: float | None = None) -> PoseView:
+def _view(
+    body: BodyModel, pose: Array, *, stored: bool = False, frame: int = 0, left_mm: float | None = None
+) -> PoseView:
     dragger = Dragger(body)
     places = dragger.points(pose)
     grips = [
@@ -162,6 +172,7 @@ def _view(body: BodyModel, pose: Array, *, stored: bool = False, left_mm: float 
         pose=pose.tolist(),
         grips=grips,
         stored=stored,
+        frame=frame,
         left_mm=left_mm,
         has_sides=_has_sides(body),
     )

@@ -1,9 +1,6 @@
 """The person in front of the cameras: by height, and fitted to the footage in the background (`subject` events)."""
 
 import asyncio
-import secrets
-import threading
-import time
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Response
@@ -11,22 +8,22 @@ from fastapi import APIRouter, Depends, Query, Response
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.body.subject import Subject
-from studio.errors import NotFoundError, StudioError
+from studio.errors import NotFoundError
 from studio.runs.overlay_drawing import encode_jpeg
 from studio.runs.overlay_pictures import compose_view, forget_composers
 from studio.runs.subject_choice import body_of_choice, choose_subject, keep_fitted
 from studio.runs.subject_fitting import FitRequest, FittedSubject, fit_session_subject
 from studio.sessions.made_from import origin_of
-from studio.sessions.session import SUBJECT_NAME, Session
+from studio.sessions.session import SUBJECT_NAME
+from studio.web.background_jobs import Job
 from studio.web.doors import Doors, doors_of
-from studio.web.error_responses import UnforeseenError, log
+from studio.web.job_kinds import SUBJECT
 from studio.web.picture_routes import Height
 from studio.web.session_routes import OpenSession
 from studio.web.subject_schemas import (
     FitSubjectRequest,
     FitSubjectState,
     LimbDrawing,
-    SizeLine,
     SubjectAnswer,
     SubjectRequest,
 )
@@ -34,8 +31,6 @@ from studio.web.subject_schemas import (
 router = APIRouter(prefix="/api", tags=["subject"])
 
 Door = Annotated[Doors, Depends(doors_of)]
-
-KEPT = 50
 
 
 @router.get("/sessions/{session}/subject")
@@ -83,34 +78,42 @@ def set_subject(session: OpenSession, wish: SubjectRequest, doors: Door) -> Subj
 async def begin_fit(session: OpenSession, wish: FitSubjectRequest, doors: Door) -> FitSubjectState:
     """Begin to fit lengths and radii. Ask for its state, or wait for `subject` events."""
     await asyncio.to_thread(session.body, wish.body)
-    state = FitSubjectState(identifier=secrets.token_hex(8), session=session.name, state="running")
-    doors.subject_fits[state.identifier] = state
-    doors.stops[state.identifier] = threading.Event()
-    while len(doors.subject_fits) > KEPT:
-        doors.subject_fits.pop(next(iter(doors.subject_fits)))
-    job = asyncio.create_task(asyncio.to_thread(_fit, doors, state.identifier, session, wish))
-    doors.jobs.add(job)
-    job.add_done_callback(doors.jobs.discard)
-    return state
+    request = FitRequest(
+        frames=tuple(wish.frames),
+        count=wish.count,
+        symmetric=wish.symmetric,
+        lengths=wish.lengths,
+        radii=wish.radii,
+        run=wish.run or "",
+        body=wish.body or "",
+        height_mm=wish.height_mm,
+        seed=wish.seed,
+    )
+
+    def work(job: Job) -> dict[str, object]:
+        found = fit_session_subject(session, request, progress=job.report, cancelled=job.cancelled)
+        place = keep_fitted(session, found).name if wish.keep else ""
+        forget_composers()
+        job.found = found
+        return {"file": place, **_answer(found)}
+
+    return doors.jobs.begin(SUBJECT, FitSubjectState(session=session.name), work)
 
 
 @router.get("/subject-fits/{identifier}")
 def fit_state(identifier: str, doors: Door) -> FitSubjectState:
     """How a fit stands, and what it found: each length before and after."""
-    state = doors.subject_fits.get(identifier)
-    if state is None:
-        raise NotFoundError(f"There is no fit '{identifier[:40]}'.", "Begin a new one.")
-    return state
+    return doors.jobs.state(SUBJECT, identifier)
 
 
 @router.post("/subject-fits/{identifier}/keep")
 def keep_fit(identifier: str, doors: Door) -> FitSubjectState:
     """Keep what a fit found as the session's subject; the old one stays beside it."""
     found = _found(identifier, doors)
-    state = doors.subject_fits[identifier]
+    state = doors.jobs.state(SUBJECT, identifier)
     place = keep_fitted(doors.workspace.session(state.session), found)
     forget_composers()
-    doors.subject_fits[identifier] = state = state.model_copy(update={"file": place.name})
+    state = doors.jobs.change(SUBJECT, identifier, file=place.name)
     doors.events.publish({"type": "sessions", "session": state.session, "run": ""})
     return state
 
@@ -122,7 +125,7 @@ def fitted_picture(identifier: str, frame: int, camera: str, doors: Door, height
     if frame not in found.frames:
         listed = ", ".join(map(str, found.frames))
         raise NotFoundError(f"Frame {frame} was not looked at in this fit.", f"These were: {listed}.")
-    session = doors.workspace.session(doors.subject_fits[identifier].session)
+    session = doors.workspace.session(fit_state(identifier, doors).session)
     pose = found.poses[found.frames.index(frame)]
     picture = compose_view(
         session, None, frame, camera, ("outline", "mask"), pose, height=height, body=found.body
@@ -133,70 +136,16 @@ def fitted_picture(identifier: str, frame: int, camera: str, doors: Door, height
 @router.delete("/subject-fits/{identifier}", status_code=202)
 def cancel_fit(identifier: str, doors: Door) -> FitSubjectState:
     """Stop a fit; nothing of it is kept."""
-    state = fit_state(identifier, doors)
-    if identifier in doors.stops:
-        doors.stops[identifier].set()
-    return state
-
-
-def _fit(doors: Doors, identifier: str, session: Session, wish: FitSubjectRequest) -> None:
-    """Fit in this thread, keeping the state up to date; never raises."""
-    stop, begun = doors.stops[identifier], time.monotonic()
-    last_step, step_begun = "", begun
-
-    def tell(**changes: object) -> None:
-        state = doors.subject_fits.get(identifier)
-        if state is not None:
-            doors.subject_fits[identifier] = state = state.model_copy(update=changes)
-            message: dict[str, object] = {"type": "subject", "session": session.name, "run": ""}
-            doors.events.publish(message | state.model_dump())
-
-    def progress(step: str, done: int, total: int) -> None:
-        nonlocal last_step, step_begun
-        now = time.monotonic()
-        if step != last_step:
-            last_step, step_begun = step, now
-        left = (now - step_begun) / done * (total - done) if done else None
-        tell(step=step, done=done, total=total, seconds_left=left)
-
-    try:
-        request = FitRequest(
-            frames=tuple(wish.frames),
-            count=wish.count,
-            symmetric=wish.symmetric,
-            lengths=wish.lengths,
-            radii=wish.radii,
-            run=wish.run or "",
-            body=wish.body or "",
-            height_mm=wish.height_mm,
-            seed=wish.seed,
-        )
-        found = fit_session_subject(session, request, progress=progress, cancelled=stop.is_set)
-        place = keep_fitted(session, found).name if wish.keep else ""
-    except StudioError as error:
-        tell(state="failed", code=error.code, message=error.message, hint=error.hint)
-        return
-    except Exception as error:
-        log.exception("fitting the subject of '%s' failed", session.name)
-        wrong = UnforeseenError(f"The fit failed: {type(error).__name__}.", f"See '{doors.log_path}'.")
-        tell(state="failed", code=wrong.code, message=wrong.message, hint=wrong.hint)
-        return
-    finally:
-        doors.stops.pop(identifier, None)
-    doors.fitted_subjects[identifier] = found
-    while len(doors.fitted_subjects) > KEPT:
-        doors.fitted_subjects.pop(next(iter(doors.fitted_subjects)))
-    forget_composers()
-    tell(state="done", file=place, seconds_left=0.0, **_answer(found))
-    doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
+    return doors.jobs.cancel(SUBJECT, identifier)
 
 
 def _found(identifier: str, doors: Doors) -> FittedSubject:
     """What a fit found. Raises NotFoundError."""
-    state = fit_state(identifier, doors)
-    if identifier not in doors.fitted_subjects:
-        raise NotFoundError(f"This fit found no subject: it is {state.state}.", "Begin a new one.")
-    return doors.fitted_subjects[identifier]
+    found = doors.jobs.found(SUBJECT, identifier)
+    if not isinstance(found, FittedSubject):
+        state = doors.jobs.state(SUBJECT, identifier).state
+        raise NotFoundError(f"This fit found no subject: it is {state}.", "Begin a new one.")
+    return found
 
 
 def limb_drawings(body: BodyModel) -> list[LimbDrawing]:
@@ -224,7 +173,7 @@ def _answer(found: FittedSubject) -> dict[str, object]:
         "body": found.body.name,
         "frames": list(found.frames),
         "poses_from": found.poses_from,
-        "sizes": [SizeLine.model_validate(size) for size in found.sizes],
+        "sizes": list(found.sizes),
         "overlap_before": found.overlap_before.tolist(),
         "overlap": found.overlap.tolist(),
         "limbs": limb_drawings(found.body),

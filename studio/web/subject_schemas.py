@@ -4,6 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from studio.web.job_schemas import NumberedJob
 from studio.web.schemas import Answer, Number, Numbers, Request, RunName
 
 
@@ -70,21 +71,11 @@ class SizeLine(Answer):
     deviation: Number
 
 
-class FitSubjectState(Answer):
-    """How a fit stands; code, message and hint say why it failed. overlap: f_s of each frame's silhouettes.
+class FitSubjectState(NumberedJob):
+    """How a fit stands. overlap: f_s of each frame's silhouettes.
     limbs: of the body that was found. file: what it was kept as, "" where it is not.
     """
 
-    identifier: str
-    session: str
-    state: Literal["running", "done", "failed"]
-    step: str = ""
-    done: int = 0
-    total: int = 0
-    seconds_left: Number = None
-    code: str = ""
-    message: str = ""
-    hint: str = ""
     body: str = ""
     frames: list[int] = Field(default_factory=list)
     poses_from: str = ""

@@ -1,14 +1,13 @@
 """Tracks of a run: listed, made in the background with progress as `track` events, downloaded; runs corrected."""
 
 import asyncio
-from collections.abc import Callable
 from typing import Annotated, Any
 
 import numpy as np
 from fastapi import APIRouter, Depends, Response
 
 from studio.capture.trc import read_trc
-from studio.errors import NotFoundError, SettingsError
+from studio.errors import SettingsError
 from studio.evaluation.errors import evaluate
 from studio.knobs import changed, knobs_of
 from studio.runs.correcting import prepare_correction, track_backwards
@@ -27,11 +26,13 @@ from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.tracking.refinement import RefinementSettings
 from studio.tracking.smoothing import SmoothingSettings
+from studio.web.background_jobs import Job
 from studio.web.doors import Doors, doors_of
+from studio.web.job_kinds import TRACK
 from studio.web.run_routes import RUN, OpenRun
 from studio.web.session_routes import OpenSession
 from studio.web.setting_views import knob_view
-from studio.web.track_jobs import Report, begin_job
+from studio.web.track_jobs import begin_job
 from studio.web.track_schemas import (
     CorrectionRequest,
     MakeTrackRequest,
@@ -49,11 +50,7 @@ Door = Annotated[Doors, Depends(doors_of)]
 def tracks(session: OpenSession, run: OpenRun, doors: Door) -> TrackList:
     """The run's tracks with how much they jitter and, where there is a truth, how far off they are."""
     lines = [_line(session, run, name) for name in track_names(run)]
-    going = [
-        state
-        for state in doors.track_jobs.values()
-        if (state.session, state.run, state.state) == (session.name, run.name, "running")
-    ]
+    going = [state for state in doors.jobs.running(TRACK, session.name) if state.run == run.name]
     return TrackList(
         tracks=lines,
         running=going,
@@ -83,7 +80,7 @@ async def begin_refining(
     source, into = wish.source or RAW, wish.into or REFINED
     check_making(run, source, into, wish.replace)
 
-    def work(report: Report, cancelled: Callable[[], bool]) -> dict[str, Any]:
+    def work(job: Job) -> dict[str, Any]:
         return _answer(
             refine_run(
                 session,
@@ -92,12 +89,12 @@ async def begin_refining(
                 into=into,
                 settings=settings,
                 replace=wish.replace,
-                progress=report,
-                cancelled=cancelled,
+                progress=job.report,
+                cancelled=job.cancelled,
             )
         )
 
-    return begin_job(doors, "refine", session.name, run.name, work)
+    return begin_job(doors, "refine", session, run, work)
 
 
 @router.post(RUN + "/smooth", status_code=202)
@@ -109,10 +106,10 @@ async def begin_smoothing(
     source, into = wish.source or "", wish.into or SMOOTHED
     check_making(run, source, into, wish.replace)
 
-    def work(_report: Report, _cancelled: Callable[[], bool]) -> dict[str, Any]:
+    def work(_job: Job) -> dict[str, Any]:
         return _answer(smooth_run(run, source=source, into=into, settings=settings, replace=wish.replace))
 
-    return begin_job(doors, "smooth", session.name, run.name, work)
+    return begin_job(doors, "smooth", session, run, work)
 
 
 @router.post(RUN + "/correct", status_code=202)
@@ -128,31 +125,29 @@ async def begin_correction(
     )  # fmt: skip
     doors.events.publish({"type": "sessions", "session": session.name, "run": made.name})
 
-    def work(report: Report, cancelled: Callable[[], bool]) -> dict[str, Any]:
+    def work(job: Job) -> dict[str, Any]:
         if wish.back_to is not None:
-            moved = track_backwards(session, made, report, cancelled)
-            return {"made_run": made.name, "moved": moved, "state": "cancelled" if cancelled() else "done"}
+            moved = track_backwards(session, made, job.report, job.cancelled)
+            return {
+                "made_run": made.name,
+                "moved": moved,
+                "state": "cancelled" if job.cancelled() else "done",
+            }
         return {"made_run": made.name}
 
-    return begin_job(doors, "correct", session.name, run.name, work)
+    return begin_job(doors, "correct", session, run, work)
 
 
 @router.get("/track-jobs/{identifier}")
 def track_job(identifier: str, doors: Door) -> TrackJobState:
     """How refining, smoothing or correcting stands."""
-    state = doors.track_jobs.get(identifier)
-    if state is None:
-        raise NotFoundError(f"Nothing is being made under '{identifier[:40]}'.", "Begin a new one.")
-    return state
+    return doors.jobs.state(TRACK, identifier)
 
 
 @router.delete("/track-jobs/{identifier}", status_code=202)
 def cancel_track_job(identifier: str, doors: Door) -> TrackJobState:
     """Stop it. Of a refinement nothing is kept, of a way back what it has reached."""
-    state = track_job(identifier, doors)
-    if identifier in doors.stops:
-        doors.stops[identifier].set()
-    return state
+    return doors.jobs.cancel(TRACK, identifier)
 
 
 def _line(session: Session, run: StoredRun, name: str) -> TrackLine:

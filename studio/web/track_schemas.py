@@ -4,8 +4,11 @@ from typing import Literal
 
 from pydantic import Field
 
+from studio.web.job_schemas import NumberedJob
 from studio.web.schemas import Answer, Number, Request, RunName, Value
 from studio.web.setting_schemas import KnobView
+
+Verb = Literal["refine", "smooth", "correct", "pose", "check"]
 
 
 class TrackLine(Answer):
@@ -56,25 +59,15 @@ class CorrectionRequest(Request):
     name: RunName | None = Field(None, description="Of the corrected run; null: numbered.")
 
 
-class TrackJobState(Answer):
-    """How refining, smoothing or correcting stands; code, message and hint say why it failed.
+class TrackJobState(NumberedJob):
+    """How refining, smoothing or correcting stands.
 
     made_run: the corrected run. track: the track that is made. pose, gain, overlap_before, overlap: of a search around
     a pose (verb pose; run is "" where it is the session's).
     """
 
-    identifier: str
-    verb: Literal["refine", "smooth", "correct", "pose", "check"]
-    session: str
+    verb: Verb
     run: str
-    state: Literal["running", "done", "failed", "cancelled"]
-    step: str = ""
-    done: int = 0
-    total: int = 0
-    seconds_left: Number = None
-    code: str = ""
-    message: str = ""
-    hint: str = ""
     track: str = ""
     made_run: str = ""
     jitter_before_mm: Number = None

@@ -13,6 +13,7 @@ from studio.sessions.beginning import begin_session
 from studio.sessions.session import Session
 from studio.tracking.evaluations import knobs_for_evaluations
 from studio.web.doors import Doors, doors_of
+from studio.web.job_kinds import BACKGROUND, EXPORT, START_POSE, SUBJECT, TRACK
 from studio.web.page_routes import assets_folder
 from studio.web.schemas import NewName
 from studio.web.session_routes import OpenSession
@@ -55,17 +56,16 @@ async def way(session: OpenSession, doors: Door) -> WayAnswer:
 def running_steps(doors: Doors, session: Session) -> dict[str, str]:
     """Steps whose job is under way in this server, with how far it is, in words."""
     jobs = {
-        "subject": doors.subject_fits.values(),
-        "start-pose": doors.initialisations.values(),
-        "background": doors.background_setups.values(),
-        "check": doors.track_jobs.values(),
-        "export": doors.exports.values(),
+        "subject": SUBJECT,
+        "start-pose": START_POSE,
+        "background": BACKGROUND,
+        "check": TRACK,
+        "export": EXPORT,
     }
     return {
         step: state.step or "beginning"
-        for step, states in jobs.items()
-        for state in states
-        if state.session == session.name and state.state == "running"
+        for step, kind in jobs.items()
+        for state in doors.jobs.running(kind, session.name)
     }
 
 

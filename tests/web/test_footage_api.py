@@ -129,7 +129,7 @@ def test_an_estimate_can_be_stopped(studio: Studio, monkeypatch: pytest.MonkeyPa
     studio.client.delete(SYNCHRONY)
     stopped.set()
     told = ended(studio)
-    assert (told["state"], told["code"]) == ("failed", "cancelled")
+    assert (told["state"], told["code"]) == ("cancelled", "cancelled")
 
 
 def test_an_import_puts_cameras_in_step_and_says_whose_layout_it_was(studio: Studio, source: Path) -> None:

@@ -201,7 +201,7 @@ def test_an_import_can_be_cancelled(studio: Studio, source: Path, monkeypatch: p
     ]
     assert studio.client.delete(f"/api/imports/{identifier}").status_code == 202
     told = finished(studio, identifier)
-    assert told["state"] == "failed"
+    assert told["state"] == "cancelled"
     assert "cancelled" in told["message"]
     assert not (studio.workspace.root / "x").exists()
 

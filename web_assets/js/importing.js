@@ -12,8 +12,8 @@ const POLL_MILLISECONDS = 400;
 async function watchImport(identifier, report) {
   for (;;) {
     const told = await fetchJson(`/api/imports/${identifier}`);
-    if (told.state === "failed") throw Object.assign(new Error(told.message), { hint: told.hint });
     if (told.state === "done") return told;
+    if (told.state !== "running") throw Object.assign(new Error(told.message), { hint: told.hint });
     report(told.total ? `${told.step} ${Math.round((100 * told.done) / told.total)} %` : told.step || "Importing…");
     await new Promise((resolve) => setTimeout(resolve, POLL_MILLISECONDS));
   }

@@ -17,8 +17,8 @@ export async function findStartPose(session, wish, report) {
   try {
     for (;;) {
       const told = await fetchJson(`/api/initialisations/${identifier}`);
-      if (told.state === "failed") throw Object.assign(new Error(told.message), { hint: told.hint });
       if (told.state === "done") return told;
+      if (told.state !== "running") throw Object.assign(new Error(told.message), { hint: told.hint });
       report(told.total > 1 ? `Finding the pose ${Math.round((100 * told.done) / told.total)} %` : "Looking…");
       await new Promise((resolve) => setTimeout(resolve, POLL_MILLISECONDS));
     }

@@ -73,8 +73,8 @@ export function adder(place, way, done) {
   async function watchTaking(identifier) {
     while (!state.stopped) {
       const told = await fetchJson(`/api/imports/${identifier}`);
-      if (told.state === "failed") throw Object.assign(new Error(told.message), { hint: told.hint, code: told.code });
       if (told.state === "done") return told;
+      if (told.state !== "running") throw Object.assign(new Error(told.message), { hint: told.hint, code: told.code });
       const share = told.total ? told.done / told.total : 0;
       way.progress(going, { words: `${told.step || "beginning"}${told.total ? ` · ${Math.round(100 * share)} %` : ""}`, share, cancel: () => remove(`/api/imports/${identifier}`).catch(complain) });
       await new Promise((resolve) => setTimeout(resolve, POLL_MILLISECONDS));

@@ -13,10 +13,9 @@ const percent = (share) => `${Math.round(100 * share)} %`;
 export function mount(place, way) {
   const { fetchJson, post, put, remove, sessionPath } = way.api;
   const here = sessionPath(way.session);
-  const remembered = `start-pose-frame ${way.session}`;
   const last = Math.max(0, (way.detail.frame_count ?? 1) - 1);
   const state = {
-    told: null, frame: Math.min(last, Number(localStorage.getItem(remembered) ?? 0)), found: null, better: null,
+    told: null, frame: Math.min(last, way.detail.start_pose_frame ?? 0), found: null, better: null,
     failed: null, editing: false, begun: false, going: false, gone: false, age: 0, timer: 0,
   };
   const steps = element("section", { className: "start-pose-make" });
@@ -36,7 +35,7 @@ export function mount(place, way) {
         const told = await fetchJson(`${path}/${begun.identifier}`);
         if (told.state === "done") return told;
         if (told.state !== "running") {
-          if (stopped || told.code === "cancelled") return null;
+          if (stopped || told.state === "cancelled") return null;
           throw Object.assign(new Error(told.message), { hint: told.hint });
         }
         way.progress(progress, { words: told.step || words, share: told.total ? told.done / told.total : null, cancel });
@@ -71,7 +70,7 @@ export function mount(place, way) {
     if (better.gain > 0) await keep(better.pose);
   });
 
-  const keep = (pose) => put(`${here}/start-pose`, { pose });
+  const keep = (pose) => put(`${here}/start-pose`, { pose, frame: state.frame });
   const exchange = (how) => during(async () => { await keep((await post(`${here}/pose/mirror`, { pose: state.told.pose, how })).pose); state.found = null; });
 
   async function edit() {
@@ -108,7 +107,7 @@ export function mount(place, way) {
     number.onchange = () => {
       if (!number.checkValidity() || number.value === "") return;
       state.frame = Number(number.value);
-      localStorage.setItem(remembered, state.frame);
+      drawCheck();
       pictures();
     };
     const busy = state.going || state.editing;
@@ -117,11 +116,16 @@ export function mount(place, way) {
     for (const one of [automatic, byHand]) one.disabled = busy;
     steps.replaceChildren(
       element("label", {}, "In frame", number),
-      element("p", { className: "hint", textContent: "The frame in which tracking begins: the whole person in view, arms off the trunk if you can choose." }),
+      element("p", { className: "hint", textContent: "The frame in which tracking begins: the whole person in view, arms off the trunk if you can choose. Frames before it can be tracked backwards from it." }),
       ...(state.editing ? [editing()] : [element("div", { className: "step-actions" }, automatic, byHand)]),
       state.failed ? element("p", { className: "wrong", role: "alert" }, state.failed.message, element("span", { className: "hint", textContent: ` ${state.failed.hint ?? ""}` })) : "");
-    check.replaceChildren(...(stored && !state.editing ? [verdict(), ...mending(busy)] : []));
+    drawCheck();
     if (!state.editing) pictures();
+  }
+
+  function drawCheck() {
+    const shown = state.told?.stored && !state.editing;
+    check.replaceChildren(...(shown ? [verdict(), ...mending(state.going)] : []));
   }
 
   const editing = () => element("div", { className: "step-place" },
@@ -136,12 +140,17 @@ export function mount(place, way) {
       ? `Made better: overlap with the masks ${percent(state.better.overlap_before)} → ${percent(state.better.overlap)}.`
       : "The search found nothing better around it.");
     const unsure = state.found && state.found.confidence < UNSURE;
-    const line = element("p", { className: unsure ? "notice" : "" , textContent: words.join(" ") || "The session has a start pose." });
+    const line = element("p", { className: unsure ? "notice" : "" , textContent: words.join(" ") || `The session has a start pose, of frame ${state.told.frame}.` });
     const doubt = unsure ? element("p", { className: "notice", textContent: "It may face the other way: look at left and right before you track." }) : "";
     return element("div", { className: "start-pose-verdict" }, line, doubt, state.found?.note ? element("p", { className: "hint", textContent: state.found.note }) : "");
   }
 
   function mending(busy) {
+    if (state.frame !== state.told.frame) {
+      const back = button(`Look at frame ${state.told.frame}`, () => { state.frame = state.told.frame; draw(); }, "small");
+      const kept = `The start pose is of frame ${state.told.frame}, where tracking begins. To begin in frame ${state.frame}, find or edit it here.`;
+      return [element("p", { className: "notice", textContent: kept }), element("div", { className: "step-actions" }, back)];
+    }
     const swatch = (side) => element("i", { className: `side-swatch ${side}` });
     const line = element("p", { className: "side-check" }, swatch("left"), "the person's left, ", swatch("right"), "the person's right. Is it so in every picture?");
     const actions = [

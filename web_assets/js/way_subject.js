@@ -98,7 +98,7 @@ export function mount(place, way) {
       element("div", { className: "fit-boxes" }, box("symmetric", "left and right alike", "Off: each side has its own lengths, which needs more frames."), box("lengths", "lengths", "Of limbs"), box("radii", "radii", "Of limbs")),
       !going && element("div", { className: "step-actions" }, begin),
       element("div", { className: "going" }),
-      state.fit?.state === "failed" && state.fit.code !== "cancelled" && wrong(state.fit),
+      state.fit?.state === "failed" && wrong(state.fit),
       found && results(),
     ].filter(Boolean));
     if (going) drawGoing();

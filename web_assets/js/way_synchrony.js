@@ -46,7 +46,7 @@ export function synchroniser(place, way, { offered }) {
     apply.hidden = true;
     const times = element("input", { type: "file", accept: ".csv", hidden: true });
     times.onchange = () => readTimes(times.files[0]).catch(complain);
-    const failed = state.estimate?.state === "failed" && state.estimate.code !== "cancelled";
+    const failed = state.estimate?.state === "failed";
     place.replaceChildren(...[
       element("h2", { textContent: "In step" }),
       element("p", { className: "hint", textContent: "The frame of each camera's file that was taken with frame 0 of the others." }),
