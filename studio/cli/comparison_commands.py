@@ -114,6 +114,7 @@ def compare(
     """
     opened = Workspace().resolve(session)
     first, last = frame_range(frames)
+    first = opened.start_pose_frame() if first is None else first
     names = tuple(one.strip() for one in trackers.split(",") if one.strip())
     lineup = Lineup(names, weighting or "", evaluations, layers, read_assignments(assignments))
     plan = plan_comparison(

@@ -14,7 +14,7 @@ from studio.cli.output import command, note, progress
 from studio.errors import RunError, SettingsError
 from studio.knobs import allowed
 from studio.runs.new_run import RunRequest, prepare_run
-from studio.runs.start_pose_file import start_pose_from_file
+from studio.runs.start_pose_file import frame_of_file, start_pose_from_file
 from studio.sessions.session import START_POSE_NAME, Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
@@ -63,7 +63,12 @@ def knob_options(function: Callable[..., object]) -> Callable[..., object]:
     help="Behaviour model, by name or file, for tracker behaviour or --set prediction=behaviour.",
 )
 @knob_options
-@click.option("--frames", metavar="A:B", default=":", help="Half open, from 0; default: all.")
+@click.option(
+    "--frames",
+    metavar="A:B",
+    default=":",
+    help="Half open, from 0; default: from the frame of the start pose to the end.",
+)
 @click.option("--seed", type=int, default=0, show_default=True, help="The same seed gives the same run.")
 @click.option(
     "--set", "changes", multiple=True, metavar="KNOB=VALUE", help="Any other knob; the guide lists them."
@@ -138,8 +143,9 @@ def _with_start_pose(request: RunRequest, session: Session, path: Path | None) -
     if path is None:
         return request
     scaled = session.body(request.body or None, request.subject)
-    pose, source = start_pose_from_file(path, scaled, request.first, session.manifest.fps)
-    return dataclasses.replace(request, start_pose=pose, start_source=source)
+    first = frame_of_file(path) if request.first is None else request.first
+    pose, source = start_pose_from_file(path, scaled, first, session.manifest.fps)
+    return dataclasses.replace(request, first=first, start_pose=pose, start_source=source)
 
 
 def _prepared(session: Session, request: RunRequest) -> StoredRun:

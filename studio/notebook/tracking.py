@@ -15,7 +15,7 @@ from studio.runs.correcting import prepare_correction, track_backwards
 from studio.runs.initialising import InitialPose
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.refining import REFINED, SMOOTHED, MadeTrack, refine_run, smooth_run
-from studio.runs.start_pose_file import start_pose_from_file
+from studio.runs.start_pose_file import frame_of_file, start_pose_from_file
 from studio.runs.tracks import RAW, pose_in_track, read_track
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -37,7 +37,7 @@ def track(
     subject: Subject | str | Path | None = None,
     start_pose: StartPose | None = None,
     behaviour: str = "",
-    first: int = 0,
+    first: int | None = None,
     last: int | None = None,
     seed: int = 0,
     name: str = "",
@@ -46,12 +46,14 @@ def track(
 ) -> Tracked:
     """Track a session and store the run; the same seed gives the same run.
 
-    tracker, weighting, body : names, the session's own by default. last : the frame after the last. knobs : any, by
+    tracker, weighting, body : names, the session's own by default. first : default the frame that the start pose is of;
+    last : the frame after the last. knobs : any, by
     name. Interrupted, what was tracked stays, and `go_on` goes on with it. Raises StudioError.
     """
     opened = open_session(session)
     measures = subject if isinstance(subject, Subject) or subject is None else read_subject(Path(subject))
-    pose, source = _start(opened, start_pose, body, measures, first)
+    first = _first(start_pose) if first is None else first
+    pose, source = _start(opened, start_pose, body, measures, first or 0)
     request = RunRequest(
         tracker=tracker,
         weighting=weighting,
@@ -148,6 +150,13 @@ def corrected_pose(run: StoredRun, frame: int, pose: StartPose | None, from_trac
     if isinstance(pose, str | Path):
         return start_pose_from_file(Path(pose), run.body(), frame, run.record.fps)
     return np.asarray(pose, dtype=np.float64), "given"
+
+
+def _first(pose: StartPose | None) -> int | None:
+    """The frame that a start pose is of; None for the session's own."""
+    if isinstance(pose, InitialPose):
+        return pose.frame
+    return frame_of_file(Path(pose)) if isinstance(pose, str | Path) else None if pose is None else 0
 
 
 def _start(

@@ -50,8 +50,9 @@ def prepare_correction(
     """Make the corrected run's folder; then track it (`worker.batch.track_to_end`), or call `track_backwards`.
 
     frame : one that the run has, or (forwards) the one after its last. pose : (D,) radians and mm, in that frame.
-    source : where it came from, in words. backwards_to : the last frame that is to be tracked backwards; None: forwards
-    to the run's end. Raises RunError, SessionError naming what is wrong; then nothing was made.
+    source : where it came from, in words. backwards_to : the last frame that is to be tracked backwards, which may lie
+    before the run's first (a run that began in the middle of its footage); None: forwards to the run's end.
+    Raises RunError, SessionError naming what is wrong; then nothing was made.
     """
     record, body = run.record, run.body()
     given = np.asarray(pose, dtype=np.float64)
@@ -73,6 +74,7 @@ def prepare_correction(
         corrected=frame,
         corrected_pose=tuple(within_limits(body, given).tolist()),
         backwards_to=backwards_to,
+        first=record.first if backwards_to is None else min(record.first, backwards_to),
         notes=(
             *record.notes,
             f"Run '{run.name}', frame {frame} corrected ({source}) and tracked {way} from it.",
@@ -143,12 +145,12 @@ def _check_frames(run: StoredRun, frame: int, backwards_to: int | None) -> None:
         )
     if backwards_to is None:
         return
-    if not record.first <= backwards_to < frame:
+    if not 0 <= backwards_to < frame:
         raise RunError(
-            f"The frames from {frame} back to {backwards_to} are not in run '{run.name}'.",
-            f"Go back to a frame from {record.first} to {frame - 1}.",
+            f"The frames from {frame} back to {backwards_to} are not in the footage of run '{run.name}'.",
+            f"Go back to a frame from 0 to {frame - 1}.",
         )
-    missing = sorted(set(range(backwards_to, frame + 1)) - set(frames))
+    missing = sorted(set(range(max(backwards_to, record.first), frame + 1)) - set(frames))
     if missing:
         raise RunError(
             f"Frame {missing[0]} of run '{run.name}' was dropped, so the run cannot be tracked back over it.",

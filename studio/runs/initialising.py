@@ -165,13 +165,13 @@ def keep_pose(session: Session, found: InitialPose, replace: bool = False) -> Pa
     if found.body == session.manifest.body and (replace or not own.exists()):
         if own.exists():
             own.rename(session.path / _free(f"{own.stem}-before", taken))
-        write_pose(own, found.names, found.pose)
+        write_pose(own, found.names, found.pose, found.frame)
         note(
             session, "start-pose", f"found in frame {found.frame}, confidence {100 * found.confidence:.0f} %"
         )
         return own
     place = session.path / _free(f"{own.stem}-frame-{found.frame}", taken)
-    write_pose(place, found.names, found.pose)
+    write_pose(place, found.names, found.pose, found.frame)
     return place
 
 

@@ -39,7 +39,8 @@ class RunRequest:
 
     tracker, weighting, body : names, "" for the session's own. subject : measures instead of the session's.
     start_pose : (D,) radians and mm, instead of the session's; start_source : where it came from, in words.
-    first, last : frames, half open; last None means all. changes : knobs by flat name. name : "" for run-1,
+    first, last : frames, half open; first None means the frame that the session's start pose is of (0 where none is
+    used, and live), last None all. changes : knobs by flat name. name : "" for run-1,
     run-2, … behaviour : a behaviour model, by its name in the workspace's models or by path; "" for the only one that
     fits where the settings need one. live : frames come on the footage's clock and are dropped where they come too
     fast (`live_run`). to_and_fro : a live run goes forth and back through the footage; `last` may lie behind its end.
@@ -51,7 +52,7 @@ class RunRequest:
     subject: Subject | None = None
     start_pose: Array | None = None
     start_source: str = ""
-    first: int = 0
+    first: int | None = None
     last: int | None = None
     seed: int = 0
     changes: Mapping[str, object] = field(default_factory=dict)
@@ -75,7 +76,10 @@ def prepare_run(
     changes = live_changes(asked.changes) if asked.live else asked.changes
     settings = session_settings(session, tracker, weighting, changes)
     check_live(settings, live=asked.live, to_and_fro=asked.to_and_fro)
-    first, last = checked_frames(session, asked.first, asked.last, endless=asked.to_and_fro)
+    own_start = asked.start_pose is None and not asked.live
+    first, last = checked_frames(
+        session, _first(session, asked, own_start), asked.last, endless=asked.to_and_fro
+    )
     if not 0 <= asked.seed < 2**63:
         raise RunError(f"The seed {asked.seed} cannot be used.", "Give a whole number of 0 or more.")
     body, notes = session.body_with_notes(asked.body or None, asked.subject)
@@ -83,6 +87,9 @@ def prepare_run(
     if behaviour is not None and behaviour.note:
         notes = (*notes, behaviour.note)
     start, source = start_pose(session, body, asked.start_pose, asked.start_source)
+    if own_start and start is not None and first != session.start_pose_frame():
+        of = session.start_pose_frame()
+        notes = (*notes, f"The run begins in frame {first}, the session's start pose is of frame {of}.")
     if start is None and not _limited(body):
         model = str(behaviour.path) if behaviour else ""
         found = _found(session, first, body, model, asked.seed, progress)
@@ -113,6 +120,20 @@ def prepare_run(
     )
     text = _body_text(session, asked.body or body.name)
     return session.new_run(record, text, behaviour.path if behaviour else None)
+
+
+def _first(session: Session, asked: RunRequest, own_start: bool) -> int:
+    """The frame that a run begins in. Raises RunError where it would end before its start pose."""
+    if asked.first is not None:
+        return asked.first
+    first = session.start_pose_frame() if own_start else 0
+    if first and asked.last is not None and asked.last <= first:
+        raise RunError(
+            f"The start pose of session '{session.name}' is of frame {first}, after the last frame wanted"
+            f" ({asked.last - 1}).",
+            "Name the first frame, too, or find a start pose in an earlier frame.",
+        )
+    return first
 
 
 def checked_frames(

@@ -13,7 +13,7 @@ from studio.capture.trc import read_trc
 from studio.errors import RunError, TruthError
 from studio.runs.search_space import parameter_names
 from studio.sessions.made_from import note
-from studio.sessions.named_rows import read_pose, write_pose
+from studio.sessions.named_rows import pose_frame, read_pose, write_pose
 from studio.sessions.names import free_name
 from studio.sessions.session import START_POSE_NAME, Session
 
@@ -22,9 +22,12 @@ Array = NDArray[np.float64]
 FEWEST_MARKERS = 4
 
 
-def keep_start_pose(session: Session, body: BodyModel, pose: Array) -> Path:
+def keep_start_pose(session: Session, body: BodyModel, pose: Array, frame: int | None = None) -> Path:
     """Make a pose (D,) the session's start pose; returns the file. The one it had stays beside it as
-    start_pose-before.csv, numbered if there are more. Raises RunError for a pose of another body than the session's.
+    start_pose-before.csv, numbered if there are more.
+
+    frame : that it is of; None: the same as the one before. Raises RunError for a pose of another body than the
+    session's, or a frame that the footage does not have.
     """
     given = np.asarray(pose, dtype=np.float64)
     if body.name != session.manifest.body or given.shape != (len(body.parameters),):
@@ -34,13 +37,25 @@ def keep_start_pose(session: Session, body: BodyModel, pose: Array) -> Path:
         )
     if not np.isfinite(given).all():
         raise RunError("The pose holds numbers that are not finite.", "Give radians and mm.")
+    of = session.start_pose_frame() if frame is None else frame
+    if not 0 <= of < max(1, session.manifest.frame_count):
+        raise RunError(
+            f"The footage of session '{session.name}' has no frame {of}.",
+            f"It has frames 0 to {session.manifest.frame_count - 1}.",
+        )
     own = session.path / START_POSE_NAME
     if own.exists():
         taken = {path.stem for path in session.path.glob("*.csv")}
         own.rename(session.path / f"{free_name(f'{own.stem}-before', taken)}.csv")
-    write_pose(own, parameter_names(body), given)
-    note(session, "start-pose", "set by hand")
+    write_pose(own, parameter_names(body), given, of)
+    note(session, "start-pose", f"set by hand in frame {of}")
     return own
+
+
+def frame_of_file(path: Path) -> int:
+    """The frame that a file's start pose is of: what a CSV says, else 0. Raises BodyError."""
+    known = pose_frame(path) if path.is_file() and path.suffix.lower() != ".trc" else None
+    return known or 0
 
 
 def start_pose_from_file(path: Path, body: BodyModel, frame: int, fps: float) -> tuple[Array, str]:
@@ -55,7 +70,7 @@ def start_pose_from_file(path: Path, body: BodyModel, frame: int, fps: float) ->
             f"There is no start pose file '{path}'.", "Give a CSV with one row of parameters, or a TRC."
         )
     if path.suffix.lower() != ".trc":
-        return read_pose(path, parameter_names(body)), f"file {path.name}"
+        return read_pose(path, parameter_names(body), frame), f"file {path.name}"
     motion = read_trc(path)
     rows = np.rint((motion.times - motion.times[0]) * fps).astype(int)
     found = np.flatnonzero(rows == frame)

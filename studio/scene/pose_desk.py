@@ -205,7 +205,12 @@ class PoseDesk:
         keep_start_pose(self._opened.session, self._opened.body, self._edited.pose)
         self._edited.saved()
         self._show()
-        tell(self._server, "Start pose saved", "Runs that are started from now on begin with it.")
+        frame = self._opened.session.start_pose_frame()
+        tell(
+            self._server,
+            "Start pose saved",
+            f"Runs that are started from now on begin with it, in frame {frame}.",
+        )
 
     def _refine(self) -> None:
         if self._refining is not None:

@@ -2,7 +2,8 @@
 keep.
 
 Numbers are in radians and mm. `sigma.csv` has a leading column `fps`: the frame rate at which its standard
-deviations from one frame to the next were measured. Files of poses have a leading column `frame`.
+deviations from one frame to the next were measured. Files of poses have a leading column `frame`, and a start pose that
+is known to be of a frame has one, too.
 """
 
 import csv
@@ -40,9 +41,16 @@ def read_pose(path: Path, names: tuple[str, ...], frame: int | None = None) -> A
     return _ordered(path, header, row, names)
 
 
-def write_pose(path: Path, names: tuple[str, ...], pose: Array) -> None:
-    """Write one pose under its parameters' names, in one step. pose : (D,) radians and mm."""
-    write_text(path, _as_csv([list(names), [repr(float(value)) for value in pose]]))
+def pose_frame(path: Path) -> int | None:
+    """The frame that the (first) pose in a CSV file is of; None where the file does not say. Raises BodyError."""
+    header, rows = _read(path)
+    return int(rows[0][header.index(FRAME)]) if FRAME in header else None
+
+
+def write_pose(path: Path, names: tuple[str, ...], pose: Array, frame: int | None = None) -> None:
+    """Write one pose under its parameters' names, in one step. pose : (D,) radians and mm. frame : it is of."""
+    head, first = ([], []) if frame is None else ([FRAME], [str(frame)])
+    write_text(path, _as_csv([[*head, *names], [*first, *(repr(float(value)) for value in pose)]]))
 
 
 def read_sigma(path: Path, names: tuple[str, ...], fps: float) -> Array:

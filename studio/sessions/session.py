@@ -19,7 +19,7 @@ from studio.errors import NotFoundError, SessionError
 from studio.geometry.camera import Camera
 from studio.sessions import atomic_files
 from studio.sessions.manifest import SessionManifest, read_manifest, write_manifest
-from studio.sessions.named_rows import Array, read_pose, read_sigma
+from studio.sessions.named_rows import Array, pose_frame, read_pose, read_sigma
 from studio.sessions.names import checked_name, free_name, inside
 from studio.sessions.results_store import create_store
 from studio.sessions.run_record import BEHAVIOUR_NAME, CAMERAS_NAME, RunRecord, write_run_record
@@ -126,6 +126,14 @@ class Session:
             return None
         model = body or self.body()
         return within_limits(model, read_pose(path, _parameter_names(model)))
+
+    def start_pose_frame(self) -> int:
+        """The frame that the start pose is of, in which tracking begins unless told otherwise; 0 where nothing says so,
+        or the footage has no such frame any more. Raises BodyError.
+        """
+        path = self.path / START_POSE_NAME
+        frame = pose_frame(path) if path.exists() else None
+        return frame if frame is not None and 0 <= frame < self.manifest.frame_count else 0
 
     def sigma(self, fps: float | None = None, body: BodyModel | None = None) -> Array | None:
         """(D,) the session's own σ0 from frame to frame at `fps` (default: its own), None without one.

@@ -18,8 +18,8 @@ class GripView(Answer):
 class PoseView(Answer):
     """A pose of the session's body: radians and mm in the order of `parameters`.
 
-    stored: whether it is the session's start pose (else the rest pose). left_mm: after a drag, how far the limb's end
-    still is from where it was dragged.
+    stored: whether it is the session's start pose (else the rest pose); frame: that it is of. left_mm: after a drag, how
+    far the limb's end still is from where it was dragged.
     """
 
     body: str
@@ -27,14 +27,18 @@ class PoseView(Answer):
     pose: list[float]
     grips: list[GripView]
     stored: bool = False
+    frame: int = 0
     left_mm: Number = None
     has_sides: bool = Field(False, description="Whether it can be mirrored.")
 
 
 class StartPoseRequest(Request):
-    """The session's start pose from now on; the one it had stays beside it."""
+    """The session's start pose from now on; the one it had stays beside it. frame: that it is of, in which tracking
+    begins; null: as before.
+    """
 
     pose: list[float]
+    frame: int | None = Field(None, ge=0)
 
 
 class PoseRequest(Request):

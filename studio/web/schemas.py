@@ -170,6 +170,7 @@ class SessionDetail(Answer):
     has_truth: bool
     next_step: str = ""
     has_start_pose: bool
+    start_pose_frame: int = 0
     tracker: str
     weighting: str
     calibration_source: str
@@ -231,7 +232,7 @@ class RunRequest(Request):
     tracker: RunName | None = None
     weighting: RunName | None = None
     body: RunName | None = None
-    first: int = Field(0, ge=0)
+    first: int | None = Field(None, ge=0, description="null: the frame that the start pose is of.")
     last: int | None = Field(None, ge=1, description="Frame after the last one; null: all.")
     seed: int = Field(0, ge=0, le=2**63 - 1)
     settings: dict[str, Value] = {}

@@ -102,6 +102,7 @@ def session_detail(session: Session) -> SessionDetail:
             "has_truth": session.truth_path is not None,
             "next_step": next_step(len(sources), session.is_calibrated),
             "has_start_pose": session.start_pose(body) is not None,
+            "start_pose_frame": session.start_pose_frame(),
             "tracker": _tracker(session),
             "weighting": _weighting(session),
             "calibration_source": manifest.calibration_source,

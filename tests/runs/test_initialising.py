@@ -106,11 +106,12 @@ def test_the_session_gets_a_start_pose_once_and_nothing_is_lost(session_on_disk:
     first = keep_pose(session, found(session, 0))
     assert first.name == "start_pose.csv"
     assert session.start_pose() is not None
-    assert first.read_text().splitlines()[0] == ",".join(names)
+    assert first.read_text().splitlines()[0] == ",".join(("frame", *names))
     assert keep_pose(session, found(session, 5)).name == "start_pose-frame-5.csv"
     assert keep_pose(session, found(session, 5)).name == "start_pose-frame-5-2.csv"
     first.write_text("mine")
     assert keep_pose(session, found(session, 1), replace=True) == first
+    assert session.start_pose_frame() == 1
     assert (session.path / "start_pose-before.csv").read_text() == "mine"
     assert keep_pose(session, found(session, 1), replace=True) == first
     assert (session.path / "start_pose-before.csv").read_text() == "mine"

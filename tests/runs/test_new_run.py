@@ -3,11 +3,13 @@
 import msgspec
 import numpy as np
 import pytest
+from toy_session import FRAMES, true_poses
 
 from studio.body.subject import Subject
 from studio.errors import BodyError, RunError, SettingsError, StudioError
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.search_space import default_sigma, parameter_names
+from studio.runs.start_pose_file import keep_start_pose
 from studio.sessions.named_rows import write_pose, write_sigma
 from studio.sessions.session import Session, described_anew
 
@@ -83,3 +85,33 @@ def test_a_start_pose_of_another_body_is_refused(session_on_disk: Session) -> No
     write_pose(session_on_disk.path / "start_pose.csv", ("a", "b"), np.zeros(2))
     with pytest.raises(BodyError, match="lacks 4"):
         prepare_run(session_on_disk)
+
+
+def test_a_run_begins_in_the_frame_of_the_start_pose(session_on_disk: Session) -> None:
+    session, body = session_on_disk, session_on_disk.body()
+    assert session.start_pose_frame() == 0
+    keep_start_pose(session, body, true_poses()[3], 3)
+    assert session.start_pose_frame() == 3
+    run = prepare_run(session, RunRequest(name="usual"))
+    assert (run.record.first, run.record.last) == (3, FRAMES)
+    assert np.allclose(run.record.start_pose or (), true_poses()[3])
+    told = prepare_run(session, RunRequest(name="told", first=1, last=2))
+    assert (told.record.first, told.record.last) == (1, 2)
+    assert "begins in frame 1, the session's start pose is of frame 3" in told.record.notes[-1]
+    given = prepare_run(session, RunRequest(name="given", start_pose=true_poses()[0]))
+    assert given.record.first == 0
+    keep_start_pose(session, body, true_poses()[0])
+    assert session.start_pose_frame() == 3
+    with pytest.raises(RunError, match="is of frame 3, after the last frame wanted") as refusal:
+        prepare_run(session, RunRequest(last=2))
+    assert "first frame" in refusal.value.hint
+    with pytest.raises(RunError, match="has no frame 99"):
+        keep_start_pose(session, body, true_poses()[0], 99)
+
+
+def test_start_poses_of_older_sessions_are_of_frame_0(session_on_disk: Session) -> None:
+    names = tuple(entry.name for entry in session_on_disk.body().parameters)
+    write_pose(session_on_disk.path / "start_pose.csv", names, true_poses()[0])
+    assert prepare_run(session_on_disk).record.first == 0
+    write_pose(session_on_disk.path / "start_pose.csv", names, true_poses()[0], FRAMES + 3)
+    assert session_on_disk.start_pose_frame() == 0

@@ -50,7 +50,13 @@ def test_a_start_pose_is_kept_and_the_old_one_stays_beside_it(studio: Studio, to
     studio.client.put(path, json={"pose": [0.0] * 4})
     with (toy.path / "start_pose-before.csv").open() as file:
         rows = list(csv.reader(file))
-    assert [float(value) for value in rows[-1]] == pytest.approx(POSE)
+    assert rows[0][0] == "frame"
+    assert [float(value) for value in rows[-1][1:]] == pytest.approx(POSE)
+    assert studio.client.put(path, json={"pose": POSE, "frame": 2}).json()["frame"] == 2
+    assert studio.client.get(TOY).json()["start_pose_frame"] == 2
+    made = studio.client.post(f"{TOY}/runs", json={"name": "later"})
+    assert (made.status_code, made.json()["first"]) == (201, 2)
+    assert studio.client.put(path, json={"pose": POSE, "frame": 99}).status_code == 409
     refused = studio.client.put(path, json={"pose": [0.0]})
     assert refused.status_code == 422
     assert "4 finite numbers" in refused.json()["message"]

@@ -67,8 +67,8 @@ async function track(back) {
 /** Backwards to which frame: a field and its button. */
 function backwards() {
   const first = get("summary")?.frames[0]?.frame ?? 0;
-  if (frame <= first) return [];
-  const field = element("input", { type: "number", min: first, max: frame - 1, step: 1, value: first, ariaLabel: "Backwards to frame" });
+  if (frame <= 0) return [];
+  const field = element("input", { type: "number", min: 0, max: frame - 1, step: 1, value: first < frame ? first : 0, ariaLabel: "Backwards to frame" });
   return [button("Track backwards to", () => { if (field.reportValidity()) return track(Number(field.value)); return null; }, "small"), field];
 }
 

@@ -51,7 +51,7 @@ export async function newRunForm(entry, like = null) {
         { name: "body", label: "Body", choices: bodyChoices, value: "" }],
       [{ name: "prediction", label: "Prediction", choices: [{ value: NOISE, label: "by noise" }, { value: BEHAVIOUR, label: "by behaviour" }], value: NOISE },
         { name: "behaviour", label: "Behaviour model", choices: [{ value: "", label: behaviours.length ? "the only one that fits" : "none learnt yet" }, ...behaviours.map(modelChoice)], value: "" }],
-      [{ name: "first", label: "First frame", kind: "number", min: 0, max: entry.frame_count - 1, value: 0 },
+      [{ name: "first", label: "First frame", kind: "number", min: 0, max: entry.frame_count - 1, value: detail.start_pose_frame ?? 0 },
         { name: "last", label: "Last frame", kind: "number", min: 0, max: entry.frame_count - 1, value: entry.frame_count - 1 }],
       [{ name: "seed", label: "Seed", kind: "number", min: 0, value: like ? like.seed + 1 : 0, hint: "The same seed gives the same run." },
         { name: "name", label: "Name", value: "", placeholder: "numbered", pattern: "[A-Za-z0-9_\\-]{0,64}" }],

@@ -10,13 +10,13 @@ const EFFORTS = [[1000, "quick · 1000 poses a frame"], [2000, "usual · 2000 po
 const BUSY = ["tracking", "compiling", "reannealing"];
 
 export function mount(place, way) {
-  const { fetchJson, post, runPath, sessionPath } = way.api;
+  const { fetchJson, post, remove, runPath, sessionPath } = way.api;
   const here = sessionPath(way.session);
   const status = element("section", { className: "track-status" });
   const form = element("form", { className: "footage-form" });
   const fold = element("details", {}, element("summary", { textContent: "Track anew" }), form);
   place.append(status, fold);
-  const state = { runs: way.detail.runs, work: null, frame: null, stopped: false, timer: 0, shownAt: 0, failed: null };
+  const state = { runs: way.detail.runs, work: null, job: null, frame: null, stopped: false, timer: 0, shownAt: 0, failed: null };
   const wall = viewWall(way);
   const newest = () => state.runs[0] ?? null;
   const path = () => runPath(way.session, newest().name);
@@ -39,6 +39,12 @@ export function mount(place, way) {
       status.replaceChildren();
       return;
     }
+    if (state.job) {
+      const { done, total, seconds_left: left } = state.job;
+      const words = [`tracking backwards${total ? `, ${done} of ${total} frames` : ""}`, left > 2 ? `${duration(left)} left` : ""].filter(Boolean).join(" · ");
+      way.progress(status, { words, share: total ? done / total : 0, cancel: () => remove(`/api/track-jobs/${state.job.identifier}`).catch(complain) });
+      return;
+    }
     const complete = run.done >= run.last - run.first;
     const stale = way.step?.state === "stale";
     if (isBusy()) {
@@ -49,8 +55,10 @@ export function mount(place, way) {
     const words = `${run.name}: ${run.done} of ${run.last - run.first} frames, ${run.describe}${run.mean_mm !== null && run.mean_mm !== undefined ? `, ${run.mean_mm.toPrecision(3)} mm from the truth` : ""}.`;
     const failed = isHere() && ["failed", "lost"].includes(state.work.state) ? state.work : state.failed;
     const on = !complete && !stale ? button(run.done ? "Track on" : "Track", () => start(run.name), "primary") : null;
+    const before = run.done && run.first > 0 && !stale ? button("Track back to frame 0", goBack, complete ? "primary" : "") : null;
+    if (before) before.title = `The run begins in frame ${run.first}. The frames before it are tracked backwards from there, into a new run; ${run.name} stays.`;
     status.replaceChildren(...[element("p", { textContent: words }), failed && element("p", { className: "wrong", role: "alert" }, failed.message, element("span", { className: "hint", textContent: ` ${failed.hint ?? ""}` })),
-      element("div", { className: "step-actions" }, ...[on, element("a", { className: "download", href: `/?session=${encodeURIComponent(way.session)}&run=${encodeURIComponent(run.name)}`, textContent: "Open in the studio" })].filter(Boolean))].filter(Boolean));
+      element("div", { className: "step-actions" }, ...[on, before, element("a", { className: "download", href: `/?session=${encodeURIComponent(way.session)}&run=${encodeURIComponent(run.name)}`, textContent: "Open in the studio" })].filter(Boolean))].filter(Boolean));
     fold.open ||= stale;
   }
 
@@ -61,6 +69,35 @@ export function mount(place, way) {
       state.work = { session: way.session, run: name, state: "compiling", frame: 0, first: 0, last: 1, done: 0 };
     } catch (error) { state.failed = error; }
     drawStatus();
+  }
+
+  /** The frames before the first one, tracked backwards from it into a new run. */
+  async function goBack() {
+    const run = newest();
+    state.failed = null;
+    try {
+      state.job = await post(`${path()}/correct`, { frame: run.first, track: "raw", back_to: 0 });
+      followBack();
+    } catch (error) { state.failed = error; }
+    drawStatus();
+  }
+
+  async function followBack() {
+    while (!state.stopped && state.job?.state === "running") {
+      drawStatus();
+      await new Promise((resolve) => setTimeout(resolve, POLL_MILLISECONDS / 2));
+      if (state.stopped) return;
+      try { state.job = await fetchJson(`/api/track-jobs/${state.job.identifier}`); } catch (error) { state.job = { state: "failed", message: error.message, hint: error.hint }; }
+    }
+    const ended = state.job;
+    state.job = null;
+    if (state.stopped) return;
+    if (ended?.state === "failed") state.failed = ended;
+    state.frame = null;
+    await loadRuns().catch(complain);
+    drawStatus();
+    showNewest();
+    way.refresh().catch(complain);
   }
 
   async function begin(event) {
@@ -93,8 +130,9 @@ export function mount(place, way) {
     form.replaceChildren(
       element("label", {}, "Tracker", select("tracker", plain.map((one) => [one.name, one.label]), way.detail.tracker)),
       element("label", {}, "Effort", select("evaluations", EFFORTS, 2000)),
-      element("div", { className: "step-row" }, element("label", {}, "First frame", element("input", { name: "first", type: "number", min: 0, max: last, value: 0 })),
+      element("div", { className: "step-row" }, element("label", {}, "First frame", element("input", { name: "first", type: "number", min: 0, max: last, value: way.detail.start_pose_frame })),
         element("label", {}, "Last frame", element("input", { name: "last", type: "number", min: 0, max: last, value: last }))),
+      way.detail.start_pose_frame > 0 ? element("p", { className: "hint", textContent: `The start pose is of frame ${way.detail.start_pose_frame}: tracking begins there. The frames before it can be tracked backwards afterwards.` }) : "",
       !way.detail.has_start_pose ? element("p", { className: "hint", textContent: "There is no start pose yet: it is looked for in the first frame, which takes a while." }) : "",
       element("div", { className: "step-actions" }, submit));
     form.onsubmit = async (event) => {
