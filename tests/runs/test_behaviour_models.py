@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from arm_behaviour import FPS, arm_model, keep_arm_model
 from toy_session import make_session, true_poses
+from tracked_runs import opened, poses_of
 
 from studio.behaviour.model_file import read_model, write_model
 from studio.body.catalogue import load_body
@@ -53,18 +54,16 @@ def made(session: Session, tracker: str, name: str = "", **changes: object) -> S
 
 def tracked(session: Session, run: StoredRun, stop: Callable[[int], bool] = lambda _: False) -> np.ndarray:
     """The run's poses; stop : asked after each layer whether to leave and take the run up again."""
-    problems, steps = ProblemSource(session, run.body(), run.cameras()), 0
-    tracking = TrackingRun(run, problems)
-    while not tracking.finished:
-        tracking.step_layer()
-        steps += 1
-        if stop(steps):
-            tracking.close()
-            tracking = TrackingRun(run, problems)
-    tracking.close()
-    problems.close()
-    with run.results() as results:
-        return results.poses()[1]
+    steps, over = 0, False
+    while not over:
+        with opened(session, run) as tracking:
+            while not tracking.finished:
+                tracking.step_layer()
+                steps += 1
+                if stop(steps):
+                    break
+            over = tracking.finished
+    return poses_of(run)
 
 
 @pytest.fixture
@@ -203,23 +202,18 @@ def test_lessons_are_the_same_wherever_a_run_is_taken_up(long_session: Session, 
 def test_frames_annealed_again_see_the_lessons_of_their_time(long_session: Session) -> None:
     run = made(long_session, "behaviour", **LEARNING)
     tracked(long_session, run)
-    problems = ProblemSource(long_session, run.body(), run.cameras())
-    tracking = TrackingRun(run, problems)
-    version, settings = tracking.latest_settings()
-    for frame in (9, 10, 23):
-        question = Reannealing(tracking, frame, version, settings)
-        while not question.finished:
-            question.step_layer()
-        with run.results() as results:
-            stored = results.result(frame)
-        assert np.array_equal(question.result().estimate.pose, stored.estimate.pose)
-        assert question.result().carried.particles is not None
-        assert stored.carried.particles is not None
-        assert np.array_equal(
-            question.result().carried.particles.extra[STATES], stored.carried.particles.extra[STATES]
-        )
-    tracking.close()
-    problems.close()
+    with opened(long_session, run) as tracking, run.results() as results:
+        for frame in (9, 10, 23):
+            question = Reannealing(tracking, frame, *tracking.latest_settings())
+            while not question.finished:
+                question.step_layer()
+            stored, again = results.result(frame), question.result()
+            assert np.array_equal(again.estimate.pose, stored.estimate.pose)
+            assert again.carried.particles is not None
+            assert stored.carried.particles is not None
+            assert np.array_equal(
+                again.carried.particles.extra[STATES], stored.carried.particles.extra[STATES]
+            )
 
 
 def test_an_attempt_without_a_model_is_the_trial_that_it_was(session_on_disk: Session) -> None:

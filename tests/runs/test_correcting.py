@@ -5,12 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 from toy_session import FRAMES, true_poses
+from tracked_runs import finish, opened, poses_of
 
 from studio.errors import NotFoundError, RunError
 from studio.runs.correcting import prepare_correction, track_backwards
 from studio.runs.new_run import RunRequest, prepare_run
-from studio.runs.problem_source import ProblemSource
-from studio.runs.tracking_run import TrackingRun
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -20,22 +19,6 @@ QUICK = {"particles": 60, "layers": 4, "start_repeats": 2}
 QUICK_FIRST_LAYERS = 2
 """Of a frame that begins anew, with the settings of the wrong run."""
 K = 5
-
-
-def finish(session: Session, run: StoredRun, layers: int | None = None) -> np.ndarray:
-    problems = ProblemSource(session, run.body(), run.cameras())
-    tracking = TrackingRun(run, problems)
-    while not tracking.finished and layers != 0:
-        tracking.step_layer()
-        layers = None if layers is None else layers - 1
-    tracking.close()
-    problems.close()
-    return poses_of(run)
-
-
-def poses_of(run: StoredRun) -> np.ndarray:
-    with run.results() as results:
-        return results.poses()[1]
 
 
 def off(poses: np.ndarray, frame: int) -> float:
@@ -120,16 +103,12 @@ def test_an_early_frame_may_be_searched_again_after_the_way_back(
 ) -> None:
     run = prepare_correction(session_on_disk, wrong, K, true_poses()[K], backwards_to=0)
     track_backwards(session_on_disk, run)
-    problems = ProblemSource(session_on_disk, run.body(), run.cameras())
-    tracking = TrackingRun(run, problems)
-    with run.results() as results:
+    with opened(session_on_disk, run) as tracking, run.results() as results:
         after = results.result(3).carried.particles
-    carried = tracking.carried_into(2).particles
+        carried = tracking.carried_into(2).particles
     assert after is not None
     assert carried is not None
     assert np.array_equal(carried.poses, after.poses)
-    tracking.close()
-    problems.close()
 
 
 @pytest.mark.parametrize(
@@ -166,13 +145,10 @@ def test_what_was_lost_before_is_not_held_against_a_corrected_frame(session_on_d
             lost = dataclasses.replace(results.result(frame), tracking=LOST, doubts=frame)
             writer.write_frame(lost, results.layers(frame))
     right = prepare_correction(session_on_disk, run, K, true_poses()[K])
-    problems = ProblemSource(session_on_disk, right.body(), right.cameras())
-    tracking = TrackingRun(right, problems)
-    assert not tracking._watch.is_sought(K)
-    first = tracking.step_layer().record
+    with opened(session_on_disk, right) as tracking:
+        assert not tracking._watch.is_sought(K)
+        first = tracking.step_layer().record
     assert np.abs(first.poses.mean(axis=0) - true_poses()[K]).max() < 0.1
-    tracking.close()
-    problems.close()
     finish(session_on_disk, right)
     with right.results() as results:
         states = results.timeline().tracking

@@ -5,15 +5,14 @@ import numpy as np
 import pytest
 from arm_behaviour import keep_arm_model
 from toy_session import true_poses
+from tracked_runs import finish
 
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.experiments.benchmark import made_evidence, ring_of_cameras
 from studio.runs.new_run import RunRequest, prepare_run
-from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import default_sigma, search_space
-from studio.runs.tracking_run import TrackingRun
 from studio.sessions.session import Session
 from studio.settings import changed_settings, default_settings
 from studio.tracking.catalogue import TRACKERS
@@ -37,12 +36,7 @@ def test_a_pair_follows_the_arm(session_on_disk: Session, tracker: str, weightin
             tracker=tracker, weighting=weighting, seed=1, start_pose=tuple(start), last=3, changes=changes
         ),
     )
-    problems = ProblemSource(session_on_disk, run.body(), run.cameras())
-    tracking = TrackingRun(run, problems)
-    while not tracking.finished:
-        tracking.step_layer()
-    tracking.close()
-    problems.close()
+    finish(session_on_disk, run)
     with run.results() as results:
         frames, poses = results.poses()
         assert frames.tolist() == [0, 1, 2]

@@ -5,13 +5,12 @@ import dataclasses
 import numpy as np
 import pytest
 from toy_session import true_poses
+from tracked_runs import finish, opened
 
 from studio.body.forward_kinematics import marker_points
 from studio.errors import NotFoundError, RunError, SettingsError
 from studio.runs.new_run import RunRequest, prepare_run
-from studio.runs.problem_source import ProblemSource
 from studio.runs.refining import MakingCancelledError, jitter, refine_run, smooth_run
-from studio.runs.tracking_run import TrackingRun
 from studio.runs.tracks import Track, read_track, track_names, write_track
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -24,12 +23,7 @@ from studio.tracking.tracker import LOST
 def run(session_on_disk: Session) -> StoredRun:
     request = RunRequest(start_pose=true_poses()[0] + 0.02, changes={"particles": 20, "layers": 3})
     stored = prepare_run(session_on_disk, request)
-    problems = ProblemSource(session_on_disk, stored.body(), stored.cameras())
-    tracking = TrackingRun(stored, problems)
-    while not tracking.finished:
-        tracking.step_layer()
-    tracking.close()
-    problems.close()
+    finish(session_on_disk, stored)
     return stored
 
 
@@ -45,37 +39,18 @@ def test_refining_comes_nearer_and_the_weighting_agrees(session_on_disk: Session
     assert told == [(done, 8) for done in range(1, 9)]
     before = np.abs(shaken.poses - true_poses()).mean()
     assert np.abs(made.track.poses - true_poses()).mean() < 0.6 * before
-    settings = TrackingSettings.of(session_on_disk, run)
-    for frame in range(8):
-        problem = settings.problem(frame)
-        old, new = problem.weigh(np.stack([shaken.poses[frame], made.track.poses[frame]]))
-        assert new >= old
-    settings.close()
+    with opened(session_on_disk, run) as tracking:
+        settings = tracking.latest_settings()[1]
+        for frame in range(8):
+            problem = tracking.problems.problem(frame, settings)
+            old, new = problem.weigh(np.stack([shaken.poses[frame], made.track.poses[frame]]))
+            assert new >= old
     back = read_track(run, "refined")
     assert np.array_equal(back.poses, made.track.poses)
     assert back.made_by["verb"] == "refine"
     assert back.made_by["from"] == "shaken"
     assert back.made_by["refinement_steps"] == RefinementSettings().refinement_steps
     assert np.array_equal(read_track(run).poses, raw.poses)
-
-
-class TrackingSettings:
-    """The run's own problems, opened anew."""
-
-    def __init__(self, source: ProblemSource, tracking: TrackingRun) -> None:
-        self.source, self.tracking = source, tracking
-
-    @classmethod
-    def of(cls, session: Session, run: StoredRun) -> "TrackingSettings":
-        source = ProblemSource(session, run.body(), run.cameras())
-        return cls(source, TrackingRun(run, source))
-
-    def problem(self, frame: int):
-        return self.source.problem(frame, self.tracking.latest_settings()[1])
-
-    def close(self) -> None:
-        self.tracking.close()
-        self.source.close()
 
 
 def test_frames_whose_silhouettes_do_not_agree_keep_their_pose(

@@ -1,15 +1,12 @@
 """A run that is stopped, killed, resumed or annealed again gives the same poses bit for bit."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 import numpy as np
 import pytest
 from toy_session import true_poses
+from tracked_runs import abandon, finish, opened
 
 from studio.errors import NotFoundError, RunError
 from studio.runs.new_run import RunRequest, prepare_run
-from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
 from studio.runs.tracking_run import TrackingRun
 from studio.sessions.results_store import ResultsWriter
@@ -26,31 +23,6 @@ def new_run(session: Session, name: str, seed: int = 7, **changes: object) -> St
     return prepare_run(
         session, RunRequest(name=name, seed=seed, start_pose=start, last=5, changes={**QUICK, **changes})
     )
-
-
-@contextmanager
-def opened(session: Session, run: StoredRun) -> Iterator[TrackingRun]:
-    problems = ProblemSource(session, run.body(), run.cameras())
-    tracking = TrackingRun(run, problems)
-    try:
-        yield tracking
-    finally:
-        tracking.close()
-        problems.close()
-
-
-def abandon(tracking: TrackingRun) -> None:
-    """What a killed process leaves behind: the store without a last word."""
-    tracking._writer.close()
-    tracking.close = lambda: None
-
-
-def finish(session: Session, run: StoredRun) -> np.ndarray:
-    with opened(session, run) as tracking:
-        while not tracking.finished:
-            tracking.step_layer()
-    with run.results() as results:
-        return results.poses()[1]
 
 
 def assert_same_layers(ones: list[LayerRecord], others: list[LayerRecord]) -> None:

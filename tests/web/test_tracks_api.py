@@ -5,11 +5,10 @@ import time
 import numpy as np
 import pytest
 from toy_session import make_session, true_poses
+from tracked_runs import finish
 from web_doubles import Studio
 
 from studio.runs.new_run import RunRequest, prepare_run
-from studio.runs.problem_source import ProblemSource
-from studio.runs.tracking_run import TrackingRun
 from studio.runs.tracks import Track, read_track, write_track
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
@@ -25,12 +24,7 @@ def run(studio: Studio, workspace: Workspace) -> StoredRun:
         name="one", start_pose=true_poses()[0] + 0.05, changes={"particles": 20, "layers": 3}
     )
     stored = prepare_run(session, request)
-    problems = ProblemSource(session, stored.body(), stored.cameras())
-    tracking = TrackingRun(stored, problems)
-    while not tracking.finished:
-        tracking.step_layer()
-    tracking.close()
-    problems.close()
+    finish(session, stored)
     return stored
 
 
