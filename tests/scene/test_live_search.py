@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import numpy as np
-from conftest import LAYERS, cloud_record, frame_result, swaying_pose
 from scene_fakes import FakeControl
+from swaying_session import LAYERS, cloud_record, frame_result, swaying_pose
 
 from studio.body.model import BodyModel
 from studio.scene.live_search import LiveSearch

@@ -3,15 +3,15 @@
 import asyncio
 import math
 import threading
-import time
 from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
-from conftest import swaying_pose
 from scene_fakes import FakeControl
+from swaying_session import swaying_pose
+from waiting import until
 
 from studio.body.dragging import Dragger
 from studio.body.forward_kinematics import marker_points
@@ -26,17 +26,7 @@ from studio.scene.pose_editor import MIRROR, RESET, ROUND, UNDO, PoseEditor, Pos
 from studio.scene.stage import SceneStage
 from studio.sessions.workspace import Workspace
 
-PATIENCE = 20.0
 SOMEBODY = 7
-
-
-def until(condition: Callable[[], object]) -> None:
-    """Wait for a state, not for a time."""
-    waiting = threading.Event()
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline, "it never came about"
-        waiting.wait(0.01)
 
 
 def by_hand(handle, value: object) -> None:

@@ -14,10 +14,10 @@ import cv2
 import numpy as np
 import pytest
 import uvicorn
-from conftest import cloud_record
 from fastapi import FastAPI
 from playwright.sync_api import Page, sync_playwright
 from scene_fakes import FakeControl
+from swaying_session import cloud_record
 
 from studio.body.model import BodyModel
 from studio.scene.stage import SceneStage

@@ -2,15 +2,14 @@
 
 import asyncio
 import dataclasses
-import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 import viser
-from conftest import FRAMES, LAYERS, cloud_record, frame_result, swaying_pose
 from scene_fakes import FakeControl
+from swaying_session import FRAMES, LAYERS, cloud_record, frame_result, swaying_pose
+from waiting import until
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
@@ -25,17 +24,6 @@ from studio.sessions.results_store import ResultsWriter
 from studio.sessions.workspace import Workspace
 from studio.worker import commands
 from studio.worker.events import FrameFinished, LayerFinished, SettingsApplied, StateChanged
-
-PATIENCE = 20.0
-
-
-def until(condition: Callable[[], object]) -> None:
-    """Wait for a state, not for a time."""
-    waiting = threading.Event()
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline, "it never came about"
-        waiting.wait(0.01)
 
 
 @pytest.fixture

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from conftest import LAYERS, PARTICLES, cloud_record, swaying_pose
 from scipy.spatial.transform import Rotation
+from swaying_session import LAYERS, PARTICLES, cloud_record, swaying_pose
 
 from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions

@@ -3,7 +3,7 @@
 import dataclasses
 
 import numpy as np
-from conftest import FRAMES, LAYERS, cloud_record, frame_result
+from swaying_session import FRAMES, LAYERS, cloud_record, frame_result
 
 from studio.body.model import BodyModel
 from studio.runs.tracks import Track, read_track, write_track

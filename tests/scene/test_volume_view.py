@@ -5,16 +5,16 @@ import threading
 
 import numpy as np
 import pytest
-from conftest import swaying_pose
 from scipy.spatial.transform import Rotation
+from swaying_session import swaying_pose
 from toy_session import true_poses
+from tracked_runs import finish
 
 from studio.body.model import BodyModel
 from studio.errors import StudioError
 from studio.runs.colour_tokens import colour_tokens
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.problem_source import ProblemSource
-from studio.runs.tracking_run import TrackingRun
 from studio.scene.frame_volume import FrameVolume, FrameVolumes
 from studio.scene.guarded_server import GuardedServer
 from studio.scene.live_search import LiveSearch
@@ -111,12 +111,7 @@ def tracked(session: Session, weighting: str) -> StoredRun:
     changes |= {"blob_learning": 2, "hull_depth": 6} if weighting == "blobs" else {}
     start = true_poses()[0]
     run = prepare_run(session, RunRequest(weighting=weighting, start_pose=start, last=4, changes=changes))
-    problems = ProblemSource(session, run.body(), run.cameras())
-    tracking = TrackingRun(run, problems)
-    while not tracking.finished:
-        tracking.step_layer()
-    tracking.close()
-    problems.close()
+    finish(session, run)
     return run
 
 

@@ -1,0 +1,17 @@
+"""Waiting for a state, not for a time."""
+
+import threading
+import time
+from collections.abc import Callable
+
+PATIENCE = 20.0
+"""Seconds."""
+
+
+def until(condition: Callable[[], object]) -> None:
+    """Return when the condition holds; fails when it never does."""
+    moment = threading.Event()
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline, "it never came about"
+        moment.wait(0.01)
