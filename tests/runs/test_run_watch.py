@@ -5,6 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from interrupted_session import BLACK, GONE, interrupted
+from sample_walk import WALK
+from tracked_runs import opened
 
 from studio.behaviour.model_file import write_model
 from studio.behaviour.model_learning import learn_model
@@ -12,16 +14,13 @@ from studio.behaviour.settings import LearningSettings
 from studio.body.forward_kinematics import marker_points
 from studio.capture.trc import read_trc
 from studio.runs.new_run import RunRequest, prepare_run
-from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
-from studio.runs.tracking_run import TrackingRun
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.synthesis.recipes import synthesize
 from studio.tracking.tracker import LOST, NO_EVIDENCE, RECOVERED, TRACKED, FrameResult
 from studio.training.sources import read_source
 
-WALK = Path(__file__).parents[2] / "sample_sessions" / "walk"
 STEP, FPS = 3, 20.0
 SMALL = {"particles": 100, "layers": 6}
 SECOND, LONGER, NEAR_MM = 20, 74, 150.0
@@ -44,25 +43,10 @@ def made(session: Session, **wish: object) -> StoredRun:
     return prepare_run(session, RunRequest(changes=changes, **wish))  # pyright: ignore[reportArgumentType]
 
 
-class Tracker:
-    """A run being tracked, with its footage."""
-
-    def __init__(self, session: Session, run: StoredRun) -> None:
-        self.problems = ProblemSource(session, run.body(), run.cameras())
-        self.tracking = TrackingRun(run, self.problems)
-
-    def __enter__(self) -> TrackingRun:
-        return self.tracking
-
-    def __exit__(self, *_: object) -> None:
-        self.tracking.close()
-        self.problems.close()
-
-
 def tracked(session: Session, run: StoredRun) -> list[FrameResult]:
     """All results of a run that is tracked to its end."""
     results = []
-    with Tracker(session, run) as tracking:
+    with opened(session, run) as tracking:
         while not tracking.finished:
             stepped = tracking.step_layer()
             if stepped.result is not None:
@@ -109,7 +93,7 @@ def test_a_run_taken_up_again_in_the_frame_of_the_search_gives_the_same_bits(
     expected, run = through[1], made(black, name="interrupted")
     results: list[FrameResult] = []
     for _ in range(20):
-        with Tracker(black, run) as tracking:
+        with opened(black, run) as tracking:
             while not tracking.finished:
                 stepped = tracking.step_layer()
                 if stepped.result is not None:
@@ -129,7 +113,7 @@ def test_the_frame_of_the_search_annealed_again_is_the_same(
     black: Session, through: tuple[StoredRun, list[FrameResult]]
 ) -> None:
     run, results = through
-    with Tracker(black, run) as tracking:
+    with opened(black, run) as tracking:
         again = Reannealing(tracking, 9, *tracking.latest_settings())
         while not again.finished:
             again.step_layer()
