@@ -29,7 +29,10 @@ CAMERA_OPTION = click.option(
 @click.option("--seconds", type=float, help="For so long; default: until Ctrl-C.")
 @click.option("--into", required=True, metavar="SESSION", help="Name or path of the session that is made.")
 @click.option(
-    "--calibration", required=True, metavar="FILE", help="The cameras' calibration, or a session that has it."
+    "--calibration",
+    required=True,
+    metavar="CALIBRATION|SESSION",
+    help="The cameras' calibration, a file or folder; or a session that has it, by its name or folder.",
 )
 @click.option("--fps", type=float, default=0.0, help="Pictures a second; default: as measured.")
 @click.option("--finish", type=click.Path(path_type=Path, exists=True, file_okay=False), metavar="FOLDER",
@@ -51,7 +54,7 @@ def record(
     place = Workspace().place_for(into)
     if place.exists():
         raise SessionError(f"There is something at '{place}' already.", "Choose another name.")
-    known = calibration_given(calibration)
+    known = calibration_given(calibration, Workspace())
     if finish is not None:
         return _imported(finish, place, known, None)
     addresses = addresses_of(cameras)

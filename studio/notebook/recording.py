@@ -7,7 +7,7 @@ from pathlib import Path
 
 from studio.capture.camera_addresses import address_from_text, check_names
 from studio.errors import FootageError
-from studio.notebook.opening import SessionName, open_session
+from studio.notebook.opening import SessionName
 from studio.notebook.progress import Report, Told, told
 from studio.sessions.recordings import SpreadFigures, calibration_given, check_cameras, import_recording
 from studio.sessions.session import Session
@@ -39,7 +39,7 @@ def record(
     """Record live cameras all at once into a session, each picture with the time at which it came.
 
     cameras : by their names in the calibration, addresses: http://… (MJPEG), rtsp://…, /dev/video0, or a video to be
-    replayed. calibration : a file, or a session that has it. seconds : for so long; default until the streams end or
+    replayed. calibration : a file or folder, or a session that has it. seconds : for so long; default until the streams end or
     Ctrl-C (a notebook's stop button), which ends the recording and keeps it. fps : default as measured. Raises
     FootageError, SessionError.
     """
@@ -69,9 +69,7 @@ def record(
 
 def _calibration(given: SessionName) -> Path:
     """The calibration's file: of a session by name or value, else as it is given."""
-    if not isinstance(given, Session) and Path(given).exists():
-        return calibration_given(given)
-    return calibration_given(open_session(given).path)
+    return calibration_given(given.path if isinstance(given, Session) else given, Workspace())
 
 
 def _until(recording: StreamRecording, seconds: float | None, report: Report) -> None:

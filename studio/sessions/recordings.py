@@ -14,19 +14,34 @@ from studio.capture.cut_recordings import mend_recording
 from studio.capture.timestamps import read_timestamps
 from studio.errors import FootageError
 from studio.sessions.importers.catalogue import ImportReport, import_source
+from studio.sessions.manifest import FILE_NAME as MANIFEST_NAME
+from studio.sessions.names import is_name
 from studio.sessions.session import CAMERAS_PATH, Session, described_anew
+from studio.sessions.workspace import Workspace
 
 TIMES_NAME = "timestamps.csv"
 LATE_SECONDS = 1e-6
 
 
-def calibration_given(place: str | Path) -> Path:
-    """The calibration's file or folder; of a session its own. Raises FootageError."""
+def calibration_given(place: str | Path, workspace: Workspace | None = None) -> Path:
+    """The calibration's file or folder; of a session, by its folder or (with a workspace) its name, its own.
+
+    Raises FootageError where there is none.
+    """
     path = Path(place).expanduser()
+    if not path.exists() and workspace is not None and is_name(str(place)):
+        path = workspace.root / str(place)
     if (path / CAMERAS_PATH).is_file():
         return path / CAMERAS_PATH
+    if (path / MANIFEST_NAME).is_file():
+        raise FootageError(
+            f"Session '{place}' has no calibration.", "Calibrate it, or give another session or a file."
+        )
     if not path.exists():
-        raise FootageError(f"There is no calibration '{place}'.", "Give its file, or a session that has one.")
+        raise FootageError(
+            f"There is no calibration '{place}'.",
+            "Give its file or folder, or a session that has one, by its name or folder.",
+        )
     return path
 
 

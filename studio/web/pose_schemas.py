@@ -18,8 +18,8 @@ class GripView(Answer):
 class PoseView(Answer):
     """A pose of the session's body: radians and mm in the order of `parameters`.
 
-    stored: whether it is the session's start pose (else the rest pose); frame: that it is of. left_mm: after a drag, how
-    far the limb's end still is from where it was dragged.
+    stored: whether it is the session's start pose (else the rest pose); frame: that it is of. left_mm: after a drag,
+    how far the limb's end still is from where it was dragged.
     """
 
     body: str
