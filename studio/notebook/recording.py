@@ -39,8 +39,8 @@ def record(
     """Record live cameras all at once into a session, each picture with the time at which it came.
 
     cameras : by their names in the calibration, addresses: http://… (MJPEG), rtsp://…, /dev/video0, or a video to be
-    replayed. calibration : a file or folder, or a session that has it. seconds : for so long; default until the streams end or
-    Ctrl-C (a notebook's stop button), which ends the recording and keeps it. fps : default as measured. Raises
+    replayed. calibration : a file or folder, or a session that has it. seconds : for so long; default until the streams
+    end or Ctrl-C (a notebook's stop button), which ends the recording and keeps it. fps : default as measured. Raises
     FootageError, SessionError.
     """
     place = Workspace().place_for(into)

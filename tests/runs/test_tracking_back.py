@@ -15,7 +15,7 @@ QUICK = {"particles": 60, "layers": 4, "start_repeats": 2}
 def test_the_frames_before_the_start_pose_are_tracked_backwards(session_on_disk: Session) -> None:
     first = RunRequest(name="late", first=K, start_pose=true_poses()[K], changes=QUICK)
     late = prepare_run(session_on_disk, first)
-    track_to_end(session_on_disk, late)
+    track_to_end(session_on_disk, late, lambda *_: None)
     with late.results() as results:
         frames, forwards = results.poses()
     assert frames.tolist() == list(range(K, FRAMES))
@@ -37,7 +37,7 @@ def test_a_cancelled_way_back_goes_on_from_a_whole_run(session_on_disk: Session)
     late = prepare_run(
         session_on_disk, RunRequest(name="late", first=3, start_pose=true_poses()[3], changes=QUICK)
     )
-    track_to_end(session_on_disk, late)
+    track_to_end(session_on_disk, late, lambda *_: None)
     with late.results() as results:
         forwards = results.poses()[1]
     run = prepare_correction(session_on_disk, late, 3, forwards[0], backwards_to=0)
