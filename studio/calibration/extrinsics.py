@@ -5,7 +5,7 @@ which its cameras agree best; then bundle adjustment, once more without the view
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -41,11 +41,21 @@ class Rig:
 
     cameras: tuple[Camera, ...]
     boards: Mapping[int, Array]
-    turned: frozenset[tuple[str, int]]
     rms: Mapping[str, float]
     views: Mapping[str, int]
-    dropped: int
-    pairs: tuple[PairPose, ...] = field(default=())
+    turned: frozenset[tuple[str, int]] = frozenset()
+    dropped: int = 0
+    pairs: tuple[PairPose, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen:
+    """What a rig is solved from. views : camera → frame → what it saw of the board."""
+
+    board: Board
+    names: tuple[str, ...]
+    lenses: Mapping[str, Lens]
+    views: Mapping[str, Mapping[int, BoardView]]
 
 
 def solve_rig(
@@ -60,25 +70,25 @@ def solve_rig(
 
     Raises CalibrationError naming the cameras that share no board view with the others.
     """
-    names = sorted(lenses, key=natural_key)
+    names = tuple(sorted(lenses, key=natural_key))
     report = progress or (lambda step, done, total: None)
-    views = views_by_camera(board, sightings, lenses)
+    seen = _Seen(board, names, lenses, views_by_camera(board, sightings, lenses))
     pairs = []
     couples = list(combinations(names, 2))
     for number, (first, second) in enumerate(couples):
         report("Comparing cameras", number, len(couples))
-        pair = pair_pose(first, second, views)
+        pair = pair_pose(first, second, seen.views)
         if pair is not None:
             pairs.append(pair)
     poses = _tree(names, pairs)
-    frames = _chosen_frames(names, views)
-    boards, turned = _board_poses(board, names, views, frames, poses, lenses)
+    frames = _chosen_frames(seen)
+    boards, turned = _board_poses(seen, frames, poses)
     report("Adjusting all together", 0, 2)
-    bundle, seen = _bundle(board, names, views, frames, poses, boards, turned, lenses)
-    bundle = adjusted(bundle, seen)
-    errors = errors_of(bundle, seen)
+    bundle, observed = _bundle(seen, frames, poses, boards, turned)
+    bundle = adjusted(bundle, observed)
+    errors = errors_of(bundle, observed)
     limit = max(OUTLYING * float(np.median(errors)), LEAST_OUTLYING_PX)
-    kept, dropped = kept_inliers(bundle, seen, limit)
+    kept, dropped = kept_inliers(bundle, observed, limit)
     missing = [name for number, name in enumerate(names) if not np.any(kept.camera == number)]
     if missing:
         raise CalibrationError(
@@ -88,7 +98,7 @@ def solve_rig(
     report("Adjusting all together", 1, 2)
     bundle = adjusted(bundle, kept, refine_lenses)
     report("Adjusting all together", 2, 2)
-    return _rig(names, lenses, frames, bundle, kept, dropped, tuple(pairs), turned)
+    return replace(_rig(seen, frames, bundle, kept), turned=turned, dropped=dropped, pairs=tuple(pairs))
 
 
 def _tree(names: Sequence[str], pairs: Sequence[PairPose]) -> dict[str, Array]:
@@ -112,11 +122,11 @@ def _tree(names: Sequence[str], pairs: Sequence[PairPose]) -> dict[str, Array]:
     return poses
 
 
-def _chosen_frames(names: Sequence[str], views: Mapping[str, Mapping[int, BoardView]]) -> list[int]:
+def _chosen_frames(seen: _Seen) -> list[int]:
     """Frames that two or more cameras saw; if there are many, those that serve the least served pairs."""
     together = {}
-    for frame in sorted(set().union(*(views[name] for name in names))):
-        pairs = list(combinations([name for name in names if frame in views[name]], 2))
+    for frame in sorted(set().union(*(seen.views[name] for name in seen.names))):
+        pairs = list(combinations([name for name in seen.names if frame in seen.views[name]], 2))
         if pairs:
             together[frame] = pairs
     served: dict[tuple[str, str], int] = {pair: 0 for pairs in together.values() for pair in pairs}
@@ -130,31 +140,25 @@ def _chosen_frames(names: Sequence[str], views: Mapping[str, Mapping[int, BoardV
 
 
 def _board_poses(
-    board: Board,
-    names: Sequence[str],
-    views: Mapping[str, Mapping[int, BoardView]],
-    frames: Sequence[int],
-    poses: Mapping[str, Array],
-    lenses: Mapping[str, Lens],
+    seen: _Seen, frames: Sequence[int], poses: Mapping[str, Array]
 ) -> tuple[dict[int, Array], frozenset[tuple[str, int]]]:
     """Frame → world_from_board on which its cameras agree best, and the views that count from the other end."""
     boards: dict[int, Array] = {}
     turned: set[tuple[str, int]] = set()
     for frame in frames:
-        seen = [name for name in names if frame in views[name]]
+        views = {name: seen.views[name][frame] for name in seen.names if frame in seen.views[name]}
         best, ends = np.inf, list[tuple[str, bool]]()
-        for name in seen:
-            view = views[name][frame]
+        for name, view in views.items():
             for pose in view.poses[~view.turned]:
                 candidate = compose(inverse(poses[name]), pose)
                 costs = [
-                    _cost(board, candidate, poses[other], lenses[other], views[other][frame])
-                    for other in seen
+                    _cost(seen.board, candidate, poses[other], seen.lenses[other], theirs)
+                    for other, theirs in views.items()
                 ]
                 total = sum(min(pair) for pair in costs)
                 if total < best:
                     best, boards[frame] = total, candidate
-                    ends = [(other, pair[1] < pair[0]) for other, pair in zip(seen, costs, strict=True)]
+                    ends = [(other, pair[1] < pair[0]) for other, pair in zip(views, costs, strict=True)]
         turned |= {(other, frame) for other, end in ends if end}
     return boards, frozenset(turned)
 
@@ -178,33 +182,28 @@ def _cost(board: Board, pose: Array, camera: Array, lens: Lens, view: BoardView)
 
 
 def _bundle(
-    board: Board,
-    names: Sequence[str],
-    views: Mapping[str, Mapping[int, BoardView]],
+    seen: _Seen,
     frames: Sequence[int],
     poses: Mapping[str, Array],
     boards: Mapping[int, Array],
     turned: frozenset[tuple[str, int]],
-    lenses: Mapping[str, Lens],
 ) -> tuple[Bundle, Observations]:
     parts: list[tuple[Array, ...]] = []
-    for number, name in enumerate(names):
+    points = seen.board.points
+    for number, name in enumerate(seen.names):
         for moment, frame in enumerate(frames):
-            if frame in views[name]:
-                sighting = views[name][frame].sighting
-                ids = len(board.points) - 1 - sighting.ids if (name, frame) in turned else sighting.ids
+            if frame in seen.views[name]:
+                sighting = seen.views[name][frame].sighting
+                ids = len(points) - 1 - sighting.ids if (name, frame) in turned else sighting.ids
                 one = np.full(len(ids), 1)
-                parts.append((one * number, one * moment, board.points[ids], sighting.pixels))
-    camera, moment, points, pixels = (np.concatenate(column) for column in zip(*parts, strict=True))
-    seen = Observations(camera.astype(np.int64), moment.astype(np.int64), points, pixels)
-    return (
-        Bundle(
-            np.array([_vector(poses[name]) for name in names]),
-            np.array([_vector(boards[frame]) for frame in frames]),
-            np.array([_lens_row(lenses[name]) for name in names]),
-        ),
-        seen,
+                parts.append((one * number, one * moment, points[ids], sighting.pixels))
+    camera, moment, corners, pixels = (np.concatenate(column) for column in zip(*parts, strict=True))
+    bundle = Bundle(
+        np.array([_vector(poses[name]) for name in seen.names]),
+        np.array([_vector(boards[frame]) for frame in frames]),
+        np.array([_lens_row(seen.lenses[name]) for name in seen.names]),
     )
+    return bundle, Observations(camera.astype(np.int64), moment.astype(np.int64), corners, pixels)
 
 
 def _vector(pose: Array) -> Array:
@@ -216,41 +215,33 @@ def _lens_row(lens: Lens) -> Array:
     return np.array([matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *lens.distortion])
 
 
-def _rig(
-    names: Sequence[str],
-    lenses: Mapping[str, Lens],
-    frames: Sequence[int],
-    bundle: Bundle,
-    seen: Observations,
-    dropped: int,
-    pairs: tuple[PairPose, ...],
-    turned: frozenset[tuple[str, int]],
-) -> Rig:
-    errors = errors_of(bundle, seen)
+def _rig(seen: _Seen, frames: Sequence[int], bundle: Bundle, used: Observations) -> Rig:
+    """The cameras and boards of a bundle, with what is left of errors on the observations that were used."""
+    errors = errors_of(bundle, used)
     cameras, rms, views = [], {}, {}
-    for number, name in enumerate(names):
+    for number, name in enumerate(seen.names):
         fx, fy, cx, cy = bundle.lenses[number, :4]
         vector = bundle.cameras[number]
         cameras.append(
             Camera(
                 name,
-                *lenses[name].size,
+                *seen.lenses[name].size,
                 np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]),
                 bundle.lenses[number, 4:].copy(),
                 rotation_from_vector(vector[:3]),
                 vector[3:].copy(),
             )
         )
-        mine = seen.camera == number
+        mine = used.camera == number
         rms[name] = float(np.sqrt(np.mean(errors[mine] ** 2)))
-        views[name] = len(np.unique(seen.moment[mine]))
-    used = set(seen.moment.tolist())
+        views[name] = len(np.unique(used.moment[mine]))
+    moments = set(used.moment.tolist())
     boards = {
         frame: rigid(rotation_from_vector(row[:3]), row[3:].copy())
         for number, (frame, row) in enumerate(zip(frames, bundle.boards, strict=True))
-        if number in used
+        if number in moments
     }
-    return Rig(tuple(cameras), boards, turned, rms, views, dropped, pairs)
+    return Rig(tuple(cameras), boards, rms, views)
 
 
 def moved(rig: Rig, new_from_old: Array) -> Rig:
