@@ -1,10 +1,10 @@
 """human31's limits: what people do is within them, what no joint can do is not."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
+from sample_walk import WALK
 
 from studio.body.branches import within_limits
 from studio.body.catalogue import load_body
@@ -16,7 +16,6 @@ from studio.sessions.session import Session
 from studio.synthesis.motions import make_motion
 from studio.synthesis.person import marker_lengths, marker_motion, skeleton_of_height
 
-WALK = Path(__file__).resolve().parents[2] / "sample_sessions" / "walk"
 HEIGHT = 1760.0
 
 

@@ -1,40 +1,32 @@
 """The page of live cameras: two MJPEG streams from loopback and two replayed videos, looked at, tracked, one stops."""
 
-import shutil
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from mjpeg_streams import Streams, jpeg, served
+from mjpeg_streams import Streams, served
 from playwright.sync_api import Browser, Page, expect
+from sample_walk import STREAM_FPS, copy_of_walk, streamed_pictures
 from studio_server import StudioServer
 
 from studio.sessions.session import Session
-from studio.web.samples import sample_folder
 
 pytestmark = pytest.mark.browser
 
-FRAMES, FPS = 70, 30.0
+FRAMES = 70
 PATIENCE = 60_000
 SECRET = "geheim"
 
 
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory: pytest.TempPathFactory) -> Session:
-    root = tmp_path_factory.mktemp("live") / "workspace"
-    shutil.copytree(sample_folder(), root / "walk")
-    return Session(root / "walk")
+    return copy_of_walk(tmp_path_factory.mktemp("live") / "workspace" / "walk")
 
 
 @pytest.fixture(scope="module")
 def streams(walk: Session) -> Iterator[Streams]:
-    footage = walk.footage()
-    pictures = {
-        name: [jpeg(footage.picture(name, 2 * frame)) for frame in range(FRAMES)] for name in ("cam1", "cam2")
-    }
-    footage.close()
-    with served(pictures, FPS) as made:
+    with served(streamed_pictures(walk, FRAMES), STREAM_FPS) as made:
         yield made
 
 

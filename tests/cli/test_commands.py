@@ -4,13 +4,13 @@ import csv
 import errno
 import json
 import os
-import shutil
 import tempfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from sample_walk import WALK, copy_of_walk
 
 from studio.cli.main import COMMANDS, main
 from studio.cli.output import progress_lines
@@ -187,9 +187,7 @@ def test_import_refuses_a_folder_that_is_no_session_and_leaves_nothing(tmp_path:
 
 
 def test_evaluate_prints_numbers_with_their_alignment(tmp_path: Path) -> None:
-    walk = Path(__file__).resolve().parents[2] / "sample_sessions" / "walk"
-    shutil.copytree(walk, tmp_path / "walk")
-    session = str(tmp_path / "walk")
+    session = str(copy_of_walk(tmp_path / "walk").path)
     tracked = told("track", session, "--frames", "0:3", "--particles", "100", "--layers", "5")
     found = told("evaluate", session, tracked["run"])
     assert found["mean_mm"] < 40.0
@@ -198,7 +196,7 @@ def test_evaluate_prints_numbers_with_their_alignment(tmp_path: Path) -> None:
     assert found["alignment"] == "none"
     assert len(found["per_frame_mm"]) == 3
     assert set(found["per_marker_mm"]) >= {"Head", "RWrist", "LAnkle"}
-    start = told("track", session, "--frames", "1:2", "--start-pose", str(walk / "truth" / "walk.trc"))
+    start = told("track", session, "--frames", "1:2", "--start-pose", str(WALK / "truth" / "walk.trc"))
     assert "markers of walk.trc" in start["start_pose"]
 
 

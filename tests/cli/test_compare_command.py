@@ -1,18 +1,17 @@
 """`studio compare` as a stranger calls it: the agreed JSON, a table, going on after Ctrl-C, refusals in words."""
 
 import json
-import shutil
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from sample_walk import copy_of_walk
 
 from studio.cli import comparison_commands
 from studio.cli.main import main
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 
-WALK = Path(__file__).resolve().parents[2] / "sample_sessions" / "walk"
 SMALL = ("--evaluations", "60", "--layers", "3", "--frames", "0:3", "--processes", "1")
 FIELDS = {"tracker", "evaluations", "mean_mm", "worst_mm", "lost_frames", "seconds"}
 
@@ -22,8 +21,7 @@ def walk() -> Session:
     """The bundled walk in this test's workspace."""
     workspace = Workspace()
     workspace.root.mkdir(parents=True, exist_ok=True)
-    shutil.copytree(WALK, workspace.root / "walk", ignore=shutil.ignore_patterns("runs", "comparisons"))
-    return workspace.session("walk")
+    return copy_of_walk(workspace.root / "walk")
 
 
 def run(*arguments: str) -> Result:

@@ -1,33 +1,25 @@
 """`studio record` and `studio live --camera`, on streams from loopback."""
 
 import json
-import shutil
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
-from mjpeg_streams import jpeg, served
+from mjpeg_streams import served
+from sample_walk import STREAM_FPS, copy_of_walk, streamed_pictures
 
 from studio.cli.main import main
 from studio.sessions.session import Session
-from studio.web.samples import sample_folder
-
-FPS = 30.0
 
 
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory: pytest.TempPathFactory) -> Session:
-    place = tmp_path_factory.mktemp("recording") / "walk"
-    shutil.copytree(sample_folder(), place)
-    return Session(place)
+    return copy_of_walk(tmp_path_factory.mktemp("recording") / "walk")
 
 
 @pytest.fixture(scope="module")
 def pictures(walk: Session) -> dict[str, list[bytes]]:
-    footage = walk.footage()
-    found = {name: [jpeg(footage.picture(name, 2 * k)) for k in range(20)] for name in ("cam1", "cam2")}
-    footage.close()
-    return found
+    return streamed_pictures(walk, 20)
 
 
 def run(*arguments: str) -> Result:
@@ -37,7 +29,7 @@ def run(*arguments: str) -> Result:
 def test_cameras_are_recorded_at_once(
     walk: Session, pictures: dict[str, list[bytes]], tmp_path: Path
 ) -> None:
-    with served(pictures, FPS) as streams:
+    with served(pictures, STREAM_FPS) as streams:
         streams.going.set()
         cameras = [part for name in pictures for part in ("--camera", f"{name}={streams.address(name)}")]
         into = ("--into", str(tmp_path / "take"), "--calibration", str(walk.path))
@@ -56,7 +48,7 @@ def test_cameras_are_recorded_at_once(
 
 def test_live_cameras_are_tracked(walk: Session, pictures: dict[str, list[bytes]], tmp_path: Path) -> None:
     quick = ("--tracker", "annealed", "--weighting", "edge-region", "--particles", "30", "--layers", "2")
-    with served(pictures, FPS) as streams:
+    with served(pictures, STREAM_FPS) as streams:
         cameras = [part for name in pictures for part in ("--camera", f"{name}={streams.address(name)}")]
         place = ("--into", str(tmp_path / "take"), "--seconds", "1", "--json")
         result = run("live", str(walk.path), *cameras, *quick, *place)

@@ -1,11 +1,11 @@
 """Comparisons on disk: made, found again, finished, thrown away and brought back."""
 
 import json
-import shutil
 from pathlib import Path
 
 import pytest
-from test_comparison import WALK, made_up, plan
+from sample_walk import copy_of_walk
+from test_comparison import made_up, plan
 
 from studio.errors import NotFoundError, SessionError
 from studio.experiments.comparison import conclude, trials
@@ -29,10 +29,7 @@ from studio.sessions.workspace import Workspace
 @pytest.fixture
 def walk(tmp_path: Path) -> Session:
     """The bundled walk in a workspace of its own (without its pictures, which nobody looks at here)."""
-    shutil.copytree(
-        WALK, tmp_path / "workspace" / "walk", ignore=shutil.ignore_patterns("videos", "runs", "comparisons")
-    )
-    return Session(tmp_path / "workspace" / "walk")
+    return copy_of_walk(tmp_path / "workspace" / "walk", "videos")
 
 
 @pytest.fixture

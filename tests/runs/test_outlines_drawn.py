@@ -4,11 +4,10 @@ The surface of every cone is sampled densely, carried by the kinematics and proj
 convex hull of the pixels is the limb's silhouette. Both ways: no point of the one is farther from the other than 2 px.
 """
 
-from pathlib import Path
-
 import cv2
 import numpy as np
 import pytest
+from sample_walk import WALK
 from scipy.spatial import KDTree
 
 from studio.body.forward_kinematics import limb_frames
@@ -21,7 +20,6 @@ from studio.sessions.session import Session
 from studio.weighting.catalogue import WEIGHTINGS
 from studio.weighting.overlay import overlay_points
 
-WALK = Path(__file__).resolve().parents[2] / "sample_sessions" / "walk"
 TOLERANCE_PX = 2.0
 STATIONS, DIRECTIONS = 25, 180
 SETTINGS = WEIGHTINGS["edge-region"].settings_type()

@@ -3,18 +3,16 @@
 import csv
 import io
 import json
-import shutil
 import time
-from pathlib import Path
 
 import pytest
+from sample_walk import copy_of_walk
 from web_doubles import Studio
 
 from studio.experiments.comparison import plan_comparison
 from studio.experiments.comparison_folders import new_comparison, place_of
 from studio.experiments.entrants import Lineup
 
-WALK = Path(__file__).resolve().parents[2] / "sample_sessions" / "walk"
 WISH = {
     "session": "walk", "trackers": [{"name": "annealed"}, {"name": "annealed:eq13", "settings": {"survival": 0.5}}],
     "evaluations": 60, "seeds": 2, "layers": 3, "last": 3,
@@ -24,9 +22,7 @@ WISH = {
 @pytest.fixture
 def compared(studio: Studio) -> Studio:
     """The studio with the bundled walk, which has a truth."""
-    shutil.copytree(
-        WALK, studio.workspace.root / "walk", ignore=shutil.ignore_patterns("runs", "comparisons")
-    )
+    copy_of_walk(studio.workspace.root / "walk")
     return studio
 
 

@@ -1,7 +1,6 @@
 """What a body cannot do, against independent geometry and against what people do."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +17,6 @@ from studio.synthesis.person import PersonMotion, marker_lengths
 from studio.weighting.hard_prior_kernels import closest
 from studio.weighting.hard_priors import LIMB_SHARE, TRUNK_SHARE, HardPriors, limb_pairs
 
-WALK = Path(__file__).resolve().parents[2] / "sample_sessions" / "walk"
 HEIGHT = 1760.0
 EXACT = 0.5
 

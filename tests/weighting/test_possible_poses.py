@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sample_walk import WALK
 
 from studio.body.branches import within_limits
 from studio.body.catalogue import load_body
@@ -19,7 +20,6 @@ from studio.synthesis.recorded_clip import read_recording
 from studio.synthesis.retargeting import on_skeleton
 from studio.weighting.hard_priors import HardPriors
 
-WALK = Path(__file__).resolve().parents[2] / "sample_sessions" / "walk"
 HEIGHT = 1760.0
 # Mean distance (mm) left by inverse kinematics of motions that the body can make.
 EXACT = 1.0

@@ -1,12 +1,11 @@
 """Comparisons worked at in processes of their own: to the end, broken off, gone on with; one at a time."""
 
-import shutil
 import threading
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
+from sample_walk import copy_of_walk
 
 from studio.errors import RunError
 from studio.experiments.comparison import Plan, plan_comparison
@@ -17,15 +16,11 @@ from studio.sessions.session import Session
 from studio.worker.comparison_desk import ComparisonDesk, ComparisonState
 from studio.worker.comparison_run import done_before, run_comparison
 
-WALK = Path(__file__).resolve().parents[2] / "sample_sessions" / "walk"
-
 
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory: pytest.TempPathFactory) -> Session:
     """The bundled walk where it can be written to."""
-    folder = tmp_path_factory.mktemp("workspace") / "walk"
-    shutil.copytree(WALK, folder, ignore=shutil.ignore_patterns("runs", "comparisons"))
-    return Session(folder)
+    return copy_of_walk(tmp_path_factory.mktemp("workspace") / "walk")
 
 
 def small(walk: Session, seeds: int = 2) -> Plan:

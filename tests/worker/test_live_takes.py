@@ -1,13 +1,13 @@
-"""Live cameras recorded and tracked: MJPEG streams on loopback, replayed videos, one that stops."""
+"""Live cameras recorded and tracked: STREAMED streams on loopback, replayed videos, one that stops."""
 
 import json
-import shutil
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 from mjpeg_streams import Streams, jpeg, served
+from sample_walk import STREAM_FPS, STREAMED, copy_of_walk, streamed_pictures
 
 from studio.capture.camera_addresses import CameraAddress, camera_address
 from studio.capture.timestamps import read_timestamps
@@ -21,7 +21,6 @@ from studio.sessions.recordings import import_recording
 from studio.sessions.session import Session
 from studio.sessions.takes import read_sets
 from studio.settings import default_settings
-from studio.web.samples import sample_folder
 from studio.worker.camera_readers import CameraReaders
 from studio.worker.camera_tracking import TakeWish, open_take, track_cameras
 from studio.worker.live_tracking import replay_live
@@ -34,26 +33,20 @@ QUICK = RunRequest(
     seed=3,
     changes={"particles": 30, "layers": 3, "recovery": "off"},
 )
-MJPEG = ("cam1", "cam2")
-FRAMES, FPS = 50, 30.0
+FRAMES = 50
 PATIENCE = 60.0
 
 
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory: pytest.TempPathFactory) -> Session:
     """The bundled walk: four cameras, empty clips, a start pose."""
-    place = tmp_path_factory.mktemp("base") / "walk"
-    shutil.copytree(sample_folder(), place)
-    return Session(place)
+    return copy_of_walk(tmp_path_factory.mktemp("base") / "walk")
 
 
 @pytest.fixture(scope="module")
 def pictures(walk: Session) -> dict[str, list[bytes]]:
     """Every second frame of two cameras as JPEG, so 30 a second."""
-    footage = walk.footage()
-    found = {name: [jpeg(footage.picture(name, 2 * frame)) for frame in range(FRAMES)] for name in MJPEG}
-    footage.close()
-    return found
+    return streamed_pictures(walk, FRAMES)
 
 
 def replays(walk: Session) -> list[CameraAddress]:
@@ -64,7 +57,7 @@ def replays(walk: Session) -> list[CameraAddress]:
 
 
 def of_streams(streams: Streams) -> list[CameraAddress]:
-    return [camera_address(name, streams.address(name)) for name in MJPEG]
+    return [camera_address(name, streams.address(name)) for name in STREAMED]
 
 
 class Watcher:
@@ -94,7 +87,7 @@ def test_two_mjpeg_streams_are_tracked_and_recorded_and_one_that_stops_is_left_o
     walk: Session, pictures: dict[str, list[bytes]], tmp_path: Path
 ) -> None:
     place = tmp_path / "take"
-    with served(pictures, FPS) as streams, pytest.raises(KeyboardInterrupt):
+    with served(pictures, STREAM_FPS) as streams, pytest.raises(KeyboardInterrupt):
         track_cameras(walk, of_streams(streams), TakeWish(place, seconds=60.0), QUICK, Watcher(streams))
     take = Session(place)
     run, taken = take.runs()[0], read_sets(place)
@@ -173,19 +166,19 @@ def test_what_cannot_be_a_take_is_refused_and_leaves_nothing(
     walk: Session, pictures: dict[str, list[bytes]], tmp_path: Path
 ) -> None:
     small = {"cam1": [jpeg(np.zeros((48, 64, 3), np.uint8))], "cam9": pictures["cam1"]}
-    with served(small, FPS) as streams:
+    with served(small, STREAM_FPS) as streams:
         for name, said in (
             ("cam1", "sends 64x48 pixels and was calibrated at 640x480"),
             ("cam9", "no camera 'cam9'"),
         ):
             address = camera_address(name, streams.address(name))
             with CameraReaders([address]) as readers, pytest.raises(FootageError, match=said):
-                open_take(walk, readers, TakeWish(tmp_path / name, seconds=5.0, fps=FPS))
+                open_take(walk, readers, TakeWish(tmp_path / name, seconds=5.0, fps=STREAM_FPS))
             assert not (tmp_path / name).exists()
 
 
 def test_a_camera_that_is_not_there_is_named_without_its_password(walk: Session) -> None:
-    with served({}, FPS) as streams:
+    with served({}, STREAM_FPS) as streams:
         place = f"http://root:geheim@127.0.0.1:{streams.port}/nothing"
         address = camera_address("cam1", place)
         with CameraReaders([address]) as readers, pytest.raises(FootageError) as caught:
