@@ -16,6 +16,7 @@ from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.workspace import Workspace
 from studio.web import (
     background_routes,
+    alignment_routes,
     background_setup_routes,
     behaviour_learning_routes,
     behaviour_routes,
@@ -75,6 +76,7 @@ ROUTERS = (
     initialisation_routes.router,
     background_routes.router,
     background_setup_routes.router,
+    alignment_routes.router,
     subject_routes.router,
     run_routes.router,
     settings_routes.router,

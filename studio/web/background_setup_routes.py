@@ -4,9 +4,9 @@ events), with the masks' quality at its end.
 
 import asyncio
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter
 
 from studio.capture.naming import match_names
 from studio.capture.pictures import is_picture
@@ -29,7 +29,7 @@ from studio.web.background_schemas import (
     BackgroundWish,
     PlatesWish,
 )
-from studio.web.doors import Doors, doors_of
+from studio.web.doors import Door, Doors
 from studio.web.job_kinds import BACKGROUND
 from studio.web.safe_paths import place_in, relative_path
 from studio.web.session_routes import OpenSession
@@ -37,8 +37,6 @@ from studio.web.setting_views import knob_view
 from studio.web.upload_routes import forget, upload_folder
 
 router = APIRouter(prefix="/api/sessions/{session}", tags=["masks"])
-
-Door = Annotated[Doors, Depends(doors_of)]
 
 
 @router.get("/background")

@@ -4,9 +4,8 @@ import asyncio
 import dataclasses
 import math
 from pathlib import Path
-from typing import Annotated
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter
 
 from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import list_bodies, load_body
@@ -20,7 +19,7 @@ from studio.training.oversampling import OversamplingSettings
 from studio.training.sources import FPS, MOTION_FILES
 from studio.web.archives import unpack_zip
 from studio.web.behaviour_learning_schemas import LearningChoices, LearningProgress, LearningRequest
-from studio.web.doors import Doors, doors_of
+from studio.web.doors import Door, Doors
 from studio.web.setting_views import knob_view
 from studio.web.upload_routes import forget, upload_folder
 from studio.worker.learning_desk import LearningState
@@ -30,8 +29,6 @@ router = APIRouter(prefix="/api/learning", tags=["behaviours"])
 
 DEFAULT_BODY = "human25"
 SKELETON, ARCHIVE, UNPACKED = ".asf", ".zip", "unpacked"
-
-Door = Annotated[Doors, Depends(doors_of)]
 
 
 @router.get("")

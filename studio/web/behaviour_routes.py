@@ -24,7 +24,7 @@ from studio.training.model_shelf import (
 )
 from studio.web.behaviour_schemas import BehaviourDetail, BehaviourList, Entropies, GeneratedWalk, ModelName
 from studio.web.behaviour_views import bodiless_detail, detail_of, entropies_of, line_of, walk_of
-from studio.web.doors import Doors, doors_of
+from studio.web.doors import Door, Doors
 from studio.web.schemas import TrashEntry
 from studio.web.session_routes import trash_entry
 
@@ -32,8 +32,6 @@ router = APIRouter(prefix="/api/behaviours", tags=["behaviours"])
 
 MOST_FRAMES = 1800
 KEPT_MODELS = 4
-
-Door = Annotated[Doors, Depends(doors_of)]
 
 
 def model_path(behaviour: str, doors: Door) -> Path:

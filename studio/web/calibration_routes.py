@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 from urllib.parse import quote
 
 import cv2
-from fastapi import APIRouter, Depends, Query, Response
+from fastapi import APIRouter, Query, Response
 
 from studio.calibration.board_pdf import usual_board, write_board_pdf
 from studio.calibration.boards import board_from_text
@@ -41,12 +41,11 @@ from studio.web.calibration_schemas import (
     ProposalView,
 )
 from studio.web.calibration_views import calibration_view, proposal_view
-from studio.web.doors import Doors, doors_of, let_go
+from studio.web.doors import Door, Doors, let_go
 from studio.web.session_routes import OpenSession
 
 router = APIRouter(prefix="/api", tags=["calibration"])
 
-Door = Annotated[Doors, Depends(doors_of)]
 
 HERE = "/sessions/{session}/calibration"
 CURRENT = "current"
@@ -87,7 +86,7 @@ def apply(session: OpenSession, identifier: str, wish: ApplyRequest, doors: Door
     new = _found(session, identifier, doors).checked_new(wish.anyway)
     let_go(doors, session.name)
     change = replace_calibration(session, new)
-    doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
+    doors.events.session_changed(session.name)
     return calibration_view(change.session, change.notes)
 
 

@@ -3,9 +3,8 @@
 import asyncio
 import time
 from pathlib import Path
-from typing import Annotated
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter
 
 from studio.calibration.board_folders import find_board_footage
 from studio.calibration.board_footage_reading import list_footage
@@ -16,13 +15,12 @@ from studio.web.background_jobs import Job, Report
 from studio.web.calibration_places import place_of
 from studio.web.calibration_proposals import Proposal, footage_sizes, how_taken, proposal_of_boards
 from studio.web.calibration_schemas import BoardRequest, SolveState
-from studio.web.doors import Doors, doors_of
+from studio.web.doors import Door, Doors
 from studio.web.job_kinds import CALIBRATION
 from studio.web.session_routes import OpenSession
 
 router = APIRouter(prefix="/api", tags=["calibration"])
 
-Door = Annotated[Doors, Depends(doors_of)]
 
 LOOKING = "Looking for the board"
 LOOKING_SHARE = 0.95

@@ -8,7 +8,7 @@ import asyncio
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query, Request
+from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
 
 from studio.capture.camera_addresses import CameraAddress, camera_address, refuse_own
@@ -27,14 +27,12 @@ from studio.web.camera_schemas import (
     RecordingWish,
     SpreadView,
 )
-from studio.web.doors import Doors, doors_of
+from studio.web.doors import Door, Doors
 from studio.web.safe_paths import PathRefused, folder_to_import
 from studio.worker.camera_tracking import TakeWish
 from studio.worker.commands import Open, Start
 
 router = APIRouter(prefix="/api", tags=["cameras"])
-
-Door = Annotated[Doors, Depends(doors_of)]
 
 
 @router.get("/cameras")

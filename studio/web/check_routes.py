@@ -1,23 +1,20 @@
 """How well a run's track fits its pictures: measured in the background (`track` events, verb "check"), and kept."""
 
 import asyncio
-from typing import Annotated
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter
 
 from studio.runs.checking import RunCheck, check_run, kept_check, usual_track
 from studio.runs.tracks import read_track
 from studio.web.background_jobs import Job
 from studio.web.check_schemas import CheckAnswer, CheckLine, CheckWish
-from studio.web.doors import Doors, doors_of
+from studio.web.doors import Door
 from studio.web.run_routes import RUN, OpenRun
 from studio.web.session_routes import OpenSession
 from studio.web.track_jobs import begin_job
 from studio.web.track_schemas import TrackJobState
 
 router = APIRouter(prefix="/api", tags=["tracks"])
-
-Door = Annotated[Doors, Depends(doors_of)]
 
 
 @router.get(RUN + "/check")

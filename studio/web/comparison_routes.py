@@ -31,7 +31,7 @@ from studio.web.comparison_schemas import (
     EntrantChoice,
     LineupChoice,
 )
-from studio.web.doors import Doors, doors_of
+from studio.web.doors import Door, Doors
 from studio.web.error_responses import log
 from studio.web.schemas import TrashEntry
 from studio.web.session_routes import OpenSession, trash_entry
@@ -42,8 +42,6 @@ router = APIRouter(prefix="/api/comparisons", tags=["comparisons"])
 
 ONE = "/{session}/{comparison}"
 GOING = ("running", "cancelling")
-
-Door = Annotated[Doors, Depends(doors_of)]
 
 
 def comparison_of(session: OpenSession, comparison: str) -> KeptComparison:
@@ -130,7 +128,7 @@ def resume(session: OpenSession, kept: Kept, doors: Door) -> ComparisonLine:
 def delete(session: OpenSession, kept: Kept, doors: Door) -> TrashEntry:
     """Move it to the trash. 409 while it runs."""
     place = throw_away(doors.workspace, session, kept)
-    doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
+    doors.events.session_changed(session.name)
     return trash_entry(place)
 
 
@@ -168,7 +166,7 @@ def _plan(session: Session, wish: ComparisonRequest) -> Plan:
 
 def _start(doors: Doors, session: Session, kept: KeptComparison) -> ComparisonLine:
     doors.desk.start(kept, session)
-    doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
+    doors.events.session_changed(session.name)
     return _line(doors, session, kept)
 
 

@@ -9,9 +9,9 @@ import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Annotated, Protocol
 
-from fastapi import Request
+from fastapi import Depends, Request
 
 from studio.export.task import Writer
 from studio.runs.overlay_pictures import forget_composers
@@ -69,8 +69,8 @@ class Control(Protocol):
         ...
 
 
-class Shown(Protocol):
-    """What the scene shows, when its own controls moved it (`scene.view_options.Shown`)."""
+class SceneFrame(Protocol):
+    """A frame of a run, or a session without any."""
 
     @property
     def session(self) -> str: ...
@@ -80,6 +80,10 @@ class Shown(Protocol):
 
     @property
     def frame(self) -> int | None: ...
+
+
+class Shown(SceneFrame, Protocol):
+    """What the scene shows, when its own controls moved it (`scene.view_options.Shown`)."""
 
     @property
     def layer(self) -> int | None: ...
@@ -94,17 +98,8 @@ class Shown(Protocol):
     def editing(self) -> bool: ...
 
 
-class EditedPose(Protocol):
+class EditedPose(SceneFrame, Protocol):
     """What is being edited in the scene (`scene.pose_desk.Editing`)."""
-
-    @property
-    def session(self) -> str: ...
-
-    @property
-    def run(self) -> str: ...
-
-    @property
-    def frame(self) -> int | None: ...
 
     @property
     def pose(self) -> Iterable[float]: ...
@@ -249,12 +244,15 @@ class Doors:
     def _tell_recording(self, recording: DeskRecording) -> None:
         self.events.publish({"type": "recording", **dataclasses.asdict(recording)})
         if recording.state == "done" or (recording.run and recording.state == "getting ready"):
-            self.events.publish({"type": "sessions", "session": recording.session, "run": ""})
+            self.events.session_changed(recording.session)
 
 
 def doors_of(request: Request) -> Doors:
     """The doors, as a dependency of routes."""
     return request.app.state.doors
+
+
+Door = Annotated[Doors, Depends(doors_of)]
 
 
 def let_go(doors: Doors, session: str, run: str = "") -> None:

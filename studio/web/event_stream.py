@@ -97,6 +97,10 @@ class EventStream:
         if self._loop is not None and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._offer, message)
 
+    def session_changed(self, session: str, run: str = "") -> None:
+        """Tell all pages that a session is not as it was; "" for the list of them. run : that it concerns, if one."""
+        self.publish({"type": "sessions", "session": session, "run": run})
+
     def _offer(self, message: dict[str, object]) -> None:
         if not self._watchers:
             return

@@ -1,8 +1,6 @@
 """Exporting a run: in the background, with progress as `export` events; the files lie in the run's folder."""
 
-from typing import Annotated
-
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter
 from fastapi.responses import FileResponse, Response
 
 from studio.capture.calibration_files import CALIBRATION_WRITERS
@@ -13,7 +11,7 @@ from studio.export.options import ExportOptions
 from studio.knobs import knobs_of
 from studio.runs.tracks import track_names
 from studio.web.background_jobs import Job
-from studio.web.doors import Doors, doors_of
+from studio.web.doors import Door
 from studio.web.export_schemas import (
     ExportChoices,
     ExportLine,
@@ -28,8 +26,6 @@ from studio.web.session_routes import OpenSession
 from studio.web.setting_views import knob_view
 
 router = APIRouter(prefix="/api", tags=["exports"])
-
-Door = Annotated[Doors, Depends(doors_of)]
 
 
 @router.get("/exports/choices")

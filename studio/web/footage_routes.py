@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 
 from studio.capture.timestamps import TIMESTAMP_NAMES
 from studio.runs.footage_pictures import bare_picture
@@ -16,7 +16,7 @@ from studio.runs.overlay_drawing import encode_jpeg
 from studio.sessions.footage_changes import change_footage, recorded_offsets, stale_runs, synchrony_of
 from studio.sessions.session import Session
 from studio.web.background_jobs import Job
-from studio.web.doors import Doors, doors_of, let_go
+from studio.web.doors import Door, let_go
 from studio.web.footage_schemas import (
     FootageCamera,
     FootageState,
@@ -30,8 +30,6 @@ from studio.web.session_routes import OpenSession
 
 router = APIRouter(prefix="/api", tags=["footage"])
 
-Door = Annotated[Doors, Depends(doors_of)]
-
 
 @router.get("/sessions/{session}/footage")
 def footage(session: OpenSession) -> FootageState:
@@ -44,7 +42,7 @@ def change(session: OpenSession, wish: FootageWish, doors: Door) -> FootageState
     """Change offsets and turns; says what that makes stale. Refused while a run of the session is being tracked."""
     let_go(doors, session.name)
     changed = change_footage(session, wish.offsets, wish.rotations)
-    doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
+    doors.events.session_changed(session.name)
     return _state(changed.session, list(changed.notes))
 
 

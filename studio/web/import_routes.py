@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query
+from fastapi import APIRouter, Query
 
 from studio.errors import StudioError
 from studio.runs.overlay_pictures import forget_composers
@@ -21,7 +21,7 @@ from studio.sessions.importers.catalogue import ImportReport, import_source
 from studio.sessions.importers.plan import Progress
 from studio.web.archives import unpack_zip
 from studio.web.background_jobs import Job
-from studio.web.doors import Doors, doors_of, let_go
+from studio.web.doors import Door, Doors, let_go
 from studio.web.import_schemas import (
     FolderView,
     FootageAddition,
@@ -39,7 +39,6 @@ from studio.web.upload_routes import forget, upload_folder
 
 router = APIRouter(prefix="/api", tags=["importing"])
 
-Door = Annotated[Doors, Depends(doors_of)]
 
 Taker = Callable[[Path, Progress, Callable[[], bool]], ImportReport | AddedFootage]
 """take(folder, progress, cancelled) reads a source into the workspace."""
@@ -139,7 +138,7 @@ def cancel_import(identifier: str, doors: Door) -> ImportState:
 def add_sample(wish: SampleRequest, doors: Door) -> NewName:
     """Copy a sample session into the workspace (if it is not there) and return its name."""
     session = install_sample(doors.workspace, wish.name)
-    doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
+    doors.events.session_changed(session.name)
     return NewName(name=session.name)
 
 

@@ -1,23 +1,20 @@
 """Finding a start pose, in the background, with progress as `initialise` events; the scene shows what is found."""
 
 import asyncio
-from typing import Annotated
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter
 
 from studio.errors import SettingsError
 from studio.runs.initialising import WEIGHTING, InitialPose, initialise, keep_pose
 from studio.runs.new_run import checked_frames
 from studio.web.background_jobs import Job
-from studio.web.doors import Doors, doors_of
+from studio.web.doors import Door
 from studio.web.initialisation_schemas import InitialisationRequest, InitialisationState
 from studio.web.job_kinds import START_POSE
 from studio.web.session_routes import OpenSession
 from studio.weighting.catalogue import WEIGHTINGS
 
 router = APIRouter(prefix="/api", tags=["start poses"])
-
-Door = Annotated[Doors, Depends(doors_of)]
 
 
 @router.post("/sessions/{session}/initialise", status_code=202)

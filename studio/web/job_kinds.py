@@ -1,5 +1,6 @@
 """All kinds of work that go on in the background of the server."""
 
+from studio.web.alignment_schemas import AlignmentJob
 from studio.web.background_jobs import JobKind
 from studio.web.background_schemas import BackgroundJob
 from studio.web.calibration_schemas import SolveState
@@ -14,6 +15,7 @@ IMPORT = JobKind("import", "import", ImportState, changes_session=True)
 SYNCHRONY = JobKind("synchrony", "estimate", SynchronyState)
 CALIBRATION = JobKind("calibration", "calibration", SolveState)
 BACKGROUND = JobKind("background", "set-up", BackgroundJob, changes_session=True)
+ALIGNMENT = JobKind("alignment", "comparison of the cameras", AlignmentJob)
 SUBJECT = JobKind("subject", "fit", FitSubjectState, changes_session=True)
 START_POSE = JobKind("initialise", "search", InitialisationState, changes_session=True)
 TRACK = JobKind("track", "job", TrackJobState)

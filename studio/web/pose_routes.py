@@ -1,10 +1,9 @@
 """Poses set by hand: start poses, dragging, mirroring, the search around a pose, and the editor in the scene."""
 
 import math
-from typing import Annotated
 
 import numpy as np
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter
 from numpy.typing import NDArray
 
 from studio.body.dragging import Dragger
@@ -17,7 +16,7 @@ from studio.runs.start_pose_file import keep_start_pose
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.web.background_jobs import Job
-from studio.web.doors import Doors, doors_of
+from studio.web.doors import Door
 from studio.web.pose_schemas import (
     BetterPoseRequest,
     DragRequest,
@@ -36,7 +35,6 @@ from studio.web.track_schemas import TrackJobState
 
 router = APIRouter(prefix="/api", tags=["poses"])
 
-Door = Annotated[Doors, Depends(doors_of)]
 Array = NDArray[np.float64]
 SESSION = "/sessions/{session}"
 
@@ -56,7 +54,7 @@ def put_start_pose(session: OpenSession, wish: StartPoseRequest, doors: Door) ->
     body = session.body()
     pose = _fitting(body, wish.pose)
     keep_start_pose(session, body, pose, wish.frame)
-    doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
+    doors.events.session_changed(session.name)
     return _view(body, pose, stored=True, frame=session.start_pose_frame())
 
 

@@ -1,25 +1,23 @@
 """What `studio reproduce` found, for the page of reports and as downloads."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import msgspec
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter
 from pydantic import Field
 from starlette.responses import FileResponse, Response
 
 from studio.errors import NotFoundError, SessionError
 from studio.experiments.findings_files import REPORT, RESULTS, SUMMARY
 from studio.typed_decoding import decode_json
-from studio.web.doors import Doors, doors_of
+from studio.web.doors import Door, Doors
 from studio.web.schemas import Answer
 
 router = APIRouter(tags=["reports"])
 
 REPRODUCTION_FOLDER = "reproduction"
 DOWNLOADS = {RESULTS: "application/json", SUMMARY: "text/markdown; charset=utf-8", REPORT: "text/html"}
-
-Door = Annotated[Doors, Depends(doors_of)]
 
 
 class Reports(Answer):

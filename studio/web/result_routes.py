@@ -8,7 +8,7 @@ import io
 from typing import Annotated, Literal
 
 import numpy as np
-from fastapi import APIRouter, Depends, Query, Response
+from fastapi import APIRouter, Query, Response
 
 from studio.errors import NotFoundError, StudioError
 from studio.runs.live_summary import summary_of
@@ -16,7 +16,6 @@ from studio.runs.tracks import RAW
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.tracking.tracker import LayerRecord
-from studio.web.doors import Doors, doors_of
 from studio.web.event_encoding import layer_summary
 from studio.web.result_schemas import (
     EvaluationView,
@@ -35,7 +34,6 @@ from studio.web.setting_views import changes_of, history_of
 
 router = APIRouter(prefix="/api", tags=["results"])
 
-Door = Annotated[Doors, Depends(doors_of)]
 MOMENTS = (
     ("weighed", "variance_weighed"),
     ("before_diffusion", "variance_resampled"),

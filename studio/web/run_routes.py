@@ -14,7 +14,7 @@ from studio.runs.new_run import RunRequest as NewRun
 from studio.runs.new_run import prepare_run
 from studio.sessions.run_log import read_log
 from studio.sessions.stored_run import StoredRun
-from studio.web.doors import Doors, doors_of, let_go
+from studio.web.doors import Door, Doors, let_go
 from studio.web.event_encoding import message_of, plain
 from studio.web.log_schemas import LogEntry, LogLines
 from studio.web.pace_schemas import PaceRequest, PaceView, SpeedView
@@ -37,7 +37,6 @@ from studio.worker.search_pace import offered
 
 router = APIRouter(prefix="/api", tags=["runs"])
 
-Door = Annotated[Doors, Depends(doors_of)]
 SEARCHING = ("tracking", "compiling")
 RUN = "/sessions/{session}/runs/{run}"
 
@@ -76,7 +75,7 @@ def make_run(session: OpenSession, wish: RunRequest, doors: Door) -> RunLine:
         to_and_fro=wish.to_and_fro,
     )
     made = prepare_run(session, request)
-    doors.events.publish({"type": "sessions", "session": session.name, "run": made.name})
+    doors.events.session_changed(session.name, made.name)
     return completed(RunLine.model_validate(made.summary()), session)
 
 
@@ -106,7 +105,7 @@ def rename_run(session: OpenSession, run: OpenRun, change: SessionChange, doors:
     if change.name is not None and change.name != name:
         let_go(doors, session.name, name)
         name = doors.workspace.rename_run(session.name, name, change.name).name
-    doors.events.publish({"type": "sessions", "session": session.name, "run": name})
+    doors.events.session_changed(session.name, name)
     return NewName(name=name)
 
 
@@ -115,7 +114,7 @@ def delete_run(session: OpenSession, run: OpenRun, doors: Door) -> TrashEntry:
     """Move a run to the trash. Refused while it is being tracked."""
     let_go(doors, session.name, run.name)
     place = doors.workspace.trash_run(session.name, run.name)
-    doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
+    doors.events.session_changed(session.name)
     return trash_entry(place)
 
 

@@ -1,16 +1,12 @@
 """What the 3-D scene shows: the page's timeline, layer buttons and camera keys arrive here."""
 
-from typing import Annotated
-
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter
 from pydantic import Field
 
-from studio.web.doors import Doors, Shown, doors_of
+from studio.web.doors import Door, Doors, Shown
 from studio.web.schemas import Request, RunName
 
 router = APIRouter(prefix="/api/scene", tags=["scene"])
-
-Door = Annotated[Doors, Depends(doors_of)]
 
 
 class SceneWish(Request):

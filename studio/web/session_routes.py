@@ -16,7 +16,7 @@ from studio.sessions.run_record import read_run_record
 from studio.sessions.session import Session
 from studio.sessions.workspace import TRASH_NAME, SessionSummary
 from studio.training.model_shelf import bring_back_model, thrown_model
-from studio.web.doors import Doors, doors_of, let_go
+from studio.web.doors import Door, Doors, let_go
 from studio.web.schemas import (
     NewName,
     Restored,
@@ -30,8 +30,6 @@ from studio.web.schemas import (
 from studio.web.session_views import session_detail, session_line
 
 router = APIRouter(prefix="/api", tags=["sessions"])
-
-Door = Annotated[Doors, Depends(doors_of)]
 
 
 def session_of(session: str, doors: Door) -> Session:
@@ -112,7 +110,7 @@ def restore(choice: TrashChoice, doors: Door) -> Restored:
         return Restored(name=owner.name, comparison=kept.name)
     if thrown_model(inside(doors.workspace.root / TRASH_NAME, choice.entry)):
         model = bring_back_model(doors.workspace, choice.entry).stem
-        doors.events.publish({"type": "sessions", "session": "", "run": ""})
+        doors.events.session_changed("")
         return Restored(name="", model=model)
     session = doors.workspace.restore(choice.entry).name
     _changed(doors, session)
@@ -139,7 +137,7 @@ def trash_entry(place: Path) -> TrashEntry:
 
 def _changed(doors: Doors, name: str) -> NewName:
     """Tell all watchers that the list of sessions is another one."""
-    doors.events.publish({"type": "sessions", "session": name, "run": ""})
+    doors.events.session_changed(name)
     return NewName(name=name)
 
 

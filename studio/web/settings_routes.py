@@ -9,7 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query
+from fastapi import APIRouter, Query
 
 from studio.body.catalogue import list_bodies, load_body
 from studio.errors import SettingsError, StudioError
@@ -27,7 +27,7 @@ from studio.settings import (
     values,
 )
 from studio.tracking.catalogue import TRACKERS
-from studio.web.doors import Doors, doors_of
+from studio.web.doors import Door, Doors
 from studio.web.presets import all_presets, drop_preset, keep_preset, preset
 from studio.web.run_routes import RUN, SEARCHING, OpenRun, ensure_open
 from studio.web.setting_schemas import (
@@ -49,7 +49,6 @@ from studio.worker import commands
 
 router = APIRouter(prefix="/api", tags=["settings"])
 
-Door = Annotated[Doors, Depends(doors_of)]
 Value = bool | int | float | str
 
 

@@ -3,7 +3,7 @@
 import asyncio
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query, Response
+from fastapi import APIRouter, Query, Response
 
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
@@ -16,7 +16,7 @@ from studio.runs.subject_fitting import FitRequest, FittedSubject, fit_session_s
 from studio.sessions.made_from import origin_of
 from studio.sessions.session import SUBJECT_NAME
 from studio.web.background_jobs import Job
-from studio.web.doors import Doors, doors_of
+from studio.web.doors import Door, Doors
 from studio.web.job_kinds import SUBJECT
 from studio.web.picture_routes import Height
 from studio.web.session_routes import OpenSession
@@ -29,8 +29,6 @@ from studio.web.subject_schemas import (
 )
 
 router = APIRouter(prefix="/api", tags=["subject"])
-
-Door = Annotated[Doors, Depends(doors_of)]
 
 
 @router.get("/sessions/{session}/subject")
@@ -70,7 +68,7 @@ def set_subject(session: OpenSession, wish: SubjectRequest, doors: Door) -> Subj
     )
     changed = choose_subject(session, wanted)
     forget_composers()
-    doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
+    doors.events.session_changed(session.name)
     return subject(changed)
 
 
@@ -114,7 +112,7 @@ def keep_fit(identifier: str, doors: Door) -> FitSubjectState:
     place = keep_fitted(doors.workspace.session(state.session), found)
     forget_composers()
     state = doors.jobs.change(SUBJECT, identifier, file=place.name)
-    doors.events.publish({"type": "sessions", "session": state.session, "run": ""})
+    doors.events.session_changed(state.session)
     return state
 
 

@@ -1,10 +1,10 @@
 """Tracks of a run: listed, made in the background with progress as `track` events, downloaded; runs corrected."""
 
 import asyncio
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from fastapi import APIRouter, Depends, Response
+from fastapi import APIRouter, Response
 
 from studio.capture.trc import read_trc
 from studio.errors import SettingsError
@@ -27,7 +27,7 @@ from studio.sessions.stored_run import StoredRun
 from studio.tracking.refinement import RefinementSettings
 from studio.tracking.smoothing import SmoothingSettings
 from studio.web.background_jobs import Job
-from studio.web.doors import Doors, doors_of
+from studio.web.doors import Door
 from studio.web.job_kinds import TRACK
 from studio.web.run_routes import RUN, OpenRun
 from studio.web.session_routes import OpenSession
@@ -42,8 +42,6 @@ from studio.web.track_schemas import (
 )
 
 router = APIRouter(prefix="/api", tags=["tracks"])
-
-Door = Annotated[Doors, Depends(doors_of)]
 
 
 @router.get(RUN + "/tracks")
@@ -123,7 +121,7 @@ async def begin_correction(
         session, run, wish.frame, pose,
         source=source, backwards_to=wish.back_to, name=wish.name or "",
     )  # fmt: skip
-    doors.events.publish({"type": "sessions", "session": session.name, "run": made.name})
+    doors.events.session_changed(session.name, made.name)
 
     def work(job: Job) -> dict[str, Any]:
         if wish.back_to is not None:

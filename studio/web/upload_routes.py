@@ -12,11 +12,11 @@ import time
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query, Request
+from fastapi import APIRouter, Query, Request
 
 from studio.errors import NotFoundError, SessionError, StudioError
 from studio.sessions.names import inside
-from studio.web.doors import Doors, doors_of
+from studio.web.doors import Door, Doors
 from studio.web.error_responses import TooLargeError
 from studio.web.import_schemas import FileState, UploadState
 from studio.web.safe_paths import place_in, relative_path
@@ -28,8 +28,6 @@ FILES = 20_000
 KEEP_FREE = 1 << 30
 STALE_SECONDS = 7 * 24 * 3600
 UPLOADS_NAME = "uploads"
-
-Door = Annotated[Doors, Depends(doors_of)]
 
 
 class DiskFullError(StudioError):

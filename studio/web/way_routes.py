@@ -3,7 +3,7 @@
 import asyncio
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query
+from fastapi import APIRouter, Query
 from starlette.responses import FileResponse, Response
 
 from studio.export.kept_exports import kept_exports
@@ -12,16 +12,14 @@ from studio.runs.way_results import newest_run
 from studio.sessions.beginning import begin_session
 from studio.sessions.session import Session
 from studio.tracking.evaluations import knobs_for_evaluations
-from studio.web.doors import Doors, doors_of
-from studio.web.job_kinds import BACKGROUND, EXPORT, START_POSE, SUBJECT, TRACK
+from studio.web.doors import Door, Doors
+from studio.web.job_kinds import ALIGNMENT, BACKGROUND, EXPORT, START_POSE, SUBJECT, TRACK
 from studio.web.page_routes import assets_folder
 from studio.web.schemas import NewName
 from studio.web.session_routes import OpenSession
 from studio.web.way_schemas import NewSession, WayAnswer
 
 router = APIRouter(tags=["way"])
-
-Door = Annotated[Doors, Depends(doors_of)]
 
 
 @router.get("/way", include_in_schema=False)
@@ -36,7 +34,7 @@ def page() -> Response:
 def begin(wish: NewSession, doors: Door) -> NewName:
     """Make an empty session: footage and calibration are added later."""
     session = begin_session(doors.workspace.place_for(wish.name), wish.title, wish.body)
-    doors.events.publish({"type": "sessions", "session": session.name, "run": ""})
+    doors.events.session_changed(session.name)
     return NewName(name=session.name)
 
 
@@ -55,16 +53,17 @@ async def way(session: OpenSession, doors: Door) -> WayAnswer:
 
 def running_steps(doors: Doors, session: Session) -> dict[str, str]:
     """Steps whose job is under way in this server, with how far it is, in words."""
-    jobs = {
-        "subject": SUBJECT,
-        "start-pose": START_POSE,
-        "background": BACKGROUND,
-        "check": TRACK,
-        "export": EXPORT,
-    }
+    jobs = (
+        ("subject", SUBJECT),
+        ("start-pose", START_POSE),
+        ("background", ALIGNMENT),
+        ("background", BACKGROUND),
+        ("check", TRACK),
+        ("export", EXPORT),
+    )
     return {
         step: state.step or "beginning"
-        for step, kind in jobs.items()
+        for step, kind in jobs
         for state in doors.jobs.running(kind, session.name)
     }
 
