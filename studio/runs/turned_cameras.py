@@ -47,10 +47,7 @@ def alignment_words(aligned: SessionAlignment) -> str:
     if not aligned.better:
         return f"{missed}, and turning cameras does not explain it: look at the masks and the calibration."
     turn, after = float(np.nanmax(found.turns)), float(np.nanmax(found.after))
-    return (
-        f"{missed}; with cameras turned by up to {turn:.2f}° they would miss by {after:.1f} px: turn them"
-        " (step Background, “Do the cameras agree?”)."
-    )
+    return f"{missed}; with cameras turned by up to {turn:.2f}° they would miss by {after:.1f} px."
 
 
 def misses_in_words(session: Session) -> str:
@@ -58,14 +55,16 @@ def misses_in_words(session: Session) -> str:
     footage, masks or calibration are other ones since.
     """
     known = origin_of(session, PART)
-    return "" if known is None or known.good or changed_inputs(session, PART) else known.words
+    if known is None or known.good or changed_inputs(session, PART):
+        return ""
+    return f"{known.words} See step Background, “Do the cameras agree?”."
 
 
 def turn_cameras(session: Session, aligned: SessionAlignment) -> CalibrationChange:
     """Let the session use the turned cameras from now on. Raises SessionError while a run is being tracked, and
     CalibrationError where the calibration is another one than that which was aligned.
     """
-    if not _is_of(session, aligned):
+    if not is_of(session, aligned):
         raise CalibrationError(
             "The calibration is another one than that which was looked at.", "Measure the cameras again."
         )
@@ -102,7 +101,7 @@ def turn_back(session: Session) -> CalibrationChange:
     return restore_calibration(session, found.before, found.source)
 
 
-def _is_of(session: Session, aligned: SessionAlignment) -> bool:
+def is_of(session: Session, aligned: SessionAlignment) -> bool:
     """Whether the cameras in use are those that were looked at: as far from the turned ones as these were turned by."""
     now, found = session.cameras(), aligned.found
     if tuple(camera.name for camera in now) != aligned.names:

@@ -15,8 +15,8 @@ from starlette.staticfiles import StaticFiles
 from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.workspace import Workspace
 from studio.web import (
-    background_routes,
     alignment_routes,
+    background_routes,
     background_setup_routes,
     behaviour_learning_routes,
     behaviour_routes,

@@ -13,7 +13,7 @@ from studio.sessions.beginning import begin_session
 from studio.sessions.session import Session
 from studio.tracking.evaluations import knobs_for_evaluations
 from studio.web.doors import Door, Doors
-from studio.web.job_kinds import ALIGNMENT, BACKGROUND, EXPORT, START_POSE, SUBJECT, TRACK
+from studio.web.job_kinds import BACKGROUND, EXPORT, START_POSE, SUBJECT, TRACK
 from studio.web.page_routes import assets_folder
 from studio.web.schemas import NewName
 from studio.web.session_routes import OpenSession
@@ -56,7 +56,6 @@ def running_steps(doors: Doors, session: Session) -> dict[str, str]:
     jobs = (
         ("subject", SUBJECT),
         ("start-pose", START_POSE),
-        ("background", ALIGNMENT),
         ("background", BACKGROUND),
         ("check", TRACK),
         ("export", EXPORT),

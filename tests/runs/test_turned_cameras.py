@@ -50,7 +50,8 @@ def test_the_way_recommends_turning_and_is_content_afterwards(
     told = calibration_step(session)
     assert told.state == "done"
     assert f"({NUDGED})" in told.why
-    assert "turn them" in told.why
+    assert "they would miss by" in told.why
+    assert "step Background" in told.why
     change = turn_cameras(session, aligned)
     assert apart(change.session) < 0.4 * DEGREES
     assert calibration_step(change.session).why == ""

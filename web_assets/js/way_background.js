@@ -3,6 +3,7 @@
 import { button, duration, element } from "./elements.js";
 import { complain } from "./messages.js";
 import { uploadFiles } from "./uploading.js";
+import { alignmentBox } from "./way_alignment.js";
 import { brush } from "./way_brush.js";
 import { maskPictures } from "./way_masks.js";
 import { qualityList } from "./way_quality.js";
@@ -27,8 +28,15 @@ export function mount(place, way) {
 
   const make = element("div", { className: "background-make" });
   const agreement = element("section", { className: "background-quality" });
+  const cameras = element("section", { className: "background-quality", hidden: true });
   const knobs = element("details", { className: "background-knobs" });
-  place.append(make, agreement, knobs);
+  place.append(make, agreement, cameras, knobs);
+  const alignment = alignmentBox(way, cameras, () => {
+    state.quality = null;
+    drawQuality();
+    pictures.show();
+    way.refresh().catch(complain);
+  });
   const pictures = maskPictures(way, paint);
 
   async function ask() {
@@ -133,7 +141,7 @@ export function mount(place, way) {
       const { job } = state.told;
       if (job?.state === "running") { drawGoing(); return follow(); }
       if (job?.state === "failed") state.failed = job;
-      if (job?.state === "done") { state.quality = job.quality; state.changed = {}; changedMasks(); drawKnobs(); way.refresh().catch(complain); }
+      if (job?.state === "done") { state.quality = job.quality; state.changed = {}; changedMasks(); drawKnobs(); way.refresh().catch(complain); if (state.told.cameras.length > 1) alignment.measure(); }
       drawQuality();
       drawMake();
     }, POLL_MILLISECONDS);
@@ -228,7 +236,8 @@ export function mount(place, way) {
     pictures.begin(state.told);
     drawMake(); drawQuality(); drawKnobs();
     follow();
+    alignment.ask().catch(complain);
   }).catch((error) => place.append(element("p", { className: "wrong", textContent: `${error.message} ${error.hint ?? ""}` })));
 
-  return () => { state.gone = true; clearTimeout(state.timer); clearTimeout(state.preview); pictures.close(); style.remove(); };
+  return () => { state.gone = true; clearTimeout(state.timer); clearTimeout(state.preview); pictures.close(); alignment.stop(); style.remove(); };
 }

@@ -1,0 +1,124 @@
+"""Whether the cameras agree on the silhouettes: measured in the background (`alignment` events), turned, turned back."""
+
+import asyncio
+from collections.abc import Sequence
+
+from fastapi import APIRouter
+
+from studio.errors import NotFoundError, RunError
+from studio.runs.aligning import SessionAlignment, align_cameras
+from studio.runs.overlay_pictures import forget_composers
+from studio.runs.turned_cameras import (
+    alignment_words,
+    is_of,
+    remember_alignment,
+    turn_back,
+    turn_cameras,
+    turned_from,
+)
+from studio.sessions.calibration_changes import CalibrationChange
+from studio.sessions.session import Session
+from studio.web.alignment_schemas import AlignmentAnswer, AlignmentJob, AlignmentLine, AlignmentWish
+from studio.web.background_jobs import Job
+from studio.web.doors import Door, Doors, let_go
+from studio.web.job_kinds import ALIGNMENT
+from studio.web.session_routes import OpenSession
+
+router = APIRouter(prefix="/api/sessions/{session}/alignment", tags=["calibration"])
+
+
+@router.get("")
+def alignment(session: OpenSession, doors: Door) -> AlignmentAnswer:
+    """How far the silhouettes miss, as it was measured last, and whether the cameras in use were turned."""
+    return _answer(session, doors)
+
+
+@router.post("", status_code=202)
+async def begin(session: OpenSession, wish: AlignmentWish, doors: Door) -> AlignmentJob:
+    """Begin to measure; nothing is changed. Ask `GET …/alignment` how it stands, or wait for `alignment` events."""
+    if doors.jobs.running(ALIGNMENT, session.name):
+        raise RunError(
+            f"The cameras of '{session.name}' are being compared.", "Wait until it is done, or cancel it."
+        )
+    session.cameras()
+
+    def work(job: Job) -> dict[str, object]:
+        found = align_cameras(session, wish.frames, progress=job.report_or_stop)
+        job.found = found
+        remember_alignment(session, found)
+        return _told(found)
+
+    return doors.jobs.begin(ALIGNMENT, AlignmentJob(session=session.name), work)
+
+
+@router.delete("", status_code=202)
+def cancel(session: OpenSession, doors: Door) -> AlignmentAnswer:
+    """Stop measuring."""
+    if doors.jobs.known(ALIGNMENT, session.name) is not None:
+        doors.jobs.cancel(ALIGNMENT, session.name)
+    return _answer(session, doors)
+
+
+@router.post("/keep")
+async def keep(session: OpenSession, doors: Door) -> AlignmentAnswer:
+    """Use the turned cameras from now on; the calibration before is kept, what becomes stale is said. Refused while a
+    run of the session is being tracked, or where the calibration is another one than that which was measured.
+    """
+    found = _found(session, doors)
+    if found is None:
+        raise NotFoundError(f"The cameras of '{session.name}' were not compared.", "Measure first.")
+    let_go(doors, session.name)
+    change = await asyncio.to_thread(turn_cameras, session, found)
+    doors.jobs.change(ALIGNMENT, session.name, kept=True)
+    return _changed(change, doors)
+
+
+@router.post("/undo")
+async def undo(session: OpenSession, doors: Door) -> AlignmentAnswer:
+    """Use the calibration again that the cameras in use were turned from."""
+    let_go(doors, session.name)
+    change = await asyncio.to_thread(turn_back, session)
+    if doors.jobs.known(ALIGNMENT, session.name) is not None:
+        doors.jobs.change(ALIGNMENT, session.name, kept=False)
+    return _changed(change, doors)
+
+
+def _changed(change: CalibrationChange, doors: Doors) -> AlignmentAnswer:
+    forget_composers()
+    doors.events.publish({"type": "sessions", "session": change.session.name, "run": ""})
+    return _answer(change.session, doors, change.notes)
+
+
+def _answer(session: Session, doors: Doors, notes: Sequence[str] = ()) -> AlignmentAnswer:
+    turned = bool(turned_from(session))
+    job = doors.jobs.known(ALIGNMENT, session.name)
+    if job is not None and job.state == "done" and not (job.kept and turned):
+        found = _found(session, doors)
+        job = job if found is not None and is_of(session, found) else None
+    possible = session.is_calibrated and len(session.manifest.footage.cameras) > 1
+    return AlignmentAnswer(session=session.name, possible=possible, job=job, turned=turned, notes=list(notes))
+
+
+def _found(session: Session, doors: Doors) -> SessionAlignment | None:
+    if doors.jobs.known(ALIGNMENT, session.name) is None:
+        return None
+    found = doors.jobs.found(ALIGNMENT, session.name)
+    return found if isinstance(found, SessionAlignment) else None
+
+
+def _told(aligned: SessionAlignment) -> dict[str, object]:
+    found = aligned.found
+    return {
+        "cameras": [
+            AlignmentLine.model_validate(
+                {"camera": name, "before_px": before, "after_px": after, "turn_degrees": turn}
+            )
+            for name, before, after, turn in zip(
+                aligned.names, found.before, found.after, found.turns, strict=True
+            )
+        ],
+        "frames": list(found.frames),
+        "needed": aligned.needed,
+        "better": aligned.better,
+        "words": alignment_words(aligned),
+    }
