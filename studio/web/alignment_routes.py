@@ -1,4 +1,4 @@
-"""Whether the cameras agree on the silhouettes: measured in the background (`alignment` events), turned, turned back."""
+"""Whether the cameras agree on the silhouettes: measured in the background (`alignment` events), turned, and back."""
 
 import asyncio
 from collections.abc import Sequence

@@ -31,9 +31,9 @@ class AlignmentJob(SessionJob):
 
 
 class AlignmentAnswer(Answer):
-    """possible: there are several calibrated cameras. job: under way, or the last one with the calibration in use. turned:
-    the cameras in use were turned from an earlier calibration, which can be had back. notes: what a change just made
-    means for what is there.
+    """possible: there are several calibrated cameras. job: under way, or the last one with the calibration in use.
+    turned: the cameras in use were turned from an earlier calibration, which can be had back. notes: what a change just
+    made means for what is there.
     """
 
     session: str

@@ -53,16 +53,16 @@ async def way(session: OpenSession, doors: Door) -> WayAnswer:
 
 def running_steps(doors: Doors, session: Session) -> dict[str, str]:
     """Steps whose job is under way in this server, with how far it is, in words."""
-    jobs = (
-        ("subject", SUBJECT),
-        ("start-pose", START_POSE),
-        ("background", BACKGROUND),
-        ("check", TRACK),
-        ("export", EXPORT),
-    )
+    jobs = {
+        "subject": SUBJECT,
+        "start-pose": START_POSE,
+        "background": BACKGROUND,
+        "check": TRACK,
+        "export": EXPORT,
+    }
     return {
         step: state.step or "beginning"
-        for step, kind in jobs
+        for step, kind in jobs.items()
         for state in doors.jobs.running(kind, session.name)
     }
 
