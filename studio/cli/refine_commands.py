@@ -44,7 +44,7 @@ def refine(
 ) -> dict[str, object]:
     """Refine every frame of a RUN on its silhouettes, and keep that beside what the search found.
 
-    A frame's weight never falls. Ctrl-C ends it, and nothing is kept.
+    Frames that follow each other are refined together. Ctrl-C ends it, and nothing is kept.
     """
     opened = Workspace().resolve(session)
     stored = opened.run(run)
@@ -55,10 +55,14 @@ def refine(
         )
     count = len(made.track.frames)
     text = (
-        f"{opened.name} / {run}: track '{into}' made from '{source}', {made.moved} of {count} frames moved, "
-        f"log-weight + {made.gain:.3f} on average."
+        f"{opened.name} / {run}: track '{into}' made from '{source}', {made.moved} of {count} frames moved; "
+        f"the silhouettes agree by {made.agreement_before:.3f} before, {made.agreement_after:.3f} after."
     )
-    return {**_told(opened.name, run, made), "moved": made.moved, "gain": made.gain, "text": text}
+    return {**_told(opened.name, run, made), "moved": made.moved, **_agreement(made), "text": text}
+
+
+def _agreement(made: MadeTrack) -> dict[str, float]:
+    return {"agreement_before": made.agreement_before, "agreement_after": made.agreement_after}
 
 
 @click.command(name="smooth")

@@ -11,26 +11,18 @@ from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import marker_points
 from studio.errors import RunError
-from studio.evidence.distance_maps import silhouette_distances
-from studio.evidence.frame_evidence import FrameEvidence
-from studio.runs.problem_source import ProblemSource
+from studio.runs.refined_frames import refined_frames
 from studio.runs.search_space import search_space
 from studio.runs.tracks import RAW, Track, read_track, stretches, track_names, write_track
 from studio.sessions.names import checked_name
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.settings import RunSettings, SettingsHistory, default_settings, settings_from_values
-from studio.tracking.loss_detection import Onlooker
-from studio.tracking.refinement import RefinementSettings, Refiner
+from studio.tracking.refinement import RefinementSettings
 from studio.tracking.smoothing import Smoothed, SmoothingSettings, rms_second_difference, smooth
-from studio.tracking.tracker import NO_EVIDENCE, FrameProblem
-from studio.weighting.catalogue import WEIGHTINGS
 
 Array = NDArray[np.float64]
 
 REFINED, SMOOTHED = "refined", "smoothed"
-JUDGE = "edge-region-silhouette"
-"""Judges where the run's own weighting reads pictures instead of masks (blobs must be told what is expected)."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -43,14 +35,16 @@ class MakingCancelledError(RunError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MadeTrack:
-    """A track that was made. moved : frames whose pose changed (refine). gain : mean rise of their log-weight.
-    filled, left_out : frames (smooth). jitter_before, jitter_after : root mean square second difference of the body's
-    markers, mm a frame², over frames that follow each other.
+    """A track that was made. moved : frames whose pose changed (refine). agreement_before, agreement_after : of the
+    silhouettes, f_s, mean over the frames that show any (refine). filled, left_out : frames (smooth). jitter_before,
+    jitter_after : root mean square second difference of the body's markers, mm a frame², over frames that follow each
+    other.
     """
 
     track: Track
     moved: int = 0
-    gain: float = 0.0
+    agreement_before: float = 0.0
+    agreement_after: float = 0.0
     filled: tuple[int, ...] = ()
     left_out: tuple[int, ...] = ()
     jitter_before: float = 0.0
@@ -68,31 +62,35 @@ def refine_run(
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> MadeTrack:
-    """Refine every frame of a track and keep the result as another.
+    """Refine every frame of a track and keep the result as another (`runs.refined_frames` says how).
 
-    A frame is never worse in the eyes of the run's own weighting, with the settings that it was tracked with. progress
-    : told after each frame. cancelled : asked before each; True ends it with MakingCancelledError, nothing is kept.
-    Raises SessionError where `into` is taken, RunError for a run without frames, and what reading the footage raises.
+    progress : told after each frame. cancelled : asked before each; True ends it with MakingCancelledError, nothing is
+    kept. Raises SessionError where `into` is taken, RunError for a run without frames, and what reading the footage
+    raises.
     """
     knobs = settings or RefinementSettings()
     track = _begun(run, source, into, replace)
-    maker = _FrameRefiner(session, run, knobs)
-    poses, confidence, gains = track.poses.copy(), track.confidence.copy(), []
-    try:
-        for at, frame in enumerate(track.frames.tolist()):
-            _ask(cancelled)
-            if track.states[at] != NO_EVIDENCE:
-                poses[at], confidence[at], gain = maker.refined(frame, track.poses[at])
-                gains += [] if gain is None else [gain]
-            if progress is not None:
-                progress(f"refining {run.name}", at + 1, len(track.frames))
-    finally:
-        maker.close()
-    made_by = {"verb": "refine", "from": source, **asdict(knobs), "moved": len(gains)}
-    made = Track(into, track.frames, poses, confidence, track.states, made_by)
+    total = len(track.frames)
+
+    def read(done: int) -> None:
+        _ask(cancelled)
+        if progress is not None:
+            progress(f"refining {run.name}", done, total)
+
+    _ask(cancelled)
+    found = refined_frames(session, run, track, knobs, read)
+    moved = int(np.count_nonzero((found.poses != track.poses).any(axis=1)))
+    made_by = {"verb": "refine", "from": source, **asdict(knobs), "moved": moved}
+    made = Track(into, track.frames, found.poses, found.agreement, track.states, made_by)
     write_track(run, made, replace=replace)
-    gain = float(np.mean(gains)) if gains else 0.0
-    return MadeTrack(made, len(gains), gain, jitter_before=jitter(run, track), jitter_after=jitter(run, made))
+    return MadeTrack(
+        made,
+        moved,
+        found.agreement_before,
+        found.agreement_after,
+        jitter_before=jitter(run, track),
+        jitter_after=jitter(run, made),
+    )
 
 
 def smooth_run(
@@ -129,7 +127,7 @@ def smooth_run(
     made = Track(into, found.frames, found.poses, *_standing(track, found), made_by)
     write_track(run, made, replace=replace)
     before, after = jitter(run, track), jitter(run, made)
-    return MadeTrack(made, 0, 0.0, filled, left_out, before, after)
+    return MadeTrack(made, filled=filled, left_out=left_out, jitter_before=before, jitter_after=after)
 
 
 def jitter(run: StoredRun, track: Track) -> float:
@@ -143,56 +141,6 @@ def jitter(run: StoredRun, track: Track) -> float:
         return 0.0
     weights = [len(part) - 2 for part in parts]
     return float(np.sqrt(np.average([rms_second_difference(part) ** 2 for part in parts], weights=weights)))
-
-
-class _FrameRefiner:
-    """Refines frames of one run: its cameras, body and settings as they were."""
-
-    def __init__(self, session: Session, run: StoredRun, knobs: RefinementSettings) -> None:
-        self._body, self._cameras = run.body(), run.cameras()
-        with run.results() as results:
-            self._history = SettingsHistory(tuple(results.settings_history()))
-        self._record = run.record
-        self._refiner = Refiner(self._body, self._cameras, knobs)
-        self._onlooker = Onlooker(self._body, self._cameras)
-        self._problems = ProblemSource(session, self._body, self._cameras)
-
-    def close(self) -> None:
-        self._problems.close()
-
-    def refined(self, frame: int, pose: Array) -> tuple[Array, float, float | None]:
-        """Pose, overlap of the silhouettes and gain of the log-weight (None where the pose was kept)."""
-        evidence, problem = self._seen(frame)
-        refiner = self._refiner_of(tuple(view.camera for view in evidence.views))
-        found = refiner.refine(pose, silhouette_distances(evidence), problem)
-        overlap = self._onlooker.sight(evidence, found.pose).overlap
-        if overlap < self._refiner.settings.refinement_least_overlap:
-            return pose, self._onlooker.sight(evidence, pose).overlap, None
-        return found.pose, overlap, found.gain if found.moved else None
-
-    def _refiner_of(self, views: tuple[str, ...]) -> Refiner:
-        """For the views that a frame has: of a live camera that had stopped there is none."""
-        if len(views) == len(self._cameras):
-            return self._refiner
-        cameras = tuple(camera for camera in self._cameras if camera.name in views)
-        return Refiner(self._body, cameras, self._refiner.settings)
-
-    def _seen(self, frame: int) -> tuple[FrameEvidence, FrameProblem]:
-        entry = self._history.in_use(frame, 0)
-        values = self._record.settings if entry is None else entry.values
-        settings: RunSettings = settings_from_values(self._record.tracker, self._record.weighting, values)
-        if WEIGHTINGS[settings.weighting_name].reads_pictures:
-            judge = default_settings(settings.tracker_name, JUDGE)
-            settings = RunSettings(
-                settings.tracker_name,
-                JUDGE,
-                settings.tracker,
-                judge.weighting,
-                settings.evidence,
-                settings.recovery,
-                settings.recording,
-            )
-        return self._problems.evidence(frame, settings), self._problems.problem(frame, settings)
 
 
 def check_making(run: StoredRun, source: str, into: str, replace: bool) -> None:

@@ -33,7 +33,7 @@ alone it hardly can be.
 """
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,20 +105,32 @@ class Onlooker:
 
     def sight(self, evidence: FrameEvidence, pose: Array, problem: FrameProblem | None = None) -> Sight:
         """How a pose (D,) agrees with a frame's evidence. problem : the frame's, told what was expected."""
+        return self.looking(evidence, problem)(pose)
+
+    def looking(
+        self, evidence: FrameEvidence, problem: FrameProblem | None = None
+    ) -> Callable[[Array], Sight]:
+        """`sight` of one frame as a function of poses (D,). It keeps little of the evidence: its silhouettes, a bit a
+        pixel.
+        """
         lost = isinstance(problem, SelfJudging) and problem.lost_evidence
-        blank = [is_blank(view) for view in evidence.views]
-        if all(blank):
-            return Sight(float("nan"), seen=False, judged_lost=lost)
+        blank = np.array([is_blank(view) for view in evidence.views])
         carved = all(view.background is not None for view in evidence.views)
+        if blank.all():
+            return lambda _: Sight(float("nan"), seen=False, judged_lost=lost)
         if carved and not any(view.mask.any() for view in evidence.views):
             empty = isinstance(problem, SelfJudging) and problem.quality == -np.inf
-            return Sight(float("nan"), seen=not empty, judged_lost=lost)
-        silhouettes = Silhouettes(evidence, HALF)
-        areas = silhouettes.areas(self._projector(evidence).blocks(pose[None]), 1)
-        own = areas.projected[0] + areas.outside[0]
-        shown = (areas.observed >= LEAST_AREA * own) & ~np.array(blank)
-        overlap = float(areas.fitness()[0][~np.array(blank)].mean())
-        return Sight(overlap, seen=bool((shown & (areas.observed > 0)).any()), judged_lost=lost)
+            return lambda _: Sight(float("nan"), seen=not empty, judged_lost=lost)
+        silhouettes, projector = Silhouettes(evidence, HALF), self._projector(evidence)
+
+        def sight(pose: Array) -> Sight:
+            areas = silhouettes.areas(projector.blocks(pose[None]), 1)
+            own = areas.projected[0] + areas.outside[0]
+            shown = (areas.observed >= LEAST_AREA * own) & ~blank
+            overlap = float(areas.fitness()[0][~blank].mean())
+            return Sight(overlap, seen=bool((shown & (areas.observed > 0)).any()), judged_lost=lost)
+
+        return sight
 
     def _projector(self, evidence: FrameEvidence) -> OutlineProjector:
         names = tuple(view.camera for view in evidence.views)

@@ -12,7 +12,7 @@ from 11 to 16 mm. Beginning with a wider loss and narrowing it gains nothing on 
 body goes to a neighbouring valley; the search has brought it near enough.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -41,6 +41,8 @@ SETTLED = 2e-4
 FEWEST_PIXELS = 3.0
 """The robust loss is at least this wide: below, it is the mask's pixels that are rough."""
 HALFWAY = 0.5
+REACH = 4.0
+"""Times c: farther than this from a silhouette's border its map is not kept, the loss has nearly reached its most."""
 
 
 class Distances(Protocol):
@@ -62,6 +64,12 @@ class Distances(Protocol):
         ...
 
 
+Equations = tuple[float, Array, Array]
+"""A loss, and of half of it gradient (D,) and matrix (D, D) per unit of each parameter."""
+FrameLoss = Callable[[Array], Equations]
+"""What a frame says of a pose (D,)."""
+
+
 @dataclass(frozen=True, slots=True)
 class RefinementSettings:
     """The knobs of local refinement."""
@@ -76,6 +84,11 @@ class RefinementSettings:
     refinement_pull: float = knob(
         40.0, 0.0, 1000.0, 1.0, unit="mm per radian",
         help="Pull towards the pose that the search found; it settles what no silhouette shows.",
+    )  # fmt: skip
+
+    refinement_acceleration: float = knob(
+        40.0, 0.0, 200.0, 1.0, unit="m/s²",
+        help="Usual acceleration of limbs; it holds neighbouring frames together. 0: every frame by itself.",
     )  # fmt: skip
 
     # Walks and runs on subtracted masks: 0.84 to 0.95; masks that show a platform and its shadow as well: 0.57 to 0.64,
@@ -128,19 +141,36 @@ class Refiner:
                 return Refined(candidate, True, float(weight - weights[0]), steps)
         return Refined(start.copy(), False, 0.0, steps)
 
-    def loss(self, pose: Array, silhouettes: Sequence[Distances]) -> tuple[float, Array, Array]:
+    def loss(self, pose: Array, silhouettes: Sequence[Distances]) -> Equations:
         """The loss at a pose, and gradient (D,) and matrix (D, D) of half of it per unit of each parameter."""
         return self._equations(pose, self._prepared(pose, silhouettes))
 
+    def frame_loss(self, start: Array, silhouettes: Sequence[Distances]) -> "FrameLoss":
+        """A frame as a function of poses near `start` (D,); without silhouettes only the pull is left of it."""
+        prepared = self._prepared(start, silhouettes) if silhouettes else None
+
+        def equations(pose: Array) -> Equations:
+            size = len(pose)
+            own = (
+                (0.0, np.zeros(size), np.zeros((size, size)))
+                if prepared is None
+                else self._equations(pose, prepared)
+            )
+            pull = self.settings.refinement_pull**2
+            away = (pose - start) / self.unit
+            return own[0] + pull * float(away @ away), own[1] + pull * away, own[2] + pull * np.eye(size)
+
+        return equations
+
     def _descended(self, start: Array, silhouettes: Sequence[Distances]) -> tuple[Array, int]:
         """The pose that Levenberg-Marquardt ends at, and the steps taken."""
-        prepared = self._prepared(start, silhouettes)
+        of_frame = self.frame_loss(start, silhouettes)
         pose, steps, damping = start.copy(), 0, DAMPING
-        loss, gradient, matrix = self._pulled(pose, start, prepared)
+        loss, gradient, matrix = of_frame(pose)
         while steps < self.settings.refinement_steps and damping < MOST_DAMPING:
             steps += 1
             offered = self._stepped(pose, gradient, matrix, damping)
-            reached = self._pulled(offered, start, prepared)
+            reached = of_frame(offered)
             moved = float(np.abs((offered - pose) / self.unit).max())
             if reached[0] <= loss:
                 pose, (loss, gradient, matrix) = offered, reached
@@ -162,32 +192,27 @@ class Refiner:
         step[free] = -np.linalg.solve(part, gradient[free])
         return np.clip(pose + step * self.unit, self.lower, self.upper)
 
-    def _pulled(self, pose: Array, start: Array, prepared: "_Prepared") -> tuple[float, Array, Array]:
-        """Loss, gradient and matrix with the pull towards the start."""
-        loss, gradient, matrix = self._equations(pose, prepared)
-        pull = self.settings.refinement_pull**2
-        away = (pose - start) / self.unit
-        return loss + pull * float(away @ away), gradient + pull * away, matrix + pull * np.eye(len(pose))
-
     def _prepared(self, pose: Array, silhouettes: Sequence[Distances]) -> "_Prepared":
         """The silhouettes as the kernel reads them, with each view's mm per pixel at the body."""
         middle = limb_ends(self.body, pose[None])[0].reshape(-1, 3).mean(axis=0)
-        views = np.zeros((len(silhouettes), 5), dtype=np.int64)
-        maps = [np.ascontiguousarray(view.signed, dtype=np.float32).ravel() for view in silhouettes]
+        mm = np.array([_mm_per_pixel(camera, middle) for camera in self.cameras])
+        views, maps = np.zeros((len(silhouettes), 7), dtype=np.int64), []
         begin = border = 0
-        for row, view in zip(views, silhouettes, strict=True):
-            height, width = view.signed.shape
-            row[:] = begin, width, height, border, border + len(view.border)
-            begin, border = begin + view.signed.size, border + len(view.border)
+        for row, view, scale in zip(views, silhouettes, self._scales(mm) / mm, strict=True):
+            (left, top), part = _about_the_border(view, REACH * scale)
+            height, width = part.shape
+            row[:] = begin, width, height, border, border + len(view.border), left, top
+            begin, border = begin + part.size, border + len(view.border)
+            maps.append(part.ravel())
         points = [np.concatenate([view.border, view.outward], axis=1) for view in silhouettes]
-        return _Prepared(
-            np.concatenate(maps),
-            views,
-            np.ascontiguousarray(np.concatenate(points)),
-            np.array([_mm_per_pixel(camera, middle) for camera in self.cameras]),
-        )
+        sizes = np.array([view.signed.shape[::-1] for view in silhouettes], dtype=np.int64)
+        return _Prepared(np.concatenate(maps), views, sizes, np.ascontiguousarray(np.concatenate(points)), mm)
 
-    def _equations(self, pose: Array, prepared: "_Prepared") -> tuple[float, Array, Array]:
+    def _scales(self, mm: Array) -> Array:
+        """(V,) mm: c of the loss in each view."""
+        return np.maximum(self.settings.refinement_scale, FEWEST_PIXELS * mm)
+
+    def _equations(self, pose: Array, prepared: "_Prepared") -> Equations:
         size = len(pose)
         steps = DIFFERENCE * np.diag(self.unit)
         corners, _ = self.projector.corners(np.concatenate([pose[None], pose + steps, pose - steps]))
@@ -199,9 +224,10 @@ class Refiner:
             self.ends,
             prepared.maps,
             prepared.views,
+            prepared.sizes,
             prepared.border,
             prepared.mm,
-            np.maximum(self.settings.refinement_scale, FEWEST_PIXELS * prepared.mm),
+            self._scales(prepared.mm),
             OUTLINE_PART,
             matrix,
             gradient,
@@ -215,6 +241,7 @@ class _Prepared:
 
     maps: NDArray[np.float32]
     views: NDArray[np.int64]
+    sizes: NDArray[np.int64]
     border: Array
     mm: Array
 
@@ -234,6 +261,15 @@ def free_ends(body: BodyModel) -> NDArray[np.bool_]:
 
     carrying = set[int]().union(*(above(limb.joint) for limb in body.limbs))
     return np.array([limb.joint not in carrying for limb in body.drawn], dtype=np.bool_)
+
+
+def _about_the_border(view: Distances, margin: float) -> tuple[tuple[int, int], NDArray[np.float32]]:
+    """Left and top of the part of a view's map that lies within `margin` pixels of its border, and that part."""
+    if not len(view.border):
+        return (0, 0), np.ascontiguousarray(view.signed[:0, :0], dtype=np.float32)
+    left, top = np.maximum(np.floor(view.border.min(axis=0) - margin), 0.0).astype(int)
+    right, bottom = np.ceil(view.border.max(axis=0) + margin).astype(int) + 1
+    return (int(left), int(top)), np.ascontiguousarray(view.signed[top:bottom, left:right], dtype=np.float32)
 
 
 def _mm_per_pixel(camera: Camera, point: Array) -> float:

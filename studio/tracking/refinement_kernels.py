@@ -136,9 +136,12 @@ def add_border(border, quads, slopes, usable, turns, ends, mm, scale, row, matri
 
 
 @njit(**OPTIONS)
-def add_outline(values, view, quads, slopes, usable, turns, ends, mm, scale, part, row, matrix, gradient):
+def add_outline(
+    values, view, size, quads, slopes, usable, turns, ends, mm, scale, part, row, matrix, gradient
+):
     """Samples of one view's outlines to the silhouette's border; returns their loss. part : of a sample beside a
-    border point. view : start, width, height of its map in `values`.
+    border point. view : start, width, height of its map in `values`, and in columns 5 and 6 where that begins in the
+    picture, of `size`: far from the silhouette there is no map, and the loss is its most.
     """
     loss = 0.0
     for limb in range(quads.shape[0]):
@@ -150,8 +153,13 @@ def add_outline(values, view, quads, slopes, usable, turns, ends, mm, scale, par
                 u = (sample + 0.5) / SAMPLES_A_SIDE
                 x = (1.0 - u) * quads[limb, first, 0] + u * quads[limb, second, 0]
                 y = (1.0 - u) * quads[limb, first, 1] + u * quads[limb, second, 1]
-                there, value, nx, ny = read_map(x, y, values, view[0], view[1], view[2])
-                if not there or in_another(x, y, quads, usable, turns, limb):
+                if not (0.0 <= x < size[0] - 1.0 and 0.0 <= y < size[1] - 1.0):
+                    continue
+                if in_another(x, y, quads, usable, turns, limb):
+                    continue
+                there, value, nx, ny = read_map(x - view[5], y - view[6], values, view[0], view[1], view[2])
+                if not there:
+                    loss += part * scale * scale
                     continue
                 ratio = (value * mm / scale) ** 2
                 loss += part * scale * scale * ratio / (1.0 + ratio)
@@ -163,12 +171,13 @@ def add_outline(values, view, quads, slopes, usable, turns, ends, mm, scale, par
 
 
 @njit(**OPTIONS)
-def normal_equations(quads, slopes, ends, maps, views, border, mm, scales, part, matrix, gradient):
+def normal_equations(quads, slopes, ends, maps, views, sizes, border, mm, scales, part, matrix, gradient):
     """Fill matrix (D, D) and gradient (D,) of half the squared loss; returns the loss.
 
     quads : (V, L, 4, 2) pixels, NaN for limbs that are not seen. slopes : (V, L, 4, 2, D) per unit of each parameter.
-    ends : (L,) whether a limb's far end may be border. maps : flat signed distances. views : (V, 5) where each begins,
-    its width and height, its first and last border point. border : (K, 4). mm : (V,) mm per pixel. scales :
+    ends : (L,) whether a limb's far end may be border. maps : flat signed distances. views : (V, 7) where each begins,
+    its width and height, its first and last border point, its left and top in the picture, whose width and height are
+    sizes (V, 2). border : (K, 4). mm : (V,) mm per pixel. scales :
     (V,) c of the loss, mm.
     """
     limbs, size = quads.shape[1], slopes.shape[4]
@@ -187,6 +196,7 @@ def normal_equations(quads, slopes, ends, maps, views, border, mm, scales, part,
         loss += add_outline(
             maps,
             views[v],
+            sizes[v],
             quads[v],
             slopes[v],
             usable,

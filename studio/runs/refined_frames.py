@@ -1,0 +1,197 @@
+"""A run's frames refined on their silhouettes, with the cameras, body and settings that they were tracked with.
+
+Frames that follow each other are refined together (`tracking.refinement_over_time`), so that the movement is one that a
+body can make. Frames whose silhouettes agree too little even then say nothing: a platform or a shadow is in the masks.
+They keep the pose that was found, as far as their neighbours' movement lets them. Frames in which the body was lost
+part the movement and are refined alone, as all are where the acceleration is 0: then a frame is never worse in the eyes
+of the run's own weighting, and one that says nothing keeps its pose. Frames without evidence are left as they are.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.evidence.distance_maps import silhouette_distances
+from studio.runs.problem_source import ProblemSource
+from studio.runs.tracks import Track, stretches
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.settings import RunSettings, SettingsHistory, default_settings, settings_from_values
+from studio.tracking.loss_detection import Onlooker, Sight
+from studio.tracking.refinement import FrameLoss, RefinementSettings, Refiner
+from studio.tracking.refinement_over_time import HELD, MovementRefiner, Window, windows
+from studio.tracking.tracker import LOST, NO_EVIDENCE
+from studio.weighting.catalogue import WEIGHTINGS
+
+Array = NDArray[np.float64]
+
+JUDGE = "edge-region-silhouette"
+"""Judges where the run's own weighting reads pictures instead of masks (blobs must be told what is expected)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RefinedFrames:
+    """poses : (K, D). agreement : (K,) f_s of each, what the track said where nothing was looked at. agreement_before,
+    agreement_after : means over the frames that were looked at, NaN without any.
+    """
+
+    poses: Array
+    agreement: Array
+    agreement_before: float
+    agreement_after: float
+
+
+def refined_frames(
+    session: Session, run: StoredRun, track: Track, knobs: RefinementSettings, read: Callable[[int], None]
+) -> RefinedFrames:
+    """The frames of a track refined. read : told how many were read after each; what it raises ends the work."""
+    work = _Work(session, run, track, knobs, read)
+    try:
+        together = knobs.refinement_acceleration > 0.0
+        sure = np.array([together and state not in (LOST, NO_EVIDENCE) for state in track.states])
+        for rows in _parts(track.frames, sure):
+            if sure[rows[0]]:
+                work.refine_together(rows)
+            elif track.states[rows[0]] != NO_EVIDENCE:
+                work.refine_alone(rows[0])
+            else:
+                work.leave()
+    finally:
+        work.problems.close()
+    return work.result()
+
+
+def _parts(frames: NDArray[np.int64], sure: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
+    """Rows that are refined together: sure frames that follow each other; every other row alone."""
+    parts: list[NDArray[np.int64]] = []
+    rows = np.flatnonzero(sure)
+    parts += [rows[part] for part in stretches(frames[rows] + np.cumsum(~sure)[rows])]
+    parts += [np.array([row]) for row in np.flatnonzero(~sure)]
+    return sorted(parts, key=lambda part: int(part[0]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _SeenFrame:
+    """What is kept of a frame while its neighbours are read."""
+
+    start: Array
+    loss: FrameLoss
+    sight: Callable[[Array], Sight]
+
+
+class _Work:
+    """Refines frames of one run, one part after the other."""
+
+    def __init__(
+        self,
+        session: Session,
+        run: StoredRun,
+        track: Track,
+        knobs: RefinementSettings,
+        read: Callable[[int], None],
+    ) -> None:
+        body, self._cameras = run.body(), run.cameras()
+        with run.results() as results:
+            self._history = SettingsHistory(tuple(results.settings_history()))
+        self._record, self._track, self._knobs, self._tell = run.record, track, knobs, read
+        self._refiner = Refiner(body, self._cameras, knobs)
+        self._onlooker = Onlooker(body, self._cameras)
+        self.problems = ProblemSource(session, body, self._cameras)
+        self._poses, self._agreement = track.poses.copy(), track.confidence.copy()
+        self._before: list[float] = []
+        self._after: list[float] = []
+        self._read = 0
+
+    def result(self) -> RefinedFrames:
+        """What has come of it."""
+        before, after = (float(np.nanmean(told)) if told else np.nan for told in (self._before, self._after))
+        return RefinedFrames(self._poses, self._agreement, before, after)
+
+    def leave(self) -> None:
+        """A frame that stays as it is."""
+        self._told()
+
+    def refine_alone(self, row: int) -> None:
+        """One frame by itself."""
+        frame, pose = int(self._track.frames[row]), self._track.poses[row]
+        settings = self._settings(frame)
+        evidence = self.problems.evidence(frame, settings)
+        refiner = self._refiner_of(tuple(view.camera for view in evidence.views))
+        found = refiner.refine(pose, silhouette_distances(evidence), self.problems.problem(frame, settings))
+        sight = self._onlooker.looking(evidence)
+        kept = sight(found.pose).overlap < self._knobs.refinement_least_overlap
+        self._keep(row, pose if kept else found.pose, sight)
+        self._told()
+
+    def refine_together(self, rows: NDArray[np.int64]) -> None:
+        """Frames that follow each other."""
+        mover = MovementRefiner(self._refiner, self._record.fps, self._knobs.refinement_acceleration)
+        seen: list[_SeenFrame] = []
+        for first, after, kept in windows(len(rows)):
+            while first + len(seen) < after:
+                seen.append(self._seen(int(rows[first + len(seen)])))
+            held = self._poses[rows[max(0, first - HELD) : first]]
+            poses = self._moved(mover, seen, held)
+            for row, pose, of_frame in zip(rows[first:kept], poses, seen, strict=False):
+                self._keep(int(row), pose, of_frame.sight)
+            seen = seen[kept - first :]
+
+    def _moved(self, mover: MovementRefiner, seen: list[_SeenFrame], held: Array) -> Array:
+        """The poses of a window; again without the frames that turn out to say nothing."""
+        starts, losses = np.array([one.start for one in seen]), [one.loss for one in seen]
+        poses = mover.refine(Window(starts, losses, held))
+        silent = [
+            one.sight(pose).overlap < self._knobs.refinement_least_overlap
+            for one, pose in zip(seen, poses, strict=True)
+        ]
+        if not any(silent):
+            return poses
+        losses = [
+            self._refiner.frame_loss(one.start, ()) if mute else one.loss
+            for one, mute in zip(seen, silent, strict=True)
+        ]
+        return mover.refine(Window(starts, losses, held))
+
+    def _seen(self, row: int) -> _SeenFrame:
+        frame, pose = int(self._track.frames[row]), self._track.poses[row]
+        evidence = self.problems.evidence(frame, self._settings(frame))
+        refiner = self._refiner_of(tuple(view.camera for view in evidence.views))
+        loss = refiner.frame_loss(pose, silhouette_distances(evidence))
+        self._told()
+        return _SeenFrame(pose, loss, self._onlooker.looking(evidence))
+
+    def _keep(self, row: int, pose: Array, sight: Callable[[Array], Sight]) -> None:
+        self._before.append(sight(self._track.poses[row]).overlap)
+        self._poses[row], self._agreement[row] = pose, sight(pose).overlap
+        self._after.append(float(self._agreement[row]))
+
+    def _told(self) -> None:
+        self._read += 1
+        self._tell(self._read)
+
+    def _refiner_of(self, views: tuple[str, ...]) -> Refiner:
+        """For the views that a frame has: of a live camera that had stopped there is none."""
+        if len(views) == len(self._cameras):
+            return self._refiner
+        cameras = tuple(camera for camera in self._cameras if camera.name in views)
+        return Refiner(self._refiner.body, cameras, self._knobs)
+
+    def _settings(self, frame: int) -> RunSettings:
+        """Those in use when the frame was tracked, with a weighting that reads masks."""
+        entry = self._history.in_use(frame, 0)
+        values = self._record.settings if entry is None else entry.values
+        settings: RunSettings = settings_from_values(self._record.tracker, self._record.weighting, values)
+        if not WEIGHTINGS[settings.weighting_name].reads_pictures:
+            return settings
+        judge = default_settings(settings.tracker_name, JUDGE)
+        return RunSettings(
+            settings.tracker_name,
+            JUDGE,
+            settings.tracker,
+            judge.weighting,
+            settings.evidence,
+            settings.recovery,
+            settings.recording,
+        )
