@@ -110,7 +110,7 @@ class _Cleaning:
         for _ in range(ROUNDS):
             taken = {camera.name: [] for camera in self.cameras}
             for frame in self.frames:
-                tell("where is nobody", done, total)
+                tell("finding where nobody stands", done, total)
                 for name, cover in self._covers(frame, models).items():
                     taken[name].append(cover)
                 done += 1

@@ -156,7 +156,7 @@ async function drawSessions() {
 /** The form of a session that begins empty. */
 function beginForm() {
   openForm({
-    heading: "New session", action: "Begin", intro: "It begins empty; footage and calibration come next.",
+    heading: "New session", action: "Begin", intro: "It begins empty; footage and calibration come next. A name has letters, digits, - and _.",
     rows: [[{ name: "name", label: "Name", required: true, pattern: "[A-Za-z0-9_\\-]{1,64}", title: "Letters, digits, - and _, up to 64" }]],
     send: async (values) => {
       const made = await api.post("/api/sessions", { name: values.name });
@@ -166,6 +166,8 @@ function beginForm() {
       await open(made.name);
     },
   });
+  const name = document.querySelector("dialog input[name=name]");
+  name.oninput = () => { name.value = name.value.replace(/\s/g, "-"); };
 }
 
 function nothing() {

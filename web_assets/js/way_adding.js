@@ -25,14 +25,15 @@ export function adder(place, way, done) {
   const replaceLine = element("label", { className: "check", title: "Cameras that the new footage does not name are forgotten." }, replaced, "replace all cameras");
   const submit = button("Add footage", begin);
   const summary = element("summary", {});
+  const elsewhere = element("p", { className: "hint" }, "Cameras that are connected now (USB, RTSP, MJPEG) are looked at and recorded under ", element("a", { href: "/recording", textContent: "Live cameras" }), ".");
   const folders = element("div", { className: "folder-list" });
   place.append(summary, element("div", { className: "footage-form" },
-    element("label", {}, "Videos, one a camera (or a .zip)", files),
+    element("label", {}, "Videos, one per camera (or a .zip of all)", files),
     element("label", {}, "or a folder: videos/, pictures, masks/, background/, calibration/; Pose2Sim, FreeMoCap, Caliscope, anipose and EasyMocap layouts too", folder),
     element("label", {}, "or a folder of the computer that the studio runs on", source), folders,
     element("label", { className: "check" }, refer, "refer to it where it lies instead of copying it"),
     element("div", { className: "step-row" }, element("label", {}, "Frames per second", fps), element("label", { title: "Where a folder holds several trials." }, "Trial", trial)),
-    replaceLine, element("div", { className: "step-actions" }, submit), going, wrong, remedy));
+    replaceLine, element("div", { className: "step-actions" }, submit), going, wrong, remedy, elsewhere));
   source.onfocus = () => browse(source.value).catch(() => folders.replaceChildren());
 
   /** Folders below the one that is typed, to be chosen by a click. */
@@ -89,6 +90,7 @@ export function adder(place, way, done) {
       place.open = !there || place.contains(document.activeElement);
       place.classList.toggle("alone", !there);
       submit.className = there ? "" : "primary";
+      elsewhere.hidden = there;
       replaceLine.hidden = !there;
     },
     stop() { state.stopped = true; state.abort?.abort(); },

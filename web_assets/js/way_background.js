@@ -11,7 +11,7 @@ import { qualityList } from "./way_quality.js";
 const POLL_MILLISECONDS = 500;
 const PREVIEW_MILLISECONDS = 180;
 const SOURCES = {
-  combined: ["Combined", "Plate and footage by region, cleaned by what the other views see. The best where there are three cameras or more."],
+  combined: ["Combined", "Pictures of the empty room where there are any, the footage itself elsewhere; cleaned by what the other views see. The best where there are three cameras or more."],
   plate: ["Picture", "A picture of the empty room from each camera, as it is."],
   clip: ["Clip", "A short video of the empty room from each camera, as it is."],
   median: ["Median", "What the footage itself shows most of the time. Good where the person moves about."],
@@ -75,8 +75,8 @@ export function mount(place, way) {
       return element("li", {}, element("span", { textContent: camera.name }), element("span", { className: "hint", textContent: camera.given ? `${camera.given === "clip" ? "clip" : "picture"} ${camera.file}` : "none" }), choose, input);
     });
     return element("details", { className: "plates", open: !state.told.cameras.some((camera) => camera.given) && state.told.cameras.length < 3 },
-      element("summary", { textContent: `The empty room: ${state.told.cameras.filter((camera) => camera.given).length} of ${state.told.cameras.length} cameras` }),
-      element("label", {}, "One file a camera, matched by name", many), element("ul", { className: "plate-list" }, ...rows), element("p", { className: "hint upload-words", role: "status" }));
+      element("summary", { textContent: `Pictures of the empty room: ${state.told.cameras.filter((camera) => camera.given).length} of ${state.told.cameras.length} cameras` }),
+      element("label", {}, "One picture or clip per camera, matched by name", many), element("ul", { className: "plate-list" }, ...rows), element("p", { className: "hint upload-words", role: "status" }));
   }
 
   async function give(files, named) {
@@ -84,6 +84,7 @@ export function mount(place, way) {
     const words = make.querySelector(".upload-words");
     try {
       const upload = await uploadFiles(files, (text) => { words.textContent = text; });
+      words.textContent = "Looking at them…";
       state.told = await post(`${here}/backgrounds`, { upload, files: named });
       state.failed = null;
       changedMasks();
@@ -118,7 +119,7 @@ export function mount(place, way) {
   function drawGoing() {
     const { step, done, total, seconds_left: left } = state.told.job;
     const share = total ? done / total : null;
-    const words = [step || "beginning", total > 1 ? `${Math.round(100 * share)} %` : "", left > 2 ? `${duration(left)} left of this step` : ""].filter(Boolean).join(" · ");
+    const words = [step || "Reading the footage", total > 1 ? `${Math.round(100 * share)} %` : "", left > 2 ? `${duration(left)} left of this step` : ""].filter(Boolean).join(" · ");
     way.progress(make.querySelector(".going"), { words, share, cancel: () => remove(`${here}/background`).catch(complain) });
   }
 

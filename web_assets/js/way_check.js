@@ -96,7 +96,7 @@ export function mount(place, way) {
     return state.tracks.map((line) => {
       const radio = element("input", { type: "radio", name: "way-track", value: line.name, checked: line.name === state.track, ariaLabel: `Look at ${line.name}` });
       radio.onchange = () => choose(line.name).catch(complain);
-      return element("tr", {}, element("td", {}, element("label", { className: "check" }, radio, line.name === "raw" ? "raw (as searched)" : line.name), line.name === usual ? element("span", { className: "badge good", textContent: "exported" }) : ""),
+      return element("tr", {}, element("td", {}, element("label", { className: "check" }, radio, line.name === "raw" ? "raw (as searched)" : line.name), line.name === usual ? element("span", { className: "badge good", textContent: "for export", title: "Step Export takes this one, unless you choose another." }) : ""),
         element("td", { textContent: line.jitter_mm === null ? "–" : `${line.jitter_mm.toFixed(1)} mm` }), ...(way.detail.has_truth ? [element("td", { textContent: line.mean_mm === null ? "–" : `${line.mean_mm.toFixed(1)} mm` })] : []));
     });
   }

@@ -11,15 +11,16 @@ export function maskPictures(way, paint) {
   const bar = element("div", { className: "mask-bar" });
   const grid = element("div", { className: "pictures masks" });
 
-  function address(camera) {
+  function address(camera, masked = true) {
     const settings = Object.keys(state.settings).length ? `&settings=${encodeURIComponent(JSON.stringify(state.settings))}` : "";
-    const show = state.bare ? "" : "mask";
+    const show = state.bare || !masked ? "" : "mask";
     return `${way.api.sessionPath(way.session)}/frames/${state.frame}/views/${encodeURIComponent(camera)}.jpg?show=${show}&height=${HEIGHT}&age=${state.age}${settings}`;
   }
 
   /** One request a picture at a time; what was wished meanwhile is asked for afterwards. */
   function load(view) {
-    const wanted = address(view.camera.name);
+    // The first masks of a session take their time: until then the picture alone is shown.
+    const wanted = address(view.camera.name, view.seen);
     if (view.busy || view.wanted === wanted) return;
     view.wanted = wanted;
     view.busy = true;
@@ -27,6 +28,7 @@ export function maskPictures(way, paint) {
     const done = (wrong) => {
       view.busy = false;
       view.box.classList.remove("waiting");
+      view.seen = true;
       view.box.classList.toggle("failed", wrong);
       if (grid.isConnected) load(view);
     };

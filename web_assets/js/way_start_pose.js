@@ -1,7 +1,7 @@
 // Step Start pose: found automatically with its confidence, checked in all views (left and right by colour), put right
 // by hand in the scene or by a turn, made better by a short search.
 
-import { button, element } from "./elements.js";
+import { button, duration, element } from "./elements.js";
 import { complain } from "./messages.js";
 
 const POLL_MILLISECONDS = 400;
@@ -38,7 +38,8 @@ export function mount(place, way) {
           if (stopped || told.state === "cancelled") return null;
           throw Object.assign(new Error(told.message), { hint: told.hint });
         }
-        way.progress(progress, { words: told.step || words, share: told.total ? told.done / told.total : null, cancel });
+        const far = [told.step || words, told.total > 1 ? `${Math.round((100 * told.done) / told.total)} %` : "", told.seconds_left > 2 ? `${duration(told.seconds_left)} left of this step` : ""];
+        way.progress(progress, { words: far.filter(Boolean).join(" · "), share: told.total ? told.done / told.total : null, cancel });
         await new Promise((resolve) => setTimeout(resolve, POLL_MILLISECONDS));
       }
     } finally { way.progress(progress, null); }

@@ -9,6 +9,8 @@ const PREVIEW_MILLISECONDS = 150;
 const USUAL_HEIGHT = 1750;
 const LEAST_MM = 1000;
 const MOST_MM = 2200;
+const LEAST_METRES = 0.3;
+const MOST_METRES = 3;
 const PICTURE_HEIGHT = 300;
 
 export function mount(place, way) {
@@ -31,6 +33,8 @@ export function mount(place, way) {
     const number = element("input", { type: "number", min: 30, max: 300, step: 0.5, value: state.height ? state.height / 10 : "", placeholder: "unknown", ariaLabel: "Height in centimetres" });
     const slider = element("input", { type: "range", min: LEAST_MM, max: MOST_MM, step: 5, value: state.height ?? USUAL_HEIGHT, ariaLabel: "Height" });
     const take = (height) => { state.height = height; look(); drawFit(); };
+    // "1.80" is metres: nobody is that many centimetres tall.
+    number.onchange = () => { if (Number(number.value) >= LEAST_METRES && Number(number.value) <= MOST_METRES) { number.value = Math.round(1000 * Number(number.value)) / 10; number.oninput(); } };
     number.oninput = () => { if (number.value === "" || !number.checkValidity()) return; take(Number(number.value) * 10); slider.value = state.height; };
     slider.oninput = () => { take(Number(slider.value)); number.value = state.height / 10; };
     who.replaceChildren(element("label", {}, "Body", body),

@@ -1,7 +1,7 @@
 // What the guided way says of its steps.
 
 export const WORDS = {
-  footage: { name: "Footage", lead: "One video or folder of pictures a camera, of the same take." },
+  footage: { name: "Footage", lead: "One video, or one folder of pictures, per camera, all of the same take." },
   calibration: { name: "Calibration", lead: "Where the cameras stand and how their lenses draw, and whether that is right." },
   background: { name: "Background", lead: "What of each picture is the person, and how far the views agree on it." },
   subject: { name: "Subject", lead: "The body that is tracked, and its measures." },
