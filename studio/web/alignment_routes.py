@@ -54,8 +54,7 @@ async def begin(session: OpenSession, wish: AlignmentWish, doors: Door) -> Align
 @router.delete("", status_code=202)
 def cancel(session: OpenSession, doors: Door) -> AlignmentAnswer:
     """Stop measuring."""
-    if doors.jobs.known(ALIGNMENT, session.name) is not None:
-        doors.jobs.cancel(ALIGNMENT, session.name)
+    doors.jobs.cancel(ALIGNMENT, session.name)
     return _answer(session, doors)
 
 
@@ -85,7 +84,7 @@ async def undo(session: OpenSession, doors: Door) -> AlignmentAnswer:
 
 def _changed(change: CalibrationChange, doors: Doors) -> AlignmentAnswer:
     forget_composers()
-    doors.events.publish({"type": "sessions", "session": change.session.name, "run": ""})
+    doors.events.session_changed(change.session.name)
     return _answer(change.session, doors, change.notes)
 
 

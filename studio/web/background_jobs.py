@@ -17,6 +17,7 @@ from studio.web.error_responses import UnforeseenError, log
 from studio.web.job_schemas import SessionJob
 
 State = TypeVar("State", bound=SessionJob)
+SomeState = TypeVar("SomeState", bound=SessionJob, covariant=True)
 Work = Callable[["Job"], Mapping[str, object]]
 """work(job) does it, in a thread; what it returns goes into the state, which is "done" unless that says otherwise."""
 Report = Callable[[str, int, int], None]
@@ -29,7 +30,7 @@ RUNNING, CANCELLED = "running", "cancelled"
 
 
 @dataclass(frozen=True, slots=True)
-class JobKind(Generic[State]):
+class JobKind(Generic[SomeState]):
     """One kind of work. event : type of the events that tell of it. noun : what it is called, without article.
 
     states : the class of its states. changes_session : once it is done, all pages hear that the session has changed.
@@ -37,7 +38,7 @@ class JobKind(Generic[State]):
 
     event: str
     noun: str
-    states: type[State]
+    states: type[SomeState]
     changes_session: bool = False
 
 
@@ -153,11 +154,11 @@ class BackgroundJobs:
         states = [cast("State", job.state) for job in list(self._jobs.get(kind.event, {}).values())]
         return [state for state in states if (state.session, state.state) == (session, RUNNING)]
 
-    def cancel(self, kind: JobKind[State], key: str) -> State:
-        """Let a job end where it stands; how it stands now. Raises NotFoundError."""
-        job = self._job(kind, key)
-        job.cancel()
-        return cast("State", job.state)
+    def cancel(self, kind: JobKind[State], key: str) -> None:
+        """Let a job end where it stands, if there is one."""
+        job = self._jobs.get(kind.event, {}).get(key)
+        if job is not None:
+            job.cancel()
 
     def change(self, kind: JobKind[State], key: str, **changes: object) -> State:
         """Replace entries of a job's state and tell all pages. Raises NotFoundError."""

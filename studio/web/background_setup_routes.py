@@ -128,8 +128,7 @@ async def begin_setup(session: OpenSession, wish: BackgroundWish, doors: Door) -
 @router.delete("/background", status_code=202)
 def cancel_setup(session: OpenSession, doors: Door) -> BackgroundAnswer:
     """Stop the set-up; the background stays as it was."""
-    if doors.jobs.known(BACKGROUND, session.name) is not None:
-        doors.jobs.cancel(BACKGROUND, session.name)
+    doors.jobs.cancel(BACKGROUND, session.name)
     return background(session, doors)
 
 

@@ -17,6 +17,7 @@ from studio.web.calibration_proposals import Proposal, footage_sizes, how_taken,
 from studio.web.calibration_schemas import BoardRequest, SolveState
 from studio.web.doors import Door, Doors
 from studio.web.job_kinds import CALIBRATION
+from studio.web.job_routes import add_job_routes
 from studio.web.session_routes import OpenSession
 
 router = APIRouter(prefix="/api", tags=["calibration"])
@@ -61,16 +62,7 @@ async def begin_solving(session: OpenSession, wish: BoardRequest, doors: Door) -
     return doors.jobs.begin(CALIBRATION, SolveState(session=session.name), work)
 
 
-@router.get("/calibrations/{identifier}")
-def solving_state(identifier: str, doors: Door) -> SolveState:
-    """How it stands, and the proposal that came of it."""
-    return doors.jobs.state(CALIBRATION, identifier)
-
-
-@router.delete("/calibrations/{identifier}", status_code=202)
-def cancel_solving(identifier: str, doors: Door) -> SolveState:
-    """Stop it; nothing is kept."""
-    return doors.jobs.cancel(CALIBRATION, identifier)
+add_job_routes(router, "/calibrations/{identifier}", CALIBRATION)
 
 
 class _Progress:

@@ -21,6 +21,7 @@ from studio.web.export_schemas import (
     FormatView,
 )
 from studio.web.job_kinds import EXPORT
+from studio.web.job_routes import add_job_routes
 from studio.web.run_routes import RUN, OpenRun
 from studio.web.session_routes import OpenSession
 from studio.web.setting_views import knob_view
@@ -72,16 +73,7 @@ async def begin_export(session: OpenSession, run: OpenRun, wish: ExportRequest, 
     return doors.jobs.begin(EXPORT, state, work)
 
 
-@router.get("/exports/{identifier}")
-def export_state(identifier: str, doors: Door) -> ExportState:
-    """How an export stands, and what came of it."""
-    return doors.jobs.state(EXPORT, identifier)
-
-
-@router.delete("/exports/{identifier}", status_code=202)
-def cancel_export(identifier: str, doors: Door) -> ExportState:
-    """Stop an export; nothing of it is kept."""
-    return doors.jobs.cancel(EXPORT, identifier)
+add_job_routes(router, "/exports/{identifier}", EXPORT)
 
 
 @router.get(RUN + "/exports/{file}", response_class=FileResponse)

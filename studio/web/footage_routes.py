@@ -104,8 +104,8 @@ def synchrony(session: OpenSession, doors: Door) -> SynchronyState:
 @router.delete("/sessions/{session}/synchrony", status_code=202)
 def cancel_synchrony(session: OpenSession, doors: Door) -> SynchronyState:
     """Stop an estimate."""
-    known = synchrony(session, doors)
-    return known if known.state == "none" else doors.jobs.cancel(SYNCHRONY, session.name)
+    doors.jobs.cancel(SYNCHRONY, session.name)
+    return synchrony(session, doors)
 
 
 def _state(session: Session, notes: list[str]) -> FootageState:

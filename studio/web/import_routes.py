@@ -31,6 +31,7 @@ from studio.web.import_schemas import (
     SourceWish,
 )
 from studio.web.job_kinds import IMPORT
+from studio.web.job_routes import add_job_routes
 from studio.web.safe_paths import PathRefused, folder_to_import, relative_path
 from studio.web.samples import install_sample
 from studio.web.schemas import NewName
@@ -122,16 +123,7 @@ async def begin_taking(doors: Doors, name: str, wish: SourceWish, take: Taker) -
     return doors.jobs.begin(IMPORT, ImportState(session=name, name=name, step="reading"), work)
 
 
-@router.get("/imports/{identifier}")
-def import_state(identifier: str, doors: Door) -> ImportState:
-    """How an import stands."""
-    return doors.jobs.state(IMPORT, identifier)
-
-
-@router.delete("/imports/{identifier}", status_code=202)
-def cancel_import(identifier: str, doors: Door) -> ImportState:
-    """Stop an import; nothing of it is kept."""
-    return doors.jobs.cancel(IMPORT, identifier)
+add_job_routes(router, "/imports/{identifier}", IMPORT)
 
 
 @router.post("/samples", status_code=201)

@@ -11,6 +11,7 @@ from studio.web.background_jobs import Job
 from studio.web.doors import Door
 from studio.web.initialisation_schemas import InitialisationRequest, InitialisationState
 from studio.web.job_kinds import START_POSE
+from studio.web.job_routes import add_job_routes
 from studio.web.session_routes import OpenSession
 from studio.weighting.catalogue import WEIGHTINGS
 
@@ -48,16 +49,7 @@ async def begin_initialisation(
     return doors.jobs.begin(START_POSE, state, work)
 
 
-@router.get("/initialisations/{identifier}")
-def initialisation_state(identifier: str, doors: Door) -> InitialisationState:
-    """How a search for a start pose stands, and what it found."""
-    return doors.jobs.state(START_POSE, identifier)
-
-
-@router.delete("/initialisations/{identifier}", status_code=202)
-def cancel_initialisation(identifier: str, doors: Door) -> InitialisationState:
-    """Stop a search; nothing of it is kept."""
-    return doors.jobs.cancel(START_POSE, identifier)
+add_job_routes(router, "/initialisations/{identifier}", START_POSE)
 
 
 def _answer(found: InitialPose) -> dict[str, object]:

@@ -18,6 +18,7 @@ from studio.sessions.session import SUBJECT_NAME
 from studio.web.background_jobs import Job
 from studio.web.doors import Door, Doors
 from studio.web.job_kinds import SUBJECT
+from studio.web.job_routes import add_job_routes
 from studio.web.picture_routes import Height
 from studio.web.session_routes import OpenSession
 from studio.web.subject_schemas import (
@@ -98,10 +99,7 @@ async def begin_fit(session: OpenSession, wish: FitSubjectRequest, doors: Door) 
     return doors.jobs.begin(SUBJECT, FitSubjectState(session=session.name), work)
 
 
-@router.get("/subject-fits/{identifier}")
-def fit_state(identifier: str, doors: Door) -> FitSubjectState:
-    """How a fit stands, and what it found: each length before and after."""
-    return doors.jobs.state(SUBJECT, identifier)
+add_job_routes(router, "/subject-fits/{identifier}", SUBJECT)
 
 
 @router.post("/subject-fits/{identifier}/keep")
@@ -123,18 +121,12 @@ def fitted_picture(identifier: str, frame: int, camera: str, doors: Door, height
     if frame not in found.frames:
         listed = ", ".join(map(str, found.frames))
         raise NotFoundError(f"Frame {frame} was not looked at in this fit.", f"These were: {listed}.")
-    session = doors.workspace.session(fit_state(identifier, doors).session)
+    session = doors.workspace.session(doors.jobs.state(SUBJECT, identifier).session)
     pose = found.poses[found.frames.index(frame)]
     picture = compose_view(
         session, None, frame, camera, ("outline", "mask"), pose, height=height, body=found.body
     )
     return Response(encode_jpeg(picture), media_type="image/jpeg", headers={"cache-control": "no-store"})
-
-
-@router.delete("/subject-fits/{identifier}", status_code=202)
-def cancel_fit(identifier: str, doors: Door) -> FitSubjectState:
-    """Stop a fit; nothing of it is kept."""
-    return doors.jobs.cancel(SUBJECT, identifier)
 
 
 def _found(identifier: str, doors: Doors) -> FittedSubject:

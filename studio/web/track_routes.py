@@ -29,6 +29,7 @@ from studio.tracking.smoothing import SmoothingSettings
 from studio.web.background_jobs import Job
 from studio.web.doors import Door
 from studio.web.job_kinds import TRACK
+from studio.web.job_routes import add_job_routes
 from studio.web.run_routes import RUN, OpenRun
 from studio.web.session_routes import OpenSession
 from studio.web.setting_views import knob_view
@@ -136,16 +137,7 @@ async def begin_correction(
     return begin_job(doors, "correct", session, run, work)
 
 
-@router.get("/track-jobs/{identifier}")
-def track_job(identifier: str, doors: Door) -> TrackJobState:
-    """How refining, smoothing or correcting stands."""
-    return doors.jobs.state(TRACK, identifier)
-
-
-@router.delete("/track-jobs/{identifier}", status_code=202)
-def cancel_track_job(identifier: str, doors: Door) -> TrackJobState:
-    """Stop it. Of a refinement nothing is kept, of a way back what it has reached."""
-    return doors.jobs.cancel(TRACK, identifier)
+add_job_routes(router, "/track-jobs/{identifier}", TRACK)
 
 
 def _line(session: Session, run: StoredRun, name: str) -> TrackLine:
