@@ -4,20 +4,16 @@ from pathlib import Path
 
 import click
 
-from studio.calibration.board_folders import find_board_footage
-from studio.calibration.board_footage_reading import HowTaken
 from studio.calibration.board_pdf import PAGES, usual_board, write_board_pdf
 from studio.calibration.boards import board_from_text
-from studio.calibration.findings import Finding, blocking
+from studio.calibration.findings import Finding
 from studio.calibration.lens_verdict import verdict
-from studio.calibration.report import report_of, told_source, write_calibrated
-from studio.calibration.verbs import Calibrated, calibrate
+from studio.calibration.report import report_of
+from studio.calibration.verbs import Calibrated
+from studio.cli.arguments import camera_numbers
 from studio.cli.output import command, note, progress
-from studio.errors import CalibrationError, NotFoundError
-from studio.sessions.calibration_changes import NewCalibration, replace_calibration
-from studio.sessions.calibration_fit import fit_to_session
-from studio.sessions.session import Session
-from studio.sessions.workspace import Workspace
+from studio.errors import CalibrationError
+from studio.sessions.board_calibration import keep_boards, place_of_boards, solve_boards
 
 BOARD_HELP = (
     "charuco:5x7,40,30 (squares, square mm, marker mm[, dictionary]) or chessboard:4x7,60 (inner corners)."
@@ -80,39 +76,30 @@ def calibrate_command(
     pictures a camera, named after the cameras. Beside the calibration lie its report (JSON) and coverage pictures.
     """
     board = board_from_text(board_text, thickness)
-    folder, session = _source(source)
+    boards = place_of_boards(source)
     measured = dict(_distance(text) for text in distances)
-    if intrinsics is None and extrinsics is None:
-        intrinsics, extrinsics = find_board_footage(folder)
-    target = place or folder / "calibration" / "cameras.toml"
-    if target.exists() and not force:
-        raise CalibrationError(
-            f"'{target}' is there already.", "Name another file with --to, or give --force."
-        )
-    sources = session.manifest.footage.cameras if session is not None else ()
+    target = boards.target(place, replace=force)
     with progress("Calibrating") as report:
-        found = calibrate(
+        found = solve_boards(
+            boards,
             board,
             intrinsics=intrinsics,
             extrinsics=extrinsics,
             floor=floor,
-            names=tuple(entry.name for entry in sources),
-            footage_sizes={entry.name: (entry.width, entry.height) for entry in sources},
+            offsets=camera_numbers(offsets, "--offset"),
             distances_mm=measured,
             refine_lenses=refine,
-            taken=_taken(session, offsets),
             progress=report,
         )
-    stops = blocking(found.findings) if not anyway else ()
-    written = _kept(found, session if place is None else None, target, stops)
-    for finding in found.findings:
-        note(_told(finding))
-    if stops:
-        raise CalibrationError(
-            f"No calibration was written: {stops[0].message}",
-            f"{stops[0].remedy} The report is {written[0]}.",
-        )
-    return {**report_of(found), "written": [str(path) for path in written], "text": _text(found, written)}
+    kept = keep_boards(boards, found, target, anyway=anyway)
+    for line in (*kept.notes, *map(_told, found.findings)):
+        note(line)
+    kept.check()
+    return {
+        **report_of(found),
+        "written": [str(path) for path in kept.files],
+        "text": _text(found, kept.files),
+    }
 
 
 @click.command("board")
@@ -136,58 +123,6 @@ def board_command(kind: str, board_text: str | None, page: str, place: Path) -> 
         "written": str(place),
         "text": f"{place}: {board.spelling}\nCalibrate with: studio calibrate FOLDER --board {board.spelling}",
     }
-
-
-def _kept(
-    found: Calibrated, session: Session | None, target: Path, stops: tuple[Finding, ...]
-) -> tuple[Path, ...]:
-    """Write what was found, into the session as its calibration if it is one's own; returns the files."""
-    if session is None or found.rig is None or stops:
-        if session is not None and target.exists():
-            # Only the report of what cannot be used: it must not pass for that of the calibration in use.
-            target = target.with_name("refused.toml")
-        if target.exists() and found.rig is not None and not stops:
-            target.replace(target.with_name(f"{target.stem}.before.toml"))
-        return write_calibrated(found, target, anyway=not stops)
-    fitted = fit_to_session(session, found.rig.cameras)
-    new = NewCalibration(
-        fitted.cameras, told_source(found), crops=fitted.crops, matching=fitted.matching, calibrated=found
-    )
-    change = replace_calibration(session, new)
-    for words in (*fitted.warnings, *change.notes):
-        note(words)
-    return tuple(sorted(path for path in target.parent.iterdir() if path.name.startswith("cameras.")))
-
-
-def _taken(session: Session | None, offsets: tuple[str, ...]) -> HowTaken:
-    """Offsets as typed, turns as the session has them. Raises CalibrationError."""
-    sources = session.manifest.footage.cameras if session is not None else ()
-    found: dict[str, int] = {}
-    for text in offsets:
-        name, _, number = text.partition("=")
-        if not name or not number.lstrip("-").isdigit():
-            raise CalibrationError(f"The offset '{text}' cannot be understood.", "Write cam2=3 (frames).")
-        found[name] = int(number)
-    return HowTaken(
-        found,
-        {source.name: source.turned for source in sources},
-        {source.name: (source.width, source.height) for source in sources},
-    )
-
-
-def _source(text: str) -> tuple[Path, Session | None]:
-    """The folder, and the session in it if it is one."""
-    try:
-        session = Workspace().resolve(text)
-    except NotFoundError:
-        folder = Path(text)
-        if not folder.is_dir():
-            raise CalibrationError(
-                f"'{text}' is no session and no folder.",
-                "Name a session, or the folder of the board's footage.",
-            ) from None
-        return folder, None
-    return session.path, session
 
 
 def _distance(text: str) -> tuple[tuple[str, str], float]:

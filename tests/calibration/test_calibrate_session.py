@@ -1,4 +1,4 @@
-"""The command on a session: what was in use is kept and said in the manifest; board footage out of step."""
+"""The verb and the command on a session: what was in use is kept and told; board footage out of step."""
 
 import shutil
 from pathlib import Path
@@ -8,6 +8,7 @@ import pytest
 from board_takes import BOARD, CAMERAS, FLOOR_FRAME, render_takes, session_of_takes
 from click.testing import CliRunner
 
+import studio
 from studio.calibration.board_footage_reading import HowTaken
 from studio.calibration.verbs import calibrate
 from studio.cli.main import main
@@ -26,8 +27,10 @@ def test_the_sessions_calibration_is_replaced_and_told(takes: Path) -> None:
     session = session_of_takes(Workspace().place_for("fresh"), takes)
     words = ["calibrate", "fresh", "--board", BOARD.spelling, "--extrinsics", str(takes / "extrinsics")]
     words += ["--intrinsics", str(takes / "intrinsics")]
-    first = CliRunner().invoke(main, words)
-    assert first.exit_code == 0, first.output
+    found = studio.calibrate(
+        session, BOARD, intrinsics=takes / "intrinsics", extrinsics=takes / "extrinsics", progress=False
+    )
+    assert session.path / "calibration" / "cameras.toml" in found.files
     assert Session(session.path).manifest.calibration_source.startswith("ChArUco board 6x5, 0.")
     before = (session.path / "calibration" / "cameras.toml").read_bytes()
     assert CliRunner().invoke(main, words).exit_code == 2
@@ -38,6 +41,14 @@ def test_the_sessions_calibration_is_replaced_and_told(takes: Path) -> None:
     (kept,) = earlier_calibrations(now)
     assert (session.path / "calibration" / "earlier" / kept / "cameras.toml").read_bytes() == before
     assert [camera.name for camera in now.cameras()] == ["cam1", "cam2"]
+
+
+def test_a_camera_that_is_not_there_is_no_offsets(takes: Path) -> None:
+    session_of_takes(Workspace().place_for("fresh"), takes)
+    words = ["calibrate", "fresh", "--board", BOARD.spelling, "--offset", "cam9=2"]
+    refused = CliRunner().invoke(main, words)
+    assert refused.exit_code == 2
+    assert "There is no camera 'cam9'" in refused.output
 
 
 def test_offsets_put_board_footage_in_step(takes: Path, tmp_path: Path) -> None:
