@@ -6,12 +6,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
-from studio.body.subject import Subject, write_subject
-from studio.body.subject import fit_subject as fitted_to
+from studio.body.subject import Subject
 from studio.capture.exclusions import painted_picture, png_of
-from studio.errors import BodyError
 from studio.notebook.opening import SessionName, open_session
 from studio.notebook.progress import Told, told
 from studio.runs.background_setup import BackgroundSetup, set_up_background
@@ -20,14 +17,13 @@ from studio.runs.initialising import initialise as initialise_session
 from studio.runs.mask_quality import MaskQuality
 from studio.runs.mask_quality import mask_quality as quality_of
 from studio.runs.session_settings import session_settings
-from studio.runs.subject_fitting import COUNT, FitRequest, FittedSubject, fit_session_subject, keep_subject
+from studio.runs.subject_choice import body_of_choice, choose_subject, keep_fitted
+from studio.runs.subject_fitting import COUNT, FitRequest, FittedSubject, fit_session_subject
 from studio.sessions.background_files import polygon_exclusion, set_backgrounds, set_exclusion
 from studio.sessions.importers.catalogue import import_source
-from studio.sessions.session import SUBJECT_NAME, Session
+from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 from studio.synthesis.recipes import synthesize as synthesize_recipe
-
-LEAST_HEIGHT, MOST_HEIGHT = 300.0, 3000.0
 
 
 def import_footage(
@@ -135,13 +131,11 @@ def subject_with_notes(
     opened = open_session(session)
     if height_mm is None and not lengths_mm:
         return opened.body_with_notes(body or None)
-    if height_mm is not None and not LEAST_HEIGHT <= height_mm <= MOST_HEIGHT:
-        raise BodyError(f"A height of {height_mm:g} mm is no person's.", "Give millimetres, such as 1800.")
-    name = body or opened.manifest.body
-    wanted = Subject(body=name, height_mm=height_mm, lengths_mm=dict(lengths_mm or {}))
-    found = fitted_to(load_body(name, opened.body_folders), wanted, opened.body_folders)
-    write_subject(wanted, opened.path / SUBJECT_NAME)
-    return found
+    wanted = Subject(
+        body=body or opened.manifest.body, height_mm=height_mm, lengths_mm=dict(lengths_mm or {})
+    )
+    choose_subject(opened, wanted)
+    return body_of_choice(opened, wanted)
 
 
 def fit_subject(
@@ -178,7 +172,7 @@ def fit_subject(
     with told(progress, f"{opened.name}: subject") as report:
         found = fit_session_subject(opened, request, progress=report)
     if keep:
-        keep_subject(opened, found)
+        keep_fitted(opened, found)
     return found
 
 

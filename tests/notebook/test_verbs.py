@@ -145,6 +145,12 @@ def test_a_height_in_metres_is_refused(session_on_disk: Session) -> None:
     assert studio.subject("toy").name == BODY
 
 
+def test_who_is_told_decides_the_body_of_new_runs(session_on_disk: Session) -> None:
+    assert studio.subject("toy", 1700.0, body="human31").name == "human31"
+    assert Session(session_on_disk.path).manifest.body == "human31"
+    assert Session(session_on_disk.path).body().name == "human31"
+
+
 def test_cameras_of_a_session_are_not_replaced_unasked(session_on_disk: Session) -> None:
     with pytest.raises(studio.StudioError, match="there already"):
         studio.calibrate("toy", "chessboard:4x7,60", extrinsics="anywhere")
