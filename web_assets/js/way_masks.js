@@ -11,16 +11,21 @@ export function maskPictures(way, paint) {
   const bar = element("div", { className: "mask-bar" });
   const grid = element("div", { className: "pictures masks" });
 
-  function address(camera, masked = true) {
+  /** Before the first mask the picture alone, as it is recorded: a session's first masks take their time. */
+  function first(camera) {
+    const lens = way.detail.cameras.find((one) => one.name === camera);
+    return lens?.quarter_turns ? "" : `${way.api.sessionPath(way.session)}/footage/${encodeURIComponent(camera)}/${state.frame}.jpg?height=${HEIGHT}`;
+  }
+
+  function address(camera) {
     const settings = Object.keys(state.settings).length ? `&settings=${encodeURIComponent(JSON.stringify(state.settings))}` : "";
-    const show = state.bare || !masked ? "" : "mask";
+    const show = state.bare ? "" : "mask";
     return `${way.api.sessionPath(way.session)}/frames/${state.frame}/views/${encodeURIComponent(camera)}.jpg?show=${show}&height=${HEIGHT}&age=${state.age}${settings}`;
   }
 
   /** One request a picture at a time; what was wished meanwhile is asked for afterwards. */
   function load(view) {
-    // The first masks of a session take their time: until then the picture alone is shown.
-    const wanted = address(view.camera.name, view.seen);
+    const wanted = (view.seen ? "" : first(view.camera.name)) || address(view.camera.name);
     if (view.busy || view.wanted === wanted) return;
     view.wanted = wanted;
     view.busy = true;
