@@ -1,4 +1,4 @@
-"""Unpacking an uploaded zip without believing it: counted, limited, and nothing leads out.
+"""What was uploaded, out of its zip and its wrapping. A zip is not believed: counted, limited, and nothing leads out.
 
 Sizes in an archive's index are claims, so the bytes are counted as they are written. Links, encrypted
 entries, names that lead out and names that appear twice are refused before anything is written.
@@ -6,7 +6,9 @@ entries, names that lead out and names that appear twice are refused before anyt
 
 import shutil
 import zipfile
+from collections.abc import Collection
 from dataclasses import dataclass
+from fnmatch import fnmatch
 from pathlib import Path
 
 from studio.errors import StudioError
@@ -14,6 +16,8 @@ from studio.web.safe_paths import is_link, place_in, relative_path
 
 CHUNK = 1 << 20
 GIGABYTE = 1 << 30
+ZIP, UNPACKED = ".zip", "unpacked"
+LITTER = frozenset(("__MACOSX", "Thumbs.db", "desktop.ini"))
 
 
 class ArchiveError(StudioError):
@@ -32,6 +36,44 @@ class ArchiveLimits:
     total: int = 40 * GIGABYTE
     ratio: float = 200.0
     free: int = 64 << 20
+
+
+def only_zip(folder: Path) -> Path | None:
+    """The zip that is all a folder holds, None where it is none or there is more."""
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    return files[0] if len(files) == 1 and files[0].suffix.lower() == ZIP else None
+
+
+def unpack_upload(folder: Path) -> Path:
+    """An upload's folder, or what its only zip holds, which is removed then. Raises ArchiveError, PathRefused."""
+    archive = only_zip(folder)
+    if archive is None:
+        return folder
+    target = folder / UNPACKED
+    target.mkdir()
+    try:
+        unpack_zip(archive, target)
+    except StudioError:
+        shutil.rmtree(target, ignore_errors=True)
+        raise
+    archive.unlink()
+    return target
+
+
+def unwrapped(folder: Path, parts: Collection[str]) -> Path:
+    """The folder itself, without folders that hold nothing but it. parts : patterns of names (small letters) that are
+    no wrapping, even of a folder that stands alone.
+    """
+    while len(inside := [path for path in folder.iterdir() if not is_litter(path.name)]) == 1:
+        if not inside[0].is_dir() or any(fnmatch(inside[0].name.lower(), part) for part in parts):
+            break
+        folder = inside[0]
+    return folder
+
+
+def is_litter(name: str) -> bool:
+    """Whether a name is something that systems leave in folders."""
+    return name.startswith(".") or name in LITTER
 
 
 def unpack_zip(archive: Path, folder: Path, limits: ArchiveLimits | None = None) -> int:

@@ -17,7 +17,7 @@ from studio.sessions.session import BODIES_NAME
 from studio.synthesis.recipe_file import recipe_names
 from studio.training.oversampling import OversamplingSettings
 from studio.training.sources import FPS, MOTION_FILES
-from studio.web.archives import unpack_zip
+from studio.web.archives import ZIP, unpack_upload
 from studio.web.behaviour_learning_schemas import LearningChoices, LearningProgress, LearningRequest
 from studio.web.doors import Door, Doors
 from studio.web.setting_views import knob_view
@@ -28,7 +28,7 @@ from studio.worker.learning_process import LearningOrder
 router = APIRouter(prefix="/api/learning", tags=["behaviours"])
 
 DEFAULT_BODY = "human25"
-SKELETON, ARCHIVE, UNPACKED = ".asf", ".zip", "unpacked"
+SKELETON = ".asf"
 
 
 @router.get("")
@@ -41,7 +41,7 @@ def choices(doors: Door) -> LearningChoices:
         bodies=list(list_bodies((doors.workspace.root / BODIES_NAME,))),
         default_body=DEFAULT_BODY,
         fps=FPS,
-        endings=[*MOTION_FILES, SKELETON, ARCHIVE],
+        endings=[*MOTION_FILES, SKELETON, ZIP],
         recipes=list(recipe_names()),
         progress=None if state is None else progress_of(state),
     )
@@ -122,12 +122,7 @@ def _check(source: str, doors: Doors) -> None:
 
 def _motion_in(folder: Path) -> tuple[str, ...]:
     """The motion files of an upload, out of its archive if it is one. Raises BehaviourError where there are none."""
-    files = [path for path in folder.rglob("*") if path.is_file()]
-    if len(files) == 1 and files[0].suffix.lower() == ARCHIVE:
-        unpacked = folder / UNPACKED
-        unpacked.mkdir()
-        unpack_zip(files[0], unpacked)
-        files = [path for path in unpacked.rglob("*") if path.is_file()]
+    files = [path for path in unpack_upload(folder).rglob("*") if path.is_file()]
     found = sorted(str(path) for path in files if path.suffix.lower() in MOTION_FILES)
     if not found:
         raise BehaviourError(

@@ -1,23 +1,21 @@
 """Where calibration files and board footage lie: in an upload, or in a folder of this machine that may be read."""
 
-import shutil
 from pathlib import Path
 
-from studio.errors import CalibrationError, NotFoundError, StudioError
-from studio.web.archives import unpack_zip
+from studio.errors import CalibrationError, NotFoundError
+from studio.web.archives import is_litter, unpack_upload, unwrapped
 from studio.web.calibration_schemas import FootagePlace
 from studio.web.doors import Doors
 from studio.web.safe_paths import PathRefused, folder_to_import, place_in, relative_path
 from studio.web.upload_routes import upload_folder
 
-UNPACKED = "unpacked"
-LITTER = frozenset(("__MACOSX", "Thumbs.db", "desktop.ini"))
+PARTS = ("intrinsic*", "extrinsic*", "calib*", "cam*")
 
 
 def place_of(doors: Doors, wish: FootagePlace) -> Path:
     """The file or folder that a client means. Raises PathRefused, NotFoundError."""
     if wish.upload is not None:
-        folder = unwrapped(_unpacked(upload_folder(doors, wish.upload)))
+        folder = unwrapped(unpack_upload(upload_folder(doors, wish.upload)), PARTS)
         return place_in(folder, relative_path(wish.path)) if wish.path else folder
     path = Path(wish.path.strip()).expanduser()
     if path.is_absolute() and path.is_file():
@@ -35,17 +33,6 @@ def place_of(doors: Doors, wish: FootagePlace) -> Path:
     return folder_to_import(wish.path, doors.footage_roots)
 
 
-def unwrapped(folder: Path) -> Path:
-    """The folder itself, without folders that hold nothing but it."""
-    while len(inside := [path for path in folder.iterdir() if not _is_litter(path.name)]) == 1:
-        if not inside[0].is_dir() or inside[0].name.lower().startswith(
-            ("intrinsic", "extrinsic", "calib", "cam")
-        ):
-            break
-        folder = inside[0]
-    return folder
-
-
 def chosen_file(place: Path, file: str, found: tuple[Path, ...]) -> Path:
     """The calibration that is meant: the place itself, the one of that name in it, or the only one.
 
@@ -60,7 +47,7 @@ def chosen_file(place: Path, file: str, found: tuple[Path, ...]) -> Path:
         return named
     if len(found) == 1:
         return found[0]
-    files = [path for path in place.iterdir() if path.is_file() and not _is_litter(path.name)]
+    files = [path for path in place.iterdir() if path.is_file() and not is_litter(path.name)]
     if not found and len(files) == 1:
         return files[0]
     if not found:
@@ -70,24 +57,3 @@ def chosen_file(place: Path, file: str, found: tuple[Path, ...]) -> Path:
         )
     names = ", ".join(path.name for path in found)
     raise CalibrationError(f"'{place.name}' holds several calibrations ({names}).", "Say which one to take.")
-
-
-def _unpacked(folder: Path) -> Path:
-    """An upload's folder, or what its only zip holds."""
-    if (folder / UNPACKED).is_dir():
-        return folder / UNPACKED
-    files = [path for path in folder.rglob("*") if path.is_file()]
-    if len(files) != 1 or files[0].suffix.lower() != ".zip":
-        return folder
-    target = folder / UNPACKED
-    target.mkdir()
-    try:
-        unpack_zip(files[0], target)
-    except StudioError:
-        shutil.rmtree(target, ignore_errors=True)
-        raise
-    return target
-
-
-def _is_litter(name: str) -> bool:
-    return name.startswith(".") or name in LITTER

@@ -7,19 +7,17 @@ of it was read.
 """
 
 import asyncio
-import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Query
 
-from studio.errors import StudioError
 from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.importers.adding import AddedFootage, FootageWish, add_footage
 from studio.sessions.importers.catalogue import ImportReport, import_source
 from studio.sessions.importers.plan import Progress
-from studio.web.archives import unpack_zip
+from studio.web.archives import only_zip, unpack_upload, unwrapped
 from studio.web.background_jobs import Job
 from studio.web.doors import Door, Doors, let_go
 from studio.web.import_schemas import (
@@ -45,6 +43,7 @@ Taker = Callable[[Path, Progress, Callable[[], bool]], ImportReport | AddedFoota
 """take(folder, progress, cancelled) reads a source into the workspace."""
 
 FOLDERS_SHOWN = 1000
+PARTS = ("videos", "pictures", "calibration")
 
 
 @router.post("/imports", status_code=202)
@@ -53,21 +52,7 @@ async def begin_import(wish: ImportRequest, doors: Door) -> ImportState:
     into = await asyncio.to_thread(doors.workspace.place_for, wish.name)
 
     def take(folder: Path, progress: Progress, cancelled: Callable[[], bool]) -> ImportReport:
-        return import_source(
-            folder,
-            into,
-            calibration=wish.calibration,
-            fps=wish.fps,
-            copy=wish.copy_footage or wish.upload is not None,
-            trial=wish.trial,
-            offsets=wish.offsets,
-            rotations=wish.rotations,
-            unit=wish.unit,
-            up=wish.up,
-            despite_findings=wish.despite_findings,
-            progress=progress,
-            cancelled=cancelled,
-        )
+        return import_source(folder, into, **_reading(wish), progress=progress, cancelled=cancelled)
 
     return await begin_taking(doors, wish.name, wish, take)
 
@@ -76,18 +61,7 @@ async def begin_import(wish: ImportRequest, doors: Door) -> ImportState:
 async def begin_adding(session: OpenSession, wish: FootageAddition, doors: Door) -> ImportState:
     """Begin to add footage to a session that is there, like an import (`GET /api/imports/{identifier}`)."""
     let_go(doors, session.name)
-    asked = FootageWish(
-        calibration=wish.calibration,
-        fps=wish.fps,
-        copy=wish.copy_footage or wish.upload is not None,
-        trial=wish.trial,
-        offsets=wish.offsets,
-        rotations=wish.rotations,
-        unit=wish.unit,
-        up=wish.up,
-        despite_findings=wish.despite_findings,
-        replaced=wish.replace,
-    )
+    asked = FootageWish(**_reading(wish), replaced=wish.replace)
 
     def take(folder: Path, progress: Progress, cancelled: Callable[[], bool]) -> AddedFootage:
         added = add_footage(session, folder, asked, progress=progress, cancelled=cancelled)
@@ -154,25 +128,12 @@ def folders(
 
 def _unpacked(folder: Path, job: Job) -> Path:
     """The uploaded folder itself: out of its zip, and without the folders that only wrap it."""
-    files = [path for path in folder.rglob("*") if path.is_file()]
-    if len(files) == 1 and files[0].suffix.lower() == ".zip":
+    if only_zip(folder):
         job.tell(step="unpacking")
-        unpacked = folder / "unpacked"
-        unpacked.mkdir()
-        try:
-            unpack_zip(files[0], unpacked)
-        except StudioError:
-            shutil.rmtree(unpacked, ignore_errors=True)
-            raise
-        files[0].unlink()
-        folder = unpacked
-    while len(inside := [path for path in folder.iterdir() if not _is_litter(path.name)]) == 1:
-        if not inside[0].is_dir() or inside[0].name.lower() in ("videos", "pictures", "calibration"):
-            break
-        folder = inside[0]
-    return folder
+    return unwrapped(unpack_upload(folder), PARTS)
 
 
-def _is_litter(name: str) -> bool:
-    """Whether a name is something that systems leave in folders."""
-    return name.startswith(".") or name in ("__MACOSX", "Thumbs.db", "desktop.ini")
+def _reading(wish: SourceWish) -> dict[str, Any]:
+    """How a source is to be read, as the importers take it."""
+    named = {"calibration", "fps", "trial", "offsets", "rotations", "unit", "up", "despite_findings"}
+    return {**wish.model_dump(include=named), "copy": wish.copy_footage or wish.upload is not None}

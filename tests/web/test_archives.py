@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from studio.errors import StudioError
-from studio.web.archives import ArchiveError, ArchiveLimits, unpack_zip
+from studio.web.archives import ArchiveError, ArchiveLimits, unpack_upload, unpack_zip, unwrapped
 
 
 def packed(path: Path, *entries: tuple[str, bytes]) -> Path:
@@ -114,3 +114,36 @@ def test_a_zip_cut_short_is_refused(tmp_path: Path, folder: Path) -> None:
     path.write_bytes(stream.getvalue()[:-200])
     with pytest.raises(ArchiveError):
         unpack_zip(path, folder)
+
+
+def test_an_upload_of_one_zip_is_what_the_zip_holds(folder: Path) -> None:
+    """Also when it is asked for again; whatever the systems that packed it left beside it."""
+    packed(folder / "take.zip", ("take/videos/a.mp4", b"12345"), ("__MACOSX/x", b""), (".DS_Store", b""))
+    for _ in range(2):
+        found = unwrapped(unpack_upload(folder), ("videos",))
+        assert found.name == "take"
+        assert (found / "videos/a.mp4").read_bytes() == b"12345"
+    assert not (folder / "take.zip").exists()
+
+
+def test_an_upload_of_files_is_left_as_it_is(folder: Path) -> None:
+    packed(folder / "a.zip", ("a.txt", b"1"))
+    (folder / "b.txt").write_text("2")
+    assert unpack_upload(folder) == folder
+    assert written(folder) == ["a.zip", "b.txt"]
+
+
+def test_a_zip_that_is_refused_leaves_nothing_but_itself(folder: Path) -> None:
+    (folder / "a.zip").write_bytes(b"no zip at all")
+    for _ in range(2):
+        with pytest.raises(ArchiveError):
+            unpack_upload(folder)
+        assert written(folder) == ["a.zip"]
+
+
+def test_a_folder_that_is_a_part_is_no_wrapping(folder: Path) -> None:
+    place = folder / "outer" / "Intrinsics_1" / "cam1"
+    place.mkdir(parents=True)
+    (place / "a.mp4").write_text("1")
+    assert unwrapped(folder, ("intrinsic*",)) == folder / "outer"
+    assert unwrapped(folder, ("cam",)) == place
