@@ -48,6 +48,13 @@ TRIALS: tuple[dict[str, Knob], ...] = (
     },
 )
 """Knobs that are tried, beside what the session or the person has. Three pieces: legs may be cut off by a gap."""
+TRIED_CLEANING = ((1.0, 0), (2.0, 0), (2.0, 1))
+"""What is tried with the best of these: how much more gaps, holes and pieces are cleaned away than the picture's size
+asks for, and how many pieces are kept then, 0 for as many as before."""
+USUAL_SIDE = 480.0
+"""Pixels of the shorter side of pictures that the usual knobs of cleaning suit."""
+HOLE_AREA = 4.0
+"""Of the usual area of holes and pieces, each time: a belt in the background's colour is wider than noise."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -127,27 +134,43 @@ def _set_up(
 def _tuned(
     session: Session, own: dict[str, Knob], progress: Progress | None
 ) -> tuple[dict[str, Knob], MaskQuality]:
-    """The knobs among TRIALS (beside `own`, which stay) whose worst camera agrees best, and the quality."""
+    """The knobs among TRIALS and then TRIED_CLEANING (beside `own`, which stay) whose worst camera agrees best, and the
+    quality.
+    """
     footage = session.footage()
+    backgrounds, done = Backgrounds(footage), 0
+    frames = spread_frames(footage.frame_count, TRIED_FRAMES)
+
+    def tried(knobs: dict[str, Knob]) -> tuple[float, dict[str, Knob], MaskQuality]:
+        nonlocal done
+        if progress is not None:
+            progress("trying knobs", done, len(TRIALS) + len(TRIED_CLEANING))
+        done += 1
+        settings = _settings(session, knobs)
+        found = mask_quality(session, settings, frames, backgrounds=backgrounds, blame=False)
+        worst = min((0.0 if view.agreement != view.agreement else view.agreement) for view in found.views)
+        return round(worst, 9), knobs, found
+
     try:
-        backgrounds = Backgrounds(footage)
-        frames = spread_frames(footage.frame_count, TRIED_FRAMES)
-        best: tuple[float, dict[str, Knob], MaskQuality] | None = None
-        for done, trial in enumerate(TRIALS):
-            if progress is not None:
-                progress("trying knobs", done, len(TRIALS))
-            knobs = {**trial, **own}
-            found = mask_quality(
-                session, _settings(session, knobs), frames, backgrounds=backgrounds, blame=False
-            )
-            worst = min((0.0 if view.agreement != view.agreement else view.agreement) for view in found.views)
-            if best is None or worst > best[0] + 1e-9:
-                best = (worst, knobs, found)
+        best = max((tried({**trial, **own}) for trial in TRIALS), key=lambda one: one[0])
+        side = min(min(camera.width, camera.height) for camera in session.manifest.footage.cameras)
+        cleaned = [_cleaning(side, more, pieces) for more, pieces in TRIED_CLEANING]
+        best = max(best, *(tried({**best[1], **knobs, **own}) for knobs in cleaned), key=lambda one: one[0])
     finally:
         footage.close()
-    if best is None:
-        raise RuntimeError("there are trials")
     return best[1], best[2]
+
+
+def _cleaning(side: int, more: float, pieces: int) -> dict[str, Knob]:
+    """Knobs of cleaning for pictures whose shorter side is so many pixels."""
+    usual, scale = EvidenceSettings(), max(1.0, side / USUAL_SIDE)
+    area = HOLE_AREA * scale**2
+    knobs: dict[str, Knob] = {
+        "mask_closing": round(usual.mask_closing * scale * more),
+        "mask_fill_holes": round(usual.mask_fill_holes * area),
+        "mask_min_component": round(usual.mask_min_component * area),
+    }
+    return {**knobs, "mask_keep_components": pieces} if pieces else knobs
 
 
 def _settings(session: Session, knobs: Mapping[str, Knob]) -> EvidenceSettings:
