@@ -4,9 +4,19 @@ from pathlib import Path
 
 import click
 
-from studio.cli.arguments import camera_numbers
+from studio.cli.arguments import (
+    COPY_OPTION,
+    DESPITE_OPTION,
+    FPS_OPTION,
+    OFFSET_OPTION,
+    ROTATE_OPTION,
+    TRIAL_OPTION,
+    camera_numbers,
+)
 from studio.cli.output import command, note, progress
+from studio.export.kept_exports import exported_files
 from studio.runs.way import way_of
+from studio.runs.way_results import newest_run
 from studio.sessions.beginning import begin_session
 from studio.sessions.importers.adding import FootageWish, add_footage
 from studio.sessions.workspace import Workspace
@@ -28,16 +38,14 @@ def new_command(session: str, title: str, body: str) -> dict[str, object]:
 @click.command("add-footage")
 @click.argument("session")
 @click.argument("source", type=click.Path(path_type=Path))
-@click.option("--fps", type=float, help="Frames per second, where the footage does not say (pictures).")
+@FPS_OPTION
 @click.option("--calibration", help="The source's calibration to take where there are several.")
-@click.option("--trial", metavar="NAME", help="Which trial, where a folder holds several.")
-@click.option("--offset", "offsets", multiple=True, metavar="CAMERA=FRAMES", help="As of 'studio import'.")
-@click.option("--rotate", "rotations", multiple=True, metavar="CAMERA=DEGREES", help="As of 'studio import'.")
+@TRIAL_OPTION
+@OFFSET_OPTION
+@ROTATE_OPTION
 @click.option("--replace", "replaced", is_flag=True, help="Forget all cameras that SOURCE does not name.")
-@click.option("--despite-findings", is_flag=True, help="As of 'studio import'.")
-@click.option(
-    "--copy/--reference", default=True, help="Copy the footage (default), or refer to it where it lies."
-)
+@DESPITE_OPTION
+@COPY_OPTION
 @command
 def add_footage_command(
     session: str,
@@ -82,7 +90,9 @@ def add_footage_command(
 @command
 def way_command(session: str) -> dict[str, object]:
     """Tell how far a SESSION is on the way from footage to an exported motion, and what is next."""
-    way = way_of(Workspace().resolve(session))
+    opened = Workspace().resolve(session)
+    run = newest_run(opened)
+    way = way_of(opened, exports=exported_files(run) if run else ())
     lines = [
         f"{MARKS[step.state]} {step.step:12} {step.words}{f'  ({step.why})' if step.why else ''}"
         for step in way.steps

@@ -1,16 +1,19 @@
 """The exports that lie in a run's folder: `exports/<file>`, each with what was said of it when it was written."""
 
 import datetime
+import hashlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import msgspec
 
 from studio.errors import NotFoundError
-from studio.export.exporting import ExportReport, Progress, export_run
+from studio.export.exporting import ExportReport, Progress, export_run, settled
 from studio.export.formats import ExportFormat
 from studio.export.options import ExportOptions
 from studio.export.task import Writer
+from studio.runs.tracks import read_track, track_names
+from studio.runs.way_results import ExportedFile
 from studio.sessions.atomic_files import write_bytes
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -21,7 +24,10 @@ SAID = ".said.json"
 
 
 class KeptExport(msgspec.Struct, frozen=True):
-    """One export. file : its name in the folder. made : UTC, ISO 8601. checked, notes : as in `ExportReport`."""
+    """One export. file : its name in the folder. made : UTC, ISO 8601. checked, notes : as in `ExportReport`. track,
+    content : the track that it was made from and a digest of its poses then; "" for a file that holds none, or of which
+    nobody knows.
+    """
 
     file: str
     format: str
@@ -32,6 +38,8 @@ class KeptExport(msgspec.Struct, frozen=True):
     checked: str
     notes: tuple[str, ...]
     options: dict[str, str | int | float | bool]
+    track: str = ""
+    content: str = ""
 
 
 def export_into_run(
@@ -50,6 +58,8 @@ def export_into_run(
     """
     folder = run.folder / FOLDER
     folder.mkdir(exist_ok=True)
+    track = settled(form, asked).track if "track" in form.takes else ""
+    content = _content(run, track) if track else ""
     report = export_run(
         session,
         run,
@@ -61,7 +71,7 @@ def export_into_run(
         record_scene=record_scene,
         pack=True,
     )
-    kept = _said(report, asked)
+    kept = msgspec.structs.replace(_said(report, asked), track=track, content=content)
     write_bytes(folder / f"{kept.file}{SAID}", msgspec.json.encode(kept))
     return kept
 
@@ -77,6 +87,22 @@ def kept_exports(run: StoredRun) -> tuple[KeptExport, ...]:
         if f"{kept.file}{SAID}" == path.name and (path.parent / kept.file).is_file():
             found.append(kept)
     return tuple(sorted(found, key=lambda kept: kept.made, reverse=True))
+
+
+def stale_export(run: StoredRun, kept: KeptExport) -> str:
+    """Why a file does not hold its track as it is now, a clause; "" where it does, or nobody can tell."""
+    if not kept.content:
+        return ""
+    if kept.track not in track_names(run):
+        return f"track '{kept.track}' that it was written from is not there any more"
+    if _content(run, kept.track) != kept.content:
+        return f"written before track '{kept.track}' changed"
+    return ""
+
+
+def exported_files(run: StoredRun) -> tuple[ExportedFile, ...]:
+    """The run's exports as the guided way wants them."""
+    return tuple(ExportedFile(kept.file, stale_export(run, kept)) for kept in kept_exports(run))
 
 
 def kept_file(run: StoredRun, name: str) -> Path:
@@ -114,6 +140,14 @@ def _stem(session: Session, run: StoredRun, asked: Mapping[str, str | int | floa
     return "-".join(
         "".join(sign if sign.isalnum() or sign in "_.-" else "_" for sign in part) for part in parts if part
     )
+
+
+def _content(run: StoredRun, track: str) -> str:
+    """A digest of a track's frames and poses."""
+    found = read_track(run, track)
+    made = hashlib.sha256(found.frames.tobytes())
+    made.update(found.poses.tobytes())
+    return made.hexdigest()[:24]
 
 
 def _counts(value: str | float) -> bool:

@@ -8,6 +8,7 @@ import hashlib
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from studio.errors import CalibrationError, NotFoundError
 from studio.runs.aligning import SessionAlignment, keep_alignment
@@ -34,14 +35,12 @@ class Turned(msgspec.Struct, frozen=True):
 
 def remember_alignment(session: Session, aligned: SessionAlignment) -> None:
     """Let the guided way say how far the silhouettes miss with the calibration that is in use now."""
-    note(session, PART, alignment_words(aligned), not aligned.needed)
+    note(session, PART, _missed(aligned, aligned.found.before), not aligned.needed)
 
 
 def alignment_words(aligned: SessionAlignment) -> str:
     """How far the silhouettes miss, and what helps: a sentence."""
-    found = aligned.found
-    worst, most = int(np.nanargmax(found.before)), float(np.nanmax(found.before))
-    missed = f"The silhouettes miss by up to {most:.1f} px ({aligned.names[worst]})"
+    found, missed = aligned.found, _missed(aligned, aligned.found.before)
     if not aligned.needed:
         return f"{missed}: the cameras agree."
     if not aligned.better:
@@ -57,7 +56,12 @@ def misses_in_words(session: Session) -> str:
     known = origin_of(session, PART)
     if known is None or known.good or changed_inputs(session, PART):
         return ""
-    return f"{known.words} See step Background, “Do the cameras agree?”."
+    return f"{known.words}: see step Background, “Do the cameras agree?”"
+
+
+def _missed(aligned: SessionAlignment, pixels: NDArray[np.float64]) -> str:
+    worst, most = int(np.nanargmax(pixels)), float(np.nanmax(pixels))
+    return f"The silhouettes miss by up to {most:.1f} px ({aligned.names[worst]})"
 
 
 def turn_cameras(session: Session, aligned: SessionAlignment) -> CalibrationChange:
@@ -75,9 +79,7 @@ def turn_cameras(session: Session, aligned: SessionAlignment) -> CalibrationChan
         write_bytes(change.session.path / RECORD_PATH, msgspec.json.encode(turned))
     found = aligned.found
     worst, most = int(np.nanargmax(found.after)), float(np.nanmax(found.after))
-    words = (
-        f"The silhouettes miss by up to {most:.1f} px ({aligned.names[worst]}) since the cameras were turned."
-    )
+    words = f"The silhouettes miss by up to {most:.1f} px ({aligned.names[worst]})"
     note(change.session, PART, words)
     return change
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from studio.errors import StudioError
-from studio.runs.way_results import check_step, export_step, track_step
+from studio.runs.way_results import ExportedFile, check_step, export_step, track_step
 from studio.runs.way_setup import (
     background_step,
     calibration_step,
@@ -43,7 +43,7 @@ class Way:
 
 
 def way_of(
-    session: Session, running: Mapping[str, str] | None = None, exports: Sequence[str] | None = None
+    session: Session, running: Mapping[str, str] | None = None, exports: Sequence[ExportedFile] | None = None
 ) -> Way:
     """How far a session is. running : step to how far its job is, in words. exports : files that were exported from
     the newest run, None where nobody looked.

@@ -1,6 +1,7 @@
 """The steps of the guided way from tracking on: track, check, export."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from studio.runs.checking import kept_check, usual_track
 from studio.runs.way_step import StepStatus, counted, enumerated
@@ -8,6 +9,16 @@ from studio.sessions.footage_changes import stale_runs
 from studio.sessions.run_record import CAMERAS_NAME
 from studio.sessions.session import CAMERAS_PATH, Session
 from studio.sessions.stored_run import StoredRun
+
+
+@dataclass(frozen=True, slots=True)
+class ExportedFile:
+    """A file that was exported from the newest run. stale : why it does not hold what is there now, a clause; "" where
+    it does.
+    """
+
+    name: str
+    stale: str = ""
 
 
 def newest_run(session: Session) -> StoredRun | None:
@@ -63,9 +74,14 @@ def check_step(session: Session) -> StepStatus:
     return StepStatus("check", "done", words)
 
 
-def export_step(session: Session, exports: Sequence[str]) -> StepStatus:
-    """The files that were exported from the newest run."""
+def export_step(session: Session, exports: Sequence[ExportedFile]) -> StepStatus:
+    """The files that were exported from the newest run, and whether they hold its tracks as they are now."""
     run = newest_run(session)
     if run is None or not exports:
         return StepStatus("export", "ready", "no file yet")
-    return StepStatus("export", "done", f"{counted(len(exports), 'file')} of {run.name}")
+    words = f"{counted(len(exports), 'file')} of {run.name}"
+    old = [file for file in exports if file.stale]
+    if old:
+        why = f"{'; '.join(f'{file.name}: {file.stale}' for file in old[:3])}{' …' if len(old) > 3 else ''}."
+        return StepStatus("export", "stale", words, f"{why} Export again, or delete what is old.")
+    return StepStatus("export", "done", words)

@@ -6,7 +6,13 @@ from fastapi.responses import FileResponse, Response
 from studio.capture.calibration_files import CALIBRATION_WRITERS
 from studio.export.exporting import settled
 from studio.export.formats import FORMATS, format_of
-from studio.export.kept_exports import discard_export, export_into_run, kept_exports, kept_file
+from studio.export.kept_exports import (
+    discard_export,
+    export_into_run,
+    kept_exports,
+    kept_file,
+    stale_export,
+)
 from studio.export.options import ExportOptions
 from studio.knobs import knobs_of
 from studio.runs.tracks import track_names
@@ -46,7 +52,10 @@ def choices() -> ExportChoices:
 def exports(session: OpenSession, run: OpenRun, doors: Door) -> ExportList:
     """The run's exports, newest first, and those under way."""
     going = [state for state in doors.jobs.running(EXPORT, session.name) if state.run == run.name]
-    lines = [ExportLine.model_validate(kept) for kept in kept_exports(run)]
+    lines = [
+        ExportLine.model_validate(kept).model_copy(update={"stale": stale_export(run, kept)})
+        for kept in kept_exports(run)
+    ]
     names = [camera.name for camera in run.cameras()]
     return ExportList(exports=lines, running=going, tracks=list(track_names(run)), cameras=names)
 

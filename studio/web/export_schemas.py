@@ -35,7 +35,9 @@ class ExportRequest(Request):
 
 
 class ExportLine(Answer):
-    """A finished export. checked: what reading the file back showed. notes: on gaps, names and axes."""
+    """A finished export. checked: what reading the file back showed. notes: on gaps, names and axes. stale: why it does
+    not hold its track as it is now.
+    """
 
     file: str
     format: str
@@ -46,6 +48,8 @@ class ExportLine(Answer):
     checked: str
     notes: list[str]
     options: dict[str, Value]
+    track: str = ""
+    stale: str = ""
 
 
 class ExportState(NumberedJob):

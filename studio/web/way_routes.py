@@ -4,9 +4,9 @@ import asyncio
 from typing import Annotated
 
 from fastapi import APIRouter, Query
-from starlette.responses import FileResponse, Response
+from starlette.responses import Response
 
-from studio.export.kept_exports import kept_exports
+from studio.export.kept_exports import exported_files
 from studio.runs.way import Way, way_of
 from studio.runs.way_results import newest_run
 from studio.sessions.beginning import begin_session
@@ -14,7 +14,7 @@ from studio.sessions.session import Session
 from studio.tracking.evaluations import knobs_for_evaluations
 from studio.web.doors import Door, Doors
 from studio.web.job_kinds import BACKGROUND, EXPORT, START_POSE, SUBJECT, TRACK
-from studio.web.page_routes import assets_folder
+from studio.web.pages import NAME, html_page
 from studio.web.schemas import NewName
 from studio.web.session_routes import OpenSession
 from studio.web.way_schemas import NewSession, WayAnswer
@@ -25,9 +25,7 @@ router = APIRouter(tags=["way"])
 @router.get("/way", include_in_schema=False)
 def page() -> Response:
     """The page of the guided way."""
-    return FileResponse(
-        assets_folder() / "way.html", media_type="text/html", headers={"cache-control": "no-cache"}
-    )
+    return html_page("way.html", {"title": f"Guided way · {NAME}"})
 
 
 @router.post("/api/sessions", status_code=201)
@@ -69,4 +67,4 @@ def running_steps(doors: Doors, session: Session) -> dict[str, str]:
 
 def _way(session: Session, running: dict[str, str]) -> Way:
     run = newest_run(session)
-    return way_of(session, running, [made.file for made in kept_exports(run)] if run else [])
+    return way_of(session, running, exported_files(run) if run else ())

@@ -56,7 +56,8 @@ def test_cameras_are_measured_turned_and_turned_back(studio: Studio, session: Se
     lines = {line["camera"]: line for line in job["cameras"]}
     assert lines[NUDGED]["after_px"] < 0.4 * lines[NUDGED]["before_px"]
     assert (job["needed"], job["better"], len(job["frames"])) == (True, True, 8)
-    assert job["words"] in calibration_why(studio)
+    assert "they would miss by" in job["words"]
+    assert f"({NUDGED})" in calibration_why(studio)
     kept = studio.client.post(f"{PLACE}/keep").json()
     assert (kept["turned"], kept["job"]["kept"]) == (True, True)
     assert any(run.name in note for note in kept["notes"])

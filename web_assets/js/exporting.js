@@ -107,7 +107,8 @@ function fileLine(made) {
   const drop = button("×", async () => { try { await remove(address); await refresh(); } catch (error) { complain(error); } }, "icon quiet");
   drop.setAttribute("aria-label", `Delete ${made.file}`);
   drop.title = "Delete this file (the run stays)";
-  return element("li", {}, element("div", {}, link, element("p", { className: "facts", textContent: facts }), ...made.notes.map((note) => element("p", { className: "facts note", textContent: note }))), drop);
+  return element("li", {}, element("div", {}, link, element("p", { className: "facts", textContent: facts }), ...made.notes.map((note) => element("p", { className: "facts note", textContent: note })),
+    made.stale && element("p", { className: "stale-file", textContent: `Old: ${made.stale}. Export it again.` })), drop);
 }
 
 function fileList() {

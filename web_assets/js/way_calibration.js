@@ -5,21 +5,10 @@ import { button, duration, element } from "./elements.js";
 import { complain } from "./messages.js";
 import { findingList, plainNumbers, rigFromAbove, residualBars } from "./calibration_drawing.js";
 import { clickFloor } from "./calibration_points.js";
+import { boardForm } from "./way_boards.js";
+import { field, files, select, text } from "./way_fields.js";
 
 const WAYS = { file: "From a file", boards: "From a board", used: "In use" };
-const DICTIONARIES = ["DICT_4X4_50", "DICT_4X4_100", "DICT_4X4_250", "DICT_5X5_50", "DICT_5X5_100", "DICT_5X5_250", "DICT_6X6_100", "DICT_6X6_250", "DICT_7X7_250", "DICT_ARUCO_ORIGINAL"];
-const PAGES = { a4: "A4", a3: "A3", letter: "Letter" };
-
-/** A text, select or number field with its label. */
-function field(label, made, hint = "") {
-  if (hint) made.title = hint;
-  return element("label", {}, label, made);
-}
-const text = (properties) => element("input", { type: "text", ...properties });
-const number = (value, properties = {}) => element("input", { type: "number", value, step: "any", min: 0, ...properties });
-const select = (options) => element("select", {}, ...Object.entries(options).map(([value, words]) => new Option(words, value)));
-const files = (properties) => element("input", { type: "file", ...properties });
-
 /** The step. */
 export function mount(place, way) {
   const here = `${way.api.sessionPath(way.session)}/calibration`;
@@ -81,83 +70,14 @@ export function mount(place, way) {
   }
 
   // --- from boards
-  function boardFields() {
-    const kept = JSON.parse(localStorage.getItem("calibration-board") ?? "null") ?? { kind: "charuco", columns: 7, rows: 5, square: 36, marker: 27 };
-    const kind = select({ charuco: "ChArUco", chessboard: "Chessboard" });
-    kind.value = kept.kind;
-    const columns = number(kept.columns, { step: 1, min: 2 });
-    const rows = number(kept.rows, { step: 1, min: 2 });
-    const square = number(kept.square);
-    const marker = number(kept.marker);
-    const markerField = field("Marker mm", marker, "Side of a marker as measured on the print");
-    const dictionary = select(Object.fromEntries(DICTIONARIES.map((name) => [name, name.replace("DICT_", "").replaceAll("_", " ").toLowerCase()])));
-    dictionary.value = kept.dictionary ?? "DICT_4X4_250";
-    const legacy = element("input", { type: "checkbox", checked: Boolean(kept.legacy) });
-    const markers = element("div", { className: "step-row" }, field("Markers", dictionary, "The dictionary that the markers are of"),
-      element("label", { className: "check", title: "Boards drawn by OpenCV before 4.6 with an even number of rows" }, legacy, "old pattern"));
-    const count = element("span", { className: "hint" });
-    const settle = () => {
-      markerField.hidden = markers.hidden = kind.value === "chessboard";
-      count.textContent = kind.value === "chessboard" ? "Columns and rows count inner corners." : "Columns and rows count squares.";
-    };
-    kind.onchange = settle;
-    settle();
-    const spelling = () => {
-      localStorage.setItem("calibration-board", JSON.stringify({ kind: kind.value, columns: columns.value, rows: rows.value, square: square.value, marker: marker.value, dictionary: dictionary.value, legacy: legacy.checked }));
-      const sizes = `${columns.value}x${rows.value},${square.value}`;
-      return kind.value === "chessboard" ? `chessboard:${sizes}` : `charuco:${sizes},${marker.value},${dictionary.value}${legacy.checked ? ",legacy" : ""}`;
-    };
-    const rowsOf = [element("div", { className: "step-row board-sizes" }, field("Board", kind), field("Columns", columns), field("Rows", rows), field("Square mm", square, "As measured on the print"), markerField), markers, count];
-    return { rowsOf, spelling };
-  }
-
-  function printRow() {
-    const kind = select({ charuco: "ChArUco", chessboard: "Chessboard" });
-    const page = select(PAGES);
-    const link = element("a", { className: "link-button", textContent: "Download the PDF" });
-    const settle = () => { link.href = `/api/calibration-boards.pdf?kind=${kind.value}&page=${page.value}`; };
-    kind.onchange = page.onchange = settle;
-    settle();
-    return element("details", { className: "print-board" }, element("summary", { textContent: "No board yet? Print one" }),
-      element("p", { className: "hint", textContent: "Print at 100 %, measure the bar and the squares, glue it on a flat, stiff plate." }),
-      element("div", { className: "step-row" }, field("Board", kind), field("Paper", page)), element("div", { className: "step-actions" }, link));
-  }
-
-  function boardForm() {
-    const board = boardFields();
-    const path = text({ placeholder: state.view.board_footage ? "found in the session" : "full path of the folder", value: state.boards ?? "" });
-    const upload = files({ webkitdirectory: true, multiple: true });
-    const floor = number(state.floor ?? "", { step: 1, placeholder: "not set" });
-    const thickness = number(state.thickness ?? 0);
-    const own = element("input", { type: "checkbox" });
-    const solve = async () => {
-      state.said = [];
-      state.proposal = null;
-      try {
-        Object.assign(state, { boards: path.value, floor: floor.value, thickness: thickness.value });
-        const wish = { board: board.spelling(), thickness_mm: Number(thickness.value), floor: floor.value === "" ? "" : `frame:${floor.value}` };
-        if (upload.files.length) wish.footage = { upload: await uploaded(upload) };
-        else if (path.value) wish.footage = { path: path.value };
-        if (own.checked) wish.offsets = await sessionOffsets();
-        const begun = await way.api.post(`${here}/solve`, wish);
-        state.job = begun.identifier;
-        hear(begun);
-      } catch (error) { state.said = [error]; draw(); }
-    };
-    const many = state.view.footage.length > 1;
-    return [
-      element("p", { className: "hint", textContent: "A folder with intrinsics/ (the board close to each camera) and extrinsics/ (all cameras at once): one video or folder of pictures a camera. Either alone does, if it shows enough." }),
-      ...board.rowsOf, field("Upload a folder", upload), field("or on this computer", path),
-      element("div", { className: "step-row" }, field("Board on the floor in frame", floor, "Frame of the common footage in which the board lies on the floor, face up; the floor can be clicked later instead"),
-        field("Plate thickness mm", thickness, "Of the plate that carries the board; matters where it lies on the floor")),
-      many && element("label", { className: "check", title: "Only where board and take are one recording" }, own, "The board was recorded without stopping: use the session's offsets"),
-      element("div", { className: "step-actions" }, button("Calibrate", solve, state.proposal ? "" : "primary")), printRow(),
-    ];
-  }
-
-  async function sessionOffsets() {
-    const told = await way.api.fetchJson(`${way.api.sessionPath(way.session)}/footage`);
-    return Object.fromEntries(told.cameras.map((camera) => [camera.name, camera.offset]));
+  async function solve(wished) {
+    state.said = [];
+    state.proposal = null;
+    try {
+      const begun = await way.api.post(`${here}/solve`, await wished());
+      state.job = begun.identifier;
+      hear(begun);
+    } catch (error) { state.said = [error]; draw(); }
   }
 
   /** The job got further. */
@@ -270,10 +190,10 @@ export function mount(place, way) {
       tab.setAttribute("aria-pressed", String(state.tab === name));
       return tab;
     }));
-    const form = { file: fileForm, boards: boardForm, used: usedForm }[state.tab]();
+    const form = { file: fileForm, boards: () => boardForm(way, state, { uploaded, solve }), used: usedForm }[state.tab]();
     const said = state.said.map((error) => element("div", { role: "alert" }, element("p", { className: "wrong", textContent: error.message }), error.hint && element("p", { className: "hint", textContent: error.hint })));
     const rig = shown();
-    place.replaceChildren(...[tabs, ...form, progress, ...said, state.proposal && proposalBox(), rig && findingList(rig)].filter(Boolean));
+    place.replaceChildren(...[tabs, ...form, progress, ...said, state.proposal && proposalBox(), rig && (state.proposal || rig.findings.length || !way.step?.why) && findingList(rig)].filter(Boolean));
     if (!state.clicking) drawAside();
   }
 

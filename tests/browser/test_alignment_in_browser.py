@@ -1,0 +1,71 @@
+"""Step Background asks whether the cameras agree: a nudged one is found, turned, and turned back."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from nudged_camera import make_nudged_session
+from page_watch import PageWatch
+from playwright.sync_api import Browser, Page, expect
+from studio_server import StudioServer
+
+from studio.sessions.session import CAMERAS_PATH
+from studio.sessions.workspace import Workspace
+
+pytestmark = pytest.mark.browser
+
+PATIENCE = 60_000
+expect.set_options(timeout=PATIENCE)
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
+    """`studio serve` on a workspace with the session."""
+    root = tmp_path_factory.mktemp("alignment") / "workspace"
+    make_nudged_session(Workspace(root).place_for("nudged"))
+    made = StudioServer("serve", root)
+    yield made
+    made.stop()
+
+
+@pytest.fixture
+def page(browser: Browser, studio: StudioServer) -> Iterator[Page]:
+    """A window on the guided way."""
+    context = browser.new_context(viewport={"width": 1280, "height": 800}, color_scheme="dark")
+    context.set_default_timeout(PATIENCE)
+    opened = context.new_page()
+    watch = PageWatch(opened, studio.origin)
+    opened.goto(studio.address)
+    yield opened
+    context.close()
+    watch.check()
+
+
+def test_a_nudged_camera_is_turned_and_turned_back(
+    page: Page, studio: StudioServer, artefacts: Path
+) -> None:
+    place = studio.workspace / "nudged" / CAMERAS_PATH
+    before = place.read_bytes()
+    page.goto(f"{studio.origin}/way?session=nudged&step=background")
+    page.get_by_role("button", name="Measure whether the cameras agree").click()
+    row = page.get_by_role("row", name=re.compile("^cam2 "))
+    expect(row).to_contain_text(re.compile(r"\d\.\d px"))
+    turn = page.get_by_role("button", name="Turn the cameras")
+    calibration = page.locator("#stepper [data-step=calibration]")
+    expect(calibration).to_contain_text("The silhouettes miss by up to")
+    turn.scroll_into_view_if_needed()
+    artefacts.mkdir(parents=True, exist_ok=True)
+    page.screenshot(path=artefacts / "way-cameras-agree.png")
+    assert place.read_bytes() == before
+    turn.click()
+    back = page.get_by_role("button", name="Turn them back")
+    expect(back).to_be_enabled()
+    expect(page.get_by_text("The session uses the turned cameras.")).to_be_visible()
+    expect(calibration).to_contain_text("aligned by silhouettes")
+    expect(calibration).not_to_contain_text("miss by")
+    assert place.read_bytes() != before
+    page.reload()
+    back.click()
+    expect(turn).to_be_enabled()
+    assert place.read_bytes() == before

@@ -1,0 +1,52 @@
+"""A file that is older than the track it was written from is called old, in the list and on the guided way."""
+
+import dataclasses
+
+import pytest
+from export_runs import MADE, moving_poses, track_of
+
+from studio.export.formats import FORMATS
+from studio.export.kept_exports import export_into_run, exported_files, kept_exports, stale_export
+from studio.runs.tracks import read_track, write_track
+from studio.runs.way_results import export_step
+from studio.runs.way_step import StepStatus
+from studio.sessions.session import Session
+
+
+@pytest.fixture
+def arm(make_run):
+    """A run of the planar arm, 12 frames."""
+    return make_run("planar_arm4", lambda body: track_of(moving_poses(body, 12)))
+
+
+def export_of_way(session: Session, run) -> StepStatus:
+    return export_step(session, exported_files(run))
+
+
+def test_a_file_older_than_its_track_is_stale(arm) -> None:
+    session, run = arm
+    written = export_into_run(session, run, FORMATS["trc"], {"track": MADE})
+    export_into_run(session, run, FORMATS["csv"], {"track": MADE})
+    assert [file.stale for file in exported_files(run)] == ["", ""]
+    track = read_track(run, MADE)
+    write_track(run, track, replace=True)
+    assert [stale_export(run, kept) for kept in kept_exports(run)] == ["", ""]
+    write_track(run, dataclasses.replace(track, poses=track.poses + 0.01), replace=True)
+    trc = next(kept for kept in kept_exports(run) if kept.file == written.file)
+    assert stale_export(run, trc) == f"written before track '{MADE}' changed"
+    export_into_run(session, run, FORMATS["trc"], {"track": MADE})
+    assert {file.name: bool(file.stale) for file in exported_files(run)}[written.file] is False
+
+
+def test_the_way_says_which_file_is_old(arm) -> None:
+    session, run = arm
+    written = export_into_run(session, run, FORMATS["csv"], {"track": MADE})
+    track = read_track(run, MADE)
+    before = export_of_way(session, run)
+    assert (before.state, before.why) == ("done", "")
+    write_track(run, dataclasses.replace(track, poses=track.poses * 1.01), replace=True)
+    after = export_of_way(session, run)
+    assert after.state == "stale"
+    assert f"{written.file}: written before track '{MADE}' changed" in after.why
+    run.folder.joinpath("tracks", f"{MADE}.npz").unlink()
+    assert "is not there any more" in export_of_way(session, run).why
