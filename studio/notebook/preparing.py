@@ -25,6 +25,8 @@ from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 from studio.synthesis.recipes import synthesize as synthesize_recipe
 
+USUAL = FitRequest()
+
 
 def import_footage(
     source: str | Path,
@@ -147,6 +149,7 @@ def fit_subject(
     lengths: bool = True,
     radii: bool = True,
     height_mm: float | None = None,
+    height_spread: float = USUAL.height_spread,
     run: str = "",
     body: str = "",
     seed: int = 0,
@@ -155,7 +158,8 @@ def fit_subject(
 ) -> FittedSubject:
     """Find lengths and radii of the person on the silhouettes of a few frames, together with the poses.
 
-    keep : make it the session's subject; the old one stays beside it.
+    height_spread : mm, how far off the height may be: 15 for a measured one, 60 for a guess. keep : make it the
+    session's subject; the old one stays beside it.
     """
     opened = open_session(session)
     request = FitRequest(
@@ -167,6 +171,7 @@ def fit_subject(
         run=run,
         body=body,
         height_mm=height_mm,
+        height_spread=height_spread,
         seed=seed,
     )
     with told(progress, f"{opened.name}: subject") as report:
