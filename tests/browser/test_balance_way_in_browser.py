@@ -237,9 +237,12 @@ def test_export(way: Way, tmp_path: Path) -> None:
     with contextlib.redirect_stdout(io.StringIO()):
         read = bvhsdk.ReadFile(str(file))
         assert read is not None
-        hips = read.getlistofjoints()[0]
+        hips = next(iter(read.getlistofjoints()))
         assert read.frames == FRAMES
-        heights = [float(np.asarray(hips.getGlobalTransform(frame))[1, 3]) for frame in range(FRAMES)]
+        heights = [
+            float(np.asarray(hips.getGlobalTransform(frame), dtype=np.float64)[1, 3])
+            for frame in range(FRAMES)
+        ]
     assert read.frametime == pytest.approx(1.0 / 60.0, abs=1e-6)
     assert all(0.6 < height < 1.3 for height in heights), heights
     way.shoot("export")

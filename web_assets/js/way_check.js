@@ -135,39 +135,49 @@ export function mount(place, way) {
     });
   }
 
-  /** Begin refining, smoothing or measuring, and follow it to its end. */
-  async function begin(verb, wish) {
+  /** Begin refining, smoothing or measuring, and follow it to its end; nothing else can be begun meanwhile. */
+  function begin(verb, wish) {
     state.failed = null;
-    try {
-      state.job = await post(`${here}/${verb}`, wish);
-      drawAll();
-      await follow();
-    } catch (error) { state.failed = error; state.job = null; drawAll(); }
+    state.job = { verb, state: "running" };
+    drawAll();
+    return carry(() => post(`${here}/${verb}`, wish));
   }
 
+  /** Follow a job, and what follows from it: a track that was made is looked at, whether it is better is the next question. */
+  async function carry(begun) {
+    try {
+      for (let start = begun; start && !state.stopped;) {
+        state.job = await start();
+        drawAll();
+        const made = await follow();
+        start = made ? () => post(`${here}/check`, { track: made }) : null;
+      }
+    } catch (error) { state.failed = error; }
+    state.job = null;
+    if (!state.stopped) drawAll();
+  }
+
+  /** Wait for the job's end; resolves with the name of the track that it made, "" for none. */
   async function follow() {
-    while (!state.stopped && state.job?.state === "running") {
+    while (state.job.state === "running") {
       await new Promise((resolve) => setTimeout(resolve, POLL_MILLISECONDS));
-      if (state.stopped) return;
+      if (state.stopped) return "";
       state.job = await fetchJson(`/api/track-jobs/${state.job.identifier}`);
       if (state.job.state === "running") drawAll();
     }
     const ended = state.job;
-    state.job = null;
-    if (state.stopped || !ended) return;
     if (ended.state === "failed") state.failed = ended;
     const made = ended.state === "done" && ended.verb !== "check" ? ended.track : "";
     await load(made || state.track);
     await way.refresh();
-    // What was made is looked at straight away: whether it is better is the next question.
-    if (made) await begin("check", { track: made });
+    return made;
   }
 
   async function load(wanted = "") {
     const [told, tracks] = await Promise.all([fetchJson(`${here}/check${wanted ? `?track=${wanted}` : ""}`), fetchJson(`${here}/tracks`)]);
     Object.assign(state, { told, tracks: tracks.tracks, track: told.track });
     const running = tracks.running[0] ?? null;
-    if (running && !state.job) { state.job = running; follow().catch(complain); }
+    if (running && !state.job) { state.job = running; carry(() => running); }
     drawAll();
     const frames = framesToSee();
     show(frames.includes(state.frame) ? state.frame : frames[0]);
