@@ -53,6 +53,7 @@ from studio.web.content_policy import PolicyHeaders
 from studio.web.doors import Control, Doors, Stage
 from studio.web.error_responses import ErrorsInWords, add_error_handlers, log
 from studio.web.event_stream import EventStream
+from studio.web.pages import assets_folder
 from studio.web.presets import Preset
 from studio.web.schemas import ErrorAnswer
 
@@ -128,7 +129,7 @@ def build_app(
     add_error_handlers(app)
     for router in ROUTERS:
         app.include_router(router)
-    app.mount("/assets", StaticFiles(directory=page_routes.assets_folder()), name="assets")
+    app.mount("/assets", StaticFiles(directory=assets_folder()), name="assets")
     # The last one added is the first to see a request.
     app.add_middleware(BodyLimit)
     app.add_middleware(AccessGuard, token=token, hosts=hosts or binding_rule("127.0.0.1", False))

@@ -1,12 +1,11 @@
 """The studio's further pages: one frame with a bar of places, what is in it is drawn by each page's own module."""
 
 from dataclasses import dataclass
-from functools import cache
 
 from fastapi import APIRouter
 from starlette.responses import HTMLResponse
 
-from studio.web.page_routes import assets_folder
+from studio.web.pages import NAME, html_page
 
 router = APIRouter(tags=["page"], include_in_schema=False)
 
@@ -69,26 +68,15 @@ def reports_page() -> HTMLResponse:
 
 
 def _answer(name: str) -> HTMLResponse:
-    return HTMLResponse(_rendered(name), headers={"cache-control": "no-cache"})
-
-
-@cache
-def _rendered(name: str) -> str:
-    """A page's text; what is put in is our own."""
     page = next(page for page in PAGES if page.name == name)
-    places = "".join(_link(address, title, page) for address, title in PLACES)
-    rail = RAIL.format(title=page.title, button=NEW if page.new else "") if page.rail else ""
-    text = (assets_folder() / TEMPLATE).read_text(encoding="utf-8")
-    filled = {
-        "title": page.title,
+    own = {
+        "title": f"{page.title} · {NAME}",
         "module": page.name,
         "columns": "" if page.rail else "wide",
-        "places": places,
-        "rail": rail,
+        "places": "".join(_link(address, title, page) for address, title in PLACES),
+        "rail": RAIL.format(title=page.title, button=NEW if page.new else "") if page.rail else "",
     }
-    for entry, value in filled.items():
-        text = text.replace(f"{{{{{entry}}}}}", value)
-    return text
+    return html_page(TEMPLATE, own)
 
 
 def _link(address: str, title: str, page: DocumentPage) -> str:

@@ -15,7 +15,7 @@ from studio.settings import RecordingSettings
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.recovery_settings import RecoverySettings
 from studio.training.oversampling import OversamplingSettings
-from studio.web.page_routes import assets_folder
+from studio.web.pages import assets_folder
 from studio.weighting.catalogue import WEIGHTINGS
 
 router = APIRouter(tags=["page"], include_in_schema=False)

@@ -6,12 +6,13 @@ from typing import Annotated
 
 import msgspec
 from fastapi import APIRouter, Depends
-from starlette.responses import FileResponse, Response
+from starlette.responses import Response
 
 from studio.errors import StudioError
 from studio.sessions.atomic_files import write_bytes
 from studio.typed_decoding import decode_json
 from studio.web.doors import Doors, doors_of
+from studio.web.pages import NAME, html_page
 
 router = APIRouter(tags=["page"])
 
@@ -32,19 +33,10 @@ class PreferencesError(StudioError):
     status, code = 422, "preferences"
 
 
-def assets_folder() -> Path:
-    """Where the pages lie: in an installed package beside this file, in a checkout in `web_assets`."""
-    here = Path(__file__).resolve().parent
-    installed = here / "assets"
-    return installed if installed.is_dir() else here.parent.parent / "web_assets"
-
-
 @router.get("/", include_in_schema=False)
 def page() -> Response:
     """The studio's page."""
-    return FileResponse(
-        assets_folder() / "index.html", media_type="text/html", headers={"cache-control": "no-cache"}
-    )
+    return html_page("index.html", {"title": NAME})
 
 
 @router.get("/api/preferences")

@@ -14,7 +14,7 @@ from studio.sessions.stored_run import StoredRun
 from studio.settings import RecordingSettings
 from studio.tracking.catalogue import TRACKERS
 from studio.web.guide_routes import anchor_of
-from studio.web.page_routes import assets_folder
+from studio.web.pages import assets_folder
 from studio.weighting.catalogue import WEIGHTINGS
 
 
@@ -26,6 +26,25 @@ def test_the_page_and_all_that_it_names_are_there(studio: Studio) -> None:
     assert named
     for address in named:
         assert studio.client.get(address).status_code == 200, address
+
+
+@pytest.mark.parametrize(
+    ("address", "title"),
+    [
+        ("/", "Capture studio"),
+        ("/way", "Guided way · Capture studio"),
+        ("/recording", "Live cameras · Capture studio"),
+        ("/reports", "Reports · Capture studio"),
+    ],
+)
+def test_every_page_is_put_together_whole(studio: Studio, address: str, title: str) -> None:
+    text = studio.client.get(address).text
+    assert f"<title>{title}</title>" in text
+    assert "{{" not in text
+    for once in ('charset="utf-8"', 'href="/assets/page.css"', 'id="theme"', 'id="dialog"', 'id="toasts"'):
+        assert text.count(once) == 1, once
+    for asset in re.findall(r'(?:href|src)="(/assets/[^"]+)"', text):
+        assert studio.client.get(asset).status_code == 200, asset
 
 
 def test_modules_have_the_type_that_browsers_want_and_are_asked_for_anew(studio: Studio) -> None:
