@@ -2,8 +2,8 @@
 
 import click
 
+from studio.cli.arguments import frame_numbers
 from studio.cli.output import command, note, progress
-from studio.errors import RunError
 from studio.runs.aligning import align_cameras
 from studio.runs.turned_cameras import remember_alignment, turn_back, turn_cameras
 from studio.sessions.session import Session
@@ -26,7 +26,7 @@ def align_command(session: str, frames: str, dry_run: bool, undo: bool) -> dict[
     if undo:
         return _undone(opened)
     with progress(f"{opened.name}: cameras") as report:
-        aligned = align_cameras(opened, _numbers(frames), progress=report)
+        aligned = align_cameras(opened, frame_numbers(frames), progress=report)
     lines = list(aligned.in_words())
     kept = aligned.needed and aligned.better and not dry_run
     remember_alignment(opened, aligned)
@@ -68,10 +68,3 @@ def _undone(session: Session) -> dict[str, object]:
         note(line)
     text = "The session uses the calibration again that its cameras were turned from."
     return {"session": session.name, "changed": True, "text": text}
-
-
-def _numbers(text: str) -> tuple[int, ...]:
-    try:
-        return tuple(int(word) for word in text.split(",") if word.strip())
-    except ValueError:
-        raise RunError(f"Frames '{text}' cannot be understood.", "Write numbers: 10,40,80.") from None

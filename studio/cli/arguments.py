@@ -2,7 +2,36 @@
 
 from collections.abc import Sequence
 
+import click
+
 from studio.errors import FootageError, RunError
+
+OFFSET_OPTION = click.option(
+    "--offset",
+    "offsets",
+    multiple=True,
+    metavar="CAMERA=FRAMES",
+    help="The frame of this camera's footage that was taken with frame 0 of the others (repeatable).",
+)
+ROTATE_OPTION = click.option(
+    "--rotate",
+    "rotations",
+    multiple=True,
+    metavar="CAMERA=DEGREES",
+    help="Turn this camera's pictures clockwise by 0, 90, 180 or 270 degrees (repeatable).",
+)
+FPS_OPTION = click.option(
+    "--fps", type=float, help="Frames per second, where the footage does not say (pictures)."
+)
+TRIAL_OPTION = click.option("--trial", metavar="NAME", help="Which trial, where a folder holds several.")
+DESPITE_OPTION = click.option(
+    "--despite-findings",
+    is_flag=True,
+    help="Take a calibration that would make results wrong (z not up, a wrong unit), with a warning.",
+)
+COPY_OPTION = click.option(
+    "--copy/--reference", default=True, help="Copy the footage (default), or refer to it where it lies."
+)
 
 
 def frame_range(text: str) -> tuple[int | None, int | None]:
@@ -16,6 +45,14 @@ def frame_range(text: str) -> tuple[int | None, int | None]:
         raise RunError(
             f"Frames '{text}' cannot be understood.", "Write A:B, half open from 0, like 0:150."
         ) from None
+
+
+def frame_numbers(text: str) -> tuple[int, ...]:
+    """A,B,… as numbers, none where nothing was given. Raises RunError."""
+    try:
+        return tuple(int(word) for word in text.split(",") if word.strip())
+    except ValueError:
+        raise RunError(f"Frames '{text}' cannot be understood.", "Write numbers: 10,40,80.") from None
 
 
 def camera_numbers(words: Sequence[str], option: str) -> dict[str, int]:

@@ -9,8 +9,9 @@ import numpy as np
 
 from studio.capture.exclusions import painted_picture, png_of
 from studio.capture.naming import match_names
+from studio.cli.arguments import frame_numbers
+from studio.cli.knob_options import chosen_changes
 from studio.cli.output import command, note, progress
-from studio.cli.tracking_commands import chosen_changes
 from studio.errors import FootageError, NotFoundError
 from studio.runs.background_setup import SOURCES, set_up_background
 from studio.runs.mask_quality import MaskQuality, mask_quality
@@ -71,7 +72,7 @@ def background(
     for word in exclude:
         if word != UNUSED:
             _exclude(opened, word)
-    knobs = chosen_changes(tuple(changes))
+    knobs = chosen_changes(changes)
     found: MaskQuality | None = None
     if source is None and knobs:
         raise FootageError("Knobs are kept with a background.", "Give --source too, or try them on the page.")
@@ -92,7 +93,7 @@ def background(
     settings = session_settings(opened).evidence
     if quality or (source is None and not plates and not exclude):
         with progress(f"{opened.name}: masks") as report:
-            found = mask_quality(opened, settings, _numbers(frames), progress=report)
+            found = mask_quality(opened, settings, frame_numbers(frames), progress=report)
     return _told(opened, found)
 
 
@@ -163,10 +164,3 @@ def _exclude(session: Session, word: str) -> None:
                 "Write a PNG's path, or X,Y;X,Y;X,Y in pixels.",
             )
         polygon_exclusion(session, camera, polygon)
-
-
-def _numbers(text: str) -> tuple[int, ...]:
-    try:
-        return tuple(int(word) for word in text.split(",") if word.strip())
-    except ValueError:
-        raise NotFoundError(f"Frames '{text}' cannot be understood.", "Write numbers: 10,40,80.") from None

@@ -1,7 +1,7 @@
 """`studio learn`, `studio models`."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -9,8 +9,9 @@ import click
 
 from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import load_body
+from studio.cli.knob_options import given, knob_options
 from studio.cli.output import command, note, progress
-from studio.knobs import Knob, allowed, changed, knobs_of
+from studio.knobs import changed, knobs_of
 from studio.sessions.session import BODIES_NAME
 from studio.sessions.workspace import Workspace
 from studio.training.learning import Learnt, learn, read_sources
@@ -18,30 +19,10 @@ from studio.training.model_shelf import ModelSummary, keep_model, list_models, p
 from studio.training.oversampling import OversamplingSettings
 from studio.training.sources import FPS, Recording
 
-F = TypeVar("F", bound=Callable[..., object])
-
 DEFAULT_BODY = "human25"
-SETTINGS = (LearningSettings, OversamplingSettings)
 SHOWN_BAD_FRAMES = 12
 SKELETON_HELP = "ASF file of the .amc sources; default: NN.asf beside NN_MM.amc."
 TEST_HELP = "A source for the test entropy, again for more; default: the last fifth of each source."
-
-
-def _knob_options(function: F) -> F:
-    """An option for every knob of learning and of the training material, made from their declarations."""
-    for settings in reversed(SETTINGS):
-        for entry in reversed(knobs_of(settings)):
-            function = click.option(
-                f"--{entry.name.replace('_', '-')}",
-                entry.name,
-                metavar=entry.kind.__name__.upper(),
-                help=_help(entry),
-            )(function)
-    return function
-
-
-def _help(entry: Knob) -> str:
-    return f"{entry.help} ({allowed(entry)}; default {entry.default})"
 
 
 class _Sources(click.Command):
@@ -72,7 +53,7 @@ class _Sources(click.Command):
 @click.option(
     "--fps", type=click.FloatRange(5.0, 240.0), default=FPS, show_default=True, help="Frames per second."
 )
-@_knob_options
+@knob_options([*knobs_of(LearningSettings), *knobs_of(OversamplingSettings)])
 @click.option("--seed", type=int, default=0, show_default=True, help="The same seed gives the same model.")
 @click.option("--force", is_flag=True, help="Replace a model of that name.")
 @command
@@ -96,7 +77,8 @@ def learn_command(
     workspace = Workspace()
     model_body = load_body(body, (workspace.root / BODIES_NAME,))
     place = place_for_model(into, workspace, replace=force)
-    learning, material = _settings(LearningSettings, knobs), _settings(OversamplingSettings, knobs)
+    asked = given(knobs)
+    learning, material = _settings(LearningSettings, asked), _settings(OversamplingSettings, asked)
     with progress("Reading motion") as report:
         recordings = read_sources(
             sources, model_body, skeleton, fps=fps, workspace=workspace, progress=report
@@ -129,12 +111,10 @@ def models_command() -> dict[str, object]:
 S = TypeVar("S", LearningSettings, OversamplingSettings)
 
 
-def _settings(kind: type[S], given: dict[str, str | None]) -> S:
+def _settings(kind: type[S], knobs: Mapping[str, str]) -> S:
     """The settings with the knobs that were given. Raises SettingsError."""
     names = {entry.name for entry in knobs_of(kind)}
-    return changed(
-        kind(), {name: value for name, value in given.items() if name in names and value is not None}
-    )
+    return changed(kind(), {name: value for name, value in knobs.items() if name in names})
 
 
 def _note_misfits(recording: Recording) -> None:

@@ -6,7 +6,7 @@ import click
 
 from studio.capture.synchrony import MOST_SECONDS, Synchrony, in_words
 from studio.capture.timestamps import TimedOffsets
-from studio.cli.arguments import camera_numbers
+from studio.cli.arguments import OFFSET_OPTION, ROTATE_OPTION, camera_numbers
 from studio.cli.output import command, note, progress
 from studio.errors import FootageError
 from studio.sessions.footage_changes import (
@@ -22,20 +22,8 @@ from studio.sessions.workspace import Workspace
 
 @click.command()
 @click.argument("session")
-@click.option(
-    "--offset",
-    "offsets",
-    multiple=True,
-    metavar="CAMERA=FRAMES",
-    help="The frame of this camera's footage that was taken with frame 0 of the others (repeatable).",
-)
-@click.option(
-    "--rotate",
-    "rotations",
-    multiple=True,
-    metavar="CAMERA=DEGREES",
-    help="Turn this camera's pictures clockwise by 0, 90, 180 or 270 degrees (repeatable).",
-)
+@OFFSET_OPTION
+@ROTATE_OPTION
 @click.option(
     "--timestamps",
     type=click.Path(path_type=Path, exists=True, dir_okay=False),

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import click
 
+from studio.cli.knob_options import SET_OPTION, chosen_changes, given
 from studio.cli.output import command, note, progress
 from studio.cli.recording_commands import CAMERA_OPTION, addresses_of
-from studio.cli.tracking_commands import chosen_changes, knob_options
+from studio.cli.tracking_commands import own_options, told_run, tracking_shown
 from studio.errors import RunError
 from studio.runs.live_replay import prepare_replay
 from studio.runs.live_request import last_of
@@ -30,12 +31,12 @@ from studio.worker.live_tracking import replay_live, track_live
 @click.option("--weighting", type=click.Choice(sorted(WEIGHTINGS)), default="blobs", show_default=True)
 @click.option("--body", default="", metavar="NAME", help="Kinematic tree; the session's subject scales it.")
 @click.option("--behaviour", default="", metavar="MODEL", help="Behaviour model, by name or file.")
-@knob_options
+@own_options
 @click.option("--from", "first", type=int, default=0, show_default=True, help="The frame that comes first.")
 @click.option("--seconds", type=float, help="Track for so long; default: to the footage's end.")
 @click.option("--repeat", is_flag=True, help="Go forth and back through the footage; needs --seconds.")
 @click.option("--seed", type=int, default=0, show_default=True)
-@click.option("--set", "changes", multiple=True, metavar="KNOB=VALUE", help="Any other knob.")
+@SET_OPTION
 @click.option("--name", default="", help="Name of the run; default: numbered.")
 @click.option("--resume", metavar="RUN", help="Go on with a live run that was ended.")
 @click.option(
@@ -92,24 +93,18 @@ def live(
         )
         with progress(f"{opened.name}: getting ready") as report:
             run = prepare_run(opened, request, report)
-    for line in run.record.notes:
-        note(line)
-    try:
-        with progress(f"{opened.name} / {run.name}") as report:
-            found = track_live(opened, run, report)
-    except KeyboardInterrupt:
-        note(f"{opened.name} / {run.name}: {_in_words(summary_of(run))}")
-        raise
+    with tracking_shown(run, lambda: _in_words(summary_of(run))) as report:
+        found = track_live(opened, run, report)
     return {**_told(run, found), "text": f"{opened.name} / {run.name}: {_in_words(found)}"}
 
 
 def _request(asked: Mapping[str, str | None], changes: tuple[str, ...]) -> RunRequest:
     """What is asked of a live run, by the command's options."""
     named = ("tracker", "weighting", "body", "behaviour", "seed", "name")
-    knobs = {key: value for key, value in asked.items() if value is not None and key not in named}
+    knobs = {key: value for key, value in asked.items() if key not in named}
     return RunRequest(
         **{key: asked[key] for key in named},  # pyright: ignore[reportArgumentType]
-        changes=chosen_changes(changes) | knobs,
+        changes=chosen_changes(changes) | given(knobs),
         live=True,
     )
 
@@ -166,19 +161,13 @@ def _replayed(session: Session, run: StoredRun, name: str) -> dict[str, object]:
 
 def _told(run: StoredRun, found: LiveSummary) -> dict[str, object]:
     """What `--json` prints of a live run."""
-    record = run.record
     return {
-        "session": run.session_name,
-        "run": run.name,
-        "tracker": record.tracker,
-        "weighting": record.weighting,
-        "body": record.body,
-        "seed": record.seed,
+        **told_run(run),
         "frames": len(found.tracked),
         "dropped": list(found.dropped),
         "dropped_share": round(found.dropped_share, 4),
         "frames_per_second": round(found.frames_per_second, 2),
-        "footage_frames_per_second": record.fps,
+        "footage_frames_per_second": run.record.fps,
         "latency_ms": {
             name: round(found.latency(share), 1)
             for name, share in (("median", 0.5), ("p95", 0.95), ("worst", 1.0))

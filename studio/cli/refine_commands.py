@@ -5,8 +5,9 @@ from typing import TypeVar
 
 import click
 
+from studio.cli.knob_options import given, knob_options
 from studio.cli.output import command, progress
-from studio.knobs import allowed, changed, knobs_of
+from studio.knobs import changed, knobs_of
 from studio.runs.refining import REFINED, SMOOTHED, MadeTrack, refine_run, smooth_run
 from studio.runs.tracks import RAW
 from studio.sessions.workspace import Workspace
@@ -16,28 +17,27 @@ from studio.tracking.smoothing import SmoothingSettings
 F = TypeVar("F", bound=Callable[..., object])
 
 
-def _knob_options(settings_type: type) -> Callable[[F], F]:
-    """An option for every knob of a settings class, made from its declaration."""
+def _track_options(settings_type: type, source: str, into: str, source_help: str) -> Callable[[F], F]:
+    """What a command is given that makes a track of a run: which run, from which track, under which name, knobs."""
 
     def add(function: F) -> F:
-        for entry in reversed(knobs_of(settings_type)):
-            text = f"{entry.help} ({allowed(entry)}; default {entry.default:g})"
-            name = f"--{entry.name.replace('_', '-')}"
-            function = click.option(name, entry.name, metavar=entry.kind.__name__.upper(), help=text)(
-                function
-            )
+        options = (
+            click.argument("session"),
+            click.argument("run"),
+            click.option("--from", "source", default=source, show_default=bool(source), help=source_help),
+            click.option("--into", default=into, show_default=True, help="Name of the track that is made."),
+            click.option("--replace", is_flag=True, help="Write over a derived track of that name."),
+            knob_options(knobs_of(settings_type)),
+        )
+        for option in reversed(options):
+            function = option(function)
         return function
 
     return add
 
 
 @click.command()
-@click.argument("session")
-@click.argument("run")
-@click.option("--from", "source", default=RAW, show_default=True, help="The track that is refined.")
-@click.option("--into", default=REFINED, show_default=True, help="Name of the track that is made.")
-@click.option("--replace", is_flag=True, help="Write over a derived track of that name.")
-@_knob_options(RefinementSettings)
+@_track_options(RefinementSettings, RAW, REFINED, "The track that is refined.")
 @command
 def refine(
     session: str, run: str, source: str, into: str, replace: bool, **knobs: str | None
@@ -48,7 +48,7 @@ def refine(
     """
     opened = Workspace().resolve(session)
     stored = opened.run(run)
-    settings = changed(RefinementSettings(), _given(knobs))
+    settings = changed(RefinementSettings(), given(knobs))
     with progress(f"{opened.name} / {run}") as report:
         made = refine_run(
             opened, stored, source=source, into=into, settings=settings, replace=replace, progress=report
@@ -66,12 +66,7 @@ def _agreement(made: MadeTrack) -> dict[str, float]:
 
 
 @click.command(name="smooth")
-@click.argument("session")
-@click.argument("run")
-@click.option("--from", "source", default="", help="The track that is smoothed; default: refined, else raw.")
-@click.option("--into", default=SMOOTHED, show_default=True, help="Name of the track that is made.")
-@click.option("--replace", is_flag=True, help="Write over a derived track of that name.")
-@_knob_options(SmoothingSettings)
+@_track_options(SmoothingSettings, "", SMOOTHED, "The track that is smoothed; default: refined, else raw.")
 @command
 def smooth_command(
     session: str, run: str, source: str, into: str, replace: bool, **knobs: str | None
@@ -81,7 +76,7 @@ def smooth_command(
     Short gaps are filled and marked, long ones stay gaps.
     """
     opened = Workspace().resolve(session)
-    settings = changed(SmoothingSettings(), _given(knobs))
+    settings = changed(SmoothingSettings(), given(knobs))
     made = smooth_run(opened.run(run), source=source, into=into, settings=settings, replace=replace)
     text = (
         f"{opened.name} / {run}: track '{into}' made from '{made.track.made_by['from']}', second difference of the "
@@ -90,10 +85,6 @@ def smooth_command(
     )
     gaps = {"filled": list(made.filled), "left_out": list(made.left_out)}
     return {**_told(opened.name, run, made), **gaps, "text": text}
-
-
-def _given(knobs: dict[str, str | None]) -> dict[str, str]:
-    return {name: value for name, value in knobs.items() if value is not None}
 
 
 def _told(session: str, run: str, made: MadeTrack) -> dict[str, object]:

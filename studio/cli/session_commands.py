@@ -6,7 +6,15 @@ import click
 
 from studio.body.catalogue import list_bodies, load_body
 from studio.capture.calibration_files import WORLDS
-from studio.cli.arguments import camera_numbers
+from studio.cli.arguments import (
+    COPY_OPTION,
+    DESPITE_OPTION,
+    FPS_OPTION,
+    OFFSET_OPTION,
+    ROTATE_OPTION,
+    TRIAL_OPTION,
+    camera_numbers,
+)
 from studio.cli.output import command, note, progress
 from studio.sessions.importers.catalogue import import_source
 from studio.sessions.workspace import Workspace
@@ -20,22 +28,10 @@ INTO_HELP = "Name of the new session in the workspace, or a path."
 @click.option(
     "--calibration", type=click.Path(path_type=Path), help="The file to take where there are several."
 )
-@click.option("--fps", type=float, help="Frames per second, where the footage does not say (pictures).")
-@click.option("--trial", metavar="NAME", help="Which trial, where a folder holds several.")
-@click.option(
-    "--offset",
-    "offsets",
-    multiple=True,
-    metavar="CAMERA=FRAMES",
-    help="The frame of this camera's footage that was taken with frame 0 of the others (repeatable).",
-)
-@click.option(
-    "--rotate",
-    "rotations",
-    multiple=True,
-    metavar="CAMERA=DEGREES",
-    help="Turn this camera's pictures clockwise by 90, 180 or 270 degrees (repeatable).",
-)
+@FPS_OPTION
+@TRIAL_OPTION
+@OFFSET_OPTION
+@ROTATE_OPTION
 @click.option(
     "--unit", type=click.Choice(("mm", "m")), help="The calibration's unit, where it is taken wrongly."
 )
@@ -46,14 +42,8 @@ INTO_HELP = "Name of the new session in the workspace, or a path."
     show_default=True,
     help="The axis of the calibration's world that points up.",
 )
-@click.option(
-    "--despite-findings",
-    is_flag=True,
-    help="Import a calibration that would make results wrong (z not up, a wrong unit), with a warning.",
-)
-@click.option(
-    "--copy/--reference", default=True, help="Copy the footage (default), or refer to it where it lies."
-)
+@DESPITE_OPTION
+@COPY_OPTION
 @command
 def import_command(
     source: Path,

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import click
 
+from studio.cli.arguments import frame_numbers
 from studio.cli.output import command, note, progress
-from studio.errors import BodyError, RunError
+from studio.errors import BodyError
 from studio.notebook.preparing import subject_with_notes
 from studio.runs.subject_choice import keep_fitted
 from studio.runs.subject_fitting import COUNT, FitRequest, FittedSubject, fit_session_subject, keep_subject
@@ -77,7 +78,7 @@ def fit_subject_command(
     """
     opened = Workspace().resolve(session)
     request = FitRequest(
-        frames=_numbers(frames),
+        frames=frame_numbers(frames),
         count=count,
         symmetric=symmetric,
         lengths=lengths,
@@ -132,10 +133,3 @@ def _pairs(words: Sequence[str]) -> dict[str, float]:
         if not equals:
             raise BodyError(f"'--length {word}' cannot be understood.", "Write RHip_RKnee=420.")
     return found
-
-
-def _numbers(text: str) -> tuple[int, ...]:
-    try:
-        return tuple(int(word) for word in text.split(",") if word.strip())
-    except ValueError:
-        raise RunError(f"Frames '{text}' cannot be understood.", "Write numbers: 10,40,80.") from None

@@ -3,16 +3,19 @@
 import csv
 import dataclasses
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeVar
 
 import click
 
 from studio.body.subject import read_subject
 from studio.cli.arguments import frame_range
+from studio.cli.knob_options import chosen_changes, given, knob_options
 from studio.cli.output import command, note, progress
-from studio.errors import RunError, SettingsError
-from studio.knobs import allowed
+from studio.errors import RunError
+from studio.notebook.progress import Report
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.start_pose_file import frame_of_file, start_pose_from_file
 from studio.sessions.session import START_POSE_NAME, Session
@@ -24,17 +27,42 @@ from studio.tracking.tracker import LOST, NO_EVIDENCE, RECOVERED
 from studio.weighting.catalogue import WEIGHTINGS
 from studio.worker.batch import BatchResult, track_to_end
 
+F = TypeVar("F", bound=Callable[..., object])
+
 OPTION_KNOBS = ("particles", "layers", "survival", "crossover")
 
 
-def knob_options(function: Callable[..., object]) -> Callable[..., object]:
-    """The options of the knobs that have one of their own, made from their declarations."""
+def own_options(function: F) -> F:
+    """The options of the knobs that have one of their own."""
     declared = {entry.name: entry for entry in reversed(knob_table())}
-    for name in reversed(OPTION_KNOBS):
-        entry = declared[name]
-        text = f"{entry.help} ({allowed(entry)})"
-        function = click.option(f"--{name}", metavar=entry.kind.__name__.upper(), help=text)(function)
-    return function
+    return knob_options([declared[name] for name in OPTION_KNOBS], with_defaults=False)(function)
+
+
+@contextmanager
+def tracking_shown(run: StoredRun, standing: Callable[[], str]) -> Iterator[Report]:
+    """A run's notes, then how far it is. standing : in words how far it came, said when somebody interrupts it."""
+    where = f"{run.session_name} / {run.name}"
+    for line in run.record.notes:
+        note(line)
+    try:
+        with progress(where) as report:
+            yield report
+    except KeyboardInterrupt:
+        note(f"{where}: {standing()}")
+        raise
+
+
+def told_run(run: StoredRun) -> dict[str, object]:
+    """What `--json` says of any run: which it is."""
+    record = run.record
+    return {
+        "session": run.session_name,
+        "run": run.name,
+        "tracker": record.tracker,
+        "weighting": record.weighting,
+        "body": record.body,
+        "seed": record.seed,
+    }
 
 
 @click.command()
@@ -62,7 +90,7 @@ def knob_options(function: Callable[..., object]) -> Callable[..., object]:
     metavar="MODEL",
     help="Behaviour model, by name or file, for tracker behaviour or --set prediction=behaviour.",
 )
-@knob_options
+@own_options
 @click.option(
     "--frames",
     metavar="A:B",
@@ -112,21 +140,20 @@ def track(
             first=first,
             last=last,
             seed=seed,
-            changes=chosen_changes(changes)
-            | {key: value for key, value in knobs.items() if value is not None},
+            changes=chosen_changes(changes) | given(knobs),
             name=name,
             behaviour=behaviour,
         )
         run = _prepared(opened, _with_start_pose(request, opened, start_pose))
-    for line in run.record.notes:
-        note(line)
+
+    def done() -> int:
+        return opened.run(run.name).summary().done
+
     try:
-        with progress(f"{opened.name} / {run.name}") as report:
+        with tracking_shown(run, lambda: f"{done()} of {run.record.frame_count} frames tracked.") as report:
             result = track_to_end(opened, run, report)
     except KeyboardInterrupt:
-        done = opened.run(run.name).summary().done
-        note(f"{opened.name} / {run.name}: {done} of {run.record.frame_count} frames tracked.")
-        if poses and done:
+        if poses and done():
             _write_poses(run, poses)
         raise
     if poses:
@@ -182,12 +209,7 @@ def _told(run: StoredRun, result: BatchResult) -> dict[str, object]:
     """What `--json` prints of a run."""
     record = run.record
     told: dict[str, object] = {
-        "session": run.session_name,
-        "run": run.name,
-        "tracker": record.tracker,
-        "weighting": record.weighting,
-        "body": record.body,
-        "seed": record.seed,
+        **told_run(run),
         "frames": record.frame_count,
         "evaluations_per_frame": result.evaluations_per_frame,
         "seconds": round(result.seconds, 3),
@@ -199,17 +221,6 @@ def _told(run: StoredRun, result: BatchResult) -> dict[str, object]:
     if record.tracker == "condensation":
         told["likelihood_scale"] = result.last_beta
     return told
-
-
-def chosen_changes(assignments: tuple[str, ...]) -> dict[str, str]:
-    """KNOB=VALUE pairs. Raises SettingsError where there is no '='."""
-    changes: dict[str, str] = {}
-    for assignment in assignments:
-        name, equals, value = assignment.partition("=")
-        if not equals:
-            raise SettingsError(f"--set '{assignment}' has no value.", "Write --set knob=value.")
-        changes[name.strip()] = value.strip()
-    return changes
 
 
 def _check_place(poses: Path) -> None:
