@@ -237,10 +237,11 @@ def test_export(way: Way, tmp_path: Path) -> None:
     with contextlib.redirect_stdout(io.StringIO()):
         read = bvhsdk.ReadFile(str(file))
         assert read is not None
-        hips = next(iter(read.getlistofjoints()))
+        joints = read.getlistofjoints()
+        assert joints
         assert read.frames == FRAMES
         heights = [
-            float(np.asarray(hips.getGlobalTransform(frame), dtype=np.float64)[1, 3])
+            float(np.asarray(joints[0].getGlobalTransform(frame), dtype=np.float64)[1, 3])
             for frame in range(FRAMES)
         ]
     assert read.frametime == pytest.approx(1.0 / 60.0, abs=1e-6)
