@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from studio.errors import StudioError as StudioError
     from studio.notebook.aligning import align as align
     from studio.notebook.aligning import unalign as unalign
+    from studio.notebook.checking import check as check
     from studio.notebook.exporting import export_run as export_run
     from studio.notebook.learning import learn as learn
     from studio.notebook.opening import list_runs as list_runs
@@ -44,6 +45,7 @@ _PLACES = {
         "background", "fit_subject", "import_footage", "initialise", "mask_quality", "subject", "synthesize",
     ),
     "notebook.aligning": ("align", "unalign"),
+    "notebook.checking": ("check",),
     "notebook.solving_cameras": ("calibrate",),
     "notebook.tracking": ("correct", "go_on", "refine", "smooth", "track"),
     "notebook.recording": ("record",),

@@ -57,6 +57,7 @@ COMMANDS = {
     "live": ("live_commands", "live", "Track a session as its pictures come, dropping what comes too fast."),
     "record": ("recording_commands", "record", "Record live cameras all at once into a session."),
     "evaluate": ("evaluation_commands", "evaluate_command", "Measure a run against the true markers."),
+    "check": ("checking_commands", "check_command", "Tell how well a run fits its pictures, frame by frame."),
     "refine": ("refine_commands", "refine", "Refine a run's poses on the silhouettes, kept beside them."),
     "smooth": ("refine_commands", "smooth_command", "Smooth a run's poses in time, fill short gaps."),
     "correct": (

@@ -2,11 +2,11 @@
 
 `checks/<track>.json`: for each looked-at frame and camera the share of the model's pixels that lie in the mask, and of
 the mask's that the model covers; beside them frames that were lost, that are doubtful, in which the body turns round
-faster than people can, and how much the markers jitter.
+faster than people can, into which a limb leaps (`jumps`), and how much the markers jitter.
 """
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import msgspec
@@ -19,6 +19,7 @@ from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
 from studio.geometry.camera import Camera
+from studio.runs.jumps import Jump, jumps_of
 from studio.runs.overlay_drawing import projected_silhouette
 from studio.runs.refining import REFINED, SMOOTHED, MakingCancelledError, jitter
 from studio.runs.run_footage import footage_of
@@ -43,12 +44,14 @@ DOUBTFUL = 0.6
 FASTEST_TURN = 2700.0
 """Degrees a second about the vertical, beyond what people do; left and right changed places then."""
 LOST = ("lost", "no evidence")
+NAMED = 4
+"""So many leaps are named in a line."""
 
 
 class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What was measured. track : its name; stamp, count : of the track then. frames : those looked at. inside, covered
     : (F, V) shares, None where there is nothing to divide by. lost, doubtful, turned : numbers of frames. jitter_mm :
-    root mean square second difference of the markers.
+    root mean square second difference of the markers. jumps : into which frames which limb leaps; None: not looked for.
     """
 
     schema: int = SCHEMA_VERSION
@@ -63,6 +66,7 @@ class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     doubtful: tuple[int, ...]
     turned: tuple[int, ...]
     jitter_mm: float
+    jumps: tuple[Jump, ...] | None = None
 
     @property
     def poor(self) -> tuple[int, ...]:
@@ -83,14 +87,15 @@ class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     @property
     def good(self) -> bool:
         """Whether nothing stands out."""
-        return not (self.poor or self.lost or self.turned)
+        return not (self.poor or self.lost or self.turned or self.jumps)
 
     def in_words(self) -> str:
-        """One line."""
+        """One line; leaps by frame and limb."""
         parts = [f"{100 * self.inside_mean:.0f} % of the model in the masks"]
         parts += [f"{len(self.poor)} of {len(self.frames)} looked-at frames do not fit"] if self.poor else []
         parts += [f"{len(self.lost)} lost"] if self.lost else []
         parts += [f"{len(self.turned)} sudden turns"] if self.turned else []
+        parts += [_leaps(self.jumps)] if self.jumps else []
         return ", ".join([*parts, f"jitter {self.jitter_mm:.1f} mm"])
 
 
@@ -145,6 +150,7 @@ def check_run(
         doubtful=_frames_where(chosen, chosen.confidence < DOUBTFUL),
         turned=sudden_turns(body, chosen, run.record.fps),
         jitter_mm=jitter(run, chosen),
+        jumps=jumps_of(body, chosen),
     )
     (run.folder / FOLDER).mkdir(exist_ok=True)
     write_record(_path(run, chosen.name), check)
@@ -166,7 +172,7 @@ def kept_check(run: StoredRun, track: str) -> RunCheck | None:
     )
     found = read_track(run, track)
     same = (check.stamp, check.count) == (track_stamp(run, track), len(found.frames))
-    return check if same else None
+    return check if same and check.jumps is not None else None
 
 
 def frame_shares(
@@ -202,6 +208,13 @@ def sudden_turns(body: BodyModel, track: Track, fps: float) -> tuple[int, ...]:
     # A body that lies down faces up: its direction over the floor says nothing.
     upright = np.minimum(length[1:], length[:-1]) > 0.5
     return tuple(int(frame) for frame in track.frames[1:][(rate > FASTEST_TURN) & upright])
+
+
+def _leaps(jumps: Sequence[Jump]) -> str:
+    """How many, and the first few."""
+    some = "; ".join(jump.in_words() for jump in jumps[:NAMED])
+    more = f"; and {len(jumps) - NAMED} more" if len(jumps) > NAMED else ""
+    return f"{len(jumps)} {'jump' if len(jumps) == 1 else 'jumps'} ({some}{more})"
 
 
 def _share(part: int, whole: int) -> float | None:

@@ -7,7 +7,7 @@ from fastapi import APIRouter
 from studio.runs.checking import RunCheck, check_run, kept_check, usual_track
 from studio.runs.tracks import read_track
 from studio.web.background_jobs import Job
-from studio.web.check_schemas import CheckAnswer, CheckLine, CheckWish
+from studio.web.check_schemas import CheckAnswer, CheckLine, CheckWish, JumpLine
 from studio.web.doors import Door
 from studio.web.run_routes import RUN, OpenRun
 from studio.web.session_routes import OpenSession
@@ -50,6 +50,7 @@ def _line(found: RunCheck) -> CheckLine:
         doubtful=list(found.doubtful),
         turned=list(found.turned),
         jitter_mm=found.jitter_mm,
+        jumps=[JumpLine.model_validate(jump) for jump in found.jumps or ()],
         inside_mean=found.inside_mean,
         good=found.good,
         words=found.in_words(),

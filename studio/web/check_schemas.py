@@ -12,6 +12,15 @@ class CheckWish(Request):
     every: int = Field(10, ge=1, le=10_000)
 
 
+class JumpLine(Answer):
+    """A limb that leaps into a frame. mm: the largest second difference of its markers; usual_mm: the median."""
+
+    frame: int
+    limb: str
+    mm: Number
+    usual_mm: Number
+
+
 class CheckLine(Answer):
     """What was measured. inside: per looked-at frame and camera, the share of the model's pixels that lie in the mask;
     covered: of the mask's, under the model. poor: frames whose views have too little of it inside; turned: sudden
@@ -27,6 +36,7 @@ class CheckLine(Answer):
     doubtful: list[int]
     turned: list[int]
     jitter_mm: Number
+    jumps: list[JumpLine] = Field(default_factory=list)
     inside_mean: Number
     good: bool
     words: str

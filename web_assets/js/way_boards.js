@@ -92,13 +92,13 @@ function moreFields(way, cameras, wish) {
     return field(`${camera} begins at`, made, "Frame of this camera's common board footage that the others' frame 0 belongs to");
   }));
   const many = cameras.length > 1;
-  return element("details", { className: "more-board", open: Boolean(wish.open) }, element("summary", { textContent: "More", onclick: () => { wish.open = !wish.open; } }),
+  return element("details", { className: "more-board", open: Boolean(wish.open) }, element("summary", { textContent: "More", onclick: () => { wish.open = !wish.open; } }), element("div", { className: "more-fields" },
     field("Lenses from", place("intrinsics", "a folder, or a calibration file"), "Board footage for the lenses, a video or folder of pictures a camera; or a calibration file that has them. Instead of intrinsics/"),
     field("Places from", place("extrinsics", "a folder"), "Board footage of all cameras at once, in step. Instead of extrinsics/"),
     field("Floor from pictures in", place("floorFolder", "a folder"), "A picture a camera of the board that lies on the floor, face up; instead of a frame of the common footage"),
     ...(many ? [distanceRows(cameras, wish.distances),
       element("label", { className: "check", title: "Only where board and take are one recording" }, own, "The board was recorded without stopping: use the session's offsets"), shifts] : []),
-    element("label", { className: "check", title: "Lenses that were found alone may change a little where all cameras together say so; only with a board that was seen all over the pictures" }, refine, "let the lenses move a little in the last adjustment"));
+    element("label", { className: "check", title: "Lenses that were found alone may change a little where all cameras together say so; only with a board that was seen all over the pictures" }, refine, "let the lenses move a little in the last adjustment")));
 }
 
 /** The form. `solve(() => wish)` begins; `uploaded(input)` uploads and resolves with the upload's identifier. */

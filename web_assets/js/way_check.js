@@ -58,6 +58,19 @@ export function mount(place, way) {
     return element("div", {}, element("p", { className: "hint", textContent: `${words}${frames.length > MOST_CHIPS ? ` (the first ${MOST_CHIPS} of ${frames.length})` : ""}` }), element("div", { className: "chips" }, ...made));
   }
 
+  /** Leaps by frame, each with its limb; the frame before is seen by ‹ in the studio's own window. */
+  function jumpChips(jumps) {
+    if (!jumps.length) return null;
+    const made = jumps.slice(0, MOST_CHIPS).map((jump) => {
+      const chip = button("", () => show(jump.frame), "small quiet");
+      chip.append(element("b", { textContent: jump.frame }), ` ${jump.limb}`);
+      chip.dataset.frame = jump.frame;
+      chip.title = `The ${jump.limb} leaps into frame ${jump.frame}: its markers bend by ${jump.mm.toFixed(0)} mm from a straight course, usually by ${jump.usual_mm.toFixed(1)} mm.`;
+      return chip;
+    });
+    return element("div", {}, element("p", { className: "hint", textContent: `Jumps${jumps.length > MOST_CHIPS ? ` (the first ${MOST_CHIPS} of ${jumps.length})` : ""}:` }), element("div", { className: "chips" }, ...made));
+  }
+
   /** A bar a looked-at frame: how much of the model lies in the masks, over all cameras. */
   function strip(check) {
     const bars = check.frames.map((frame, row) => {
@@ -76,6 +89,7 @@ export function mount(place, way) {
       check.good ? "The motion fits the pictures." : "Look at the marked frames.",
       `${percent(check.inside_mean)} of the model lies in the masks.`,
       check.turned.length ? `The body turns round suddenly ${check.turned.length} times: left and right may have changed places.` : "Left and right keep their places: no sudden turn.",
+      check.jumps.length ? `A limb leaps ${check.jumps.length === 1 ? "once" : `${check.jumps.length} times`}: it was lost or taken for another.` : "",
       check.jitter_mm !== null ? `The markers jitter by ${check.jitter_mm.toFixed(1)} mm.` : "",
     ];
     return element("p", { className: check.good ? "" : "notice", textContent: parts.filter(Boolean).join(" ") });
@@ -88,7 +102,7 @@ export function mount(place, way) {
     if (!check) {
       return found.replaceChildren(element("p", { className: "hint", textContent: `Track "${state.track}" of ${run.name}: every tenth frame is compared with the masks, in every view.` }), element("div", { className: "step-actions" }, measure));
     }
-    found.replaceChildren(...[verdict(check), strip(check), chips("Too little of the model in the masks:", check.poor), chips("Lost:", check.lost), chips("Doubtful:", check.doubtful), chips("Sudden turns:", check.turned), element("div", { className: "step-actions" }, measure)].filter(Boolean));
+    found.replaceChildren(...[verdict(check), strip(check), chips("Too little of the model in the masks:", check.poor), chips("Lost:", check.lost), chips("Doubtful:", check.doubtful), chips("Sudden turns:", check.turned), jumpChips(check.jumps), element("div", { className: "step-actions" }, measure)].filter(Boolean));
   }
 
   function trackRows() {

@@ -1,0 +1,125 @@
+"""Frames in which a limb leaps: where the second difference of its markers is far above what is usual for it.
+
+A search that loses an arm and finds it again moves it from one frame to the next as no arm moves. The root mean square
+of all frames (jitter) hides a few of these; they are what a person sees first. What is usual differs from limb to limb
+and from moment to moment, so each limb is compared with its own median over the track, and with its neighbours in time.
+"""
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.forward_kinematics import marker_points
+from studio.body.model import BodyModel
+from studio.runs.tracks import Track, stretches
+
+Array = NDArray[np.float64]
+
+LEAST_MM = 25.0
+"""A second difference (mm a frame²) below this is no leap, however still the limb is otherwise."""
+SPREADS = 8.0
+"""Above the median of the track, in robust standard deviations."""
+TIMES = 4.0
+"""Above the median of the frames around it: a punch is quick for longer than a frame."""
+AROUND = 12
+"""Frames before and after that count as around it."""
+DEVIATION = 1.4826
+"""Standard deviations in a median absolute deviation, of a normal distribution."""
+ABOUT = 0.8
+WHOLE = "whole body"
+
+
+class Jump(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """frame : into which the limb leaps. limb : its name, "whole body" where all leap. mm : the largest second
+    difference of its markers. usual_mm : the median over the track.
+    """
+
+    frame: int
+    limb: str
+    mm: float
+    usual_mm: float
+
+    def in_words(self) -> str:
+        """ "frame 41, left arm"."""
+        return f"frame {self.frame}, {self.limb}"
+
+
+def jumps_of(body: BodyModel, track: Track) -> tuple[Jump, ...]:
+    """All leaps of a track, ascending by frame; none for a body without markers."""
+    if not body.markers:
+        return ()
+    points = marker_points(body, track.poses)
+    limbs = marker_limbs(body)
+    found: dict[int, list[Jump]] = {}
+    for limb in dict.fromkeys(limbs):
+        own = points[:, [at for at, name in enumerate(limbs) if name == limb]]
+        for jump in _limb_jumps(limb, track.frames, own):
+            found.setdefault(jump.frame, []).append(jump)
+    several = len(set(limbs)) > 2
+    told: list[Jump] = []
+    for _, jumps in sorted(found.items()):
+        if several and len(jumps) == len(set(limbs)):
+            far = max(jumps, key=lambda jump: jump.mm)
+            jumps = [msgspec.structs.replace(far, limb=WHOLE)]
+        told += jumps
+    return tuple(told)
+
+
+def marker_limbs(body: BodyModel) -> tuple[str, ...]:
+    """(M,) each marker's limb: the group of the parameters that move its joint, or the nearest joint above."""
+    owned: dict[int, str] = {}
+    for index, joint in enumerate(body.joints):
+        moved = [step.parameter for step in joint.steps if step.parameter >= 0]
+        owned[index] = body.parameters[moved[0]].limb if moved else owned.get(joint.parent, "")
+    return tuple(owned[marker.joint] for marker in body.markers)
+
+
+def _limb_jumps(limb: str, frames: NDArray[np.int64], points: Array) -> list[Jump]:
+    """Leaps of one limb. points : (K, M, 3) its markers."""
+    bends = np.full(len(frames), np.nan)
+    parts = [part for part in stretches(frames) if part.stop - part.start > 2]
+    for part in parts:
+        second = np.linalg.norm(np.diff(points[part], n=2, axis=0), axis=-1).max(axis=1)
+        bends[part.start + 1 : part.stop - 1] = second
+    known = bends[np.isfinite(bends)]
+    if not known.size:
+        return []
+    usual = float(np.median(known))
+    spread = DEVIATION * float(np.median(np.abs(known - usual)))
+    level = max(LEAST_MM, usual + SPREADS * spread)
+    jumps = []
+    for part in parts:
+        high = [row for row in range(part.start + 1, part.stop - 1) if bends[row] > level]
+        for run in _runs(high):
+            if bends[run].max() > TIMES * _usual_around(bends, run):
+                jumps.append(_jump(limb, frames, points, bends, run, usual))
+    return jumps
+
+
+def _runs(rows: list[int]) -> list[list[int]]:
+    """Rows that follow each other, together."""
+    found: list[list[int]] = []
+    for row in rows:
+        if found and row == found[-1][-1] + 1:
+            found[-1].append(row)
+        else:
+            found.append([row])
+    return found
+
+
+def _usual_around(bends: Array, run: list[int]) -> float:
+    before, after = bends[max(0, run[0] - AROUND) : run[0]], bends[run[-1] + 1 : run[-1] + 1 + AROUND]
+    near = np.concatenate([before, after])
+    near = near[np.isfinite(near)]
+    return float(np.median(near)) if near.size else 0.0
+
+
+def _jump(
+    limb: str, frames: NDArray[np.int64], points: Array, bends: Array, run: list[int], usual: float
+) -> Jump:
+    """The leap that a run of high second differences tells of: into the frame with the longest step, the first of two
+    that are about as long (there and back).
+    """
+    steps = np.linalg.norm(np.diff(points[run[0] - 1 : run[-1] + 2], axis=0), axis=-1).max(axis=1)
+    row = run[0] + int(np.argmax(steps >= ABOUT * steps.max()))
+    return Jump(int(frames[row]), limb, float(bends[run].max()), usual)
