@@ -21,11 +21,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solveh_banded
 
 from studio.body.forward_kinematics import limb_frames
 from studio.body.model import BodyModel
 from studio.body.tables import kinematic_tables
+from studio.tracking.banded_solving import solve_banded
 from studio.tracking.refinement import (
     DAMPING,
     DIFFERENCE,
@@ -138,14 +138,14 @@ class MovementRefiner:
         free = np.where(held, 0.0, 1.0)
         diagonal = np.einsum("tii->ti", here.blocks[0])
         lift = damping * diagonal + 1e-9 * diagonal.mean() + 1e-12
-        banded = np.zeros((3 * size, count * size))
+        rows = np.zeros((count * size, 3 * size))
         for apart in range(3):
             for t in range(apart, count):
                 block = here.blocks[apart, t] * free[t][:, None] * free[t - apart]
                 if apart == 0:
                     block = block + np.diag(lift[t] * free[t] + held[t])
-                add_block(banded, block, t * size, (t - apart) * size)
-        step = solveh_banded(banded, -(here.gradient * free).ravel(), lower=True, check_finite=False)
+                place_block(rows, block, t * size, (t - apart) * size)
+        step = solve_banded(rows, -(here.gradient * free).ravel())
         return np.clip(poses + step.reshape(count, size) * refiner.unit, refiner.lower, refiner.upper)
 
 
@@ -180,9 +180,10 @@ def body_points(body: BodyModel, poses: Array) -> Array:
     return points.reshape(len(points), -1)
 
 
-def add_block(banded: Array, block: Array, row: int, column: int) -> None:
-    """Add the lower half of a block (D, D) that begins at (row, column) of a matrix to that matrix's lower band."""
-    rows, columns = np.mgrid[: block.shape[0], : block.shape[1]]
-    below = row + rows - column - columns
-    kept = below >= 0
-    banded[below[kept], column + columns[kept]] += block[kept]
+def place_block(rows: Array, block: Array, row: int, column: int) -> None:
+    """Put the lower half of a block (D, D) that begins at (row, column) of a matrix into that matrix's rows, as
+    `solve_banded` wants them.
+    """
+    i, j = np.mgrid[row : row + len(block), column : column + len(block)]
+    below = i >= j
+    rows[i[below], (j - i + rows.shape[1] - 1)[below]] = block[below]

@@ -10,14 +10,15 @@ from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
 from studio.evidence.distance_maps import SilhouetteDistances, silhouette_distances
+from studio.tracking.banded_solving import solve_banded
 from studio.tracking.refinement import FrameLoss, RefinementSettings, Refiner
 from studio.tracking.refinement_over_time import (
     OVERLAP,
     WINDOW,
     MovementRefiner,
     Window,
-    add_block,
     body_points,
+    place_block,
     windows,
 )
 from studio.tracking.smoothing import rms_second_difference
@@ -133,18 +134,24 @@ def test_the_gradient_is_that_of_the_acceleration(body: BodyModel, movement: Arr
         assert np.sum(equations.gradient * way) == pytest.approx((ahead - back) / 4e-4, rel=1e-3)
 
 
-def test_the_band_holds_what_the_whole_matrix_would() -> None:
+def test_blocks_lie_where_the_solver_looks_for_them() -> None:
     rng = np.random.default_rng(3)
     count, size = 5, 3
-    whole, banded = np.zeros((15, 15)), np.zeros((9, 15))
+    whole, rows = np.zeros((15, 15)), np.zeros((15, 9))
     for t, k in itertools.product(range(count), range(3)):
         if t >= k:
             block = rng.standard_normal((size, size))
-            block = block + block.T if k == 0 else block
+            block = block @ block.T + 20.0 * np.eye(size) if k == 0 else block
             whole[t * size : (t + 1) * size, (t - k) * size : (t - k + 1) * size] = block
-            add_block(banded, block, t * size, (t - k) * size)
-    for below in range(9):
-        np.testing.assert_array_equal(banded[below, : 15 - below], np.diagonal(whole, -below))
+            place_block(rows, block, t * size, (t - k) * size)
+    whole = np.tril(whole) + np.tril(whole, -1).T
+    right = rng.standard_normal(15)
+    np.testing.assert_allclose(solve_banded(rows, right), np.linalg.solve(whole, right), rtol=1e-10)
+
+
+def test_a_matrix_that_is_not_positive_is_refused() -> None:
+    with pytest.raises(FloatingPointError):
+        solve_banded(np.array([[0.0, 1.0], [2.0, 1.0]]), np.ones(2))
 
 
 @pytest.mark.parametrize("count", [1, WINDOW, WINDOW + 1, 3 * WINDOW + 7])
