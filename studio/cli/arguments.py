@@ -1,10 +1,13 @@
 """Arguments that several commands understand alike."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 import click
 
 from studio.errors import FootageError, RunError
+
+F = TypeVar("F", bound=Callable[..., object])
 
 OFFSET_OPTION = click.option(
     "--offset",
@@ -20,18 +23,31 @@ ROTATE_OPTION = click.option(
     metavar="CAMERA=DEGREES",
     help="Turn this camera's pictures clockwise by 0, 90, 180 or 270 degrees (repeatable).",
 )
-FPS_OPTION = click.option(
-    "--fps", type=float, help="Frames per second, where the footage does not say (pictures)."
-)
-TRIAL_OPTION = click.option("--trial", metavar="NAME", help="Which trial, where a folder holds several.")
-DESPITE_OPTION = click.option(
-    "--despite-findings",
-    is_flag=True,
-    help="Take a calibration that would make results wrong (z not up, a wrong unit), with a warning.",
-)
-COPY_OPTION = click.option(
-    "--copy/--reference", default=True, help="Copy the footage (default), or refer to it where it lies."
-)
+
+
+def footage_options(function: F) -> F:
+    """How the footage of a source is read and kept, for commands that take some in."""
+    options = (
+        click.option(
+            "--fps", type=float, help="Frames per second, where the footage does not say (pictures)."
+        ),
+        click.option("--trial", metavar="NAME", help="Which trial, where a folder holds several."),
+        OFFSET_OPTION,
+        ROTATE_OPTION,
+        click.option(
+            "--despite-findings",
+            is_flag=True,
+            help="Take a calibration that would make results wrong (z not up, a wrong unit), with a warning.",
+        ),
+        click.option(
+            "--copy/--reference",
+            default=True,
+            help="Copy the footage (default), or refer to it where it lies.",
+        ),
+    )
+    for option in reversed(options):
+        function = option(function)
+    return function
 
 
 def frame_range(text: str) -> tuple[int | None, int | None]:

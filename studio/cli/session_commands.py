@@ -6,15 +6,7 @@ import click
 
 from studio.body.catalogue import list_bodies, load_body
 from studio.capture.calibration_files import WORLDS
-from studio.cli.arguments import (
-    COPY_OPTION,
-    DESPITE_OPTION,
-    FPS_OPTION,
-    OFFSET_OPTION,
-    ROTATE_OPTION,
-    TRIAL_OPTION,
-    camera_numbers,
-)
+from studio.cli.arguments import camera_numbers, footage_options
 from studio.cli.output import command, note, progress
 from studio.sessions.importers.catalogue import import_source
 from studio.sessions.workspace import Workspace
@@ -28,10 +20,7 @@ INTO_HELP = "Name of the new session in the workspace, or a path."
 @click.option(
     "--calibration", type=click.Path(path_type=Path), help="The file to take where there are several."
 )
-@FPS_OPTION
-@TRIAL_OPTION
-@OFFSET_OPTION
-@ROTATE_OPTION
+@footage_options
 @click.option(
     "--unit", type=click.Choice(("mm", "m")), help="The calibration's unit, where it is taken wrongly."
 )
@@ -42,8 +31,6 @@ INTO_HELP = "Name of the new session in the workspace, or a path."
     show_default=True,
     help="The axis of the calibration's world that points up.",
 )
-@DESPITE_OPTION
-@COPY_OPTION
 @command
 def import_command(
     source: Path,

@@ -4,15 +4,7 @@ from pathlib import Path
 
 import click
 
-from studio.cli.arguments import (
-    COPY_OPTION,
-    DESPITE_OPTION,
-    FPS_OPTION,
-    OFFSET_OPTION,
-    ROTATE_OPTION,
-    TRIAL_OPTION,
-    camera_numbers,
-)
+from studio.cli.arguments import camera_numbers, footage_options
 from studio.cli.output import command, note, progress
 from studio.export.kept_exports import exported_files
 from studio.runs.way import way_of
@@ -38,14 +30,9 @@ def new_command(session: str, title: str, body: str) -> dict[str, object]:
 @click.command("add-footage")
 @click.argument("session")
 @click.argument("source", type=click.Path(path_type=Path))
-@FPS_OPTION
+@footage_options
 @click.option("--calibration", help="The source's calibration to take where there are several.")
-@TRIAL_OPTION
-@OFFSET_OPTION
-@ROTATE_OPTION
 @click.option("--replace", "replaced", is_flag=True, help="Forget all cameras that SOURCE does not name.")
-@DESPITE_OPTION
-@COPY_OPTION
 @command
 def add_footage_command(
     session: str,
