@@ -21,6 +21,9 @@ class ExportedFile:
     stale: str = ""
 
 
+NOT_EVERYWHERE = "It does not fit everywhere: look at the marked frames."
+
+
 def newest_run(session: Session) -> StoredRun | None:
     """The run that the way is about: the newest one of footage that has an end; None without."""
     runs = [run for run in session.runs() if not run.record.to_and_fro]
@@ -71,7 +74,7 @@ def check_step(session: Session) -> StepStatus:
     changed = run_changes(session, run)
     if changed:
         return StepStatus("check", "stale", words, f"Measured before {enumerated(changed)} changed.")
-    return StepStatus("check", "done", words)
+    return StepStatus("check", "done", words, "" if check.good else NOT_EVERYWHERE)
 
 
 def export_step(session: Session, exports: Sequence[ExportedFile]) -> StepStatus:

@@ -63,6 +63,7 @@ class BackgroundJob(SessionJob):
 class BackgroundAnswer(Answer):
     """A session's background. source: what it is made of, "masks" where masks came with the footage. possible: what it
     can be made of now. settings: all knobs of masks with their values in use; own: those the session has said.
+    measured: how far the views agreed when that was last measured, in words.
     """
 
     session: str
@@ -73,6 +74,7 @@ class BackgroundAnswer(Answer):
     knobs: list[KnobView]
     settings: dict[str, Value]
     own: dict[str, Value]
+    measured: str = ""
     job: BackgroundJob | None
 
 

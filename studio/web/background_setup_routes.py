@@ -17,7 +17,7 @@ from studio.runs.mask_quality import MaskQuality, mask_quality
 from studio.runs.overlay_pictures import forget_composers
 from studio.runs.session_settings import session_settings
 from studio.sessions.background_files import exclusion_path, read_evidence, set_backgrounds
-from studio.sessions.made_from import note
+from studio.sessions.made_from import note, origin_of
 from studio.sessions.session import Session
 from studio.settings import values
 from studio.web.background_jobs import Job
@@ -72,6 +72,7 @@ def background(session: OpenSession, doors: Door) -> BackgroundAnswer:
             "knobs": [knob_view(entry) for entry in knobs],
             "settings": {entry.name: now[entry.name] for entry in knobs},
             "own": evidence.knobs,
+            "measured": known.words if (known := origin_of(session, "background")) is not None else "",
             "job": doors.jobs.known(BACKGROUND, session.name),
         }
     )

@@ -88,7 +88,8 @@ async def begin_taking(doors: Doors, name: str, wish: SourceWish, take: Taker) -
         if wish.upload:
             forget(doors, wish.upload)
         return {
-            "notes": list(report.notes),
+            # An upload's folder is named by a number that nobody has seen.
+            "notes": [note.replace(f"'{wish.upload}'", "what was uploaded") for note in report.notes],
             "warnings": list(report.warnings),
             "layout": report.layout,
             "matching": list(report.matching),

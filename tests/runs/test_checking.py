@@ -12,6 +12,7 @@ from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.refining import SMOOTHED
 from studio.runs.tracks import Track, write_track
 from studio.runs.way import way_of
+from studio.runs.way_results import check_step
 
 
 def step(session, name):
@@ -48,12 +49,15 @@ def test_the_true_poses_fit_and_others_do_not(session):
     assert all(share is not None and share > 0.7 for row in found.covered for share in row)
     assert found.inside_mean > 0.9
     assert kept_check(run, SMOOTHED) == found
+    assert (check_step(session).state, check_step(session).why) == ("done", "")
     kept(run, true_poses() + 1.0)
     assert kept_check(run, SMOOTHED) is None
     wrong = check_run(session, run, every=3)
     assert wrong.inside_mean < 0.6
     assert wrong.poor == wrong.frames
     assert not wrong.good
+    assert check_step(session).state == "done"
+    assert "look at the marked frames" in check_step(session).why
 
 
 def test_a_body_that_turns_round_at_once_is_named():

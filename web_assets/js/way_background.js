@@ -157,7 +157,7 @@ export function mount(place, way) {
       drawQuality();
     }, "small");
     measure.hidden = state.told.cameras.length < 2;
-    agreement.replaceChildren(element("div", { className: "head-line" }, element("h2", { textContent: "Agreement of the views" }), measure), ...qualityList(state.quality, paint));
+    agreement.replaceChildren(element("div", { className: "head-line" }, element("h2", { textContent: "Agreement of the views" }), measure), ...qualityList(state.quality, paint, state.told.measured));
     pictures.tell(state.quality);
   }
 

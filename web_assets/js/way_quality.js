@@ -6,8 +6,10 @@ import { button, element } from "./elements.js";
 const USABLE = 0.9;
 const percent = (share) => (share === null ? "—" : `${Math.round(100 * share)} %`);
 
-/** What is said of a quality (`GET S/masks/quality`), null where nobody measured; `paint(camera)` opens the brush. */
-export function qualityList(quality, paint) {
+/** What is said of a quality (`GET S/masks/quality`), null where nobody measured it since the studio was opened (then what
+ * is known in words, `measured`, is said); `paint(camera)` opens the brush. */
+export function qualityList(quality, paint, measured = "") {
+  if (!quality && measured) return [element("p", { className: "hint", textContent: `When it was last measured, ${measured}. Measure again to see every camera.` })];
   if (!quality) return [element("p", { className: "hint", textContent: "Not measured yet. No truth is needed: where one view's mask says “person”, the others must agree in space." })];
   const rows = quality.cameras.map((line) => {
     const kind = line.usable ? "good" : line.agreement !== null && line.agreement >= 0.8 ? "warn" : "bad";
