@@ -166,6 +166,7 @@ def _told(run: StoredRun, found: LiveSummary) -> dict[str, object]:
         "frames": len(found.tracked),
         "dropped": list(found.dropped),
         "dropped_share": round(found.dropped_share, 4),
+        "incomplete": list(found.incomplete),
         "frames_per_second": round(found.frames_per_second, 2),
         "footage_frames_per_second": run.record.fps,
         "latency_ms": {
@@ -184,5 +185,7 @@ def _in_words(found: LiveSummary) -> str:
         words += f"; {len(found.dropped)} dropped ({found.dropped_share:.1%}): {in_words(found.dropped)}"
     else:
         words += "; none dropped"
+    if found.incomplete:
+        words += f"; {len(found.incomplete)} sets of pictures incomplete: {in_words(found.incomplete)}"
     latency = " / ".join(f"{found.latency(share):.0f}" for share in (0.5, 0.95, 1.0))
     return f"{words}; picture to pose {latency} ms (median / 95 % / worst)"

@@ -18,6 +18,7 @@ from studio.runs.live_problems import LiveProblems, Ready
 from studio.runs.live_summary import LiveMeter, LiveStanding
 from studio.runs.pace import Progress
 from studio.runs.storing_behind import StoringBehind
+from studio.runs.take_following import SetNumbers
 from studio.runs.tracking_run import TrackingRun
 from studio.sessions.stored_run import StoredRun
 from studio.settings import RunSettings
@@ -47,7 +48,7 @@ class LiveRun(TrackingRun):
         super().__init__(run, problems)
         self._behind = StoringBehind(storing)
         with run.results() as results:
-            self.meter = LiveMeter(results.frames())
+            self.meter = LiveMeter(results.frames(), SetNumbers(run.folder.parents[1]))
             self._over = results.ended() == OVER
 
     @property
@@ -155,7 +156,7 @@ class LiveRun(TrackingRun):
         self._behind.wait()
         super().keep(result, layers, version, settings, alone=alone)
         with self.run.results() as results:
-            self.meter = LiveMeter(results.frames())
+            self.meter = LiveMeter(results.frames(), SetNumbers(self.run.folder.parents[1]))
         self._over = False
 
 

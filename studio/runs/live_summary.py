@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.errors import NotFoundError
+from studio.runs.take_following import SetNumbers
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.takes import read_sets
 
@@ -21,13 +22,15 @@ WATCHED = 60
 class LiveStanding:
     """A live run at this moment. dropped : frames that came and were not tracked, so far. dropped_share : of all that
     came. latency_ms : median over the last frames, NaN before the first. frames_per_second : over the same, NaN before
-    the second.
+    the second. incomplete : moments of a take at which not every camera's picture came in time: nothing that could have
+    been tracked.
     """
 
     dropped: int
     dropped_share: float
     latency_ms: float
     frames_per_second: float
+    incomplete: int = 0
 
     @property
     def in_words(self) -> str:
@@ -37,22 +40,35 @@ class LiveStanding:
             parts.append(f"{self.frames_per_second:.1f} fps")
         if self.latency_ms == self.latency_ms:
             parts.append(f"latency {self.latency_ms:.0f} ms")
-        return " · ".join([*parts, f"{self.dropped} dropped"])
+        lacking = [f"{self.incomplete} incomplete"] if self.incomplete else []
+        return " · ".join([*parts, f"{self.dropped} dropped", *lacking])
 
 
 class LiveMeter:
     """Measures a live run as it goes."""
 
-    def __init__(self, tracked: Sequence[int] = ()) -> None:
-        """tracked : the frames it has already."""
-        self._came = (tracked[-1] - tracked[0] + 1) if tracked else 0
-        self._tracked, self._newest = len(tracked), tracked[-1] if tracked else None
+    def __init__(self, tracked: Sequence[int] = (), sets: SetNumbers | None = None) -> None:
+        """tracked : the frames it has already. sets : of a take, whose numbers tell the time; None: every number has
+        its pictures.
+        """
+        self._sets = sets if sets is not None and sets.of_a_take else None
+        self._came, self._incomplete = 0, 0
+        self._tracked, self._newest = len(tracked), tracked[0] - 1 if tracked else None
+        if tracked:
+            self.passed(tracked[-1])
         self._last: deque[tuple[float, float]] = deque(maxlen=WATCHED)
 
     def passed(self, frame: int) -> None:
         """Frames up to this one came; it need not be tracked."""
-        self._came += 1 if self._newest is None else max(0, frame - self._newest)
-        self._newest = frame if self._newest is None else max(frame, self._newest)
+        before = frame - 1 if self._newest is None else self._newest
+        if self._sets is not None:
+            # A take may end before its time: what comes after the last set never was.
+            frame = min(frame, self._sets.last)
+        passed = max(0, frame - before)
+        came = passed if self._sets is None else self._sets.between(before, max(frame, before))
+        self._came += came
+        self._incomplete += passed - came
+        self._newest = max(frame, before)
 
     def tracked(self, frame: int, came: float, ready: float) -> None:
         """A frame was tracked. came, ready : when its pictures had come and when its pose was ready, seconds."""
@@ -74,12 +90,14 @@ class LiveMeter:
             dropped_share=dropped / self._came if self._came else 0.0,
             latency_ms=1e3 * float(np.median(times[:, 1] - times[:, 0])) if len(times) else float("nan"),
             frames_per_second=rate_of(times[:, 1]),
+            incomplete=self._incomplete,
         )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LiveSummary:
-    """tracked, dropped : frame numbers, ascending; together all from the first tracked one to the last that came.
+    """tracked, dropped : frame numbers, ascending; together all from the first tracked one to the last that came, but
+    for those of a take that are incomplete: at these moments not every camera's picture came in time.
     frames_per_second : tracked ones from the first pose to the last, pauses left out; NaN for fewer than two. latencies
     (K,) : ms from the last picture of a set to its pose, frame by frame.
     """
@@ -88,6 +106,7 @@ class LiveSummary:
     dropped: tuple[int, ...]
     frames_per_second: float
     latencies: Array
+    incomplete: tuple[int, ...] = ()
 
     @property
     def dropped_share(self) -> float:
@@ -107,16 +126,20 @@ def summary_of(run: StoredRun) -> LiveSummary:
     with run.results() as results:
         tracked, over = results.frames(), results.ended() == "finished"
         _, times = results.arrivals()
+    incomplete: tuple[int, ...] = ()
     came = range(tracked[0], run.record.last if over else tracked[-1] + 1) if tracked else range(0)
     known, sets = set(tracked), read_sets(run.folder.parents[1]).sets
     if sets and tracked:
         # Of a take, the sets that live cameras gave: numbers between them tell only the time.
         came = [one.frame for one in sets if one.frame >= tracked[0]]
+        there = set(came)
+        incomplete = tuple(frame for frame in range(tracked[0], came[-1]) if frame not in there)
     return LiveSummary(
         tracked=tuple(tracked),
         dropped=tuple(frame for frame in came if frame not in known),
         frames_per_second=rate_of(times[:, 1]),
         latencies=1e3 * (times[:, 1] - times[:, 0]),
+        incomplete=incomplete,
     )
 
 

@@ -4,6 +4,7 @@ Recorder and tracker may be two threads or two processes; they share the take's 
 """
 
 import time
+from bisect import bisect_right
 from collections.abc import Callable
 from pathlib import Path
 
@@ -75,3 +76,40 @@ class TakeFollower:
             elif row[0].isdigit():
                 found = taken_set(row)
                 self._newest = Arrival(found.frame, tuple(found.times.values()))
+
+
+class SetNumbers:
+    """Which numbers of a take have a set, read on as its recorder writes. folder : the session's."""
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / LIVE / SETS_NAME
+        self._offset, self._rest = 0, b""
+        self._numbers: list[int] = []
+
+    @property
+    def of_a_take(self) -> bool:
+        """Whether the session is one: of footage, every number has its pictures."""
+        return bool(self._numbers) or self._path.exists()
+
+    @property
+    def last(self) -> int:
+        """The newest set's number, -1 before the first."""
+        self._look()
+        return self._numbers[-1] if self._numbers else -1
+
+    def between(self, after: int, to: int) -> int:
+        """How many sets there are of numbers above `after`, up to `to`."""
+        self._look()
+        return bisect_right(self._numbers, to) - bisect_right(self._numbers, after)
+
+    def _look(self) -> None:
+        """Read the lines that are new."""
+        if not self._path.exists():
+            return
+        with self._path.open("rb") as file:
+            file.seek(self._offset)
+            content = file.read()
+        self._offset += len(content)
+        *lines, self._rest = (self._rest + content).split(b"\n")
+        words = (line.partition(b",")[0] for line in lines)
+        self._numbers += [int(word) for word in words if word.isdigit()]

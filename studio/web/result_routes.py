@@ -89,6 +89,7 @@ def live_figures(run: OpenRun) -> LiveView:
         tracked=len(found.tracked),
         dropped=list(found.dropped),
         dropped_share=found.dropped_share,
+        incomplete=list(found.incomplete),
         frames_per_second=found.frames_per_second,
         latency_median_ms=found.latency(0.5),
         latency_p95_ms=found.latency(0.95),

@@ -23,13 +23,15 @@ class FrameLine(Answer):
 
 
 class LiveView(Answer):
-    """How a live run went. dropped: frames that came and were not tracked. latencies_ms: from the last picture of a set
+    """How a live run went. dropped: frames that came and were not tracked; incomplete: moments of a take at which not
+    every camera's picture came in time. latencies_ms: from the last picture of a set
     to its pose, of the tracked frames in order.
     """
 
     tracked: int
     dropped: list[int]
     dropped_share: float
+    incomplete: list[int] = Field(default_factory=list)
     frames_per_second: Number
     latency_median_ms: Number
     latency_p95_ms: Number

@@ -2,12 +2,15 @@
 
 import math
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from studio.runs.live_summary import LiveMeter, LiveStanding, LiveSummary, in_words, rate_of
 from studio.runs.storing_behind import StoringBehind
+from studio.runs.take_following import SetNumbers
+from studio.sessions.takes import LIVE, SETS_NAME
 
 
 def test_the_meter_counts_what_came_and_was_not_tracked() -> None:
@@ -35,6 +38,27 @@ def test_a_meter_goes_on_where_a_run_stood() -> None:
     assert meter.standing.dropped == 2
     meter.tracked(9, 0.0, 0.01)
     assert meter.standing.dropped == 3
+
+
+def test_incomplete_sets_are_not_dropped_frames(tmp_path: Path) -> None:
+    """Numbers of a take tell the time: of 0-9 there are sets 0, 3, 4, 6, 7 and 9."""
+    (tmp_path / LIVE).mkdir()
+    lines = tmp_path / LIVE / SETS_NAME
+    lines.write_text("frame,moment\n0,0\n3,30\n4,40\n")
+    meter = LiveMeter((), SetNumbers(tmp_path))
+    meter.tracked(0, 0.0, 0.01)
+    meter.tracked(3, 0.0, 0.01)
+    assert (meter.standing.dropped, meter.standing.incomplete) == (0, 2)
+    with lines.open("a") as file:
+        file.write("6,60\n7,70\n9,90\n12")
+    meter.tracked(7, 0.0, 0.01)
+    assert (meter.standing.dropped, meter.standing.incomplete) == (2, 3)
+    assert meter.standing.dropped_share == pytest.approx(2 / 5)
+    meter.passed(299)
+    assert (meter.standing.dropped, meter.standing.incomplete) == (3, 4)
+    again = LiveMeter([0, 3, 7], SetNumbers(tmp_path))
+    assert (again.standing.dropped, again.standing.incomplete) == (2, 3)
+    assert meter.standing.in_words.endswith("3 dropped · 4 incomplete")
 
 
 def test_rates_leave_pauses_out() -> None:

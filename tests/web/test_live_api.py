@@ -54,6 +54,7 @@ def test_the_state_event_says_how_it_keeps_up() -> None:
     assert told["live"] == {
         "dropped": 3,
         "dropped_share": 0.1,
+        "incomplete": 0,
         "latency_ms": None,
         "frames_per_second": 29.8,
     }

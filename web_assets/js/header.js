@@ -19,11 +19,11 @@ function clock(seconds) {
 
 /** How a live run keeps up, in one line. */
 function liveLine(work, word) {
-  const { dropped, latency_ms: latency, frames_per_second: rate } = work.live;
+  const { dropped, incomplete, latency_ms: latency, frames_per_second: rate } = work.live;
   const parts = [work.state === "tracking" ? "live" : `${word} (live)`];
   if (work.state === "tracking" && rate) parts.push(`${rate.toFixed(1)} fps`);
   if (work.state === "tracking" && latency !== null) parts.push(`latency ${latency.toFixed(0)} ms`);
-  return [...parts, `${dropped} dropped`].join(" · ");
+  return [...parts, `${dropped} dropped`, ...(incomplete ? [`${incomplete} incomplete`] : [])].join(" · ");
 }
 
 /** What the worker does, in one line. */
