@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from studio.calibration.board_poses import BoardView, PairPose, pair_pose, views_by_camera
 from studio.calibration.boards import Board
-from studio.calibration.bundle import Bundle, Observations, adjusted, errors_of, kept_inliers, rotated
+from studio.calibration.bundle import Bundle, Observations, adjusted, errors_of, kept_inliers
 from studio.calibration.intrinsics import Lens
 from studio.calibration.sightings import Sighting
 from studio.capture.naming import listed, natural_key
@@ -258,8 +258,3 @@ def moved_cameras(cameras: Sequence[Camera], new_from_old: Array) -> tuple[Camer
         pose = compose(rigid(camera.rotation, camera.translation), back)
         found.append(replace(camera, rotation=pose[:, :3].copy(), translation=pose[:, 3].copy()))
     return tuple(found)
-
-
-def board_points(board: Board, pose: Array) -> Array:
-    """(K, 3) a board's corners in the world."""
-    return rotated(np.repeat(_vector(pose)[None, :3], len(board.points), 0), board.points) + pose[:, 3]

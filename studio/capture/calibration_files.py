@@ -74,11 +74,6 @@ class Calibration:
     crops: dict[str, AssumedCrop] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
-    @property
-    def source_text(self) -> str:
-        """The imported text, files after each other."""
-        return "\n".join(path.read_text(encoding="utf-8", errors="replace") for path in self.sources)
-
 
 def find_calibrations(folder: Path) -> tuple[Path, ...]:
     """Everything in a folder that can be read as a calibration: files, or the folder itself for several that belong

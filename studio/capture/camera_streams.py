@@ -46,8 +46,6 @@ class Shot:
     came: float
 
 
-# Opens a camera: yields its pictures until the stream ends; raises FootageError where it breaks.
-OpenStream = Callable[[CameraAddress], Iterator[Shot]]
 # Waits so many seconds, or until whoever waits is told to stop: then it says True.
 Wait = Callable[[float], bool]
 

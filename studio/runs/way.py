@@ -7,7 +7,6 @@ result was made from.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 from studio.errors import StudioError
 from studio.runs.way_results import ExportedFile, check_step, export_step, track_step
@@ -83,8 +82,6 @@ def _status(
 
 
 LACKING = {"footage": "footage", "calibration": "a calibration", "track": "a run that has frames"}
-
-Order = Literal["stale", "ready", "running"]
 
 
 def _next(steps: Sequence[StepStatus]) -> str:

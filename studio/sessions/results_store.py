@@ -190,10 +190,6 @@ class ResultsWriter:
             )
         self._transaction(statements)
 
-    def forget_partial(self) -> None:
-        """Drop the state of an unfinished frame."""
-        self._transaction(list(_FORGET_PARTIAL))
-
     def forget_from(self, frame: int) -> None:
         """Drop the results of `frame` and all later ones, and the settings that were first used in them.
 
