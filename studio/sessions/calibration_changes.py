@@ -95,7 +95,7 @@ def replace_calibration(session: Session, new: NewCalibration) -> CalibrationCha
 
 
 def restore_calibration(session: Session, name: str, source: str) -> CalibrationChange:
-    """Let a session use an earlier calibration again, byte for byte with all that lay beside it; the one before is kept.
+    """Let a session use an earlier calibration again, byte for byte with all that lay beside it; the one before stays.
 
     name : one of `earlier_calibrations`. source : where it came from, in words. Raises NotFoundError, SessionError
     while a run is being tracked, CalibrationError where it lacks a camera of the footage.
