@@ -18,6 +18,7 @@ import av.video
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.capture.freed_memory import give_back_freed_memory
 from studio.capture.video_probe import MAX_FRAMES, announced_frames, check_turn, open_video, reason
 from studio.errors import FootageError
 
@@ -51,6 +52,14 @@ def measure_video(path: Path, on_frame: Callable[[int, int], None] | None = None
     on_frame : called with frames decoded and frames announced (0 if unknown); may raise to stop.
     Raises FootageError naming the file and the frame where it is damaged or cut.
     """
+    try:
+        return _measured(path, on_frame)
+    finally:
+        give_back_freed_memory()
+
+
+def _measured(path: Path, on_frame: Callable[[int, int], None] | None) -> VideoMeasure:
+    """`measure_video` itself."""
     times: list[float] = []
     width = height = 0
     with open_video(path) as container:
@@ -113,6 +122,7 @@ class VideoReader:
         with self._lock:
             if self._container is not None:
                 self._container.close()
+                give_back_freed_memory()
             self._container = None
 
     def _go_to(self, index: int) -> None:
