@@ -48,9 +48,10 @@ class EvidenceSettings:
     )
     mask_gain_fit: bool = knob(
         True,
-        label="fit brightness",
+        label="fit colours per frame",
         takes_effect=NEXT_FRAME,
-        help="Scale each colour of the background to the frame first: plates may be exposed differently.",
+        help="Scale each colour of the background to each frame first: plates may be exposed differently, and cameras"
+        " and lamps change while they run.",
     )
     mask_shadow_test: bool = knob(
         True,

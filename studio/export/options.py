@@ -43,7 +43,9 @@ class ExportOptions:
     names: str = knob(
         OWN,
         choices=(OWN, "halpe26", "mixamo", "opensim"),
-        help="Names of points and bones: the body's own, or those that another program knows.",
+        help="Names of points and bones: the body's own, or those that another program knows. Points that the body does"
+        " not have are left out, and the file's note names them: of halpe26 nose, eyes, ears and small toes, which no"
+        " body of the studio has, and without feet (human31) heels and big toes.",
     )
     rest: str = knob(
         "tpose",

@@ -17,7 +17,7 @@ const SOURCES = {
   median: ["Median", "What the footage itself shows most of the time. Good where the person moves about."],
 };
 const MISSING = { plate: "Give a picture for every camera below.", clip: "Give a clip for every camera below." };
-const FIRST = ["mask_threshold", "mask_shadow_test", "mask_shadow_darkest", "mask_shadow_colour", "mask_opening", "mask_closing", "mask_keep_components"];
+const FIRST = ["mask_threshold", "mask_gain_fit", "mask_shadow_test", "mask_shadow_darkest", "mask_shadow_colour", "mask_opening", "mask_closing", "mask_keep_components"];
 
 export function mount(place, way) {
   const { fetchJson, post, remove, sessionPath } = way.api;
