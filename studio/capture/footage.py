@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.capture.footage_source import CameraSource, FootageSource
+from studio.capture.freed_memory import give_back_freed_memory
 from studio.capture.numbered_pictures import NumberedReader, has_picture
 from studio.capture.pictures import PictureReader, read_picture
 from studio.capture.video import VideoReader
@@ -141,6 +142,7 @@ class Footage:
         """Close all files."""
         for kept in (*self._pictures.values(), *self._masks.values()):
             kept.close()
+        give_back_freed_memory()
 
     def _checked(self, frame: int) -> int:
         if not 0 <= frame < self.frame_count:

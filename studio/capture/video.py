@@ -122,7 +122,6 @@ class VideoReader:
         with self._lock:
             if self._container is not None:
                 self._container.close()
-                give_back_freed_memory()
             self._container = None
 
     def _go_to(self, index: int) -> None:
