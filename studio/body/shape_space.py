@@ -1,9 +1,9 @@
 """A body's size as a few numbers: what a fit of the subject searches besides the poses.
 
 Dimensions of a body file that set a joint's place or a limb's length are *lengths*, those that are a cone's radius are
-*radii*; nothing here knows a body by name. Dimensions that a person has alike (left and right; the radii of one limb)
-make a group, whose one number is the logarithm of a common factor: 0 is the body as it is, 0.1 is 10.5 % more, and no
-value is impossible.
+*radii*; nothing here knows a body by name. Dimensions that a person has alike (left and right) make a group, whose one
+number is the logarithm of a common factor: 0 is the body as it is, 0.1 is 10.5 % more, and no value is impossible. A
+cone's two radii are two groups: shins taper more than the body file's, and a cone that cannot has its joints moved.
 """
 
 import dataclasses
@@ -23,7 +23,6 @@ from studio.errors import BodyError
 Array = NDArray[np.float64]
 
 SIDE = re.compile(r"(^|_)(left|right)(_|$)")
-RADIUS_END = re.compile(r"_radius_(start|end)$")
 SMALL = ("foot_heel", "foot_drop", "ankle_height")
 """Offsets within a foot: they follow from the height, silhouettes do not tell them."""
 
@@ -80,7 +79,7 @@ def shape_space(
     found: dict[tuple[str, str], list[str]] = {}
     for name, kind in kinds.items():
         if wanted[kind] and body.dimensions[name] > 0.0 and name not in SMALL:
-            found.setdefault((_group_name(name, kind, symmetric), kind), []).append(name)
+            found.setdefault((_group_name(name, symmetric), kind), []).append(name)
     if not found:
         raise BodyError(
             f"Body '{body.name}' has no dimensions that could be fitted.",
@@ -113,11 +112,9 @@ def _name(value: float | str) -> str:
     return split_sign(value)[1] if isinstance(value, str) else ""
 
 
-def _group_name(name: str, kind: str, symmetric: bool) -> str:
-    """The group of a dimension: without its side where both sides are alike, and without its end of a cone."""
-    if symmetric:
-        name = SIDE.sub(r"\1", name)
-    return RADIUS_END.sub("_radius", name) if kind == "radius" else name
+def _group_name(name: str, symmetric: bool) -> str:
+    """The group of a dimension: without its side where both sides are alike."""
+    return SIDE.sub(r"\1", name) if symmetric else name
 
 
 def mean_sides(space: ShapeSpace, dimensions: Mapping[str, float]) -> dict[str, float]:

@@ -1,9 +1,9 @@
 """Fit the subject of a session: limb lengths and radii found on the silhouettes of a few frames, with their poses.
 
 The frames are those in which the person stands most differently (`runs.subject_frames`). Their first poses come from a
-run of the session where one has them, else each frame is searched for one (`runs.initialising`). The search itself is
-`tracking.shape_search`. What is found is a subject whose dimensions are written out, so that every later run of the
-session has this body.
+run of the session where one has them, else each frame is searched for one (`runs.initialising`). A population finds the
+valley (`tracking.shape_search`), a descent its floor (`tracking.shape_refinement`). What is found is a subject whose
+dimensions are written out, so that every later run of the session has this body.
 """
 
 import dataclasses
@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from studio.body.branches import within_limits
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
-from studio.body.shape_space import levelled, shape_space
+from studio.body.shape_space import ShapeSpace, levelled, shape_space
 from studio.body.subject import Subject, fit_subject, write_subject
 from studio.errors import RunError
 from studio.evidence.backgrounds import Backgrounds
+from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
 from studio.runs.initialising import initialise
@@ -33,7 +34,9 @@ from studio.sessions.calibration_changes import stale_runs
 from studio.sessions.names import free_name
 from studio.sessions.session import SUBJECT_NAME, Session
 from studio.tracking.loss_detection import anything_seen
-from studio.tracking.shape_search import FoundShape, ShapeSearch, ShapeSearchSettings
+from studio.tracking.shape_prior import ShapePrior, ShapeSpreads
+from studio.tracking.shape_refinement import RefinedShape, ShapeRefiner
+from studio.tracking.shape_search import ShapeSearch, ShapeSearchSettings
 from studio.weighting.shape_silhouettes import ShapeSilhouettes
 
 Array = NDArray[np.float64]
@@ -51,7 +54,8 @@ class FitRequest:
 
     frames : to look at; () chooses `count`. symmetric : left and right alike. lengths, radii : what may change. run :
     whose poses to begin with, "" for the session's newest run of this body that has them. body : "" for the session's.
-    height_mm : as known to a few centimetres; None takes the subject's. height_spread : mm, its standard deviation.
+    height_mm : as known to a few centimetres; None takes the subject's. height_spread : mm, its standard deviation;
+    silhouettes overrule a height that is many times that off.
     """
 
     frames: tuple[int, ...] = ()
@@ -64,13 +68,13 @@ class FitRequest:
     height_mm: float | None = None
     height_spread: float = 15.0
     seed: int = 0
-    particles: int = 48
-    layers: int = 120
+    particles: int = 24
+    layers: int = 40
 
 
 @dataclass(frozen=True, slots=True)
 class FittedSize:
-    """One group of dimensions, mm: before, after, and the standard deviation of the search's last particles."""
+    """One group of dimensions, mm: before, after, and the standard deviation of that (`ShapeRefiner.refine`)."""
 
     name: str
     kind: str
@@ -124,26 +128,43 @@ def fit_session_subject(
     space = shape_space(body, symmetric=asked.symmetric, lengths=asked.lengths, radii=asked.radii)
     space = levelled(space) if asked.symmetric else space
     limbs = {name: number for number, name in enumerate(dict.fromkeys(p.limb for p in body.parameters))}
+    prior = ShapePrior(space, ShapeSpreads(height=asked.height_spread), subject.height_mm)
+    silhouettes = ShapeSilhouettes(space, session.cameras(), evidence)
     search = ShapeSearch(
-        ShapeSilhouettes(space, session.cameras(), evidence),
+        silhouettes,
         np.array([[entry.lower for entry in body.parameters], [entry.upper for entry in body.parameters]]),
         np.array([ANGLE_SPREAD if entry.kind == "angle" else PLACE_SPREAD for entry in body.parameters]),
         np.array([limbs[entry.limb] for entry in body.parameters]),
-        height=subject.height_mm,
-        settings=ShapeSearchSettings(
-            particles=asked.particles, layers=asked.layers, height_spread=asked.height_spread
-        ),
+        prior,
+        settings=ShapeSearchSettings(particles=asked.particles, layers=asked.layers),
         seed=asked.seed,
         progress=lambda done, total: tell("fitting lengths and radii", done, total),
     )
     found = search.run(start)
-    before, after = space.sizes(np.zeros_like(found.shape)), space.sizes(found.shape)
-    sizes = tuple(
-        FittedSize(group.name, group.kind, group.dimensions, float(one), float(other), float(other * share))
-        for group, one, other, share in zip(space.groups, before, after, found.deviation, strict=True)
+    tell("refining lengths and radii", 0, 1)
+    borders = [silhouette_distances(one) for one in evidence]
+    refiner = ShapeRefiner(silhouettes.programs, session.cameras(), borders, prior)
+    refined = refiner.refine(found.shape, found.poses, asked.seed)
+    fitted = space.body_of(refined.shape)
+    return FittedSubject(
+        subject_of(subject, fitted),
+        fitted,
+        _sizes(space, refined),
+        frames,
+        refined.poses,
+        found.before,
+        search.fitness(refined.shape, refined.poses),
+        poses_from,
+        search.evaluations,
     )
-    fitted = subject_of(subject, space.body_of(found.shape))
-    return _fitted(fitted, space.body_of(found.shape), sizes, frames, found, poses_from)
+
+
+def _sizes(space: ShapeSpace, refined: RefinedShape) -> tuple[FittedSize, ...]:
+    before, after = space.sizes(np.zeros_like(refined.shape)), space.sizes(refined.shape)
+    return tuple(
+        FittedSize(group.name, group.kind, group.dimensions, float(one), float(other), float(other * share))
+        for group, one, other, share in zip(space.groups, before, after, refined.deviation, strict=True)
+    )
 
 
 def keep_subject(session: Session, found: FittedSubject, into: Path | None = None) -> Path:
@@ -247,19 +268,6 @@ def subject_of(subject: Subject, body: BodyModel) -> Subject:
     lengths = {name: value for name, value in body.dimensions.items() if entries[name].ratio is None}
     ratios = {name: value for name, value in body.dimensions.items() if entries[name].ratio is not None}
     return Subject(body=body.name, height_mm=subject.height_mm, dimensions_mm=lengths, ratios=ratios)
-
-
-def _fitted(
-    subject: Subject,
-    body: BodyModel,
-    sizes: tuple[FittedSize, ...],
-    frames: tuple[int, ...],
-    found: FoundShape,
-    poses_from: str,
-) -> FittedSubject:
-    return FittedSubject(
-        subject, body, sizes, frames, found.poses, found.before, found.fitness, poses_from, found.evaluations
-    )
 
 
 def _watched(progress: Progress | None, cancelled: Callable[[], bool] | None) -> Progress:

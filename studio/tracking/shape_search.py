@@ -11,9 +11,8 @@ would be hundreds of dimensions, but given the shape the frames do not depend on
 3. weighs each particle by the sum over the frames, with the prior of the shapes, at a sharpness that leaves the wanted
    share of particles alive (Eqs. 11, 12), and draws the next ones, the best one always among them.
 
-The answer is the mean shape of the last layers' survivors, the uncertainty their standard deviation: how far a
-shape can go at full sharpness without being worse, given that poses follow. It knows nothing of what a person in
-clothes and a body of cones differ by, which is more.
+The answer is the mean shape of the last layers' survivors. It finds the valley, limbs that were lost included;
+`shape_refinement` descends to its floor and tells how far the answer can be trusted.
 """
 
 from collections.abc import Callable
@@ -25,6 +24,7 @@ from numpy.typing import NDArray
 from studio.body.forward_kinematics import limb_ends
 from studio.body.shape_space import ShapeSpace
 from studio.tracking.lost_limbs import lost_limbs_found
+from studio.tracking.shape_prior import ShapePrior
 from studio.weighting.shape_silhouettes import POSES, ShapeSilhouettes
 
 Array = NDArray[np.float64]
@@ -44,28 +44,24 @@ STEP = 1e-4
 class ShapeSearchSettings:
     """How much is searched. particles : M. layers : in all. survival : share of particles that survive a layer.
 
-    length_spread, radius_spread : the prior's standard deviations, as shares. height_spread : mm. pose_steps : how
-    often the poses of a layer are improved. sought : places that are tried of each limb at first, 0 for none.
+    pose_steps : how often the poses of a layer are improved. sought : places that are tried of each limb at first, 0
+    for none.
     """
 
     particles: int = 24
-    layers: int = 60
+    layers: int = 40
     survival: float = 0.4
-    length_spread: float = 0.08
-    radius_spread: float = 0.15
-    height_spread: float = 15.0
     pose_steps: int = 2
     sought: int = 4096
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundShape:
-    """shape, deviation : (S,) logarithms. poses : (F, D) that go with the shape. fitness, before : (F,) f_s of them
-    and of the first shape and poses. evaluations : poses weighed.
+    """shape : (S,) logarithms. poses : (F, D) that go with the shape. fitness, before : (F,) f_s of them and of the
+    first shape and poses. evaluations : poses weighed.
     """
 
     shape: Array
-    deviation: Array
     poses: Array
     fitness: Array
     before: Array
@@ -85,8 +81,7 @@ class ShapeSearch:
     """One search.
 
     silhouettes : the frames. limits : (2, D) of the poses. spread : (D,) how far poses may be off at first (radians,
-    mm). limb_of : (D,) number of the limb that each parameter belongs to. height : mm, of the standing body, where it
-    is known.
+    mm). limb_of : (D,) number of the limb that each parameter belongs to. prior : of the shapes.
     """
 
     def __init__(
@@ -95,8 +90,8 @@ class ShapeSearch:
         limits: Array,
         spread: Array,
         limb_of: NDArray[np.int64],
+        prior: ShapePrior,
         *,
-        height: float | None = None,
         settings: ShapeSearchSettings | None = None,
         seed: int = 0,
         progress: Progress | None = None,
@@ -107,16 +102,14 @@ class ShapeSearch:
         self._rng = np.random.default_rng(np.random.SeedSequence((seed, 0x5AB)))
         self._progress = progress
         self._space: ShapeSpace = silhouettes.programs.space
-        self._sigma = prior_spread(self._space, self._settings)
-        self._height = height
-        self._own_height, self._height_slope = _height_of(self._space)
+        self._prior, self._sigma = prior, prior.sigma
         self.evaluations = 0
 
     def run(self, poses: Array) -> FoundShape:
         """The shape and the poses, from poses (F, D) of the space's own body."""
         rules, rng = self._settings, self._rng
         count = rules.particles
-        before = self._fitness(np.zeros((1, len(self._sigma))), poses[None, :, None])[0, :, 0]
+        before = self.fitness(np.zeros(len(self._sigma)), poses)
         poses = self.sought(poses)
         first = _Population(np.zeros((count, len(self._sigma))), np.repeat(poses[None], count, axis=0))
         now = first
@@ -128,7 +121,7 @@ class ShapeSearch:
             moved = self._moved(now, layer, heat)
             for _ in range(rules.pose_steps):
                 self._improve(moved, heat)
-            total = SHARPNESS * moved.fitness.sum(axis=1) + self.log_prior(moved.shapes)
+            total = SHARPNESS * moved.fitness.sum(axis=1) + self._prior.log(moved.shapes)
             weights = tempered(total, rules.survival)
             if layer >= round((1.0 - KEPT) * rules.layers):
                 kept.append((weights, moved.shapes))
@@ -136,14 +129,6 @@ class ShapeSearch:
             chosen[0] = int(np.argmax(total))
             now = _Population(moved.shapes[chosen], moved.poses[chosen], moved.fitness[chosen])
         return self._answer(now, kept, before)
-
-    def log_prior(self, shapes: Array) -> Array:
-        """(M,) of shapes (M, S): published proportions, and the height where it is known."""
-        found = -0.5 * np.square(shapes / self._sigma).sum(axis=1)
-        if self._height is not None:
-            height = self._own_height + shapes @ self._height_slope
-            found -= 0.5 * np.square((height - self._height) / self._settings.height_spread)
-        return found
 
     def _moved(self, now: _Population, layer: int, heat: float) -> _Population:
         """New shapes around the population's, with poses carried along."""
@@ -219,6 +204,10 @@ class ShapeSearch:
         rest, tries = self._space.body.neutral, self._settings.sought
         return lost_limbs_found(self._rng, fitness, poses, self._limbs, self._limits, rest, tries)
 
+    def fitness(self, shape: Array, poses: Array) -> Array:
+        """(F,) f_s of a shape (S,) in poses (F, D)."""
+        return self._fitness(shape[None], poses[None, :, None])[0, :, 0]
+
     def _fitness(self, shapes: Array, poses: Array) -> Array:
         """(M, F, K) of poses (M, F, K, D), K at most sixteen."""
         wanted = poses.shape[2]
@@ -235,7 +224,6 @@ class ShapeSearch:
         weights = np.concatenate([one for one, _ in kept]) / len(kept)
         shapes = np.concatenate([one for _, one in kept])
         shape = weights @ shapes
-        deviation = np.sqrt(weights @ np.square(shapes - shape))
         poses = np.empty_like(now.poses)
         for k in range(poses.shape[1]):
             poses[:, k] = self._within(
@@ -249,14 +237,8 @@ class ShapeSearch:
         if self._progress is not None:
             self._progress(self._settings.layers, self._settings.layers)
         return FoundShape(
-            shape, deviation, last.poses[best, frames], last.fitness[best, frames], before, self.evaluations
+            shape, last.poses[best, frames], last.fitness[best, frames], before, self.evaluations
         )
-
-
-def prior_spread(space: ShapeSpace, settings: ShapeSearchSettings) -> Array:
-    """(S,) the prior's standard deviations."""
-    spread = {"length": settings.length_spread, "radius": settings.radius_spread}
-    return np.array([spread[group.kind] for group in space.groups])
 
 
 def tempered(log_weights: Array, survival: float) -> Array:
@@ -280,15 +262,3 @@ def tempered(log_weights: Array, survival: float) -> Array:
 def _normalised(log_weights: Array) -> Array:
     weights = np.exp(log_weights - log_weights.max())
     return weights / weights.sum()
-
-
-def _height_of(space: ShapeSpace) -> tuple[float, Array]:
-    """The height of the rest pose (which stands on the floor), mm, and its slope (S,) over the shape."""
-
-    def height(shape: Array) -> float:
-        body = space.body_of(shape)
-        return float(limb_ends(body, body.neutral)[0, ..., 2].max())
-
-    size = len(space.groups)
-    own = height(np.zeros(size))
-    return own, np.array([(height(STEP * unit) - own) / STEP for unit in np.eye(size)])

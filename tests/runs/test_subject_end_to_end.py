@@ -28,3 +28,4 @@ def test_lengths_of_people_who_are_only_seen(tmp_path: Path) -> None:
         usual += before
     print(f"median {np.median(np.abs(usual)):.1f} mm by height, {np.median(np.abs(fitted)):.1f} mm fitted")
     assert np.median(np.abs(fitted)) <= 15.0
+    assert np.median(np.abs(fitted)) < np.median(np.abs(usual))

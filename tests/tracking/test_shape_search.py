@@ -2,46 +2,50 @@
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from sized_people import MEASURED, DrawnPerson, drawn_person
 
 from studio.body.forward_kinematics import limb_ends, marker_points
 from studio.body.shape_space import shape_space
-from studio.tracking.shape_search import (
-    FoundShape,
-    ShapeSearch,
-    ShapeSearchSettings,
-    tempered,
-)
-from studio.weighting.shape_silhouettes import ShapeSilhouettes
+from studio.evidence.distance_maps import silhouette_distances
+from studio.tracking.shape_prior import ShapePrior, ShapeSpreads
+from studio.tracking.shape_refinement import RefinedShape, ShapeRefiner
+from studio.tracking.shape_search import ShapeSearch, ShapeSearchSettings, tempered
+from studio.weighting.shape_silhouettes import ShapePrograms, ShapeSilhouettes
 
 SEEDS = range(1, 7)
 
 
 def search_of(person: DrawnPerson, settings: ShapeSearchSettings, seed: int = 0) -> ShapeSearch:
     """A search as `runs.subject_fitting` sets it up."""
-    body = person.body
+    body, space = person.body, shape_space(person.body)
     limbs = {name: number for number, name in enumerate(dict.fromkeys(p.limb for p in body.parameters))}
     return ShapeSearch(
-        ShapeSilhouettes(shape_space(body), person.cameras, person.frames),
+        ShapeSilhouettes(space, person.cameras, person.frames),
         np.array([[entry.lower for entry in body.parameters], [entry.upper for entry in body.parameters]]),
         np.array([0.35 if entry.kind == "angle" else 60.0 for entry in body.parameters]),
         np.array([limbs[entry.limb] for entry in body.parameters]),
-        height=person.told_height,
+        ShapePrior(space, ShapeSpreads(), person.told_height),
         settings=settings,
         seed=seed,
     )
 
 
-def errors(person: DrawnPerson, found: FoundShape) -> tuple[list[float], list[float]]:
-    """mm, of each measured limb: as fitted, and as it was."""
+def refined(person: DrawnPerson, seed: int) -> RefinedShape:
+    """A fit as `runs.subject_fitting` does it."""
+    found = search_of(person, ShapeSearchSettings(), seed).run(person.poses)
     space = shape_space(person.body)
-    after = dict(zip(space.names, space.sizes(found.shape), strict=True))
-    before = dict(zip(space.names, space.sizes(0.0 * found.shape), strict=True))
-    names = list(MEASURED)
-    return (
-        [abs(after[name] - person.lengths[name]) for name in names],
-        [abs(before[name] - person.lengths[name]) for name in names],
-    )
+    prior = ShapePrior(space, ShapeSpreads(), person.told_height)
+    borders = [silhouette_distances(frame) for frame in person.frames]
+    refiner = ShapeRefiner(ShapePrograms(space), person.cameras, borders, prior)
+    return refiner.refine(found.shape, found.poses, seed)
+
+
+def errors(person: DrawnPerson, shape: NDArray[np.float64]) -> NDArray[np.float64]:
+    """mm, of each measured limb."""
+    space = shape_space(person.body)
+    sizes = dict(zip(space.names, space.sizes(shape), strict=True))
+    return np.array([sizes[name] - person.lengths[name] for name in MEASURED])
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +60,6 @@ def test_silhouettes_agree_better_afterwards_and_a_seed_repeats(person: DrawnPer
     again = search_of(person, settings).run(person.poses)
     assert (found.fitness > found.before + 0.02).all()
     assert (found.shape == again.shape).all()
-    assert (found.deviation > 0.0).all()
     assert found.poses.shape == person.poses.shape
 
 
@@ -72,15 +75,6 @@ def test_poses_follow_a_shape_so_that_limbs_stay(person: DrawnPerson) -> None:
     left = limb_ends(space.body_of(shape), pose[None]) - there
     carried = limb_ends(space.body_of(shape), (pose + follow @ shape)[None]) - there
     assert np.linalg.norm(carried) < 0.75 * np.linalg.norm(left)
-
-
-def test_the_prior_knows_the_height(person: DrawnPerson) -> None:
-    search = search_of(person, ShapeSearchSettings())
-    space = shape_space(person.body)
-    taller = np.where([group.kind == "length" for group in space.groups], 0.05, 0.0)
-    usual, tall = search.log_prior(np.array([0.0 * taller, taller]))
-    assert usual == pytest.approx(0.0, abs=0.1)
-    assert tall < usual - 5.0
 
 
 def test_an_arm_that_was_lost_is_found_again(person: DrawnPerson) -> None:
@@ -109,15 +103,22 @@ def test_weights_are_tempered_to_the_survival_rate() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(3600)
 def test_lengths_of_people_with_drawn_limbs() -> None:
-    """Issue 5, Show 4: median over limbs and subjects within 15 mm."""
-    fitted, usual = [], []
+    """Issue 5, Show 4: median over limbs and subjects within 15 mm; and two thirds, about, within one deviation."""
+    fitted, usual, sure = [], [], []
     for seed in SEEDS:
         one = drawn_person(seed)
-        found = search_of(one, ShapeSearchSettings(particles=48, layers=120), seed).run(one.poses)
-        after, before = errors(one, found)
-        fitted += after
-        usual += before
-        print(seed, [round(value) for value in before], "→", [round(value) for value in after])
+        found = refined(one, seed)
+        after, before = errors(one, found.shape), errors(one, 0.0 * found.shape)
+        space = shape_space(one.body)
+        spread = dict(zip(space.names, space.sizes(found.shape) * found.deviation, strict=True))
+        sure.append(np.abs(after) < [spread[name] for name in MEASURED])
+        fitted.append(np.abs(after))
+        usual.append(np.abs(before))
+        print(seed, before.round(), "→", after.round())
     print(f"median {np.median(usual):.1f} mm from the height, {np.median(fitted):.1f} mm fitted")
+    print(f"within one deviation: {np.mean(sure):.2f}, by limb {np.mean(sure, axis=0).round(2)}")
     assert np.median(fitted) <= 15.0
+    assert np.median(fitted) < 0.7 * np.median(usual)
+    assert 0.5 <= np.mean(sure) <= 0.95

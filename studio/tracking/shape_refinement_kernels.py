@@ -1,0 +1,35 @@
+"""Normal equations of outlines against a silhouette's border, for bodies whose size changes with their pose."""
+
+import numpy as np
+from numba import njit
+
+from studio.tracking.refinement_kernels import add_border, turning
+
+OPTIONS = {"error_model": "numpy", "nogil": True, "cache": True}
+
+
+@njit(**OPTIONS)
+def border_equations(quads, slopes, ends, border, views, mm, scales, matrix, gradient):
+    """Fill matrix (P, P) and gradient (P,) of half the loss of `refinement_kernels`; returns the loss.
+
+    quads : (V, L, 4, 2) pixels, NaN for limbs that are not seen. slopes : (V, L, 4, 2, P) per unit of each parameter
+    of pose and shape. ends : (L,) whether a limb's far end may be border. border : (K, 4). views : (V, 2) first and
+    last border point. mm : (V,) mm per pixel. scales : (V,) c of the loss, mm.
+    """
+    limbs, size = quads.shape[1], slopes.shape[4]
+    row, usable, turns = np.zeros(size), np.zeros(limbs, np.bool_), np.zeros(limbs)
+    matrix[:] = 0.0
+    gradient[:] = 0.0
+    loss = 0.0
+    for v in range(quads.shape[0]):
+        for limb in range(limbs):
+            usable[limb] = np.isfinite(quads[v, limb].sum()) and np.isfinite(slopes[v, limb].sum())
+            turns[limb] = turning(quads[v, limb])
+        seen = border[views[v, 0] : views[v, 1]]
+        loss += add_border(
+            seen, quads[v], slopes[v], usable, turns, ends, mm[v], scales[v], row, matrix, gradient
+        )
+    for p in range(size):
+        for q in range(p):
+            matrix[q, p] = matrix[p, q]
+    return loss
