@@ -25,6 +25,7 @@ from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.evidence.masks import cleaned
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
+from studio.progress import Progress
 from studio.sessions.session import Session
 from studio.volume.hull_settings import HullSettings
 from studio.volume.hull_silhouette import silhouette
@@ -32,7 +33,6 @@ from studio.volume.reconstruction import Reconstructor
 from studio.volume.tracking_space import box_of
 
 Bytes = NDArray[np.uint8]
-Progress = Callable[[str, int, int], None]
 
 FRAMES = 20
 ROUNDS = 2
@@ -142,7 +142,9 @@ class _Cleaning:
 
     def _plate(self, name: str, taken: Bytes) -> CleanPlate:
         """taken : (K, h, w) of `_covers`."""
-        stack = np.stack([self.footage.picture(name, frame) for frame in self.frames])
+        stack = np.empty((len(self.frames), *self.first[name].mean.shape), np.uint8)
+        for row, frame in zip(stack, self.frames, strict=True):
+            row[:] = self.footage.picture(name, frame)
         fallback = np.clip(np.rint(self.first[name].mean), 0, 255).astype(np.uint8)
         picture, empty = median_of_empty(stack, taken, fallback)
         never = empty < FEWEST_EMPTY
