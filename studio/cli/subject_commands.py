@@ -73,8 +73,8 @@ def fit_subject_command(
 ) -> dict[str, object]:
     """Find limb lengths and radii of the person in SESSION, together with the poses of a few frames.
 
-    The result becomes the session's subject (the old one stays beside it as subject-before.toml). ± is the standard
-    deviation of the search's last particles.
+    The result becomes the session's subject (the old one stays beside it as subject-before.toml). ± is one
+    standard deviation.
     """
     opened = Workspace().resolve(session)
     request = FitRequest(

@@ -62,7 +62,7 @@ class FitSubjectRequest(Request):
 
 
 class SizeLine(Answer):
-    """A group of dimensions, mm. deviation: of the search's last particles."""
+    """A group of dimensions, mm. deviation: one standard deviation of `after`."""
 
     name: str
     kind: Literal["length", "radius"]

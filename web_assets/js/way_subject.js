@@ -163,7 +163,7 @@ export function mount(place, way) {
       element("p", { textContent: `The body covers ${Math.round(100 * mean(fit.overlap))} % of the silhouettes and they it (${Math.round(100 * mean(fit.overlap_before))} % before), in ${frames}; first poses ${fit.poses_from.startsWith("run") ? `of ${fit.poses_from}` : fit.poses_from}.` }),
       fit.file ? element("p", { className: "hint", textContent: "Saved. What was there before stays beside it as subject-before." }) : element("div", { className: "step-actions" }, keep),
       table("length"), table("radius"),
-      element("p", { className: "hint", textContent: "± is the spread of the last search. Clothes and flesh are no cones: lengths may be off by more, one or two centimetres as a rule." }));
+      element("p", { className: "hint", textContent: "± is one standard deviation: two limbs in three, about, lie within it. Wrists and shoulders show least." }));
   }
 
   /** The pictures of the fit: the new body over each frame, a camera each in turn. */
