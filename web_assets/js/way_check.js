@@ -48,6 +48,14 @@ export function mount(place, way) {
     for (const chip of found.querySelectorAll("[data-frame]")) chip.toggleAttribute("aria-current", Number(chip.dataset.frame) === frame);
   }
 
+  /** The frame that is looked at, as long as there is something to see in it. */
+  function showAgain() {
+    const frames = framesToSee();
+    const check = state.told?.check;
+    const named = check ? [...check.lost, ...check.doubtful, ...check.turned, ...check.jumps.map((jump) => jump.frame)] : [];
+    show(frames.includes(state.frame) || named.includes(state.frame) ? state.frame : frames[0]);
+  }
+
   function chips(words, frames) {
     if (!frames.length) return null;
     const made = frames.slice(0, MOST_CHIPS).map((frame) => {
@@ -135,8 +143,7 @@ export function mount(place, way) {
     state.track = name;
     state.told = await fetchJson(`${here}/check?track=${name}`);
     drawAll();
-    const frames = framesToSee();
-    show(frames.includes(state.frame) ? state.frame : frames[0]);
+    showAgain();
   }
 
   function drawAll() {
@@ -193,8 +200,7 @@ export function mount(place, way) {
     const running = tracks.running[0] ?? null;
     if (running && !state.job) { state.job = running; carry(() => running); }
     drawAll();
-    const frames = framesToSee();
-    show(frames.includes(state.frame) ? state.frame : frames[0]);
+    showAgain();
   }
 
   load().catch(complain);

@@ -52,10 +52,11 @@ export function mount(place, way) {
       way.progress(status, { words: workWords(), share, cancel: () => post(`${path()}/cancel`).catch(complain) });
       return;
     }
-    const words = `${run.name}: ${run.done} of ${run.last - run.first} frames, ${run.describe}${run.mean_mm !== null && run.mean_mm !== undefined ? `, ${run.mean_mm.toPrecision(3)} mm from the truth` : ""}.`;
+    const which = run.first > 0 ? ` (from frame ${run.first} on)` : "";
+    const words = `${run.name}: ${run.done} of ${run.last - run.first} frames${which}, ${run.describe}${run.mean_mm !== null && run.mean_mm !== undefined ? `, ${run.mean_mm.toPrecision(3)} mm from the truth` : ""}.`;
     const failed = isHere() && ["failed", "lost"].includes(state.work.state) ? state.work : state.failed;
     const on = !complete && !stale ? button(run.done ? "Track on" : "Track", () => start(run.name), "primary") : null;
-    const before = run.done && run.first > 0 && !stale ? button("Track back to frame 0", goBack, complete ? "primary" : "") : null;
+    const before = run.done && run.first > 0 && !stale ? button("Track back to frame 0", goBack) : null;
     if (before) before.title = `The run begins in frame ${run.first}. The frames before it are tracked backwards from there, into a new run; ${run.name} stays.`;
     status.replaceChildren(...[element("p", { textContent: words }), failed && element("p", { className: "wrong", role: "alert" }, failed.message, element("span", { className: "hint", textContent: ` ${failed.hint ?? ""}` })),
       element("div", { className: "step-actions" }, ...[on, before, element("a", { className: "download", href: `/?session=${encodeURIComponent(way.session)}&run=${encodeURIComponent(run.name)}`, textContent: "Open in the studio" })].filter(Boolean))].filter(Boolean));
