@@ -93,9 +93,11 @@ export function mount(place, way) {
   }
 
   function verdict(check) {
+    const seen = check.covered.flat().filter((share) => share !== null);
+    const covered = seen.reduce((sum, share) => sum + share, 0) / seen.length;
     const parts = [
       check.good ? "The motion fits the pictures." : "Look at the marked frames.",
-      `${percent(check.inside_mean)} of the model lies in the masks.`,
+      `${percent(check.inside_mean)} of the model lies in the masks${seen.length ? `, ${percent(covered)} of the masks under the model: where it is little, an arm or a leg is elsewhere` : ""}.`,
       check.turned.length ? `The body turns round suddenly ${check.turned.length} times: left and right may have changed places.` : "Left and right keep their places: no sudden turn.",
       check.jumps.length ? `A limb leaps ${check.jumps.length === 1 ? "once" : `${check.jumps.length} times`}: it was lost or taken for another.` : "",
       check.jitter_mm !== null ? `The markers jitter by ${check.jitter_mm.toFixed(1)} mm.` : "",
