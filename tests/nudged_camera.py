@@ -1,5 +1,5 @@
-"""A session on disk whose calibration was right until one camera was nudged: masks of a wandering cloud of points, drawn
-with OpenCV by the true cameras, and the calibration of before.
+"""A session on disk whose calibration was right until one camera was nudged: masks of a wandering cloud of points,
+drawn with OpenCV by the true cameras, and the calibration of before.
 """
 
 import dataclasses
