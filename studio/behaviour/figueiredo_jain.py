@@ -17,7 +17,6 @@ each of three to five components in two and three dimensions):
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,9 +25,9 @@ from numpy.typing import NDArray
 from studio.behaviour.gaussian_mixture import GaussianMixture
 from studio.behaviour.mixture_kernels import losses_without, replace_component, shares_of
 from studio.errors import BehaviourError
+from studio.progress import Progress
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]
 
 COVARIANCES = ("full", "diagonal")
 

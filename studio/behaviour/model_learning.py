@@ -1,6 +1,6 @@
 """From recordings of poses to a behaviour model (Caillette et al. 2007, sections 3.2 and 4)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +15,10 @@ from studio.behaviour.root_motion import learn_root_motion
 from studio.behaviour.settings import LearningSettings
 from studio.body.model import BodyModel
 from studio.errors import BehaviourError
+from studio.progress import Progress
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-Progress = Callable[[str, int, int], None]
 
 
 def learn_model(

@@ -1,7 +1,7 @@
 """Board footage of several cameras: one video, or one folder of pictures, or one picture a camera."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,9 +15,9 @@ from studio.capture.naming import match_names, natural_key
 from studio.capture.pictures import is_picture, list_pictures, read_picture
 from studio.capture.video import VIDEO_SUFFIXES, VideoReader, measure_video
 from studio.errors import CalibrationError
+from studio.progress import Progress
 
 Bytes = NDArray[np.uint8]
-Progress = Callable[[str, int, int], None]
 
 LENS_FRAMES, RIG_FRAMES = 60, 120
 LENS_PICTURES = 30

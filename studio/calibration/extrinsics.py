@@ -4,7 +4,7 @@ Pairs of cameras vote on their relative pose; the most trusted pairs make a tree
 which its cameras agree best; then bundle adjustment, once more without the views that do not fit.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -21,9 +21,9 @@ from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
 from studio.geometry.rigid import compose, inverse, rigid
 from studio.geometry.rotations import rotation_from_vector, vector_from_rotation
+from studio.progress import Progress
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]
 
 MOST_FRAMES = 90
 CLIPPED_PX = 30.0

@@ -1,6 +1,6 @@
 """Cameras from board footage, from folders to a calibration file with its report."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -32,8 +32,7 @@ from studio.capture.naming import listed, natural_key
 from studio.capture.sanity import common_target, quarter_turns
 from studio.errors import CalibrationError
 from studio.geometry.rigid import rigid
-
-Progress = Callable[[str, int, int], None]
+from studio.progress import Progress
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from studio.capture.footage_source import FootageSource
 from studio.capture.naming import listed
 from studio.errors import FootageError
+from studio.progress import Progress
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]
 
 WIDTH = 96
 MOST_FRAMES = 3000

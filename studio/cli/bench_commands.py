@@ -11,7 +11,7 @@ from studio.cli.output import command, progress
 from studio.experiments.benchmark import run_benchmark
 from studio.experiments.hull_benchmark import run_hull_benchmark
 from studio.experiments.live_benchmark import in_words
-from studio.notebook.progress import Report
+from studio.progress import Progress
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.scene.live_benchmarking import run_live_benchmark
 from studio.sessions.workspace import Workspace
@@ -20,15 +20,15 @@ from studio.worker.control import StudioControl
 from studio.worker.latency import measure_reannealing
 
 
-def _kernels(report: Report) -> dict[str, object]:
+def _kernels(report: Progress) -> dict[str, object]:
     return dict(run_benchmark(progress=report))
 
 
-def _hulls(report: Report) -> dict[str, object]:
+def _hulls(report: Progress) -> dict[str, object]:
     return {"hull": run_hull_benchmark(progress=report)}
 
 
-def _slider(report: Report) -> dict[str, object]:
+def _slider(report: Progress) -> dict[str, object]:
     report("re-annealing", 0, 1)
     with tempfile.TemporaryDirectory() as folder:
         workspace = Workspace(Path(folder))
@@ -42,11 +42,11 @@ def _slider(report: Report) -> dict[str, object]:
     return {"reannealing": dataclasses.asdict(latency)}
 
 
-def _live(report: Report) -> dict[str, object]:
+def _live(report: Progress) -> dict[str, object]:
     return {"live": run_live_benchmark(report)}
 
 
-PARTS: dict[str, Callable[[Report], dict[str, object]]] = {
+PARTS: dict[str, Callable[[Progress], dict[str, object]]] = {
     "kernels": _kernels,
     "hulls": _hulls,
     "slider": _slider,

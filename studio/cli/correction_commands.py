@@ -7,11 +7,12 @@ import click
 from studio.cli.output import command, note, progress
 from studio.errors import RunError
 from studio.notebook.tracking import corrected_pose
+from studio.progress import Progress
 from studio.runs.correcting import prepare_correction, track_backwards
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
-from studio.worker.batch import Report, track_to_end
+from studio.worker.batch import track_to_end
 
 
 @click.command()
@@ -62,7 +63,7 @@ def correct(
     }
 
 
-def _backwards(session: Session, run: StoredRun, report: Report) -> int:
+def _backwards(session: Session, run: StoredRun, report: Progress) -> int:
     """Frames tracked; Ctrl-C keeps those that are done, and says how many."""
     done = [0]
 

@@ -14,7 +14,8 @@ import msgspec
 from rich.console import Console
 
 from studio.errors import StudioError
-from studio.notebook.progress import Report, bar
+from studio.notebook.progress import bar
+from studio.progress import Progress
 
 P = ParamSpec("P")
 
@@ -105,7 +106,7 @@ def note(text: str) -> None:
 
 
 @contextmanager
-def progress(title: str) -> Iterator[Report]:
+def progress(title: str) -> Iterator[Progress]:
     """Progress on standard error with the time that is left; yields `report(step in words, done, total)`.
 
     A bar on a terminal; in a log file a line now and then.
@@ -117,7 +118,7 @@ def progress(title: str) -> Iterator[Report]:
         yield report
 
 
-def progress_lines(title: str, seconds_between: float = 10.0) -> Report:
+def progress_lines(title: str, seconds_between: float = 10.0) -> Progress:
     """A reporter that prints a line at most every so many seconds."""
     began = said = time.monotonic()
 

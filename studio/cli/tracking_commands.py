@@ -15,7 +15,7 @@ from studio.cli.arguments import frame_range
 from studio.cli.knob_options import chosen_changes, given, knob_options
 from studio.cli.output import command, note, progress
 from studio.errors import RunError
-from studio.notebook.progress import Report
+from studio.progress import Progress
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.start_pose_file import frame_of_file, start_pose_from_file
 from studio.sessions.session import START_POSE_NAME, Session
@@ -39,7 +39,7 @@ def own_options(function: F) -> F:
 
 
 @contextmanager
-def tracking_shown(run: StoredRun, standing: Callable[[], str]) -> Iterator[Report]:
+def tracking_shown(run: StoredRun, standing: Callable[[], str]) -> Iterator[Progress]:
     """A run's notes, then how far it is. standing : in words how far it came, said when somebody interrupts it."""
     where = f"{run.session_name} / {run.name}"
     for line in run.record.notes:

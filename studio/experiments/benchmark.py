@@ -22,6 +22,7 @@ from studio.body.model import BodyModel
 from studio.evidence.edges import bodytrack_edges, proximity_edges
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
+from studio.progress import Progress
 from studio.weighting.bodytrack import BodytrackSettings, BodytrackWeigher
 from studio.weighting.edge_region import EdgeRegionProblem, EdgeRegionSettings, EdgeRegionWeigher
 from studio.weighting.edge_region_kernels import LANES, loads_only
@@ -33,7 +34,6 @@ from studio.weighting.silhouette_areas import FULL, HALF
 from studio.weighting.template import TemplateSettings, TemplateWeigher
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]
 
 WIDTH, HEIGHT = 640, 480
 FOCAL, DISTANCE, ABOVE = 560.0, 3300.0, 1700.0

@@ -23,12 +23,12 @@ from studio.experiments.benchmark import filled
 from studio.geometry.camera import Camera
 from studio.geometry.cones import limb_outlines
 from studio.geometry.projection import project
+from studio.progress import Progress
 from studio.volume.reconstruction import HullSettings, Reconstructor
 from studio.volume.tracking_space import box_of
 
 Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
-Progress = Callable[[str, int, int], None]
 
 WIDTH, HEIGHT, FOCAL = 320, 240, 300.0
 DISTANCE, LOW, HIGH = 3300.0, 1500.0, 2500.0

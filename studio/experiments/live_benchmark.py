@@ -7,7 +7,7 @@ In a live run decoding and the hull are done on one core while the frame before 
 """
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from studio.behaviour.model_file import read_model
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.pipeline import EvidenceMaker
+from studio.progress import Progress
 from studio.runs.live_summary import LiveSummary
 from studio.runs.new_run import RunRequest
 from studio.runs.search_space import search_space, session_sigma
@@ -29,7 +30,6 @@ from studio.weighting.blobs import BlobWeigher
 from studio.weighting.catalogue import WEIGHTINGS
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]
 
 TRACKER, WEIGHTING = "behaviour", "blobs"
 CHANGES: Mapping[str, object] = {"particles": 1000, "hull_depth": 7}

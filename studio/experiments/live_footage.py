@@ -6,7 +6,6 @@ as any recording is.
 """
 
 import dataclasses
-from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
@@ -17,13 +16,12 @@ from studio.behaviour.model_learning import learn_model
 from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import load_body
 from studio.capture.to_and_fro import folded
+from studio.progress import Progress
 from studio.sessions.manifest import write_manifest
 from studio.sessions.session import Session
 from studio.synthesis.clips import ClipWriter
 from studio.synthesis.recipes import synthesize
 from studio.training.sources import recipe_recording
-
-Progress = Callable[[str, int, int], None]
 
 RECIPE = "walk-five-cameras"
 QUALITY = 19.0

@@ -19,11 +19,10 @@ from studio.export.overlay_video import write_videos
 from studio.export.table_files import write_csv, write_npz, write_parquet
 from studio.export.task import ExportCancelledError, ExportTask, Writer, Written
 from studio.knobs import changed
+from studio.progress import Progress, watched
 from studio.sessions.atomic_files import discard, new_folder_beside, sync_folder
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-
-Progress = Callable[[str, int, int], None]
 
 WRITERS: dict[str, Writer] = {
     "bvh": write_bvh,
@@ -110,12 +109,8 @@ def export_run(
     motion = no_motion(run) if form.what == "cameras" else motion_of(run, options)
     folder = _working_folder(place)
 
-    def step(words: str, done: int, total: int) -> None:
-        if cancelled is not None and cancelled():
-            raise ExportCancelledError("The export was cancelled.", "Start it again when you like.")
-        if progress is not None:
-            progress(words, done, total)
-
+    ending = ExportCancelledError("The export was cancelled.", "Start it again when you like.")
+    step = watched(progress, cancelled, ending)
     try:
         written = writer(ExportTask(session, run, motion, options, folder / place.name, step))
         step("finishing", 1, 1)

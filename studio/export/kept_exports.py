@@ -8,10 +8,11 @@ from pathlib import Path
 import msgspec
 
 from studio.errors import NotFoundError
-from studio.export.exporting import ExportReport, Progress, export_run, settled
+from studio.export.exporting import ExportReport, export_run, settled
 from studio.export.formats import ExportFormat
 from studio.export.options import ExportOptions
 from studio.export.task import Writer
+from studio.progress import Progress
 from studio.runs.tracks import read_track, track_names
 from studio.runs.way_results import ExportedFile
 from studio.sessions.atomic_files import write_bytes

@@ -11,6 +11,7 @@ from studio.errors import ExportError
 from studio.export.axes import Axes
 from studio.export.motion import Motion
 from studio.export.options import ExportOptions
+from studio.progress import Progress
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
@@ -38,7 +39,7 @@ class ExportTask:
     motion: Motion
     options: ExportOptions
     place: Path
-    step: Callable[[str, int, int], None]
+    step: Progress
 
     @property
     def axes(self) -> Axes:

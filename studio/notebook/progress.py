@@ -1,19 +1,20 @@
 """How a verb tells what it does: to a function of one's own, or in a bar where somebody is looking."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
 
-Report = Callable[[str, int, int], None]
-"""Called with a step in words, how many are done and how many there are (0: nobody knows)."""
-Told = Report | bool | None
+from studio.progress import Progress
+
+Told = Progress | bool | None
 """A function of one's own; True for a bar, False for nothing; None for a bar where somebody is looking."""
 
 
 @contextmanager
-def told(progress: Told, title: str) -> Iterator[Report]:
+def told(progress: Told, title: str) -> Iterator[Progress]:
     """What a verb reports to. A function that raises ends the verb, and nothing half done is kept."""
     if callable(progress):
         yield progress
@@ -27,7 +28,7 @@ def told(progress: Told, title: str) -> Iterator[Report]:
 
 
 @contextmanager
-def bar(console: Console, title: str) -> Iterator[Report]:
+def bar(console: Console, title: str) -> Iterator[Progress]:
     """A bar with the time that is left."""
     columns = (
         TextColumn("{task.description}"),
@@ -36,7 +37,7 @@ def bar(console: Console, title: str) -> Iterator[Report]:
         TimeRemainingColumn(),
         TextColumn("{task.fields[speed]}"),
     )
-    with Progress(*columns, console=console) as shown:
+    with Bar(*columns, console=console) as shown:
         task = shown.add_task(title, total=None, speed="")
 
         def report(step: str, done: int, total: int) -> None:

@@ -8,7 +8,8 @@ from pathlib import Path
 from studio.capture.camera_addresses import address_from_text, check_names
 from studio.errors import FootageError
 from studio.notebook.opening import SessionName
-from studio.notebook.progress import Report, Told, told
+from studio.notebook.progress import Told, told
+from studio.progress import Progress
 from studio.sessions.recordings import SpreadFigures, calibration_given, check_cameras, import_recording
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
@@ -72,7 +73,7 @@ def _calibration(given: SessionName) -> Path:
     return calibration_given(given.path if isinstance(given, Session) else given, Workspace())
 
 
-def _until(recording: StreamRecording, seconds: float | None, report: Report) -> None:
+def _until(recording: StreamRecording, seconds: float | None, report: Progress) -> None:
     """Record for so long, or until it ends by itself."""
     began = time.monotonic()
     while seconds is None or time.monotonic() - began < seconds:

@@ -17,6 +17,7 @@ from studio.capture.pictures import is_picture
 from studio.errors import FootageError
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.settings import EvidenceSettings
+from studio.progress import Progress
 from studio.runs.clean_plates import clean_plates
 from studio.runs.mask_quality import MaskQuality, mask_quality, spread_frames
 from studio.runs.session_settings import session_settings
@@ -55,8 +56,6 @@ USUAL_SIDE = 480.0
 """Pixels of the shorter side of pictures that the usual knobs of cleaning suit."""
 HOLE_AREA = 4.0
 """Of the usual area of holes and pieces, each time: a belt in the background's colour is wider than noise."""
-
-Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
 from studio.geometry.camera import Camera
+from studio.progress import Progress, watched
 from studio.runs.jumps import Jump, jumps_of
 from studio.runs.overlay_drawing import projected_silhouette
 from studio.runs.refining import REFINED, SMOOTHED, MakingCancelledError, jitter
@@ -32,7 +33,6 @@ from studio.tracking.start_candidates import facing
 from studio.weighting.overlay import overlay_points
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]
 
 FOLDER = "checks"
 SCHEMA_VERSION = 1
@@ -125,17 +125,13 @@ def check_run(
     rows = range(0, len(chosen.frames), max(1, every))
     settings = _settings(run)
 
-    def told(done: int) -> None:
-        if cancelled is not None and cancelled():
-            raise MakingCancelledError("The check was cancelled.", "Start it again when you like.")
-        if progress is not None:
-            progress("comparing with the masks", done, len(rows))
-
+    ending = MakingCancelledError("The check was cancelled.", "Start it again when you like.")
+    tell = watched(progress, cancelled, ending)
     shares = []
     with contextlib.closing(footage_of(session, run)) as footage:
         maker = EvidenceMaker(cameras, footage, Backgrounds(footage), settings.evidence, "none")
         for done, row in enumerate(rows):
-            told(done)
+            tell("comparing with the masks", done, len(rows))
             evidence = maker.evidence(int(chosen.frames[row]))
             shares.append(frame_shares(body, cameras, chosen.poses[row], evidence, settings))
     check = RunCheck(

@@ -25,7 +25,7 @@ from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.evidence.masks import cleaned
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
-from studio.progress import Progress
+from studio.progress import Progress, watched
 from studio.sessions.session import Session
 from studio.volume.hull_settings import HullSettings
 from studio.volume.hull_silhouette import silhouette
@@ -80,10 +80,11 @@ def clean_plates(
             f"Session '{session.name}' has {len(cameras)} cameras: backgrounds are cleaned with three or more.",
             "Use a plate, an empty clip or the median instead.",
         )
+    ending = RunError("Making the background was cancelled.", "Start it again when you like.")
     footage = session.footage()
     try:
         cleaning = _Cleaning(cameras, footage, dataclasses.replace(settings, **CLEARED), frames)
-        return cleaning.run(_watched(progress, cancelled))
+        return cleaning.run(watched(progress, cancelled, ending))
     finally:
         footage.close()
 
@@ -189,13 +190,3 @@ def median_of_empty(frames, taken, fallback):
                 for c in range(3):
                     out[y, x, c] = np.uint8(np.median(values[c, :found]) + 0.5)
     return out, empty
-
-
-def _watched(progress: Progress | None, cancelled: Callable[[], bool] | None) -> Progress:
-    def tell(step: str, done: int, total: int) -> None:
-        if cancelled is not None and cancelled():
-            raise RunError("Making the background was cancelled.", "Start it again when you like.")
-        if progress is not None:
-            progress(step, done, total)
-
-    return tell

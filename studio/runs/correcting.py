@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from studio.body.branches import within_limits
 from studio.errors import RunError, SessionError
+from studio.progress import Progress
 from studio.runs.new_run import software_version
 from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
@@ -34,7 +35,6 @@ from studio.sessions.stored_run import BODY_FOLDER, StoredRun
 from studio.settings import settings_from_values
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]
 
 
 def prepare_correction(

@@ -7,7 +7,7 @@ more without it, and what of the other masks comes back is what this camera alon
 """
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,7 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
+from studio.progress import Progress
 from studio.runs.silhouette_doubts import height_of, person_alone, silhouette_doubts
 from studio.sessions.session import Session
 from studio.volume.hull import Hull
@@ -132,7 +133,7 @@ def mask_quality(
     *,
     backgrounds: Backgrounds | None = None,
     blame: bool = True,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> MaskQuality:
     """The quality of a session's masks in some frames (default: five, evenly spread).
 

@@ -2,7 +2,6 @@
 
 import os
 import tempfile
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,15 +18,13 @@ from studio.experiments.live_benchmark import (
     stage_rows,
 )
 from studio.experiments.live_footage import learn_walk, make_footage
+from studio.progress import Progress
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.scene.live_watching import Watched, track_watched
 from studio.sessions.manifest import write_manifest
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 from studio.worker.live_tracking import track_live
-
-# Called with a step in words, what is done of it and how much it is.
-Report = Callable[[str, int, int], None]
 
 PRESSED = 36.0
 """Frames a second: a clock of 30 cannot show more than 30, nor forgive a dropped frame. The same video, a little
@@ -36,7 +33,7 @@ FASTER = 2.0
 """Times the footage's rate: what is sustained of that is all that the machine can do."""
 
 
-def run_live_benchmark(report: Report, seconds: float = SECONDS) -> dict[str, object]:
+def run_live_benchmark(report: Progress, seconds: float = SECONDS) -> dict[str, object]:
     """Show 6 of the real-time tracker: stages beside Table 1, and whether 30 frames a second are sustained.
 
     seconds : of replayed video with the scene open, at 30 Hz and then at 36. Sustained are 30 frames a second where
@@ -78,7 +75,7 @@ def run_live_benchmark(report: Report, seconds: float = SECONDS) -> dict[str, ob
     }
 
 
-def _pressed(workspace: Workspace, session: Session, request: RunRequest, report: Report) -> Watched:
+def _pressed(workspace: Workspace, session: Session, request: RunRequest, report: Progress) -> Watched:
     """The whole video at 36 Hz with the scene open."""
     manifest = session.manifest
     faster = replace(manifest.footage, fps=PRESSED)

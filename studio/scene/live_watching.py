@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from studio.errors import RunError
+from studio.progress import Progress
 from studio.runs.live_summary import LiveSummary, summary_of
 from studio.scene.light_viewer import LightViewer
 from studio.scene.stage import SceneStage
@@ -16,8 +17,6 @@ from studio.worker.control import StudioControl
 from studio.worker.events import StateChanged
 from studio.worker.watchers import Subscription
 
-# Called with a step in words, frames that came and frames in all.
-Report = Callable[[str, int, int], None]
 PATIENCE_SECONDS = 120.0
 
 
@@ -31,7 +30,7 @@ class Watched:
 
 
 def track_watched(
-    workspace: Workspace, session: Session, run: StoredRun, report: Report, *, scene: bool = True
+    workspace: Workspace, session: Session, run: StoredRun, report: Progress, *, scene: bool = True
 ) -> Watched:
     """Track a prepared live run of a session of the workspace to its end. scene : open it, with a viewer; else track
     in the process of its own alone.
@@ -63,7 +62,7 @@ def track_watched(
     return Watched(summary_of(run), messages, size)
 
 
-def _until(events: Subscription, is_reached: Callable[[StateChanged], bool], report: Report) -> None:
+def _until(events: Subscription, is_reached: Callable[[StateChanged], bool], report: Progress) -> None:
     """Wait for a state of the tracking process, telling how it keeps up."""
     while True:
         event = events.get(timeout=PATIENCE_SECONDS)

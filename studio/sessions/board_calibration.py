@@ -9,8 +9,9 @@ from studio.calibration.board_footage_reading import HowTaken
 from studio.calibration.boards import Board
 from studio.calibration.findings import Finding, blocking
 from studio.calibration.report import told_source, write_calibrated
-from studio.calibration.verbs import Calibrated, Progress, calibrate
+from studio.calibration.verbs import Calibrated, calibrate
 from studio.errors import CalibrationError, NotFoundError
+from studio.progress import Progress
 from studio.sessions.calibration_changes import NewCalibration, replace_calibration
 from studio.sessions.calibration_fit import fit_to_session
 from studio.sessions.session import CAMERAS_PATH, Session

@@ -1,7 +1,7 @@
 """What was recorded from live cameras, made a session like any other: offsets by the times at which pictures came."""
 
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
@@ -13,6 +13,7 @@ from studio.capture.camera_sets import APART, SpreadFigures, furthest, spread_fi
 from studio.capture.cut_recordings import mend_recording
 from studio.capture.timestamps import read_timestamps
 from studio.errors import FootageError
+from studio.progress import Progress
 from studio.sessions.importers.catalogue import ImportReport, import_source
 from studio.sessions.manifest import FILE_NAME as MANIFEST_NAME
 from studio.sessions.names import is_name
@@ -61,7 +62,7 @@ def import_recording(
     into: Path,
     calibration: Path,
     notes: Sequence[str] = (),
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> tuple[ImportReport, SpreadFigures]:
     """Make a session at `into` of a recording, which is then removed; a recording that was cut off is mended first.
 

@@ -6,7 +6,6 @@ fit of a model to a person. The mask is exact: a pixel is arm when its centre li
 limb.
 """
 
-from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -21,6 +20,7 @@ from studio.capture.trc import MarkerMotion
 from studio.geometry.camera import Camera
 from studio.geometry.cones import limb_outlines
 from studio.geometry.projection import project
+from studio.progress import Progress
 from studio.sessions.atomic_files import write_text
 from studio.sessions.named_rows import poses_csv
 from studio.synthesis.clips import ClipWriter
@@ -29,7 +29,6 @@ from studio.synthesis.recipe_file import Recipe
 
 Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
-Progress = Callable[[str, int, int], None]
 
 SWING_SHARE, SPEED_SHARE = 0.30, 0.5
 ARM_COLOUR, WALL_COLOUR = (196.0, 186.0, 178.0), (64.0, 62.0, 60.0)

@@ -1,20 +1,18 @@
 """A rendered person's footage as files: a video a camera, empty clips or plates, masks."""
 
-from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
 import cv2
 
 from studio.geometry.camera import Camera
+from studio.progress import Progress
 from studio.synthesis.clips import ClipWriter
 from studio.synthesis.person import PersonMotion
 from studio.synthesis.recipe_file import Picture, Recipe
 from studio.synthesis.renderer import Renderer
 from studio.synthesis.rooms import ROOMS
 from studio.synthesis.wardrobes import WARDROBES
-
-Progress = Callable[[str, int, int], None]
 
 STEPPED_OVER, STEPPED_OVER_HEIGHT = "box", 120.0
 

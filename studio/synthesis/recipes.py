@@ -1,7 +1,6 @@
 """From a recipe to a session: footage rendered, truth beside it, imported like anybody's footage."""
 
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
@@ -14,6 +13,7 @@ from studio.capture.calibration_files import read_calibration, write_calibration
 from studio.capture.trc import MarkerMotion, write_trc
 from studio.errors import BodyError, SessionError
 from studio.geometry.camera import Camera
+from studio.progress import Progress
 from studio.sessions.importers.bodytrack import RATE, read_numbers
 from studio.sessions.importers.catalogue import import_source
 from studio.sessions.manifest import read_manifest, write_manifest
@@ -35,8 +35,6 @@ from studio.synthesis.recipe_file import JOINED, RECORDED, Recipe, find_recipe, 
 from studio.synthesis.recorded_clip import read_recording, recorded_person
 from studio.synthesis.recorded_motion import RecordedMotion
 from studio.synthesis.shape import skeleton_of_subject, subject_of_file, with_hands_and_feet
-
-Progress = Callable[[str, int, int], None]
 
 ARM = "arm"
 RECIPE_COPY = "recipe.toml"

@@ -13,9 +13,10 @@ from studio.behaviour.model_learning import learn_model
 from studio.behaviour.settings import LearningSettings
 from studio.body.model import BodyModel
 from studio.errors import StudioError
+from studio.progress import Progress
 from studio.sessions.workspace import Workspace
 from studio.training.oversampling import OversamplingSettings, oversampled
-from studio.training.sources import FPS, Progress, Recording, expand, read_source
+from studio.training.sources import FPS, Recording, expand, read_source
 
 Array = NDArray[np.float64]
 

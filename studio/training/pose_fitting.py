@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.model import BodyModel
+from studio.progress import Progress
 from studio.training.marker_problem import MarkerProblem
 from studio.training.other_spellings import respelt
 from studio.training.path_splicing import spliced
@@ -22,7 +23,6 @@ from studio.training.smooth_path import SmoothPath, Steadiness
 from studio.training.targets import Targets
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]
 
 STEADY = Steadiness(acceleration=90.0, speed=8.0, rest=1.5)
 """mm a radian a frame, at STEADY_FPS frames a second."""

@@ -5,7 +5,7 @@ motion is made without rendering it. A skeleton is put on the synthetic one with
 met by the body in the size that their distances tell; a run of the same body is taken as it is.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from studio.body.model import BodyModel
 from studio.body.subject import Subject, fit_subject
 from studio.capture.trc import MarkerMotion, read_trc
 from studio.errors import StudioError
+from studio.progress import Progress
 from studio.sessions.manifest import FILE_NAME as SESSION_FILE
 from studio.sessions.run_record import FILE_NAME as RUN_FILE
 from studio.sessions.stored_run import StoredRun
@@ -36,7 +37,6 @@ from studio.training.resampling import frame_times, points_at, poses_at
 from studio.training.targets import Targets, marker_names, of_person, of_poses, skeleton_of_body
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]
 
 FPS = 30.0
 FEWEST_FRAMES = 10

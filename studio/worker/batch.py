@@ -1,15 +1,12 @@
 """A run tracked to its end in this process, for commands and scripts; Ctrl-C keeps what is done."""
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 
+from studio.progress import Progress
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.worker.open_live_run import opened
-
-# Called with a step in words, frames done and frames in all.
-Report = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +21,7 @@ class BatchResult:
     seconds: float
 
 
-def track_to_end(session: Session, run: StoredRun, report: Report) -> BatchResult:
+def track_to_end(session: Session, run: StoredRun, report: Progress) -> BatchResult:
     """Track a prepared or interrupted run to its last frame.
 
     Raises StudioError; KeyboardInterrupt is passed on after the run was marked as cancelled.

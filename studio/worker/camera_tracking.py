@@ -3,19 +3,20 @@
 import contextlib
 import math
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from studio.capture.camera_addresses import CameraAddress
 from studio.errors import RunError, StudioError
+from studio.progress import Progress
 from studio.runs.live_summary import LiveSummary
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.takes import begin_take
 from studio.worker.camera_readers import CameraReaders
-from studio.worker.live_tracking import Report, track_live
+from studio.worker.live_tracking import track_live
 from studio.worker.take_recording import TakeRecording, TakeStanding
 
 LONGEST_SECONDS = 3600.0
@@ -75,7 +76,7 @@ def track_cameras(
     addresses: Sequence[CameraAddress],
     wish: TakeWish,
     request: RunRequest,
-    report: Report,
+    report: Progress,
     *,
     readers: CameraReaders | None = None,
 ) -> TrackedCameras:
@@ -103,7 +104,7 @@ def track_cameras(
 class _Words:
     """Reports of the tracker with what is to be said of the cameras."""
 
-    def __init__(self, recording: TakeRecording, report: Callable[[str, int, int], None]) -> None:
+    def __init__(self, recording: TakeRecording, report: Progress) -> None:
         self._recording, self._report = recording, report
 
     def __call__(self, step: str, done: int, total: int) -> None:

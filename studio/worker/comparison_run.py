@@ -13,13 +13,11 @@ from studio.experiments.kept_comparison import KeptComparison, trial_key
 from studio.experiments.kept_trials import KeptOutcome, measured_by, plain
 from studio.experiments.reproduction_plan import TrialJob
 from studio.experiments.tracking_trials import measure_tracking
+from studio.progress import Progress
 from studio.sessions.manifest import now
 from studio.sessions.session import Session
 from studio.worker.trial_pool import run_jobs
 from studio.worker.trial_process import TrialResult
-
-# Called with a step in words, trials done and trials in all.
-Report = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +35,7 @@ class _Work:
 def run_comparison(
     kept: KeptComparison,
     session: Session,
-    report: Report,
+    report: Progress,
     *,
     processes: int | None = None,
     checkpoint: Callable[[], None] = lambda: None,
@@ -70,7 +68,7 @@ def done_before(kept: KeptComparison, plan: Plan) -> int:
 def _run(
     kept: KeptComparison,
     work: _Work,
-    report: Report,
+    report: Progress,
     processes: int | None,
     checkpoint: Callable[[], None],
 ) -> Comparison:

@@ -4,7 +4,7 @@ import dataclasses
 import logging
 import os
 import signal
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
@@ -14,6 +14,7 @@ from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import load_body
 from studio.errors import StudioError
 from studio.knobs import Value, changed, knobs_of
+from studio.progress import Progress
 from studio.sessions.session import BODIES_NAME
 from studio.sessions.workspace import Workspace
 from studio.training.learning import learn, read_sources
@@ -74,7 +75,7 @@ def learn_to_order(order: LearningOrder, outbox: Connection) -> None:
             tell("failed", f"Learning failed: {type(problem).__name__}: {problem}.", "See the log.")
 
 
-def _learnt(order: LearningOrder, tell: Callable[[str, int, int], None]) -> dict[str, object]:
+def _learnt(order: LearningOrder, tell: Progress) -> dict[str, object]:
     """Learn and keep the model; its numbers."""
     workspace, body = Workspace(order.root), load_body(order.body, (order.root / BODIES_NAME,))
     place_for_model(order.name, workspace)
@@ -102,5 +103,5 @@ def _learnt(order: LearningOrder, tell: Callable[[str, int, int], None]) -> dict
     return told | {"bad_frames": bad}
 
 
-def _named(reading: Callable[[str, int, int], None], number: int) -> Callable[[str, int, int], None]:
+def _named(reading: Progress, number: int) -> Progress:
     return lambda words, done, parts: reading(f"{number} {words}", done, parts)

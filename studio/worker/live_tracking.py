@@ -1,7 +1,6 @@
 """A live run tracked in this process, for commands and scripts; Ctrl-C ends it and keeps what is done."""
 
-from collections.abc import Callable
-
+from studio.progress import Progress
 from studio.runs.live_replay import Comparison, compare, replay
 from studio.runs.live_summary import LiveSummary, summary_of
 from studio.runs.problem_source import ProblemSource
@@ -10,12 +9,9 @@ from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.worker.open_live_run import MakeSource, OpenLiveRun
 
-# Called with a step in words, frames that came and frames in all.
-Report = Callable[[str, int, int], None]
-
 
 def track_live(
-    session: Session, run: StoredRun, report: Report, make_source: MakeSource | None = None
+    session: Session, run: StoredRun, report: Progress, make_source: MakeSource | None = None
 ) -> LiveSummary:
     """Track a prepared or interrupted live run until its last frame has come.
 
@@ -41,7 +37,7 @@ def track_live(
     return summary_of(run)
 
 
-def replay_live(session: Session, run: StoredRun, into: StoredRun, report: Report) -> Comparison:
+def replay_live(session: Session, run: StoredRun, into: StoredRun, report: Progress) -> Comparison:
     """Track the frames of a live run again, into a run made by `live_replay.prepare_replay`, and compare the two."""
     problems = ProblemSource(session, into.body(), into.cameras(), footage=footage_of(session, into))
     with run.results() as results:

@@ -20,6 +20,7 @@ from studio.capture.video import VideoMeasure, VideoReader, measure_video
 from studio.errors import CalibrationError, FootageError
 from studio.evidence.backgrounds import check_plate_size
 from studio.geometry.camera import Camera
+from studio.progress import Progress
 from studio.sessions.importers.agreement import (
     MeasuredCamera,
     check_before_decoding,
@@ -29,7 +30,7 @@ from studio.sessions.importers.agreement import (
     gap_warnings,
 )
 from studio.sessions.importers.alignment import turns_asked, with_offsets
-from studio.sessions.importers.plan import Progress, SourcePlan
+from studio.sessions.importers.plan import SourcePlan
 
 NO_BARS, BAR_FRAMES = (0, 0, 0, 0), 4
 CENTRAL = (0.35, 0.65)

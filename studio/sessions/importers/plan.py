@@ -1,6 +1,6 @@
 """What was found in a source, before anything of it is opened or copied."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,8 +11,6 @@ from studio.body.subject import Subject
 from studio.errors import SessionError
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]
-"""progress(step in words, done, total); total is 0 where it is unknown."""
 
 
 class ImportCancelled(SessionError):

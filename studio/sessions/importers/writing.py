@@ -12,8 +12,9 @@ from studio.capture.footage_source import CameraSource, FootageSource
 from studio.capture.pictures import list_pictures
 from studio.capture.trc import read_trc
 from studio.errors import SessionError
+from studio.progress import Progress
 from studio.sessions.importers.measuring import MeasuredSource
-from studio.sessions.importers.plan import Progress, SourcePlan
+from studio.sessions.importers.plan import SourcePlan
 from studio.sessions.manifest import CameraMatch, SessionManifest, now, write_manifest
 from studio.sessions.named_rows import read_pose, read_sigma, write_pose, write_sigma
 from studio.sessions.names import free_name, name_from
