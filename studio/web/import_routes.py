@@ -13,10 +13,10 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Query
 
+from studio.progress import Progress
 from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.importers.adding import AddedFootage, FootageWish, add_footage
 from studio.sessions.importers.catalogue import ImportReport, import_source
-from studio.sessions.importers.plan import Progress
 from studio.web.archives import only_zip, unpack_upload, unwrapped
 from studio.web.background_jobs import Job
 from studio.web.doors import Door, Doors, let_go

@@ -15,6 +15,7 @@ from studio.capture.pictures import check_picture, list_pictures
 from studio.capture.video_probe import probe_video
 from studio.errors import FootageError, SessionError
 from studio.geometry.camera import Camera
+from studio.progress import Progress
 from studio.sessions.atomic_files import discard, new_folder_beside
 from studio.sessions.importers.bodytrack import is_bodytrack, plan_bodytrack
 from studio.sessions.importers.catalogue import check_request, watched
@@ -22,7 +23,7 @@ from studio.sessions.importers.checking import check_rig
 from studio.sessions.importers.folder_layout import plan_folder
 from studio.sessions.importers.measuring import MeasuredSource, measure_source, part_name
 from studio.sessions.importers.placing import cameras_that_stay, forget_old, take_in
-from studio.sessions.importers.plan import Progress, SourcePlan
+from studio.sessions.importers.plan import SourcePlan
 from studio.sessions.importers.writing import (
     check_person,
     check_room,

@@ -7,12 +7,13 @@ from pathlib import Path
 
 from studio.capture.calibration_files import read_calibration
 from studio.errors import FootageError, SessionError
+from studio.progress import Progress
 from studio.sessions.atomic_files import discard, move_into_place, new_folder_beside
 from studio.sessions.importers.bodytrack import is_bodytrack, plan_bodytrack
 from studio.sessions.importers.checking import check_rig
 from studio.sessions.importers.folder_layout import plan_folder
 from studio.sessions.importers.measuring import measure_source
-from studio.sessions.importers.plan import ImportCancelled, Progress, SourcePlan
+from studio.sessions.importers.plan import ImportCancelled, SourcePlan
 from studio.sessions.importers.writing import check_person, check_room, write_session
 from studio.sessions.manifest import CameraMatch
 from studio.sessions.session import Session
