@@ -144,7 +144,7 @@ def fit_session_subject(
     tell("refining lengths and radii", 0, 1)
     borders = [silhouette_distances(one) for one in evidence]
     refiner = ShapeRefiner(silhouettes.programs, session.cameras(), borders, prior)
-    refined = refiner.refine(found.shape, found.poses, asked.seed)
+    refined = refiner.refine(found.shape, found.poses, asked.seed, others=(start,))
     fitted = space.body_of(refined.shape)
     return FittedSubject(
         subject_of(subject, fitted),

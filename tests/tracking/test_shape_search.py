@@ -38,7 +38,7 @@ def refined(person: DrawnPerson, seed: int) -> RefinedShape:
     prior = ShapePrior(space, ShapeSpreads(), person.told_height)
     borders = [silhouette_distances(frame) for frame in person.frames]
     refiner = ShapeRefiner(ShapePrograms(space), person.cameras, borders, prior)
-    return refiner.refine(found.shape, found.poses, seed)
+    return refiner.refine(found.shape, found.poses, seed, others=(person.poses,))
 
 
 def errors(person: DrawnPerson, shape: NDArray[np.float64]) -> NDArray[np.float64]:
