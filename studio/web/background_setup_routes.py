@@ -17,6 +17,7 @@ from studio.runs.mask_quality import MaskQuality, mask_quality
 from studio.runs.overlay_pictures import forget_composers
 from studio.runs.session_settings import session_settings
 from studio.sessions.background_files import exclusion_path, read_evidence, set_backgrounds
+from studio.sessions.inner_paths import place_in, relative_path
 from studio.sessions.made_from import note, origin_of
 from studio.sessions.session import Session
 from studio.settings import values
@@ -31,7 +32,6 @@ from studio.web.background_schemas import (
 )
 from studio.web.doors import Door, Doors
 from studio.web.job_kinds import BACKGROUND
-from studio.web.safe_paths import place_in, relative_path
 from studio.web.session_routes import OpenSession
 from studio.web.setting_views import knob_view
 from studio.web.upload_routes import forget, upload_folder

@@ -12,12 +12,12 @@ from studio.body.catalogue import list_bodies, load_body
 from studio.errors import BehaviourError, NotFoundError
 from studio.knobs import knobs_of
 from studio.runs.behaviour_models import SUFFIX, models_folder
+from studio.sessions.archives import ENDINGS, unpacked
 from studio.sessions.names import checked_name
 from studio.sessions.session import BODIES_NAME
 from studio.synthesis.recipe_file import recipe_names
 from studio.training.oversampling import OversamplingSettings
 from studio.training.sources import FPS, MOTION_FILES
-from studio.web.archives import ZIP, unpack_upload
 from studio.web.behaviour_learning_schemas import LearningChoices, LearningProgress, LearningRequest
 from studio.web.doors import Door, Doors
 from studio.web.setting_views import knob_view
@@ -41,7 +41,7 @@ def choices(doors: Door) -> LearningChoices:
         bodies=list(list_bodies((doors.workspace.root / BODIES_NAME,))),
         default_body=DEFAULT_BODY,
         fps=FPS,
-        endings=[*MOTION_FILES, SKELETON, ZIP],
+        endings=[*MOTION_FILES, SKELETON, *ENDINGS],
         recipes=list(recipe_names()),
         progress=None if state is None else progress_of(state),
     )
@@ -122,7 +122,7 @@ def _check(source: str, doors: Doors) -> None:
 
 def _motion_in(folder: Path) -> tuple[str, ...]:
     """The motion files of an upload, out of its archive if it is one. Raises BehaviourError where there are none."""
-    files = [path for path in unpack_upload(folder).rglob("*") if path.is_file()]
+    files = [path for path in unpacked(folder).rglob("*") if path.is_file()]
     found = sorted(str(path) for path in files if path.suffix.lower() in MOTION_FILES)
     if not found:
         raise BehaviourError(

@@ -3,10 +3,11 @@
 from pathlib import Path
 
 from studio.errors import CalibrationError, NotFoundError
-from studio.web.archives import is_litter, unpack_upload, unwrapped
+from studio.sessions.archives import is_litter, unpacked, unwrapped
+from studio.sessions.inner_paths import PathRefused, place_in, relative_path
 from studio.web.calibration_schemas import FootagePlace
 from studio.web.doors import Doors
-from studio.web.safe_paths import PathRefused, folder_to_import, place_in, relative_path
+from studio.web.safe_paths import folder_to_import
 from studio.web.upload_routes import upload_folder
 
 PARTS = ("intrinsic*", "extrinsic*", "calib*", "cam*")
@@ -15,7 +16,7 @@ PARTS = ("intrinsic*", "extrinsic*", "calib*", "cam*")
 def place_of(doors: Doors, wish: FootagePlace) -> Path:
     """The file or folder that a client means. Raises PathRefused, NotFoundError."""
     if wish.upload is not None:
-        folder = unwrapped(unpack_upload(upload_folder(doors, wish.upload)), PARTS)
+        folder = unwrapped(unpacked(upload_folder(doors, wish.upload)), PARTS)
         return place_in(folder, relative_path(wish.path)) if wish.path else folder
     path = Path(wish.path.strip()).expanduser()
     if path.is_absolute() and path.is_file():

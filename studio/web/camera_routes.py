@@ -15,6 +15,7 @@ from studio.capture.camera_addresses import CameraAddress, camera_address, refus
 from studio.capture.stream_files import preview_jpeg
 from studio.errors import NotFoundError
 from studio.runs.new_run import RunRequest
+from studio.sessions.inner_paths import PathRefused
 from studio.sessions.recordings import calibration_given
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -28,7 +29,7 @@ from studio.web.camera_schemas import (
     SpreadView,
 )
 from studio.web.doors import Door, Doors
-from studio.web.safe_paths import PathRefused, folder_to_import
+from studio.web.safe_paths import folder_to_import
 from studio.worker.camera_tracking import TakeWish
 from studio.worker.commands import Open, Start
 

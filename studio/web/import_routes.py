@@ -15,9 +15,10 @@ from fastapi import APIRouter, Query
 
 from studio.progress import Progress
 from studio.runs.overlay_pictures import forget_composers
+from studio.sessions.archives import FOOTAGE_PARTS, only_archive, unpacked, unwrapped
 from studio.sessions.importers.adding import AddedFootage, FootageWish, add_footage
 from studio.sessions.importers.catalogue import ImportReport, import_source
-from studio.web.archives import only_zip, unpack_upload, unwrapped
+from studio.sessions.inner_paths import PathRefused, relative_path
 from studio.web.background_jobs import Job
 from studio.web.doors import Door, Doors, let_go
 from studio.web.import_schemas import (
@@ -30,7 +31,7 @@ from studio.web.import_schemas import (
 )
 from studio.web.job_kinds import IMPORT
 from studio.web.job_routes import add_job_routes
-from studio.web.safe_paths import PathRefused, folder_to_import, relative_path
+from studio.web.safe_paths import folder_to_import
 from studio.web.samples import install_sample
 from studio.web.schemas import NewName
 from studio.web.session_routes import OpenSession
@@ -43,7 +44,6 @@ Taker = Callable[[Path, Progress, Callable[[], bool]], ImportReport | AddedFoota
 """take(folder, progress, cancelled) reads a source into the workspace."""
 
 FOLDERS_SHOWN = 1000
-PARTS = ("videos", "pictures", "calibration")
 
 
 @router.post("/imports", status_code=202)
@@ -128,10 +128,10 @@ def folders(
 
 
 def _unpacked(folder: Path, job: Job) -> Path:
-    """The uploaded folder itself: out of its zip, and without the folders that only wrap it."""
-    if only_zip(folder):
+    """The uploaded folder itself: out of its archive, and without the folders that only wrap it."""
+    if only_archive(folder):
         job.tell(step="unpacking")
-    return unwrapped(unpack_upload(folder), PARTS)
+    return unwrapped(unpacked(folder), FOOTAGE_PARTS)
 
 
 def _reading(wish: SourceWish) -> dict[str, Any]:

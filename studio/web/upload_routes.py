@@ -15,11 +15,11 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request
 
 from studio.errors import NotFoundError, SessionError, StudioError
+from studio.sessions.inner_paths import place_in, relative_path
 from studio.sessions.names import inside
 from studio.web.doors import Door, Doors
 from studio.web.error_responses import TooLargeError
 from studio.web.import_schemas import FileState, UploadState
-from studio.web.safe_paths import place_in, relative_path
 
 router = APIRouter(prefix="/api/uploads", tags=["importing"])
 

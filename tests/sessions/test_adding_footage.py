@@ -36,6 +36,13 @@ def empty(tmp_path: Path) -> Session:
     return begin_session(tmp_path / "mine")
 
 
+def test_an_archive_is_added_like_its_folder(tmp_path: Path, empty: Session, raw: Path) -> None:
+    packed = Path(shutil.make_archive(str(tmp_path / "take"), "zip", raw))
+    added = add_footage(empty, packed, FootageWish(fps=60.0))
+    assert added.session.manifest.frame_count == FRAMES
+    assert not [path for path in empty.path.parent.iterdir() if path.name.startswith(".partial")]
+
+
 def test_an_empty_session_takes_bare_footage(empty, raw):
     added = add_footage(empty, raw, FootageWish(fps=60.0))
     source = added.session.manifest.footage

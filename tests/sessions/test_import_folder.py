@@ -11,6 +11,7 @@ from toy_footage import number_of, numbered_frame, rig, write_pictures, write_vi
 
 from studio.capture.trc import read_trc
 from studio.errors import CalibrationError, FootageError, SessionError
+from studio.sessions.archives import ArchiveError
 from studio.sessions.importers.catalogue import import_source
 from studio.sessions.importers.plan import ImportCancelled
 
@@ -245,3 +246,24 @@ def test_the_balancing_man(real_data: Path, tmp_path: Path) -> None:
         other.release()
         for number in (70, 3):
             assert np.abs(footage.picture(camera, number).astype(int) - frames[number]).mean() < 2.0
+
+
+@pytest.mark.parametrize("kind", ["zip", "gztar"])
+def test_an_archive_is_imported_like_its_folder(tmp_path: Path, kind: str) -> None:
+    source = video_source(tmp_path / "source")
+    packed = Path(shutil.make_archive(str(tmp_path / "take"), kind, source))
+    plain = import_source(source, tmp_path / "plain").session
+    made = import_source(packed, tmp_path / "sessions" / "made").session
+    assert made.manifest.footage == plain.manifest.footage
+    assert made.manifest.title == "take"
+    assert [path.name for path in (tmp_path / "sessions").iterdir()] == ["made"]
+
+
+def test_an_archive_cannot_stay_where_it_is_and_a_broken_one_leaves_nothing(tmp_path: Path) -> None:
+    packed = tmp_path / "take.tar.gz"
+    packed.write_bytes(b"no tar")
+    with pytest.raises(FootageError, match=r"'take\.tar\.gz' cannot stay"):
+        import_source(packed, tmp_path / "sessions" / "made", copy=False)
+    with pytest.raises(ArchiveError, match=r"take\.tar\.gz"):
+        import_source(packed, tmp_path / "sessions" / "made")
+    assert not list((tmp_path / "sessions").iterdir())

@@ -8,14 +8,8 @@ import pytest
 from web_doubles import Studio, cookie_header
 
 from studio.errors import NotFoundError
-from studio.web.safe_paths import (
-    PathRefused,
-    default_footage_roots,
-    folder_to_import,
-    is_link,
-    place_in,
-    relative_path,
-)
+from studio.sessions.inner_paths import PathRefused, place_in, relative_path
+from studio.web.safe_paths import default_footage_roots, folder_to_import
 
 WRONG_NAMES = [
     "", ".", "..", "../a", "a/../b", "/etc/passwd", "a//b", "a/", "a\\b", "..\\a", "C:a", "C:/a", "a\0b", "a\nb",
@@ -78,14 +72,6 @@ def test_footage_roots_never_hold_the_whole_disk(monkeypatch: pytest.MonkeyPatch
     roots = default_footage_roots(tmp_path)
     assert tmp_path.resolve() in roots
     assert Path("/") not in roots
-
-
-def test_modes_of_links_and_devices() -> None:
-    assert is_link(0o120777)
-    assert is_link(0o020666)
-    assert not is_link(0o100644)
-    assert not is_link(0o040755)
-    assert not is_link(0)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ export function adder(place, way, done) {
   const going = element("div", {});
   const wrong = element("p", { className: "wrong", role: "alert", hidden: true });
   const remedy = element("p", { className: "hint", hidden: true });
-  const files = element("input", { type: "file", multiple: true, name: "files", accept: "video/*,image/*,.zip,.toml,.csv,.yml,.json" });
+  const files = element("input", { type: "file", multiple: true, name: "files", accept: "video/*,image/*,.zip,.tar,.gz,.tgz,.bz2,.xz,.toml,.csv,.yml,.json" });
   const folder = element("input", { type: "file", multiple: true, name: "folder" });
   folder.setAttribute("webkitdirectory", "");
   const source = element("input", { type: "text", name: "source", placeholder: "full path" });
@@ -28,7 +28,7 @@ export function adder(place, way, done) {
   const elsewhere = element("p", { className: "hint" }, "Cameras that are connected now (USB, RTSP, MJPEG) are looked at and recorded under ", element("a", { href: "/recording", textContent: "Live cameras" }), ".");
   const folders = element("div", { className: "folder-list" });
   place.append(summary, element("div", { className: "footage-form" },
-    element("label", {}, "Videos, one per camera (or a .zip of all)", files),
+    element("label", {}, "Videos, one per camera (or a zip or tar of all)", files),
     element("label", {}, "or a folder: videos/, pictures, masks/, background/, calibration/; Pose2Sim, FreeMoCap, Caliscope, anipose and EasyMocap layouts too", folder),
     element("label", {}, "or a folder of the computer that the studio runs on", source), folders,
     element("label", { className: "check" }, refer, "refer to it where it lies instead of copying it"),

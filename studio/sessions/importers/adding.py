@@ -16,9 +16,10 @@ from studio.capture.video_probe import probe_video
 from studio.errors import FootageError, SessionError
 from studio.geometry.camera import Camera
 from studio.progress import Progress
+from studio.sessions.archives import FOOTAGE_PARTS, folder_of
 from studio.sessions.atomic_files import discard, new_folder_beside
 from studio.sessions.importers.bodytrack import is_bodytrack, plan_bodytrack
-from studio.sessions.importers.catalogue import check_request, watched
+from studio.sessions.importers.catalogue import check_request, import_watched
 from studio.sessions.importers.checking import check_rig
 from studio.sessions.importers.folder_layout import plan_folder
 from studio.sessions.importers.measuring import MeasuredSource, measure_source, part_name
@@ -74,17 +75,23 @@ def add_footage(
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> AddedFootage:
-    """Add a source's footage (with masks and backgrounds) to a session.
+    """Add the footage (with masks and backgrounds) of a folder, or of an archive of one, to a session.
 
     A session that is calibrated keeps its calibration, which has to name every camera; else the source's is taken
     over where it has one (and subject, start pose and truth, where the session has none). A camera that is there
     already gets the new footage. All is read before anything changes; whatever fails, the session stays as it was.
     Raises StudioError.
     """
-    asked, report = wish or FootageWish(), watched(progress, cancelled)
-    check_request(source, asked.fps)
+    asked, report = wish or FootageWish(), import_watched(progress, cancelled)
+    check_request(source, asked.fps, asked.copy)
     _check_idle(session)
-    plan = _plan(session, source.resolve(), asked)
+    with folder_of(source.resolve(), FOOTAGE_PARTS, session.path / "take") as folder:
+        return _added(session, folder, asked, report)
+
+
+def _added(session: Session, source: Path, asked: FootageWish, report: Progress) -> AddedFootage:
+    """`add_footage` from a folder."""
+    plan = _plan(session, source, asked)
     person = check_person(plan)
     if asked.copy:
         check_room(plan, session.path)

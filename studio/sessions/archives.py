@@ -1,0 +1,246 @@
+"""Footage out of an archive and its wrapping. An archive is not believed: counted, limited, and nothing leads out.
+
+Sizes in an archive's index are claims, so the bytes are counted as they are written. Links, devices, encrypted entries,
+names that lead out and names that appear twice are refused before anything is written.
+"""
+
+import contextlib
+import lzma
+import shutil
+import stat
+import tarfile
+import zipfile
+import zlib
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import IO
+
+from studio.errors import StudioError
+from studio.sessions.atomic_files import discard, new_folder_beside
+from studio.sessions.inner_paths import place_in, relative_path
+
+CHUNK = 1 << 20
+GIGABYTE = 1 << 30
+UNPACKED = "unpacked"
+TARS = (".tar", ".tar.gz", ".tgz", ".tar.bz2", ".tar.xz")
+ENDINGS = (".zip", *TARS)
+FOOTAGE_PARTS = ("videos", "pictures", "calibration")
+"""Folders that are part of a source even where they stand alone in it."""
+LITTER = frozenset(("__MACOSX", "Thumbs.db", "desktop.ini"))
+BROKEN = (
+    zipfile.BadZipFile,
+    tarfile.TarError,
+    zlib.error,
+    lzma.LZMAError,
+    EOFError,
+    NotImplementedError,
+    RuntimeError,
+    FileExistsError,
+)
+
+
+class ArchiveError(StudioError):
+    """An archive that cannot be unpacked safely."""
+
+    status, code = 422, "archive"
+
+
+@dataclass(frozen=True, slots=True)
+class ArchiveLimits:
+    """entries : files and folders. total : bytes unpacked. ratio : of unpacked to packed, beyond `free`
+    bytes.
+    """
+
+    entries: int = 20_000
+    total: int = 40 * GIGABYTE
+    ratio: float = 200.0
+    free: int = 64 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """name : with forward slashes. mode : its file mode, 0 if unknown. claimed : bytes, as the index says."""
+
+    name: str
+    is_folder: bool
+    mode: int
+    encrypted: bool
+    claimed: int
+    open: Callable[[], IO[bytes]]
+
+
+def is_archive(path: Path) -> bool:
+    """Whether a file's name is that of an archive which can be unpacked."""
+    return path.name.lower().endswith(ENDINGS)
+
+
+def only_archive(folder: Path) -> Path | None:
+    """The archive that is all a folder holds, None where it is none or there is more."""
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    return files[0] if len(files) == 1 and is_archive(files[0]) else None
+
+
+def unwrapped(folder: Path, parts: Collection[str]) -> Path:
+    """The folder itself, without folders that hold nothing but it. parts : patterns of names (small letters) that are
+    no wrapping, even of a folder that stands alone.
+    """
+    while len(inside := [path for path in folder.iterdir() if not is_litter(path.name)]) == 1:
+        if not inside[0].is_dir() or any(fnmatch(inside[0].name.lower(), part) for part in parts):
+            break
+        folder = inside[0]
+    return folder
+
+
+def is_litter(name: str) -> bool:
+    """Whether a name is something that systems leave in folders."""
+    return name.startswith(".") or name in LITTER
+
+
+def unpack(archive: Path, folder: Path, limits: ArchiveLimits | None = None) -> int:
+    """Unpack a zip or tar into `folder`, which must be empty, and return the bytes written.
+
+    Raises ArchiveError, PathRefused; what was written until then is the caller's to remove.
+    """
+    allowed = limits or ArchiveLimits()
+    try:
+        with _entries(archive) as found:
+            entries = _checked(found, allowed)
+            most = min(allowed.total, max(allowed.free, int(archive.stat().st_size * allowed.ratio)))
+            most = min(most, shutil.disk_usage(folder).free - GIGABYTE)
+            written = 0
+            for entry in entries:
+                place = place_in(folder, relative_path(entry.name))
+                if entry.is_folder:
+                    place.mkdir(parents=True, exist_ok=True)
+                    continue
+                place.parent.mkdir(parents=True, exist_ok=True)
+                written += _unpack_one(entry, place, most - written)
+            return written
+    except BROKEN as error:
+        raise _broken(archive, error) from None
+    except OSError as error:
+        if error.errno is None:  # what gzip and bz2 say of data that are none
+            raise _broken(archive, error) from None
+        raise
+
+
+def unpacked(folder: Path) -> Path:
+    """A folder, or what its only archive holds, which is removed then. Raises ArchiveError, PathRefused."""
+    archive = only_archive(folder)
+    if archive is None:
+        return folder
+    target = folder / UNPACKED
+    target.mkdir()
+    try:
+        unpack(archive, target)
+    except StudioError:
+        shutil.rmtree(target, ignore_errors=True)
+        raise
+    archive.unlink()
+    return target
+
+
+@contextlib.contextmanager
+def folder_of(source: Path, parts: Collection[str], beside: Path) -> Iterator[Path]:
+    """A source's folder: itself, or what an archive holds, unpacked beside `beside` for as long as it is in use.
+
+    parts : as of `unwrapped`. Raises ArchiveError, PathRefused.
+    """
+    if not (source.is_file() and is_archive(source)):
+        yield source
+        return
+    folder = new_folder_beside(beside)
+    inside = folder / (source.name.partition(".")[0] or UNPACKED)
+    try:
+        inside.mkdir()
+        unpack(source, inside)
+        yield unwrapped(inside, parts)
+    finally:
+        discard(folder)
+
+
+@contextlib.contextmanager
+def _entries(archive: Path) -> Iterator[Iterator[_Entry]]:
+    if archive.name.lower().endswith(TARS):
+        with tarfile.open(archive) as tar:
+            yield (_tar_entry(tar, member) for member in tar if member.name not in (".", "./"))
+    else:
+        with zipfile.ZipFile(archive) as packed:
+            yield (_zip_entry(packed, info) for info in packed.infolist())
+
+
+def _zip_entry(packed: zipfile.ZipFile, info: zipfile.ZipInfo) -> _Entry:
+    return _Entry(
+        info.filename.rstrip("/"),
+        info.is_dir(),
+        info.external_attr >> 16,
+        bool(info.flag_bits & 1),
+        info.file_size,
+        lambda: packed.open(info),
+    )
+
+
+def _tar_entry(tar: tarfile.TarFile, member: tarfile.TarInfo) -> _Entry:
+    def content() -> IO[bytes]:
+        opened = tar.extractfile(member)
+        if opened is None:
+            raise tarfile.TarError(f"'{member.name}' has no content")
+        return opened
+
+    known = member.isfile() or member.isdir()
+    mode = 0 if known else stat.S_IFLNK
+    name = member.name.removeprefix("./").rstrip("/")
+    return _Entry(name, member.isdir(), mode, False, member.size, content)
+
+
+def _checked(found: Iterator[_Entry], limits: ArchiveLimits) -> list[_Entry]:
+    """All entries. A tar's index is what lies before each file, so it is refused as soon as it claims too much."""
+    entries: list[_Entry] = []
+    seen: set[str] = set()
+    claimed = 0
+    for entry in found:
+        entries.append(entry)
+        claimed += entry.claimed
+        if len(entries) > limits.entries:
+            raise ArchiveError(
+                f"The archive has more than {limits.entries} entries.",
+                f"Keep it under {limits.entries}, or import by path.",
+            )
+        if claimed > limits.total:
+            raise _too_much(entry)
+        name = str(relative_path(entry.name)).lower()
+        if stat.S_IFMT(entry.mode) not in (0, stat.S_IFREG, stat.S_IFDIR):
+            raise ArchiveError(f"'{entry.name}' in the archive is a link.", "Pack the file itself.")
+        if entry.encrypted:
+            raise ArchiveError(f"'{entry.name}' in the archive is encrypted.", "Pack it without a password.")
+        if name in seen:
+            raise ArchiveError(f"'{entry.name}' is in the archive twice.", "Pack the folder again.")
+        seen.add(name)
+    return entries
+
+
+def _unpack_one(entry: _Entry, place: Path, most: int) -> int:
+    """Write one file, refusing to go beyond `most` bytes."""
+    written = 0
+    with entry.open() as source, place.open("xb") as target:
+        while chunk := source.read(CHUNK):
+            written += len(chunk)
+            if written > most:
+                raise _too_much(entry)
+            target.write(chunk)
+    return written
+
+
+def _broken(archive: Path, error: Exception) -> ArchiveError:
+    return ArchiveError(
+        f"'{archive.name}' is not an archive that can be unpacked ({error}).", "Pack the folder again."
+    )
+
+
+def _too_much(entry: _Entry) -> ArchiveError:
+    return ArchiveError(
+        f"The archive unpacks to more than is allowed (at '{entry.name}').",
+        "Import the folder by its path, or pack less.",
+    )
