@@ -111,12 +111,11 @@ def test_masks_are_usable_in_all_views(way: Way) -> None:
 
 
 def test_the_model_lies_in_the_masks(way: Way) -> None:
-    """At least 85 % of the model's pixels in every tenth frame; in no single view much less."""
+    """At least 85 % of the model's pixels, in every tenth frame, in each view."""
     shares = np.array(way.check.inside, dtype=np.float64)
     print(np.round(shares, 3))
     print(way.check.in_words())
-    assert float(shares.mean(axis=1).min()) >= 0.85
-    assert float(shares.min()) >= 0.82
+    assert float(shares.min()) >= 0.85
 
 
 def test_left_and_right_are_not_swapped(way: Way) -> None:
