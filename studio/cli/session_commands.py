@@ -45,7 +45,7 @@ def import_command(
     despite_findings: bool,
     copy: bool,
 ) -> dict[str, object]:
-    """Make a session from a folder of footage and calibration, checking one against the other.
+    """Make a session from a folder (or an archive) of footage and calibration, checking one against the other.
 
     Folders of Pose2Sim, FreeMoCap, Caliscope, anipose, EasyMocap and PARSEC are recognised.
     """
