@@ -144,8 +144,8 @@ class _Cleaning:
     def _plate(self, name: str, taken: Bytes) -> CleanPlate:
         """taken : (K, h, w) of `_covers`."""
         stack = np.empty((len(self.frames), *self.first[name].mean.shape), np.uint8)
-        for row, frame in zip(stack, self.frames, strict=True):
-            row[:] = self.footage.picture(name, frame)
+        for row, frame in enumerate(self.frames):
+            stack[row] = self.footage.picture(name, frame)
         fallback = np.clip(np.rint(self.first[name].mean), 0, 255).astype(np.uint8)
         picture, empty = median_of_empty(stack, taken, fallback)
         never = empty < FEWEST_EMPTY
