@@ -3,7 +3,7 @@
 A shape (`body.shape_space`) is a few logarithms. Lengths vary by a common factor (tall and short people) and each on
 its own; radii each on its own. The height is believed as far as it was said to be known, but with Cauchy's law: a guess
 that is wrong by many times that costs little more than one wrong by a few, so that silhouettes overrule it. (A real man
-of 1.72 m, told as 1.80 m: 1.77 m with a Student's t of three degrees of freedom, 1.75 m with Cauchy's, 1.75 m from his
+of 1.72 m, told as 1.80 m: 1.77 m with a Student's t of three degrees of freedom, 1.76 m with Cauchy's, 1.75 m from his
 silhouettes alone; people whose height was told within 3 cm come out the same.)
 """
 
