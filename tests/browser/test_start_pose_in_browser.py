@@ -32,7 +32,7 @@ def test_a_start_pose_is_made_better_and_edited(browser: Browser, studio: Studio
     window = StudioPage(browser, studio, with_scene=False)
     page = window.page
     page.goto(f"{studio.origin}/way?session=toy&step=start-pose")
-    page.get_by_text("The session has a start pose.").wait_for()
+    page.get_by_text("The session has a start pose, of frame 0.").wait_for()
     page.get_by_alt_text("front, frame 0, start pose").wait_for()
     before = studio.get(POSE)["pose"]
     page.get_by_role("button", name="Refine from here").click()
