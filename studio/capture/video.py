@@ -123,6 +123,8 @@ class VideoReader:
             if self._container is not None:
                 self._container.close()
             self._container = None
+            # What yields frames holds the decoder with all its buffers.
+            self._frames = iter(())
 
     def _go_to(self, index: int) -> None:
         """Place the decoder so that frame `index` is at most a keyframe's distance ahead."""
