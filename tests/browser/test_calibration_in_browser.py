@@ -63,7 +63,17 @@ def test_cameras_from_a_board(window: StudioPage, studio: StudioServer, takes: P
         page.get_by_label(label).fill(str(value))
     page.get_by_label("or on this computer").fill(str(takes))
     page.get_by_label("Board on the floor in frame").fill(str(FLOOR_FRAME))
-    page.get_by_role("button", name="Calibrate", exact=True).click()
+    page.get_by_text("More", exact=True).click()
+    page.get_by_role("button", name="Add a measured distance").click()
+    apart = float(np.linalg.norm(CAMERAS[0].centre - CAMERAS[1].centre))
+    page.get_by_label("Millimetres between their lenses").fill(f"{apart:.0f}")
+    page.get_by_label("let the lenses move a little").check()
+    with page.expect_request(lambda request: request.url.endswith("/calibration/solve")) as asked:
+        page.get_by_role("button", name="Calibrate", exact=True).click()
+    wish = asked.value.post_data_json
+    names = [camera.name for camera in CAMERAS]
+    assert wish["distances"] == [{"first": names[0], "second": names[1], "mm": round(apart)}]
+    assert wish["refine_lenses"] is True
     page.get_by_role("button", name="Use this calibration").wait_for()
     assert page.locator(".rig polygon").count() == 2
     assert page.locator(".residuals rect").count() >= 20
@@ -90,6 +100,7 @@ def test_the_floor_is_clicked(window: StudioPage, studio: StudioServer, artefact
         page.locator(".point-list button").nth(number).click()
         for index, camera in enumerate(CAMERAS):
             image = page.locator(".clickable img").nth(index)
+            image.evaluate("image => image.decode()")  # before it is there it has no size to click in
             image.scroll_into_view_if_needed()
             box = image.bounding_box()
             assert box is not None
