@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Playwright, sync_playwright
+from studio_page import StudioPage
 from studio_server import StudioServer
+from toy_session import make_session
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 ARGUMENTS = [
@@ -48,6 +50,23 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
     studio = StudioServer("demo", tmp_path_factory.mktemp("demo") / "workspace")
     yield studio
     studio.stop()
+
+
+@pytest.fixture
+def toy_studio(tmp_path: Path) -> Iterator[StudioServer]:
+    """`studio serve` on the toy arm."""
+    make_session(tmp_path / "workspace" / "toy")
+    made = StudioServer("serve", tmp_path / "workspace")
+    yield made
+    made.stop()
+
+
+@pytest.fixture(scope="module")
+def window(browser: Browser, studio: StudioServer) -> Iterator[StudioPage]:
+    """One window, its scene left blank, for all tests of a file that has a `studio`; they go on from one another."""
+    opened = StudioPage(browser, studio, with_scene=False)
+    yield opened
+    opened.close()
 
 
 @pytest.fixture(scope="session")

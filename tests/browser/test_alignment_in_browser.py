@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 from nudged_camera import make_nudged_session
-from page_watch import PageWatch
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
+from studio_page import StudioPage
 from studio_server import StudioServer
 
 from studio.sessions.session import CAMERAS_PATH
@@ -29,22 +29,14 @@ def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
     made.stop()
 
 
-@pytest.fixture
-def page(browser: Browser, studio: StudioServer) -> Iterator[Page]:
+@pytest.fixture(scope="module")
+def page(window: StudioPage) -> Page:
     """A window on the guided way."""
-    context = browser.new_context(viewport={"width": 1280, "height": 800}, color_scheme="dark")
-    context.set_default_timeout(PATIENCE)
-    opened = context.new_page()
-    watch = PageWatch(opened, studio.origin)
-    opened.goto(studio.address)
-    yield opened
-    context.close()
-    watch.check()
+    window.context.set_default_timeout(PATIENCE)
+    return window.page
 
 
-def test_a_nudged_camera_is_turned_and_turned_back(
-    page: Page, studio: StudioServer, artefacts: Path
-) -> None:
+def test_a_nudged_camera_is_turned_and_turned_back(page: Page, studio: StudioServer, artefacts: Path) -> None:
     place = studio.workspace / "nudged" / CAMERAS_PATH
     before = place.read_bytes()
     page.goto(f"{studio.origin}/way?session=nudged&step=background")

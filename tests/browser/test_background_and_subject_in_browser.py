@@ -6,9 +6,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from page_watch import PageWatch
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 from sized_sessions import make_sized_session
+from studio_page import StudioPage
 from studio_server import StudioServer
 
 from studio.sessions.workspace import Workspace
@@ -30,16 +30,10 @@ def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
 
 
 @pytest.fixture(scope="module")
-def page(browser: Browser, studio: StudioServer) -> Iterator[Page]:
+def page(window: StudioPage) -> Page:
     """A window on the guided way."""
-    context = browser.new_context(viewport={"width": 1280, "height": 800}, color_scheme="dark")
-    context.set_default_timeout(PATIENCE)
-    opened = context.new_page()
-    watch = PageWatch(opened, studio.origin)
-    opened.goto(studio.address)
-    yield opened
-    context.close()
-    watch.check()
+    window.context.set_default_timeout(PATIENCE)
+    return window.page
 
 
 def step(page: Page, studio: StudioServer, name: str) -> None:

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser
 from scene_wire import until
 from studio_page import StudioPage
 from studio_server import StudioServer
@@ -21,14 +20,6 @@ def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
     made = StudioServer("serve", tmp_path_factory.mktemp("serve") / "workspace")
     yield made
     made.stop()
-
-
-@pytest.fixture(scope="module")
-def window(browser: Browser, studio: StudioServer) -> Iterator[StudioPage]:
-    """One window for all tests of this file, which go on from one another."""
-    opened = StudioPage(browser, studio, with_scene=False)
-    yield opened
-    opened.close()
 
 
 def names(window: StudioPage) -> list[str]:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Locator
+from playwright.sync_api import Locator
 from scene_wire import until
 from studio_page import StudioPage
 from studio_server import StudioServer
@@ -28,14 +28,6 @@ def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
     made.post("/api/samples", {"name": "walk"})
     yield made
     made.stop()
-
-
-@pytest.fixture(scope="module")
-def window(browser: Browser, studio: StudioServer) -> Iterator[StudioPage]:
-    """One window for all tests of this file."""
-    opened = StudioPage(browser, studio, with_scene=False)
-    yield opened
-    opened.close()
 
 
 @pytest.fixture

@@ -1,7 +1,7 @@
 """A frame put right by hand on the page, tracked on and backwards; tracks made from the run's menu and chosen."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Browser
 from studio_page import StudioPage
 from studio_server import StudioServer
-from toy_session import FRAMES, make_session, true_poses
+from toy_session import FRAMES, true_poses
 
 pytestmark = pytest.mark.browser
 
@@ -18,18 +18,13 @@ QUICK = {"particles": 40, "layers": 4, "start_repeats": 1, "recovery": "off"}
 
 
 @pytest.fixture
-def studio(tmp_path: Path) -> Iterator[StudioServer]:
-    """`studio serve` on the toy arm, with a run that is tracked to its end."""
-    workspace = tmp_path / "workspace"
-    workspace.mkdir()
-    make_session(workspace / "toy")
-    made = StudioServer("serve", workspace)
+def studio(toy_studio: StudioServer) -> StudioServer:
+    """The toy arm, with a run that is tracked to its end."""
     start = (true_poses()[0] + [1.2, -2.0, 1.8, -1.5]).tolist()
-    made.post(RUN, {"name": "one", "start_pose": start, "settings": QUICK})
-    made.post(f"{RUN}/one/start")
-    made.until(lambda state: state["run"] == "one" and state["state"] == "finished")
-    yield made
-    made.stop()
+    toy_studio.post(RUN, {"name": "one", "start_pose": start, "settings": QUICK})
+    toy_studio.post(f"{RUN}/one/start")
+    toy_studio.until(lambda state: state["run"] == "one" and state["state"] == "finished")
+    return toy_studio
 
 
 def opened(browser: Browser, studio: StudioServer) -> StudioPage:

@@ -1,14 +1,11 @@
 """The guided way's start pose: made better from the page, edited by hand, shown in every view."""
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import numpy as np
 import pytest
 from playwright.sync_api import Browser
 from studio_page import StudioPage
 from studio_server import StudioServer
-from toy_session import make_session, true_poses
+from toy_session import true_poses
 
 pytestmark = pytest.mark.browser
 
@@ -16,16 +13,11 @@ POSE = "/api/sessions/toy/start-pose"
 
 
 @pytest.fixture
-def studio(tmp_path: Path) -> Iterator[StudioServer]:
-    """`studio serve` on the toy arm, whose start pose is a little off."""
-    workspace = tmp_path / "workspace"
-    workspace.mkdir()
-    make_session(workspace / "toy")
-    made = StudioServer("serve", workspace)
+def studio(toy_studio: StudioServer) -> StudioServer:
+    """The toy arm, whose start pose is a little off."""
     off = true_poses()[0] + np.array([0.12, -0.1, 0.1, -0.08])
-    made.post(POSE, {"pose": off.tolist()}, "PUT")
-    yield made
-    made.stop()
+    toy_studio.post(POSE, {"pose": off.tolist()}, "PUT")
+    return toy_studio
 
 
 def test_a_start_pose_is_made_better_and_edited(browser: Browser, studio: StudioServer) -> None:

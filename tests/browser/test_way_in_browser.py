@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from page_watch import PageWatch
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
+from studio_page import StudioPage
 from studio_server import StudioServer
 
 from studio.web.samples import sample_folder
@@ -38,19 +38,10 @@ def studio(tmp_path_factory: pytest.TempPathFactory, raw: Path) -> Iterator[Stud
 
 
 @pytest.fixture(scope="module")
-def page(browser: Browser, studio: StudioServer) -> Iterator[Page]:
+def page(window: StudioPage) -> Page:
     """One window that goes the whole way; the scene is left blank."""
-    context = browser.new_context(
-        viewport={"width": 1280, "height": 800}, color_scheme="dark", accept_downloads=True
-    )
-    context.set_default_timeout(PATIENCE)
-    opened = context.new_page()
-    watch = PageWatch(opened, studio.origin)
-    opened.route("**/scene/**", lambda route: route.fulfill(body="", content_type="text/html"))
-    opened.goto(studio.address)
-    yield opened
-    watch.check()
-    context.close()
+    window.context.set_default_timeout(PATIENCE)
+    return window.page
 
 
 def state_of(page: Page, step: str, state: str) -> None:
