@@ -10,7 +10,7 @@ const pixels = (value) => (value === null ? "–" : `${value.toFixed(1)} px`);
 export function alignmentBox(way, place, changed) {
   const { fetchJson, post, remove, sessionPath } = way.api;
   const here = `${sessionPath(way.session)}/alignment`;
-  const state = { told: null, failed: null, busy: false, stopped: false };
+  const state = { told: null, failed: null, busy: false, stopped: false, asked: false };
 
   function table(job) {
     const head = ["camera", "misses by", "turned by", job.kept ? "misses now by" : "would miss by"];
@@ -39,18 +39,19 @@ export function alignmentBox(way, place, changed) {
     const { job, possible, turned, notes } = state.told;
     place.hidden = !possible;
     const going = job?.state === "running";
-    const measure = button(job?.state === "done" ? "Measure again" : "Measure", begin, "small");
+    const measure = button(job?.state === "done" ? "Measure again" : "Measure", () => { state.asked = true; return begin(); }, "small");
     measure.disabled = going || state.busy;
     measure.setAttribute("aria-label", "Measure whether the cameras agree");
     const bar = element("div", {});
     const failed = state.failed ?? (job?.state === "failed" ? job : null);
+    const alarm = state.asked || state.failed;  // nobody asked for what was measured by itself
     const done = job?.state === "done" ? job : null;
     place.replaceChildren(...[
       element("div", { className: "head-line" }, element("h2", { textContent: "Do the cameras agree?" }), measure), bar,
       done && table(done), done && element("p", { className: done.needed && !done.kept ? "notice" : "hint", textContent: verdict(done) }),
       !done && !going && element("p", { className: "hint", textContent: turned ? "The cameras in use were turned by their silhouettes." : ASKED }),
       actions(done), ...notes.map((note) => element("p", { className: "notice", textContent: note })),
-      failed && element("p", { className: "wrong", role: "alert" }, failed.message, element("span", { className: "hint", textContent: ` ${failed.hint ?? ""}` })),
+      failed && element("p", alarm ? { className: "wrong", role: "alert" } : { className: "hint" }, failed.message, element("span", { className: "hint", textContent: ` ${failed.hint ?? ""}` })),
     ].filter(Boolean));
     if (!going) return;
     const share = job.total ? job.done / job.total : null;
