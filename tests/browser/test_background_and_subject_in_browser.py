@@ -74,7 +74,7 @@ def test_the_background_is_set_up_and_the_views_agree(
     page: Page, studio: StudioServer, artefacts: Path
 ) -> None:
     step(page, studio, "background")
-    page.get_by_role("radio", name="Picture").check()
+    page.get_by_role("radio", name="Picture A picture of").check()
     page.get_by_label("try what makes the views agree best").uncheck()
     page.get_by_role("button", name="Set up the background").click()
     page.get_by_role("button", name="Cancel").wait_for()
