@@ -3,39 +3,17 @@
 import re
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
+from board_takes import PLACES, render_takes, two_cameras
 
 import studio
-from studio.calibration.boards import Board
 from studio.export.bvh_reading import read_bvh
 from studio.notebook.opening import Tracked
-from studio.synthesis.board_footage import BoardRenderer, close_boards, floor_board, waved_boards
-from studio.synthesis.cameras import placed_camera
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "web_assets" / "guide" / "python.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```python\n(.*?)^```$", PAGE, re.DOTALL | re.MULTILINE)
-BOARD = Board("charuco", 6, 5, 120.0, 90.0, "DICT_4X4_50")
-PLACES = ((2600.0, -900.0, 1500.0), (2600.0, 900.0, 1900.0))
-
-
-def board_footage(folder: Path) -> None:
-    """What the page says lies in its folder: pictures of two cameras, the board on the floor in the last common one."""
-    rng = np.random.default_rng(4)
-    cameras = tuple(
-        placed_camera(f"cam{number + 1}", place, (0.0, 0.0, 700.0), size=(800, 600), focal_px=700.0)
-        for number, place in enumerate(PLACES)
-    )
-    renderer = BoardRenderer(BOARD, cameras)
-    common = [*waved_boards(rng, BOARD, cameras, 13, reach=450.0), floor_board((-250.0, 200.0))]
-    for number, camera in enumerate(cameras):
-        for place, poses in (("intrinsics", close_boards(rng, BOARD, camera, 14)), ("extrinsics", common)):
-            pictures = folder / place / camera.name
-            pictures.mkdir(parents=True)
-            for frame, pose in enumerate(poses):
-                cv2.imwrite(str(pictures / f"{frame:03d}.png"), renderer.picture(number, frame, pose))
 
 
 @pytest.mark.timeout(900)
@@ -43,7 +21,9 @@ def test_the_page_runs_from_top_to_bottom(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    board_footage(tmp_path / "board-footage")
+    render_takes(
+        tmp_path / "board-footage", two_cameras((800, 600), (700.0, 700.0)), common_count=13, lens_count=14
+    )
     names: dict[str, object] = {}
     assert len(BLOCKS) >= 9
     for number, block in enumerate(BLOCKS, 1):
