@@ -99,22 +99,6 @@ class Proposals:
         return found
 
 
-def footage_sizes(session: Session) -> dict[str, tuple[int, int]]:
-    """Camera → width, height of a session's footage."""
-    return {source.name: (source.width, source.height) for source in session.manifest.footage.cameras}
-
-
-def how_taken(session: Session, offsets: Mapping[str, int]) -> HowTaken:
-    """How board footage of the session's cameras is read. Raises CalibrationError for a camera that is not there."""
-    sources = session.manifest.footage.cameras
-    unknown = sorted(set(offsets) - {source.name for source in sources}) if sources else []
-    if unknown:
-        raise CalibrationError(
-            f"There is no camera '{unknown[0][:64]}'.", "Name offsets by the footage's cameras."
-        )
-    return HowTaken(dict(offsets), {source.name: source.turned for source in sources}, footage_sizes(session))
-
-
 def proposal_of_file(session: Session, read: Calibration) -> Proposal:
     """What a calibration file gives a session. Raises CalibrationError where it does not fit the footage."""
     fitted = fit_to_session(session, read.cameras, sizes_known=read.sizes_known, read=read)

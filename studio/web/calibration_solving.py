@@ -10,10 +10,11 @@ from studio.calibration.board_folders import find_board_footage
 from studio.calibration.board_footage_reading import list_footage
 from studio.calibration.boards import Board, board_from_text
 from studio.calibration.verbs import calibrate
+from studio.sessions.board_calibration import footage_sizes, how_taken
 from studio.sessions.session import Session
 from studio.web.background_jobs import Job, Report
 from studio.web.calibration_places import place_of
-from studio.web.calibration_proposals import Proposal, footage_sizes, how_taken, proposal_of_boards
+from studio.web.calibration_proposals import Proposal, proposal_of_boards
 from studio.web.calibration_schemas import BoardRequest, SolveState
 from studio.web.doors import Door, Doors
 from studio.web.job_kinds import CALIBRATION
