@@ -73,7 +73,9 @@ def test_half_of_the_error_above_the_floor_goes_and_the_motion_is_smooth(walk: S
         (raw, raw_worst), (refined, refined_worst) = error(run, "raw"), error(run, "refined")
         assert refined - floor < 0.5 * (raw - floor)
         assert refined_worst < raw_worst
-        print(f"raw {raw:.1f}, refined {refined:.1f}, floor {floor:.1f} mm; {made.jitter_after:.1f} mm a frame²")
+        print(
+            f"raw {raw:.1f}, refined {refined:.1f}, floor {floor:.1f} mm; {made.jitter_after:.1f} mm a frame²"
+        )
         assert made.jitter_before > 5.0
         assert made.jitter_after < 5.0
         assert smoothed.jitter_after < made.jitter_after
