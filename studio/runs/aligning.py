@@ -1,6 +1,6 @@
 """A session's cameras turned a little so that its silhouettes agree (`calibration.silhouette_alignment`)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -12,13 +12,13 @@ from studio.calibration.silhouette_checks import outlines_of
 from studio.errors import CalibrationError
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.pipeline import EvidenceMaker
+from studio.progress import Progress
 from studio.runs.mask_quality import spread_frames
 from studio.runs.session_settings import session_settings
 from studio.sessions.calibration_changes import CalibrationChange, NewCalibration, replace_calibration
 from studio.sessions.session import Session
 
 Bytes = NDArray[np.uint8]
-Progress = Callable[[str, int, int], None]
 
 FRAMES = 16
 WORTHWHILE = 3.0

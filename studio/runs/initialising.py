@@ -17,6 +17,7 @@ from studio.body.model import BodyModel
 from studio.errors import RunError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
+from studio.progress import Cancelled, Progress, watched
 from studio.runs.behaviour_models import fitting, model_folders, model_path
 from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import parameter_names, search_space, session_sigma
@@ -47,8 +48,6 @@ HIPS, NEAR, FAR, AHEAD, AROUND = 950.0, 1500.0, 8000.0, 3500.0, 1500.0
 """mm, where a single camera looks: height of hips, how far they may be, how far they are taken to be, and about."""
 SURE_OVERLAP, NO_OVERLAP = 0.75, 0.5
 """f_s of a start pose from which on its fit says nothing against it, and at which nothing speaks for it."""
-
-Progress = Callable[[str, int, int], None]
 
 
 class InitialisationCancelledError(RunError):
@@ -95,7 +94,7 @@ def initialise(
     weighting: str = WEIGHTING,
     seed: int = 0,
     progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancelled | None = None,
 ) -> InitialPose:
     """The pose of the session's body in a frame.
 
@@ -104,7 +103,10 @@ def initialise(
     in the frame, NotFoundError for a frame that is not there.
     """
     tree = body or session.body()
-    tell = _watched(progress, cancelled)
+    ending = InitialisationCancelledError(
+        "The search for a start pose was cancelled.", "Start it again when you like."
+    )
+    tell = watched(progress, cancelled, ending)
     settings = session_settings(session, DEFAULT_TRACKER, weighting)
     prototypes = None
     if behaviour:
@@ -245,17 +247,3 @@ def seek(
         progress=progress,
     )
     return search.run(candidates, known)
-
-
-def _watched(progress: Progress | None, cancelled: Callable[[], bool] | None) -> Progress:
-    """A progress callback that also ends a cancelled search."""
-
-    def tell(step: str, done: int, total: int) -> None:
-        if cancelled is not None and cancelled():
-            raise InitialisationCancelledError(
-                "The search for a start pose was cancelled.", "Start it again when you like."
-            )
-        if progress is not None:
-            progress(step, done, total)
-
-    return tell

@@ -3,7 +3,6 @@
 The weighting judges: what comes out is never worse in its eyes than what was given.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from studio.body.branches import within_limits
 from studio.errors import RunError
 from studio.evidence.distance_maps import silhouette_distances
+from studio.progress import Cancelled, Progress, watched
 from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import search_space, session_sigma
 from studio.runs.session_settings import session_settings
@@ -34,8 +34,6 @@ SHORT = {"particles": 150, "layers": 8, "start_repeats": 1}
 HAND_FPS = 15.0
 """A hand is as far off as a body moves in one frame at that rate."""
 STEP = "searching around the pose"
-
-Progress = Callable[[str, int, int], None]
 
 
 class PoseSearchCancelledError(RunError):
@@ -64,7 +62,7 @@ def better_pose(
     run: StoredRun | None = None,
     seed: int = 0,
     progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancelled | None = None,
 ) -> BetterPose:
     """The best pose near a given one (D,) in a frame. run : whose body, cameras and weighting count; None: the
     session's.
@@ -92,15 +90,17 @@ def better_pose(
             "Choose a frame in which the person is in view, or check the masks.",
         )
     layers, done = int(SHORT["layers"]), 0
+    ending = PoseSearchCancelledError(
+        "The search around the pose was cancelled.", "Start it again when you like."
+    )
+    tell = watched(progress, cancelled, ending)
 
     def checked(_: object) -> None:
         nonlocal done
         done += 1
-        _ask(cancelled)
-        if progress is not None:
-            progress(STEP, done, layers + 1)
+        tell(STEP, done, layers + 1)
 
-    _ask(cancelled)
+    tell(STEP, done, layers + 1)
     space = search_space(body, session_sigma(session, body, min(HAND_FPS, session.manifest.fps)))
     found = search_frame(
         TRACKERS[TRACKER],
@@ -119,8 +119,7 @@ def better_pose(
     weights = problem.weigh(np.stack([given, begin, refined]))
     best = [given, begin, refined][int(np.argmax(weights))]
     onlooker = Onlooker(body, problems.cameras)
-    if progress is not None:
-        progress(STEP, layers + 1, layers + 1)
+    tell(STEP, layers + 1, layers + 1)
     return BetterPose(
         pose=best,
         gain=float(weights.max() - weights[0]),
@@ -150,10 +149,3 @@ def _short_settings(session: Session, run: StoredRun | None) -> RunSettings:
         settings.recovery,
         settings.recording,
     )
-
-
-def _ask(cancelled: Callable[[], bool] | None) -> None:
-    if cancelled is not None and cancelled():
-        raise PoseSearchCancelledError(
-            "The search around the pose was cancelled.", "Start it again when you like."
-        )

@@ -3,7 +3,6 @@
 A track says in `made_by` what it was made from and how, so that it can be made again.
 """
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import marker_points
 from studio.errors import RunError
+from studio.progress import Cancelled, Progress, watched
 from studio.runs.refined_frames import refined_frames
 from studio.runs.search_space import search_space
 from studio.runs.tracks import RAW, Track, read_track, stretches, track_names, write_track
@@ -23,8 +23,6 @@ from studio.tracking.smoothing import Smoothed, SmoothingSettings, rms_second_di
 Array = NDArray[np.float64]
 
 REFINED, SMOOTHED = "refined", "smoothed"
-
-Progress = Callable[[str, int, int], None]
 
 
 class MakingCancelledError(RunError):
@@ -60,7 +58,7 @@ def refine_run(
     settings: RefinementSettings | None = None,
     replace: bool = False,
     progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancelled | None = None,
 ) -> MadeTrack:
     """Refine every frame of a track and keep the result as another (`runs.refined_frames` says how).
 
@@ -70,15 +68,12 @@ def refine_run(
     """
     knobs = settings or RefinementSettings()
     track = _begun(run, source, into, replace)
-    total = len(track.frames)
-
-    def read(done: int) -> None:
-        _ask(cancelled)
-        if progress is not None:
-            progress(f"refining {run.name}", done, total)
-
-    _ask(cancelled)
-    found = refined_frames(session, run, track, knobs, read)
+    ending = MakingCancelledError(
+        "Refining was cancelled, nothing was kept.", "Start it again when you like."
+    )
+    tell, step, total = watched(progress, cancelled, ending), f"refining {run.name}", len(track.frames)
+    tell(step, 0, total)
+    found = refined_frames(session, run, track, knobs, lambda done: tell(step, done, total))
     moved = int(np.count_nonzero((found.poses != track.poses).any(axis=1)))
     made_by = {"verb": "refine", "from": source, **asdict(knobs), "moved": moved}
     made = Track(into, track.frames, found.poses, found.agreement, track.states, made_by)
@@ -179,10 +174,3 @@ def _standing(track: Track, found: Smoothed) -> tuple[Array, tuple[str, ...]]:
     confidence = np.array([track.confidence[at] if at >= 0 else 0.0 for at in rows])
     states = tuple(track.states[at] if at >= 0 else "" for at in rows)
     return np.where(found.filled, 0.0, confidence), states
-
-
-def _ask(cancelled: Callable[[], bool] | None) -> None:
-    if cancelled is not None and cancelled():
-        raise MakingCancelledError(
-            "Refining was cancelled, nothing was kept.", "Start it again when you like."
-        )

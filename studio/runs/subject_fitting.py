@@ -7,7 +7,7 @@ dimensions are written out, so that every later run of the session has this body
 """
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
+from studio.progress import Cancelled, Progress, watched
 from studio.runs.initialising import initialise
 from studio.runs.refining import REFINED
 from studio.runs.search_space import parameter_names
@@ -40,7 +41,6 @@ from studio.tracking.shape_search import ShapeSearch, ShapeSearchSettings
 from studio.weighting.shape_silhouettes import ShapeSilhouettes
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]
 
 COUNT = 5
 MOST_FRAMES = 24
@@ -110,7 +110,7 @@ def fit_session_subject(
     request: FitRequest | None = None,
     *,
     progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    cancelled: Cancelled | None = None,
 ) -> FittedSubject:
     """The subject of a session, fitted to its silhouettes. Nothing is written: see `keep_subject`.
 
@@ -120,7 +120,8 @@ def fit_session_subject(
     asked = request or FitRequest()
     if not asked.lengths and not asked.radii:
         raise RunError("Neither lengths nor radii are to be fitted.", "Choose at least one of them.")
-    tell = _watched(progress, cancelled)
+    ending = FitCancelledError("Fitting the subject was cancelled.", "Start it again when you like.")
+    tell = watched(progress, cancelled, ending)
     body, subject = _first_body(session, asked)
     tell("choosing frames", 0, 1)
     frames, start, poses_from = _first_poses(session, body, asked, tell)
@@ -268,13 +269,3 @@ def subject_of(subject: Subject, body: BodyModel) -> Subject:
     lengths = {name: value for name, value in body.dimensions.items() if entries[name].ratio is None}
     ratios = {name: value for name, value in body.dimensions.items() if entries[name].ratio is not None}
     return Subject(body=body.name, height_mm=subject.height_mm, dimensions_mm=lengths, ratios=ratios)
-
-
-def _watched(progress: Progress | None, cancelled: Callable[[], bool] | None) -> Progress:
-    def tell(step: str, done: int, total: int) -> None:
-        if cancelled is not None and cancelled():
-            raise FitCancelledError("Fitting the subject was cancelled.", "Start it again when you like.")
-        if progress is not None:
-            progress(step, done, total)
-
-    return tell

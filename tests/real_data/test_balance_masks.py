@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+import studio
 from studio.runs.background_setup import set_up_background
 from studio.runs.mask_quality import USABLE, mask_quality
 from studio.runs.session_settings import session_settings
@@ -17,7 +18,9 @@ FRAMES = (0, 30, 60, 99)
 @pytest.mark.slow
 @pytest.mark.real_data
 def test_masks_agree_in_all_four_views(real_data: Path, tmp_path: Path) -> None:
-    """Agreement with the hull of 0.9 or more in each view, from plates in two of which people stand."""
+    """Agreement with the hull of 0.9 or more in each view, from plates in two of which people stand; the cameras turned
+    first, as the guided way says: one of them was touched, which the masks cannot help.
+    """
     folder = real_data / "pose2sim-balance"
     session = import_source(folder, tmp_path / "balance", copy=False).session
     plates = {
@@ -26,6 +29,7 @@ def test_masks_agree_in_all_four_views(real_data: Path, tmp_path: Path) -> None:
     }
     session = set_backgrounds(session, plates)
     set_up_background(session, "combined", exclude_unused=True)
+    assert studio.align(session).changed
     session = Session(session.path)
     found = mask_quality(session, session_settings(session).evidence, FRAMES)
     for view in found.views:
