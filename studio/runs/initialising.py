@@ -19,6 +19,7 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 from studio.progress import Cancelled, Progress, watched
 from studio.runs.behaviour_models import fitting, model_folders, model_path
+from studio.runs.initial_limbs import limbs_put_right
 from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import parameter_names, search_space, session_sigma
 from studio.runs.session_settings import session_settings
@@ -138,13 +139,17 @@ def initialise(
         prototypes=prototypes,
         progress=lambda done, total: tell("searching for the pose", done, total),
     )
-    overlap = Onlooker(tree, cameras).sight(masks, found.pose).overlap
+    pose = found.pose
+    if len(cameras) >= FEWEST_VIEWS:
+        tell("looking for each limb", 0, 1)
+        pose = limbs_put_right(tree, cameras, masks, pose, seed)
+    overlap = Onlooker(tree, cameras).sight(masks, pose).overlap
     fit = float(np.clip((overlap - NO_OVERLAP) / (SURE_OVERLAP - NO_OVERLAP), 0.0, 1.0))
     return InitialPose(
         frame=evidence.frame,
         body=tree.name,
         names=parameter_names(tree),
-        pose=found.pose,
+        pose=pose,
         confidence=found.confidence * fit,
         margin=found.margin,
         rival=found.rival,

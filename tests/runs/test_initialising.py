@@ -86,7 +86,7 @@ def test_a_run_without_start_pose_finds_one(people: Session) -> None:
     run = prepare_run(people, RunRequest(first=1, last=2), lambda *told: steps.append(told))
     assert run.record.start_pose is not None
     assert run.record.start_source.startswith("found in frame 1, confidence ")
-    assert steps[-1][0] == "searching for the pose"
+    assert steps[-1][0] == "looking for each limb"
     assert not (people.path / "start_pose.csv").exists()
 
 
