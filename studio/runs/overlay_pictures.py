@@ -42,7 +42,10 @@ Bytes = NDArray[np.uint8]
 Found = TypeVar("Found")
 
 _NEED_EVIDENCE = {"mask", "edges"}
-_KEPT_COMPOSERS = 3
+_KEPT_COMPOSERS, _KEPT_PIXELS = 3, 18_000_000
+"""How many are kept at most, and pixels of all their cameras. A pixel holds about 100 bytes (decoder, background,
+pictures), so two sessions of four full-HD cameras are 1.7 GB.
+"""
 
 
 class ViewComposer:
@@ -58,6 +61,11 @@ class ViewComposer:
         self._settings = settings or _settings_of(session, run)
         self._truth = _truth_of(session)
         self._lock = threading.RLock()
+
+    @property
+    def pixels(self) -> int:
+        """Of all cameras' pictures together."""
+        return sum(camera.width * camera.height for camera in self.cameras.values())
 
     def use(self, settings: RunSettings) -> None:
         """Make masks, edge maps and samples with these settings from now on."""
@@ -219,7 +227,10 @@ def _composer(session: Session, run: StoredRun | None) -> ViewComposer:
         if key not in _composers:
             _composers[key] = ViewComposer(session, run)
         _composers.move_to_end(key)
-        while len(_composers) > _KEPT_COMPOSERS:
+        while len(_composers) > 1 and (
+            len(_composers) > _KEPT_COMPOSERS
+            or sum(composer.pixels for composer in _composers.values()) > _KEPT_PIXELS
+        ):
             _composers.popitem(last=False)[1].close()
         return _composers[key]
 
