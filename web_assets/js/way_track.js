@@ -107,9 +107,7 @@ export function mount(place, way) {
     state.failed = null;
     try {
       const settings = Number(values.evaluations) ? await fetchJson(`/api/evaluations?tracker=${values.tracker}&evaluations=${values.evaluations}`) : {};
-      const weighting = state.choices.trackers.find((one) => one.name === values.tracker)?.weighting;
-      const usual = values.tracker === way.detail.tracker ? way.detail.weighting : weighting;
-      const made = await post(`${here}/runs`, { tracker: values.tracker, weighting: usual, first: Number(values.first), last: Number(values.last) + 1, settings });
+      const made = await post(`${here}/runs`, { tracker: values.tracker, weighting: values.weighting, first: Number(values.first), last: Number(values.last) + 1, settings });
       fold.open = false;
       await loadRuns();
       await start(made.name);
@@ -128,8 +126,15 @@ export function mount(place, way) {
     const plain = state.choices.trackers.filter((one) => !one.needs_behaviour);
     const select = (name, options, value) => element("select", { name }, ...options.map(([key, words]) => new Option(words, key, false, key === value)));
     const submit = element("button", { type: "submit", className: "primary", textContent: newest() ? "Track anew" : "Track" });
+    const usual = (tracker) => (tracker === way.detail.tracker ? way.detail.weighting : plain.find((one) => one.name === tracker)?.weighting);
+    const tracker = select("tracker", plain.map((one) => [one.name, one.label]), way.detail.tracker);
+    const weighting = select("weighting", state.choices.weightings.map((one) => [one.name, one.label]), state.weighting ?? usual(tracker.value));
+    weighting.onchange = () => { state.weighting = weighting.value; };
+    tracker.onchange = () => { if (!state.weighting) weighting.value = usual(tracker.value); };
     form.replaceChildren(
-      element("label", {}, "Tracker", select("tracker", plain.map((one) => [one.name, one.label]), way.detail.tracker)),
+      element("label", {}, "Tracker", tracker),
+      element("label", {}, "Poses are judged by", weighting),
+      element("p", { className: "hint", textContent: "Edges and silhouette suit a room that is full of things: edges inside the masks are often the room's." }),
       element("label", {}, "Effort", select("evaluations", EFFORTS, 2000)),
       element("div", { className: "step-row" }, element("label", {}, "First frame", element("input", { name: "first", type: "number", min: 0, max: last, value: way.detail.start_pose_frame })),
         element("label", {}, "Last frame", element("input", { name: "last", type: "number", min: 0, max: last, value: last }))),
