@@ -41,8 +41,11 @@ from studio.weighting.catalogue import WEIGHTINGS
 
 Array = NDArray[np.float64]
 
-WEIGHTING = "edge-region-silhouette"
-"""The one that tells poses apart best: of the three of its terms none alone found as many."""
+WEIGHTING = "edge-silhouette"
+"""The one that tells poses apart best: of 20 moments of the Lee walk's twin (human31) it found all, 24 mm off on
+average, and with samples of the region beside them 19, at 48 mm; on the balancing man, whose room is full of edges,
+those put an arm before the chest.
+"""
 HULL_DEPTH = 6
 FEWEST_VIEWS = 2
 HIPS, NEAR, FAR, AHEAD, AROUND = 950.0, 1500.0, 8000.0, 3500.0, 1500.0

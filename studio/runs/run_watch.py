@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
-from studio.runs.initialising import WEIGHTING, hull_of, seek, whole_problem
+from studio.runs.initialising import hull_of, seek, whole_problem
 from studio.sessions.results_reader import ResultsReader
 from studio.settings import RunSettings, default_settings
 from studio.tracking.initialisation import PER_FAMILY, QUICK
@@ -37,6 +37,8 @@ from studio.tracking.tracker import (
 
 Array = NDArray[np.float64]
 
+SEEKING = "edge-region-silhouette"
+"""The weighting that a lost body is looked for with; recovery was measured with it."""
 SHORT_GAP_S = 0.1
 """After less time without evidence the body is still about where it was."""
 
@@ -250,7 +252,7 @@ class RunWatch:
 def _seeking(settings: RunSettings) -> RunSettings:
     """The settings that a lost body is looked for with: the run's evidence, the weighting that tells most."""
     return dataclasses.replace(
-        default_settings(settings.tracker_name, WEIGHTING),
+        default_settings(settings.tracker_name, SEEKING),
         evidence=settings.evidence,
         recovery=settings.recovery,
     )
