@@ -45,7 +45,12 @@ export function mount(place, way) {
       const inside = row >= 0 ? check.inside[row][view] : null;
       wall.note(camera, row < 0 ? "" : `${percent(inside)} of the model in the mask, ${percent(check.covered[row][view])} of the mask under the model`, inside !== null && inside < GOOD ? "bad" : "");
     });
-    for (const chip of found.querySelectorAll("[data-frame]")) chip.toggleAttribute("aria-current", Number(chip.dataset.frame) === frame);
+    markShown();
+  }
+
+  /** The chips and bars of the frame that is looked at. */
+  function markShown() {
+    for (const chip of found.querySelectorAll("[data-frame]")) chip.toggleAttribute("aria-current", Number(chip.dataset.frame) === state.frame);
   }
 
   /** The frame that is looked at, as long as there is something to see in it. */
@@ -113,6 +118,7 @@ export function mount(place, way) {
       return found.replaceChildren(element("p", { className: "hint", textContent: `Track "${state.track}" of ${run.name}: every tenth frame is compared with the masks, in every view.` }), element("div", { className: "step-actions" }, measure));
     }
     found.replaceChildren(...[verdict(check), strip(check), chips("Too little of the model in the masks:", check.poor), chips("Lost:", check.lost), chips("Doubtful:", check.doubtful), chips("Sudden turns:", check.turned), jumpChips(check.jumps), element("div", { className: "step-actions" }, measure)].filter(Boolean));
+    markShown();
   }
 
   function trackRows() {
