@@ -1,5 +1,6 @@
 """The steps of the guided way before tracking: footage, calibration, background, subject, start pose."""
 
+from studio.body.forward_kinematics import limb_ends
 from studio.runs.turned_cameras import misses_in_words
 from studio.runs.way_step import StepName, StepStatus, counted, enumerated
 from studio.sessions.background_files import read_evidence
@@ -82,16 +83,23 @@ def _what_to_look_at(session: Session) -> str:
     return "look at the masks, and ask whether the cameras agree"
 
 
+def _standing_mm(session: Session) -> float:
+    """How tall the session's body stands."""
+    body = session.body()
+    return float(limb_ends(body, body.neutral)[0, ..., 2].max())
+
+
 def subject_step(session: Session) -> StepStatus:
     """The person: by height, or fitted."""
     if not (session.path / SUBJECT_NAME).exists():
         return StepStatus("subject", "ready", f"body {session.manifest.body}, of usual size", optional=True)
     subject = session.subject()
     known = origin_of(session, "subject")
-    height = subject.height_mm if subject else None
+    told = subject.height_mm if subject else None
+    stands = _standing_mm(session) if known else told
     parts = [subject.body if subject else session.manifest.body]
-    parts += [f"{height / 1000:.2f} m"] if height else []
-    parts += ["fitted to the footage"] if known else ["by height"] if height else ["measures given"]
+    parts += [f"{stands / 1000:.2f} m"] if stands and told else []
+    parts += ["fitted to the footage"] if known else ["by height"] if told else ["measures given"]
     words = ", ".join(parts)
     return _stale(session, "subject", words, "Fitted with") or StepStatus("subject", "done", words)
 

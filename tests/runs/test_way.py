@@ -1,10 +1,17 @@
 """The guided way: how far a session is, and what a change makes stale."""
 
+import dataclasses
+from pathlib import Path
+
 import pytest
 
+from studio.body.subject import Subject, write_subject
 from studio.errors import SessionError
 from studio.runs.way import way_of
+from studio.runs.way_setup import subject_step
 from studio.sessions.beginning import begin_session
+from studio.sessions.made_from import note
+from studio.sessions.session import SUBJECT_NAME
 from studio.sessions.workspace import Workspace
 
 STEPS = ["footage", "calibration", "background", "subject", "start-pose", "track", "check", "export"]
@@ -35,3 +42,15 @@ def test_a_name_is_taken_once(tmp_path):
     begin_session(workspace.place_for("mine"))
     with pytest.raises(SessionError, match="already"):
         workspace.place_for("mine")
+
+
+def test_a_fitted_subject_is_as_tall_as_its_body_stands_not_as_was_guessed(tmp_path: Path) -> None:
+    session = begin_session(Workspace(tmp_path).place_for("mine"), body="human31")
+    guess = Subject(body="human31", height_mm=1800.0)
+    write_subject(guess, session.path / SUBJECT_NAME)
+    assert subject_step(session).words == "human31, 1.80 m, by height"
+    body = session.body()
+    shorter = {name: 0.95 * body.dimensions[name] for name in ("left_shin_length", "right_shin_length")}
+    write_subject(dataclasses.replace(guess, dimensions_mm=shorter), session.path / SUBJECT_NAME)
+    note(session, "subject")
+    assert subject_step(session).words == "human31, 1.78 m, fitted to the footage"
