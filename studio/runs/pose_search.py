@@ -3,7 +3,7 @@
 The weighting judges: what comes out is never worse in its eyes than what was given.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from studio.errors import RunError
 from studio.evidence.distance_maps import silhouette_distances
 from studio.progress import Cancelled, Progress, watched
 from studio.runs.problem_source import ProblemSource
+from studio.runs.refined_frames import JUDGE
 from studio.runs.search_space import search_space, session_sigma
 from studio.runs.session_settings import session_settings
 from studio.sessions.session import Session
@@ -28,8 +29,6 @@ from studio.weighting.catalogue import WEIGHTINGS
 Array = NDArray[np.float64]
 
 TRACKER = "annealed"
-JUDGE = "edge-region-silhouette"
-"""Judges where the session's own weighting reads pictures instead of masks (blobs must be told what is expected)."""
 SHORT = {"particles": 150, "layers": 8, "start_repeats": 1}
 HAND_FPS = 15.0
 """A hand is as far off as a body moves in one frame at that rate."""
@@ -140,12 +139,4 @@ def _short_settings(session: Session, run: StoredRun | None) -> RunSettings:
         history = results.settings_history()
     values = history[-1].values if history else run.record.settings
     own = settings_from_values(run.record.tracker, weighting, values)
-    return RunSettings(
-        settings.tracker_name,
-        weighting,
-        settings.tracker,
-        own.weighting,
-        own.evidence,
-        settings.recovery,
-        settings.recording,
-    )
+    return replace(settings, weighting=own.weighting, evidence=own.evidence)

@@ -8,7 +8,7 @@ of the run's own weighting, and one that says nothing keeps its pose. Frames wit
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -186,12 +186,4 @@ class _Work:
         if not WEIGHTINGS[settings.weighting_name].reads_pictures:
             return settings
         judge = default_settings(settings.tracker_name, JUDGE)
-        return RunSettings(
-            settings.tracker_name,
-            JUDGE,
-            settings.tracker,
-            judge.weighting,
-            settings.evidence,
-            settings.recovery,
-            settings.recording,
-        )
+        return replace(settings, weighting_name=JUDGE, weighting=judge.weighting)

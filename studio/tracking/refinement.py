@@ -195,7 +195,7 @@ class Refiner:
     def _prepared(self, pose: Array, silhouettes: Sequence[Distances]) -> "_Prepared":
         """The silhouettes as the kernel reads them, with each view's mm per pixel at the body."""
         middle = limb_ends(self.body, pose[None])[0].reshape(-1, 3).mean(axis=0)
-        mm = np.array([_mm_per_pixel(camera, middle) for camera in self.cameras])
+        mm = np.array([mm_per_pixel(camera, middle) for camera in self.cameras])
         views, maps = np.zeros((len(silhouettes), 7), dtype=np.int64), []
         begin = border = 0
         for row, view, scale in zip(views, silhouettes, self._scales(mm) / mm, strict=True):
@@ -272,7 +272,7 @@ def _about_the_border(view: Distances, margin: float) -> tuple[tuple[int, int], 
     return (int(left), int(top)), np.ascontiguousarray(view.signed[top:bottom, left:right], dtype=np.float32)
 
 
-def _mm_per_pixel(camera: Camera, point: Array) -> float:
+def mm_per_pixel(camera: Camera, point: Array) -> float:
     """How many mm a pixel spans at a point (3,), at least at 100 mm from the camera."""
     depth = float(camera.rotation[2] @ point + camera.translation[2])
     return max(depth, 100.0) / float(np.sqrt(camera.matrix[0, 0] * camera.matrix[1, 1]))

@@ -171,6 +171,22 @@ def add_outline(
 
 
 @njit(**OPTIONS)
+def look_at_limbs(quads, slopes, usable, turns):
+    """Fill usable (L,), whether a limb is seen, and turns (L,), which way round it runs, of one view's limbs."""
+    for limb in range(quads.shape[0]):
+        usable[limb] = np.isfinite(quads[limb].sum()) and np.isfinite(slopes[limb].sum())
+        turns[limb] = turning(quads[limb])
+
+
+@njit(**OPTIONS)
+def mirror_lower_half(matrix):
+    """Make a matrix symmetric whose lower half was filled."""
+    for p in range(matrix.shape[0]):
+        for q in range(p):
+            matrix[q, p] = matrix[p, q]
+
+
+@njit(**OPTIONS)
 def normal_equations(quads, slopes, ends, maps, views, sizes, border, mm, scales, part, matrix, gradient):
     """Fill matrix (D, D) and gradient (D,) of half the squared loss; returns the loss.
 
@@ -186,9 +202,7 @@ def normal_equations(quads, slopes, ends, maps, views, sizes, border, mm, scales
     gradient[:] = 0.0
     loss = 0.0
     for v in range(quads.shape[0]):
-        for limb in range(limbs):
-            usable[limb] = np.isfinite(quads[v, limb].sum()) and np.isfinite(slopes[v, limb].sum())
-            turns[limb] = turning(quads[v, limb])
+        look_at_limbs(quads[v], slopes[v], usable, turns)
         seen = border[views[v, 3] : views[v, 4]]
         loss += add_border(
             seen, quads[v], slopes[v], usable, turns, ends, mm[v], scales[v], row, matrix, gradient
@@ -209,7 +223,5 @@ def normal_equations(quads, slopes, ends, maps, views, sizes, border, mm, scales
             matrix,
             gradient,
         )
-    for p in range(size):
-        for q in range(p):
-            matrix[q, p] = matrix[p, q]
+    mirror_lower_half(matrix)
     return loss

@@ -35,6 +35,7 @@ from studio.tracking.refinement import (
     TIGHTENED,
     Distances,
     free_ends,
+    mm_per_pixel,
 )
 from studio.tracking.shape_prior import ShapePrior
 from studio.tracking.shape_refinement_kernels import border_equations
@@ -257,12 +258,6 @@ class ShapeRefiner:
         return np.stack(
             [(corners(shape + step) - corners(shape - step)) / (2.0 * DIFFERENCE) for step in steps]
         )
-
-
-def mm_per_pixel(camera: Camera, point: Array) -> float:
-    """How many mm a pixel spans at a point (3,), at least at 100 mm from the camera."""
-    depth = float(camera.rotation[2] @ point + camera.translation[2])
-    return max(depth, 100.0) / float(np.sqrt(camera.matrix[0, 0] * camera.matrix[1, 1]))
 
 
 def _of_hidden_joints(body: BodyModel) -> NDArray[np.bool_]:

@@ -3,9 +3,7 @@
 import numpy as np
 from numba import njit
 
-from studio.tracking.refinement_kernels import add_border, turning
-
-OPTIONS = {"error_model": "numpy", "nogil": True, "cache": True}
+from studio.tracking.refinement_kernels import OPTIONS, add_border, look_at_limbs, mirror_lower_half
 
 
 @njit(**OPTIONS)
@@ -22,14 +20,10 @@ def border_equations(quads, slopes, ends, border, views, mm, scales, matrix, gra
     gradient[:] = 0.0
     loss = 0.0
     for v in range(quads.shape[0]):
-        for limb in range(limbs):
-            usable[limb] = np.isfinite(quads[v, limb].sum()) and np.isfinite(slopes[v, limb].sum())
-            turns[limb] = turning(quads[v, limb])
+        look_at_limbs(quads[v], slopes[v], usable, turns)
         seen = border[views[v, 0] : views[v, 1]]
         loss += add_border(
             seen, quads[v], slopes[v], usable, turns, ends, mm[v], scales[v], row, matrix, gradient
         )
-    for p in range(size):
-        for q in range(p):
-            matrix[q, p] = matrix[p, q]
+    mirror_lower_half(matrix)
     return loss
