@@ -27,6 +27,10 @@ Bytes = NDArray[np.uint8]
 EXCLUSIONS = "exclusions"
 """Folder of a session with a painted picture a camera."""
 KEPT_BYTES = 24_000_000
+MANY_PICTURES = 24
+"""After so many pictures it is worth a fifth of a second to give back what their decoders held; pages that ask for one
+picture at a time do not wait for that.
+"""
 """Pictures kept for each camera: eight of 1920x1080/2, twenty-six of 640x480."""
 MASK_LEVEL = 127
 """Masks that come with the data are foreground above this grey level (lossy videos blur 0 and 255)."""
@@ -142,7 +146,8 @@ class Footage:
         """Close all files."""
         for kept in (*self._pictures.values(), *self._masks.values()):
             kept.close()
-        give_back_freed_memory()
+        if sum(kept.read_count for kept in self._pictures.values()) >= MANY_PICTURES:
+            give_back_freed_memory()
 
     def _checked(self, frame: int) -> int:
         if not 0 <= frame < self.frame_count:
@@ -213,6 +218,7 @@ class _Kept:
         self._kept: OrderedDict[int, Bytes] = OrderedDict()
         self._lock = threading.Lock()
         self._room = max(2, KEPT_BYTES // (3 * camera.width * camera.height))
+        self.read_count = 0
 
     def read(self, index: int) -> Bytes:
         with self._lock:
@@ -220,6 +226,7 @@ class _Kept:
             if found is not None:
                 self._kept.move_to_end(index)
                 return found
+            self.read_count += 1
             picture = turned_picture(self._reader.read(index + self._camera.offset), self._camera.turned)
             height, width = picture.shape[:2]
             if (width, height) != (self._camera.width, self._camera.height):

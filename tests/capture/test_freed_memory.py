@@ -1,11 +1,14 @@
 """What a decoder lets go of goes back to the system."""
 
+import itertools
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from toy_session import make_session
 
+from studio.capture import footage
 from studio.capture.freed_memory import give_back_freed_memory
 
 MEASURED = """
@@ -36,3 +39,19 @@ def test_a_measured_video_leaves_little_behind(real_data: Path) -> None:
         [sys.executable, "-c", MEASURED, str(video)], capture_output=True, text=True, check=True
     )
     assert float(told.stdout) < 60.0
+
+
+@pytest.mark.parametrize(("pictures", "given_back"), [(1, 0), (4, 1)])
+def test_only_footage_that_was_read_much_makes_others_wait(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pictures: int, given_back: int
+) -> None:
+    told: list[int] = []
+    monkeypatch.setattr(footage, "MANY_PICTURES", 4)
+    monkeypatch.setattr(footage, "give_back_freed_memory", lambda: told.append(1))
+    opened = make_session(tmp_path / "toy").footage()
+    names = list(opened.cameras)
+    reads = ((name, frame) for frame in range(opened.frame_count) for name in names)
+    for name, frame in itertools.islice(reads, pictures):
+        opened.picture(name, frame)
+    opened.close()
+    assert len(told) == given_back
