@@ -2,9 +2,10 @@
 
 import math
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from studio.numba_in_threads import numba
 
 Array = NDArray[np.float64]
 

@@ -27,11 +27,10 @@ Bytes = NDArray[np.uint8]
 EXCLUSIONS = "exclusions"
 """Folder of a session with a painted picture a camera."""
 KEPT_BYTES = 24_000_000
+"""Pictures kept for each camera: eight of 1920x1080/2, twenty-six of 640x480."""
 MANY_PICTURES = 24
 """After so many pictures it is worth a fifth of a second to give back what their decoders held; pages that ask for one
-picture at a time do not wait for that.
-"""
-"""Pictures kept for each camera: eight of 1920x1080/2, twenty-six of 640x480."""
+picture at a time do not wait for that."""
 MASK_LEVEL = 127
 """Masks that come with the data are foreground above this grey level (lossy videos blur 0 and 255)."""
 

@@ -13,10 +13,10 @@ from typing import Literal, Protocol
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from studio.evidence.settings import EvidenceSettings
+from studio.numba_in_threads import njit
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]

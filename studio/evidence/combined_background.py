@@ -21,11 +21,11 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from studio.evidence.background import GaussianBackground
 from studio.evidence.colour_fit import fit_colours
+from studio.numba_in_threads import njit
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]

@@ -11,8 +11,9 @@ import math
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from studio.numba_in_threads import njit
 
 Bytes = NDArray[np.uint8]
 

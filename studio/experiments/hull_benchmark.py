@@ -9,7 +9,6 @@ import dataclasses
 import time
 from collections.abc import Callable
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,6 +22,7 @@ from studio.experiments.benchmark import filled
 from studio.geometry.camera import Camera
 from studio.geometry.cones import limb_outlines
 from studio.geometry.projection import project
+from studio.numba_in_threads import numba
 from studio.progress import Progress
 from studio.volume.reconstruction import HullSettings, Reconstructor
 from studio.volume.tracking_space import box_of

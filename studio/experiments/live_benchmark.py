@@ -11,13 +11,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from studio.behaviour.model_file import read_model
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.pipeline import EvidenceMaker
+from studio.numba_in_threads import numba
 from studio.progress import Progress
 from studio.runs.live_summary import LiveSummary
 from studio.runs.new_run import RunRequest

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from studio.capture.footage import Footage
@@ -25,6 +24,7 @@ from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.evidence.masks import cleaned
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
+from studio.numba_in_threads import njit
 from studio.progress import Progress, watched
 from studio.sessions.session import Session
 from studio.volume.hull_settings import HullSettings

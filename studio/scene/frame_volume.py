@@ -14,11 +14,11 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-import numba
 from numpy import float64
 from numpy.typing import NDArray
 
 from studio.errors import StudioError
+from studio.numba_in_threads import numba
 from studio.runs.problem_source import ProblemSource
 from studio.scene.moment import Moment
 from studio.scene.opened_run import OpenedRun

@@ -8,8 +8,8 @@ never passes through. Smooth union: I. Quilez, "Smooth minimum" (quadratic polyn
 import math
 
 import numpy as np
-from numba import njit
 
+from studio.numba_in_threads import njit
 from studio.synthesis.flesh import (
     AXES,
     BOUND,

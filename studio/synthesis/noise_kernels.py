@@ -3,7 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit, prange
+
+from studio.numba_in_threads import njit, prange
 
 # Odd multipliers of the 32-bit finaliser of MurmurHash3 (Appleby, public domain) and of a lattice.
 _MIX_ONE, _MIX_TWO = np.uint32(0x85EBCA6B), np.uint32(0xC2B2AE35)

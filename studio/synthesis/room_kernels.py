@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit, prange
 
+from studio.numba_in_threads import njit, prange
 from studio.synthesis.noise_kernels import hashed, value_noise
 from studio.synthesis.room import BOOKS, CARPET, CHECKS, GRAIN, PLANKS, POSTER, TILES
 

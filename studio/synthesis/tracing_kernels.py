@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit, prange
 
+from studio.numba_in_threads import njit, prange
 from studio.synthesis.distance_kernels import (
     FAR,
     body_distance,

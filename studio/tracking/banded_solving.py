@@ -5,8 +5,9 @@ step or not) makes millimetres of them; the same run must come out on any number
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from studio.numba_in_threads import njit
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,8 @@ what the body does not explain (hair, a shadow in the mask) pulls little.
 """
 
 import numpy as np
-from numba import njit
+
+from studio.numba_in_threads import njit
 
 OPTIONS = {"error_model": "numpy", "nogil": True, "cache": True}
 MARGIN = 1.0

@@ -1,8 +1,8 @@
 """Normal equations of outlines against a silhouette's border, for bodies whose size changes with their pose."""
 
 import numpy as np
-from numba import njit
 
+from studio.numba_in_threads import njit
 from studio.tracking.refinement_kernels import OPTIONS, add_border, look_at_limbs, mirror_lower_half
 
 

@@ -4,8 +4,9 @@ LAPACK's solver hands these narrow bands to all processors, which costs more tha
 others use them (30 s instead of 0.05 s for 30 frames on two busy cores).
 """
 
-import numba
 import numpy as np
+
+from studio.numba_in_threads import numba
 
 SMALLEST = 1e-12
 

@@ -4,11 +4,11 @@ A turn by θ about the world axis a through o moves a point p by a × (p - o) d�
 along a moves points by a. Summed over a joint's own steps and those of all joints above it.
 """
 
-import numba
 import numpy as np
 
 from studio.body.forward_kinematics import take_step
 from studio.body.model import MOVE
+from studio.numba_in_threads import numba
 
 MOVES = MOVE
 

@@ -7,8 +7,9 @@ voxels give the same bits every time.
 
 import math
 
-import numba
 import numpy as np
+
+from studio.numba_in_threads import numba
 
 # Columns of a blob's row in `factors`: mean, upper triangle of the root of its inverse covariance, colour, inverse
 # standard deviation of each colour.

@@ -7,8 +7,8 @@ may compute the same tile: each writes the same numbers, and whoever reads sees 
 """
 
 import numpy as np
-from numba import njit
 
+from studio.numba_in_threads import njit
 from studio.volume.hull_cameras import HEIGHT, WIDTH
 from studio.volume.hull_rules import DEEPEST, SHADOW
 

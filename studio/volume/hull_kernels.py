@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit, prange
 
+from studio.numba_in_threads import njit, prange
 from studio.volume.distance_kernels import look_at_tile
 from studio.volume.hull_cameras import HEIGHT, WIDTH
 from studio.volume.hull_projection import (

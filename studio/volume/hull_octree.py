@@ -1,8 +1,8 @@
 """From one depth of the hull's octree to the next, voxels' colours, and masks' summed areas."""
 
 import numpy as np
-from numba import njit, prange
 
+from studio.numba_in_threads import njit, prange
 from studio.volume.distance_kernels import look_at_tile
 from studio.volume.hull_cameras import HEIGHT, WIDTH
 from studio.volume.hull_kernels import BLOCK, KEPT, SPLIT, shares_of

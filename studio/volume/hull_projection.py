@@ -9,8 +9,7 @@ distortion adds within one voxel is hundredths of a pixel.
 
 import math
 
-from numba import njit
-
+from studio.numba_in_threads import njit
 from studio.volume.hull_cameras import CENTRE, DISTORTION, MATRIX, RADIUS, ROTATION, TRANSLATION
 
 U, V, DEPTH, AXES, SINKS, BOUND_X, BOUND_Y, AREA, FACES, SHARE, PLACE = 0, 1, 2, 3, 9, 12, 13, 14, 15, 18, 19

@@ -3,10 +3,10 @@
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from studio.geometry.camera import Camera
+from studio.numba_in_threads import njit
 from studio.volume.hull import Hull
 from studio.volume.hull_cameras import camera_rows
 from studio.volume.hull_projection import AXES, BOUND_X, BOUND_Y, PLACE, U, V, place_voxel

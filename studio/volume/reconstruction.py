@@ -21,7 +21,6 @@ Of the last depth's rule, volume kept of that body and its hull's volume over it
 from dataclasses import dataclass
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,7 +28,7 @@ from studio.errors import FootageError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.yuv_background import YuvBackground
 from studio.geometry.camera import Camera
-from studio.parallel_launch import ONE_LAUNCH
+from studio.numba_in_threads import ONE_LAUNCH, numba
 from studio.volume import hull_kernels as kernels
 from studio.volume import hull_octree as octree
 from studio.volume import hull_rules as rule

@@ -22,13 +22,13 @@ space (d = 3).
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import joint_frames
 from studio.body.model import BodyModel
 from studio.body.tables import kinematic_tables
+from studio.numba_in_threads import numba
 from studio.volume.blob_model import BlobMixture, BlobModel
 
 Array = NDArray[np.float64]

@@ -11,9 +11,8 @@ precision is no faster.
 """
 
 import numpy as np
-from numba import njit, prange
-from numba.core import types
-from numba.extending import intrinsic
+
+from studio.numba_in_threads import intrinsic, njit, prange, types
 
 LANES = 16
 ROWS = 8

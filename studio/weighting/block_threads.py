@@ -8,9 +8,7 @@ say) waiting for a second thread to be scheduled can take longer than all of a l
 
 from collections.abc import Callable
 
-import numba
-
-from studio.parallel_launch import ONE_LAUNCH
+from studio.numba_in_threads import ONE_LAUNCH, numba
 
 
 def run_blocks(

@@ -7,7 +7,8 @@ index of an entry that is 0, then bare loads. Maps are 16-bit and hold (255 - e)
 """
 
 import numpy as np
-from numba import njit, prange
+
+from studio.numba_in_threads import njit, prange
 
 LANES = 16
 ROUND = 16

@@ -9,7 +9,8 @@ left out of N.
 """
 
 import numpy as np
-from numba import njit, prange
+
+from studio.numba_in_threads import njit, prange
 
 LANES = 16
 CHUNK = 16

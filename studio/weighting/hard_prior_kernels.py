@@ -11,8 +11,8 @@ Frames are twelve rows of sixteen lanes as in `outline_kernels`, from which the 
 """
 
 import numpy as np
-from numba import njit, prange
 
+from studio.numba_in_threads import njit, prange
 from studio.weighting.outline_kernels import INLINED, LANES, ONE, OPTIONS, ZERO, pose_frames, pose_motions
 
 # Squared sine of two axes' angle below which they count as parallel; squared mm that count as nothing.

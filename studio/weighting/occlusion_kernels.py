@@ -6,7 +6,8 @@ middles. Sixteen poses at a time, like the outlines; pairs of limbs that lie apa
 """
 
 import numpy as np
-from numba import njit, prange
+
+from studio.numba_in_threads import njit, prange
 
 LANES = 16
 ZERO, HALF, ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)

@@ -13,7 +13,8 @@ compare as unseen.
 """
 
 import numpy as np
-from numba import njit, prange
+
+from studio.numba_in_threads import njit, prange
 
 LANES = 16
 # Rows of an outline: x and y (pixels) of A start, A end, B end, B start; how it is seen (1 wholly inside the

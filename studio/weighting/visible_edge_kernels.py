@@ -7,8 +7,8 @@ which is counted all the same, and NOT_COUNTED for a hidden one.
 """
 
 import numpy as np
-from numba import njit, prange
 
+from studio.numba_in_threads import njit, prange
 from studio.weighting.area_kernels import bit_count
 from studio.weighting.edge_region_kernels import (
     CHUNK,

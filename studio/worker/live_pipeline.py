@@ -9,9 +9,8 @@ nothing queues up.
 import threading
 from collections.abc import Callable
 
-import numba
-
 from studio.capture.frame_clock import Arrival, LiveSource
+from studio.numba_in_threads import numba
 from studio.runs.live_problems import Ready
 
 

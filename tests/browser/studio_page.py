@@ -53,7 +53,8 @@ class StudioPage:
                 return
             self.page.wait_for_timeout(50)
         state = {name: self.get(name) for name in ("session", "run", "frame", "layer", "work", "connected")}
-        raise AssertionError(f"never came about: {condition}; the state is {state}")
+        said = "\n".join(self.studio.faults())
+        raise AssertionError(f"never came about: {condition}; the state is {state}\n{said}")
 
     def see_scene(self) -> None:
         """Wait until the scene is drawn and has its panel; the warning of software rendering is closed."""

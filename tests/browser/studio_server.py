@@ -1,5 +1,6 @@
 """A studio of its own: the command in a subprocess, its printed address, and its API as a script talks to it."""
 
+import json
 import os
 import re
 import signal
@@ -82,6 +83,12 @@ class StudioServer:
         """Let each layer that is tracked take at least so many seconds from now on; 0: as fast as it can."""
         self.post("/api/worker/pace", {"seconds_a_layer": seconds_a_layer})
         self.until(lambda state: state["seconds_a_layer"] == seconds_a_layer)
+
+    def faults(self) -> list[str]:
+        """What the runs' logs hold of errors, for the message of a test that fails."""
+        logs = self.workspace.rglob("log.jsonl")
+        entries = [json.loads(line) for path in logs for line in path.read_text().splitlines()]
+        return [entry["text"] for entry in entries if entry["level"] == "error"]
 
     def worker(self) -> psutil.Process:
         """The tracking process: the child that was spawned for it (multiprocessing's own helper is another)."""

@@ -8,7 +8,6 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numba
 import numpy as np
 
 from studio.experiments.caillette.setting import MEMORY, SOURCE, TEST, TEST_640, training
@@ -21,6 +20,7 @@ from studio.experiments.experiment import Experiment, Findings, Number, Outcome,
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.hull_benchmark import TABLE_1
 from studio.experiments.statistics import number, overall
+from studio.numba_in_threads import numba
 from studio.volume.hull import Hull
 
 DEPTHS, VIEWS, PARTICLES = (6, 7, 8), (3, 4, 5), (500, 1000)

@@ -10,7 +10,6 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numba
 import numpy as np
 
 from studio.experiments.charts import Chart, Series
@@ -18,6 +17,7 @@ from studio.experiments.deutscher_reid.setting import CIRCLE, PLAIN, SOURCE, WEI
 from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Table, Trial
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import number
+from studio.numba_in_threads import numba
 from studio.runs.search_space import default_sigma, search_space
 from studio.settings import changed_settings, default_settings
 from studio.tracking.catalogue import TRACKERS
