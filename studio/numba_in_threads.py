@@ -10,6 +10,7 @@ kernels at once, so whoever launches one (`with ONE_LAUNCH:`) holds this lock. A
 """
 
 import threading
+from typing import Any
 
 import numba
 from numba import njit, prange
@@ -19,6 +20,7 @@ from numba.extending import intrinsic
 
 __all__ = ["ONE_LAUNCH", "intrinsic", "njit", "numba", "prange", "types"]
 
-cpu_target.target_context.refresh()
+_everything_numba_loads: Any = cpu_target.target_context
+_everything_numba_loads.refresh()
 
 ONE_LAUNCH = threading.Lock()
