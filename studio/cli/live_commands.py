@@ -9,7 +9,7 @@ import click
 from studio.cli.knob_options import SET_OPTION, chosen_changes, given
 from studio.cli.output import command, note, progress
 from studio.cli.recording_commands import CAMERA_OPTION, addresses_of
-from studio.cli.tracking_commands import own_options, told_run, tracking_shown
+from studio.cli.tracking_commands import DESPITE_OPTION, own_options, told_run, tracking_shown
 from studio.errors import RunError
 from studio.runs.live_replay import prepare_replay
 from studio.runs.live_request import last_of
@@ -36,6 +36,7 @@ from studio.worker.live_tracking import replay_live, track_live
 @click.option("--seconds", type=float, help="Track for so long; default: to the footage's end.")
 @click.option("--repeat", is_flag=True, help="Go forth and back through the footage; needs --seconds.")
 @click.option("--seed", type=int, default=0, show_default=True)
+@DESPITE_OPTION
 @SET_OPTION
 @click.option("--name", default="", help="Name of the run; default: numbered.")
 @click.option("--resume", metavar="RUN", help="Go on with a live run that was ended.")
@@ -100,7 +101,7 @@ def live(
 
 def _request(asked: Mapping[str, str | None], changes: tuple[str, ...]) -> RunRequest:
     """What is asked of a live run, by the command's options."""
-    named = ("tracker", "weighting", "body", "behaviour", "seed", "name")
+    named = ("tracker", "weighting", "body", "behaviour", "seed", "name", "despite_findings")
     knobs = {key: value for key, value in asked.items() if key not in named}
     return RunRequest(
         **{key: asked[key] for key in named},  # pyright: ignore[reportArgumentType]

@@ -29,6 +29,9 @@ from studio.worker.batch import BatchResult, track_to_end
 
 F = TypeVar("F", bound=Callable[..., object])
 
+DESPITE_OPTION = click.option(
+    "--despite-findings", is_flag=True, help="Track although the footage speaks against the calibration."
+)
 OPTION_KNOBS = ("particles", "layers", "survival", "crossover")
 
 
@@ -98,6 +101,7 @@ def told_run(run: StoredRun) -> dict[str, object]:
     help="Half open, from 0; default: from the frame of the start pose to the end.",
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="The same seed gives the same run.")
+@DESPITE_OPTION
 @click.option(
     "--set", "changes", multiple=True, metavar="KNOB=VALUE", help="Any other knob; the guide lists them."
 )
@@ -117,6 +121,7 @@ def track(
     behaviour: str,
     frames: str,
     seed: int,
+    despite_findings: bool,
     changes: tuple[str, ...],
     poses: Path | None,
     name: str,
@@ -143,6 +148,7 @@ def track(
             changes=chosen_changes(changes) | given(knobs),
             name=name,
             behaviour=behaviour,
+            despite_findings=despite_findings,
         )
         run = _prepared(opened, _with_start_pose(request, opened, start_pose))
 

@@ -14,7 +14,7 @@ from studio.notebook.progress import Told, told
 from studio.runs.background_setup import BackgroundSetup, set_up_background
 from studio.runs.initialising import WEIGHTING, InitialPose, keep_pose
 from studio.runs.initialising import initialise as initialise_session
-from studio.runs.mask_quality import MaskQuality
+from studio.runs.mask_quality import MaskQuality, measure_masks
 from studio.runs.mask_quality import mask_quality as quality_of
 from studio.runs.session_settings import session_settings
 from studio.runs.subject_choice import body_of_choice, choose_subject, keep_fitted
@@ -102,9 +102,15 @@ def background(
 
 
 def mask_quality(session: SessionName, frames: Sequence[int] = (), *, progress: Told = None) -> MaskQuality:
-    """How far the masks agree in the hull, camera by camera. frames : default five, evenly spread."""
+    """How far the masks agree in the hull, camera by camera, and what the silhouettes say against the calibration.
+
+    frames : default five, evenly spread; then it is remembered, and a fault that makes results wrong keeps `track` from
+    beginning.
+    """
     opened = open_session(session)
     with told(progress, f"{opened.name}: masks") as report:
+        if not frames:
+            return measure_masks(opened, report)
         return quality_of(opened, session_settings(opened).evidence, frames, progress=report)
 
 

@@ -42,13 +42,15 @@ def track(
     seed: int = 0,
     name: str = "",
     knobs: Mapping[str, object] | None = None,
+    despite_findings: bool = False,
     progress: Told = None,
 ) -> Tracked:
     """Track a session and store the run; the same seed gives the same run.
 
     tracker, weighting, body : names, the session's own by default. first : default the frame that the start pose is of;
-    last : the frame after the last. knobs : any, by
-    name. Interrupted, what was tracked stays, and `go_on` goes on with it. Raises StudioError.
+    last : the frame after the last. knobs : any, by name. despite_findings : also where the footage speaks against the
+    calibration, as `mask_quality` may find. Interrupted, what was tracked stays, and `go_on` goes on with it. Raises
+    StudioError.
     """
     opened = open_session(session)
     measures = subject if isinstance(subject, Subject) or subject is None else read_subject(Path(subject))
@@ -67,6 +69,7 @@ def track(
         changes=dict(knobs or {}),
         name=name,
         behaviour=behaviour,
+        despite_findings=despite_findings,
     )
     with told(progress, f"{opened.name}: tracking") as report:
         run = prepare_run(opened, request, report)

@@ -21,7 +21,9 @@ from studio.evidence.pipeline import EvidenceMaker
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
 from studio.progress import Progress
-from studio.runs.silhouette_doubts import height_of, person_alone, silhouette_doubts
+from studio.runs.session_settings import session_settings
+from studio.runs.silhouette_doubts import MEASURED, height_of, person_alone, silhouette_doubts
+from studio.sessions.made_from import note
 from studio.sessions.session import Session
 from studio.volume.hull import Hull
 from studio.volume.hull_pieces import chosen_voxels, piece_numbers
@@ -163,6 +165,16 @@ def mask_quality(
     found = summed(chosen, tuple(camera.name for camera in cameras), counted)
     doubts = silhouette_doubts(cameras, people, height_of(session)) if blame else ()
     return dataclasses.replace(found, doubts=doubts)
+
+
+def measure_masks(session: Session, progress: Progress | None = None) -> MaskQuality:
+    """The quality of the masks as the session makes them, remembered: a blocking doubt keeps runs from being made
+    (`silhouette_doubts.check_believed`). Raises RunError for a single camera, FootageError.
+    """
+    found = mask_quality(session, session_settings(session).evidence, progress=progress)
+    stops = tuple(str(finding) for finding in blocking(found.doubts))
+    note(session, MEASURED, found.in_words(), found.usable, stops)
+    return found
 
 
 def spread_frames(count: int, wanted: int) -> tuple[int, ...]:

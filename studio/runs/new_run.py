@@ -22,6 +22,7 @@ from studio.runs.initialising import InitialPose, Progress, initialise
 from studio.runs.live_request import check_live, live_changes
 from studio.runs.search_space import parameter_names, session_sigma
 from studio.runs.session_settings import session_settings
+from studio.runs.silhouette_doubts import check_believed, standing_doubts
 from studio.sessions.manifest import now
 from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session, free_run_name
@@ -44,6 +45,7 @@ class RunRequest:
     run-2, … behaviour : a behaviour model, by its name in the workspace's models or by path; "" for the only one that
     fits where the settings need one. live : frames come on the footage's clock and are dropped where they come too
     fast (`live_run`). to_and_fro : a live run goes forth and back through the footage; `last` may lie behind its end.
+    despite_findings : also where the footage speaks against the calibration.
     """
 
     tracker: str = ""
@@ -60,6 +62,7 @@ class RunRequest:
     behaviour: str = ""
     live: bool = False
     to_and_fro: bool = False
+    despite_findings: bool = False
 
 
 def prepare_run(
@@ -71,6 +74,9 @@ def prepare_run(
     frame is searched for one, which takes a while. progress : told how far that is.
     """
     asked = request or RunRequest()
+    doubts = standing_doubts(session)
+    if not asked.despite_findings:
+        check_believed(session)
     tracker = asked.tracker or session.manifest.tracker or DEFAULT_TRACKER
     weighting = asked.weighting or session.manifest.weighting or usual_weighting(tracker)
     changes = live_changes(asked.changes) if asked.live else asked.changes
@@ -83,6 +89,7 @@ def prepare_run(
     if not 0 <= asked.seed < 2**63:
         raise RunError(f"The seed {asked.seed} cannot be used.", "Give a whole number of 0 or more.")
     body, notes = session.body_with_notes(asked.body or None, asked.subject)
+    notes = (*notes, *(f"Tracked despite: {doubt}" for doubt in doubts))
     behaviour = chosen_model(session, body, settings, asked.behaviour)
     if behaviour is not None and behaviour.note:
         notes = (*notes, behaviour.note)

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from studio.calibration.checks import Masks, check_calibration
 from studio.calibration.findings import Finding
-from studio.errors import StudioError
+from studio.errors import CalibrationError, StudioError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.masks import cleaned
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
+from studio.sessions.made_from import changed_inputs, origin_of
 from studio.sessions.session import Session
 
 Bytes = NDArray[np.uint8]
@@ -23,6 +24,8 @@ PERSON_ALONE = EvidenceSettings(
     mask_opening=0, mask_closing=0, mask_fill_holes=0, mask_min_component=0, mask_keep_components=1
 )
 UNEXPLAINED = "views-disagree"
+MEASURED = "background"
+"""The part of a session whose measuring tells of doubts."""
 SIZES = ("scale", "square-size")
 
 
@@ -48,6 +51,25 @@ def silhouette_doubts(
         by_height = finding.code in SIZES and height_mm is not None
         found.append(dataclasses.replace(finding, severity="warns") if by_height else finding)
     return tuple(found)
+
+
+def standing_doubts(session: Session) -> tuple[str, ...]:
+    """What the silhouettes said, when they were measured last, that makes all results wrong: sentences. None where the
+    footage or the calibration is another one since.
+    """
+    measured = origin_of(session, MEASURED)
+    if measured is None or changed_inputs(session, MEASURED, ("footage", "calibration")):
+        return ()
+    return measured.stops
+
+
+def check_believed(session: Session) -> None:
+    """Raises CalibrationError where the silhouettes speak against the calibration."""
+    if doubts := standing_doubts(session):
+        raise CalibrationError(
+            f"The footage of '{session.name}' speaks against its calibration: {doubts[0]}",
+            "Set it right and measure the masks again, or track despite the findings.",
+        )
 
 
 def height_of(session: Session) -> float | None:

@@ -1,6 +1,7 @@
 """The steps of the guided way before tracking: footage, calibration, background, subject, start pose."""
 
 from studio.body.forward_kinematics import limb_ends
+from studio.runs.silhouette_doubts import standing_doubts
 from studio.runs.turned_cameras import misses_in_words
 from studio.runs.way_step import StepName, StepStatus, counted, enumerated
 from studio.sessions.background_files import read_evidence
@@ -47,6 +48,8 @@ def calibration_step(session: Session) -> StepStatus:
             words,
             f"The footage of camera {enumerated(other)} is of another size now.",
         )
+    if doubts := standing_doubts(session):
+        return StepStatus("calibration", "stale", words, f"The footage speaks against it: {doubts[0]}")
     return StepStatus(
         "calibration", "done", f"{words}, {source}" if source else words, misses_in_words(session)
     )
@@ -78,8 +81,8 @@ def background_step(session: Session) -> StepStatus:
 
 def _what_to_look_at(session: Session) -> str:
     """Masks disagree because they are poor, or because the cameras are not where the calibration has them."""
-    if misses_in_words(session):
-        return "the cameras miss, see step Calibration"
+    if misses_in_words(session) or standing_doubts(session):
+        return "the cameras are not what the calibration says, see there"
     return "look at the masks, and ask whether the cameras agree"
 
 

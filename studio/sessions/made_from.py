@@ -6,6 +6,7 @@ has no entry and is never stale; neither is one whose file was replaced by hand 
 """
 
 import hashlib
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import msgspec
@@ -27,19 +28,22 @@ INPUTS = {
     "alignment": ("footage", "calibration", "masks"),
 }
 """Part to what it is made from."""
+ALL_INPUTS = ("footage", "calibration", "subject", "masks")
 
 FILES = {"subject": SUBJECT_NAME, "start-pose": START_POSE_NAME}
 
 
 class Origin(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Of one part. content : digest of its file, "" where it has none. inputs : digests of what it was made from.
-    words : what was found, in words; good : whether it is fit for what comes next.
+    words : what was found, in words; good : whether it is fit for what comes next. stops : what was found that makes
+    all results wrong, sentences.
     """
 
     content: str
     inputs: dict[str, str]
     words: str = ""
     good: bool = True
+    stops: tuple[str, ...] = ()
 
 
 class MadeFrom(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -49,20 +53,22 @@ class MadeFrom(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     parts: dict[str, Origin] = {}
 
 
-def digests(session: Session) -> dict[str, str]:
-    """Digests of "footage", "calibration", "subject" and "masks" as they are now; "" for what is not there."""
-    return {
-        "footage": _digest(msgspec.json.encode(_footage_facts(session))) if session.has_footage else "",
-        "calibration": _file_digest(session.path / CAMERAS_PATH),
-        "subject": _digest(session.manifest.body.encode(), _content(session.path / SUBJECT_NAME)),
-        "masks": _masks_digest(session),
+def digests(session: Session, names: Iterable[str] = ALL_INPUTS) -> dict[str, str]:
+    """Digests of what is named, as it is now; "" for what is not there."""
+    of: dict[str, Callable[[Session], str]] = {
+        "footage": _footage_digest,
+        "calibration": lambda session: _file_digest(session.path / CAMERAS_PATH),
+        "subject": _subject_digest,
+        "masks": _masks_digest,
     }
+    return {name: of[name](session) for name in names}
 
 
-def note(session: Session, part: str, words: str = "", good: bool = True) -> None:
-    """Remember that a part was made just now, of what is there now. part : a key of INPUTS."""
-    now = digests(session)
-    origin = Origin(_own(session, part), {name: now[name] for name in INPUTS[part]}, words, good)
+def note(
+    session: Session, part: str, words: str = "", good: bool = True, stops: tuple[str, ...] = ()
+) -> None:
+    """Remember that a part was made just now, of what is there now. part : a key of INPUTS; the rest as in `Origin`."""
+    origin = Origin(_own(session, part), digests(session, INPUTS[part]), words, good, stops)
     _write(session, {**_read(session).parts, part: origin})
 
 
@@ -72,21 +78,20 @@ def origin_of(session: Session, part: str) -> Origin | None:
     return found if found is not None and found.content == _own(session, part) else None
 
 
-def changed_inputs(session: Session, part: str) -> tuple[str, ...]:
-    """What a part was made from that is another one now: some of INPUTS[part], in their order."""
+def changed_inputs(session: Session, part: str, among: Iterable[str] = ALL_INPUTS) -> tuple[str, ...]:
+    """What a part was made from that is another one now: some of INPUTS[part], in order. among : what is asked."""
     found = origin_of(session, part)
     if found is None:
         return ()
-    now = digests(session)
-    return tuple(name for name in INPUTS[part] if found.inputs.get(name, "") != now[name])
+    now = digests(session, [name for name in INPUTS[part] if name in among])
+    return tuple(name for name in now if found.inputs.get(name, "") != now[name])
 
 
 def adopt(session: Session) -> None:
     """Before something changes: parts that were given count as made from what is there now."""
     known = _read(session).parts
-    now = digests(session)
     given = {
-        part: Origin(_own(session, part), {name: now[name] for name in INPUTS[part]})
+        part: Origin(_own(session, part), digests(session, INPUTS[part]))
         for part in FILES
         if (session.path / FILES[part]).exists() and origin_of(session, part) is None and part != "subject"
     }
@@ -94,15 +99,19 @@ def adopt(session: Session) -> None:
         _write(session, {**known, **given})
 
 
-def _footage_facts(session: Session) -> list[object]:
+def _footage_digest(session: Session) -> str:
+    if not session.has_footage:
+        return ""
     source = session.manifest.footage
-    return [
-        source.fps,
-        [
-            [camera.name, camera.path, camera.width, camera.height, camera.offset, camera.turned]
-            for camera in source.cameras
-        ],
+    facts = [
+        [camera.name, camera.path, camera.width, camera.height, camera.offset, camera.turned]
+        for camera in source.cameras
     ]
+    return _digest(msgspec.json.encode([source.fps, facts]))
+
+
+def _subject_digest(session: Session) -> str:
+    return _digest(session.manifest.body.encode(), _content(session.path / SUBJECT_NAME))
 
 
 def _masks_digest(session: Session) -> str:

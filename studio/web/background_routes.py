@@ -7,11 +7,10 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import Field
 
 from studio.errors import NotFoundError
-from studio.runs.mask_quality import MaskQuality, mask_quality
+from studio.runs.mask_quality import MaskQuality, mask_quality, measure_masks
 from studio.runs.overlay_pictures import forget_composers
 from studio.runs.session_settings import session_settings
 from studio.sessions.background_files import exclusion_path, read_evidence, set_exclusion, write_evidence
-from studio.sessions.made_from import note
 from studio.web.background_schemas import MaskQualityAnswer, ViewQualityLine
 from studio.web.calibration_schemas import FindingView
 from studio.web.picture_routes import Knobs, knob_changes
@@ -46,13 +45,7 @@ async def quality(session: OpenSession, frames: Frames = None, settings: Knobs =
 @router.post("/masks/quality")
 async def measure(session: OpenSession) -> MaskQualityAnswer:
     """Measure the masks as the session makes them, and remember it for the guided way."""
-
-    def measured() -> MaskQuality:
-        found = mask_quality(session, session_settings(session).evidence)
-        note(session, "background", found.in_words(), found.usable)
-        return found
-
-    return quality_answer(await asyncio.to_thread(measured))
+    return quality_answer(await asyncio.to_thread(measure_masks, session))
 
 
 @router.get("/exclusions/{camera}", response_class=Response)

@@ -13,12 +13,12 @@ from studio.capture.pictures import is_picture
 from studio.errors import FootageError, RunError, StudioError
 from studio.knobs import knobs_of
 from studio.runs.background_setup import MODEL_OF, SOURCES, set_up_background
-from studio.runs.mask_quality import MaskQuality, mask_quality
+from studio.runs.mask_quality import MaskQuality, measure_masks
 from studio.runs.overlay_pictures import forget_composers
 from studio.runs.session_settings import session_settings
 from studio.sessions.background_files import exclusion_path, read_evidence, set_backgrounds
 from studio.sessions.inner_paths import place_in, relative_path
-from studio.sessions.made_from import note, origin_of
+from studio.sessions.made_from import origin_of
 from studio.sessions.session import Session
 from studio.settings import values
 from studio.web.background_jobs import Job
@@ -140,13 +140,11 @@ def _measured(session: Session, job: Job) -> MaskQuality | None:
     if len(session.manifest.footage.cameras) < 2 or not session.is_calibrated:
         return None
     try:
-        found = mask_quality(session, session_settings(session).evidence, progress=job.report_or_stop)
+        return measure_masks(session, job.report_or_stop)
     except StudioError:
         if job.cancelled():
             return None
         raise
-    note(session, "background", found.in_words(), found.usable)
-    return found
 
 
 def _check_free(doors: Doors, name: str) -> None:

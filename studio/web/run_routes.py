@@ -73,6 +73,7 @@ def make_run(session: OpenSession, wish: RunRequest, doors: Door) -> RunLine:
         behaviour=wish.behaviour or "",
         live=wish.live,
         to_and_fro=wish.to_and_fro,
+        despite_findings=wish.despite_findings,
     )
     made = prepare_run(session, request)
     doors.events.session_changed(session.name, made.name)

@@ -179,6 +179,9 @@ class SessionDetail(Answer):
     assumptions: list[str]
     notes: list[str]
     warnings: list[str]
+    doubts: list[str] = Field(
+        default_factory=list, description="What the footage says against the calibration."
+    )
     runs: list[RunLine]
 
 
@@ -246,6 +249,9 @@ class RunRequest(Request):
     )
     to_and_fro: bool = Field(
         False, description="A live run goes forth and back; last may lie behind the end."
+    )
+    despite_findings: bool = Field(
+        False, description="Also where the footage speaks against the calibration."
     )
 
 

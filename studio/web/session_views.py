@@ -7,6 +7,7 @@ from studio.capture.footage_source import CameraSource
 from studio.errors import StudioError
 from studio.experiments.comparison_folders import comparison_count
 from studio.geometry.camera import Camera
+from studio.runs.silhouette_doubts import standing_doubts
 from studio.sessions.beginning import next_step
 from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session
@@ -111,6 +112,7 @@ def session_detail(session: Session) -> SessionDetail:
             "assumptions": list(manifest.assumptions),
             "notes": list(manifest.notes),
             "warnings": list(manifest.warnings),
+            "doubts": list(standing_doubts(session)),
             "runs": [
                 completed(RunLine.model_validate(run.summary()), session) for run in reversed(session.runs())
             ],

@@ -1,7 +1,8 @@
 // Learning a model: the form, and the card that tells how far it is.
 
 import { fetchJson, post } from "./api.js";
-import { button, duration, element } from "./elements.js";
+import { button, element } from "./elements.js";
+import { withTimeLeft } from "./jobs.js";
 import { uploadFiles } from "./uploading.js";
 
 const USES = [["", "–"], ["learn", "learn"], ["test", "test"]];
@@ -93,11 +94,7 @@ export function showLearningForm(content, { choices, sessions, started }) {
 }
 
 /** What is said of progress in one line. */
-export function progressWords({ state, step, done, total, seconds_left: left }) {
-  if (state !== "running") return state;
-  const share = total ? `${Math.floor((100 * done) / total)} %` : "";
-  return [step || "beginning", share, left === null ? "" : `about ${duration(left)} left of this step`].filter(Boolean).join(" · ");
-}
+export const progressWords = (told) => (told.state === "running" ? withTimeLeft(told, "beginning") : told.state);
 
 /** The card of what is being learnt, or of why it was not. again: called for another form. */
 export function showLearning(content, progress, { cancel, again }) {

@@ -3,11 +3,11 @@
 
 import { fetchJson, post, remove, runPath } from "./api.js";
 import { button, element } from "./elements.js";
+import { followJob } from "./jobs.js";
 import { onEvent } from "./live.js";
 import { complain, say } from "./messages.js";
 import { openSession, refreshSessions } from "./rail.js";
 import { get, set, watch } from "./state.js";
-import { awaitJob } from "./tracks.js";
 
 const bar = document.getElementById("correcting");
 const opener = document.getElementById("correct");
@@ -47,14 +47,14 @@ async function track(back) {
     const begunJob = await post(`${runPath(session, run)}/correct`, { frame: edited.frame, pose: edited.pose, back_to: back });
     going = begunJob;
     draw();
-    const ended = await awaitJob(begunJob, (told) => { going = told; draw(); });
+    const ended = await followJob(`/api/track-jobs/${begunJob.identifier}`, (told) => { going = told; draw(); });
     const at = edited.frame;
     frame = going = null;
     draw();
     await remove(POSE_PATH);
     await refreshSessions();
     openSession(session, ended.made_run);
-    say(`Frame ${at} of ${run} is corrected in ${ended.made_run}${ended.stopped ? ", as far as it came" : ""}; ${run} stays as it was.`);
+    say(`Frame ${at} of ${run} is corrected in ${ended.made_run}${ended.state === "cancelled" ? ", as far as it came" : ""}; ${run} stays as it was.`);
     if (back === null) await post(`${runPath(session, ended.made_run)}/start`);
     else set({ frame: at });
   } catch (error) {

@@ -1,23 +1,11 @@
 // Importing a session: a folder of the computer that the studio runs on, or an upload from this browser.
 
-import { fetchJson, post } from "./api.js";
+import { post } from "./api.js";
 import { openForm } from "./dialogs.js";
+import { jobDone, standing } from "./jobs.js";
 import { say } from "./messages.js";
 import { openSession, refreshSessions } from "./rail.js";
 import { uploadFiles } from "./uploading.js";
-
-const POLL_MILLISECONDS = 400;
-
-/** Wait for an import to end, telling its progress; throws its error. */
-async function watchImport(identifier, report) {
-  for (;;) {
-    const told = await fetchJson(`/api/imports/${identifier}`);
-    if (told.state === "done") return told;
-    if (told.state !== "running") throw Object.assign(new Error(told.message), { hint: told.hint });
-    report(told.total ? `${told.step} ${Math.round((100 * told.done) / told.total)} %` : told.step || "Importing…");
-    await new Promise((resolve) => setTimeout(resolve, POLL_MILLISECONDS));
-  }
-}
 
 /** Open the form. */
 export function importForm() {
@@ -36,7 +24,7 @@ export function importForm() {
       if (values.files.length) body.upload = await uploadFiles(values.files, report);
       else body.source = values.source;
       const { identifier } = await post("/api/imports", body);
-      const told = await watchImport(identifier, report);
+      const told = await jobDone(`/api/imports/${identifier}`, (going) => report(standing(going, "Importing…")));
       await refreshSessions();
       openSession(values.name);
       for (const warning of told.warnings ?? []) say(warning, { kind: "warning" });

@@ -44,6 +44,7 @@ export async function newRunForm(entry, like = null) {
   const bodyChoices = [{ value: "", label: `the session's (${entry.body})` }, ...bodies.map((body) => ({ value: body.name, label: `${body.name} · ${body.parameters} parameters` }))];
   openForm({
     heading: `New run of ${entry.name}`, action: "Track",
+    intro: detail.doubts.length ? `The footage speaks against the calibration. ${detail.doubts[0]}` : "",
     rows: [
       [{ name: "tracker", label: "Tracker", choices: trackers.map((one) => ({ value: one.name, label: one.label })), value: first.tracker },
         { name: "weighting", label: "Weighting", choices: weightings.map((one) => ({ value: one.name, label: one.label })), value: first.weighting }],
@@ -57,6 +58,7 @@ export async function newRunForm(entry, like = null) {
         { name: "name", label: "Name", value: "", placeholder: "numbered", pattern: "[A-Za-z0-9_\\-]{0,64}" }],
       [{ name: "find", kind: "check", label: "find the start pose in the first frame", value: needsPose }],
       [{ name: "live", kind: "check", label: "live: drops frames rather than falls behind", value: false }],
+      ...(detail.doubts.length ? [[{ name: "despite", kind: "check", label: "track although the calibration is in doubt", value: false }]] : []),
     ],
     // A tracker brings its usual weighting along, unless the session or the person wants another.
     changed: async (name, form) => {
@@ -80,7 +82,7 @@ export async function newRunForm(entry, like = null) {
       const made = await post(`${sessionPath(entry.name)}/runs`, {
         name: values.name || null, tracker: values.tracker, weighting: values.weighting, body: values.body || null, seed: Number(values.seed),
         first: Number(values.first), last: Number(values.last) + 1, settings: { ...preset?.values, ...guided },
-        behaviour: values.behaviour || null, live: values.live,
+        behaviour: values.behaviour || null, live: values.live, despite_findings: Boolean(values.despite),
         ...(found ? { start_pose: found.pose, start_source: found.source } : {}),
       });
       await refreshSessions();

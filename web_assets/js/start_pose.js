@@ -1,11 +1,11 @@
 // Finding a start pose in a frame: progress while it is looked for, what was found and how sure it is.
 
-import { fetchJson, post, remove, sessionPath } from "./api.js";
+import { post, remove, sessionPath } from "./api.js";
 import { openForm } from "./dialogs.js";
+import { jobDone, standing } from "./jobs.js";
 import { say } from "./messages.js";
 import { openSessionAlone, refreshSessions } from "./rail.js";
 
-const POLL_MILLISECONDS = 400;
 const UNSURE = 0.75;
 
 /** Look for the pose in a frame; resolves with what was found, throws what went wrong. `wish`: frame, body, behaviour, replace. */
@@ -15,13 +15,7 @@ export async function findStartPose(session, wish, report) {
   const stop = () => { remove(`/api/initialisations/${identifier}`).catch(() => {}); };
   dialog.addEventListener("close", stop, { once: true });
   try {
-    for (;;) {
-      const told = await fetchJson(`/api/initialisations/${identifier}`);
-      if (told.state === "done") return told;
-      if (told.state !== "running") throw Object.assign(new Error(told.message), { hint: told.hint });
-      report(told.total > 1 ? `Finding the pose ${Math.round((100 * told.done) / told.total)} %` : "Looking…");
-      await new Promise((resolve) => setTimeout(resolve, POLL_MILLISECONDS));
-    }
+    return await jobDone(`/api/initialisations/${identifier}`, (told) => report(standing(told, "Finding the pose…")));
   } finally {
     dialog.removeEventListener("close", stop);
   }

@@ -2,28 +2,16 @@
 
 import { fetchJson, post, remove, runPath } from "./api.js";
 import { openForm } from "./dialogs.js";
+import { followJob, standing } from "./jobs.js";
 import { onEvent } from "./live.js";
 import { complain, say } from "./messages.js";
 import { openSession } from "./rail.js";
 import { get, set, watch } from "./state.js";
 
-const POLL_MILLISECONDS = 300;
 const choice = document.getElementById("track-choice");
 const RAW = "raw";
 const WORDS = { refine: ["Refining", "refined"], smooth: ["Smoothing", "smoothed"] };
 const named = (line) => (line.name === RAW ? "as searched" : line.name) + (line.mean_mm === null || line.mean_mm === undefined ? "" : ` · ${line.mean_mm.toPrecision(3)} mm`);
-
-/** Wait for work in the background; resolves with its state when it has ended, throws what went wrong, null if cancelled. */
-export async function awaitJob(begun, report) {
-  for (;;) {
-    const told = await fetchJson(`/api/track-jobs/${begun.identifier}`);
-    if (told.state === "done") return told;
-    if (told.state === "cancelled") return { ...told, stopped: true };
-    if (told.state === "failed") throw Object.assign(new Error(told.message), { hint: told.hint });
-    report(told);
-    await new Promise((resolve) => setTimeout(resolve, POLL_MILLISECONDS));
-  }
-}
 
 /** Ask which tracks the run has, and offer them. */
 async function loadTracks() {
@@ -71,8 +59,8 @@ export async function makeTrackForm(session, run, verb) {
       dialog.addEventListener("close", stop, { once: true });
       report(`${going}…`);
       try {
-        const ended = await awaitJob(begun, (job) => report(job.total > 1 ? `${going} ${Math.round((100 * job.done) / job.total)} %` : `${going}…`));
-        if (ended.stopped) return;
+        const ended = await followJob(`/api/track-jobs/${begun.identifier}`, (job) => report(standing(job, `${going}…`)));
+        if (ended.state === "cancelled") return;
         tell(ended, run);
         openSession(session, run);
         await loadTracks();

@@ -1,11 +1,9 @@
 // Footage taken into the session: uploaded from this browser, or from a folder of the studio's computer.
 
 import { button, element } from "./elements.js";
+import { CANCELLED, jobDone, shareOf, standing } from "./jobs.js";
 import { complain } from "./messages.js";
 import { uploadFiles } from "./uploading.js";
-
-const POLL_MILLISECONDS = 400;
-const CANCELLED = "cancelled";
 
 /** Draw the form in `place` (a details element); `done(told)` is called when footage was taken in. */
 export function adder(place, way, done) {
@@ -71,16 +69,9 @@ export function adder(place, way, done) {
   }
 
   /** Wait until everything is read; null where the step was left meanwhile. */
-  async function watchTaking(identifier) {
-    while (!state.stopped) {
-      const told = await fetchJson(`/api/imports/${identifier}`);
-      if (told.state === "done") return told;
-      if (told.state !== "running") throw Object.assign(new Error(told.message), { hint: told.hint, code: told.code });
-      const share = told.total ? told.done / told.total : 0;
-      way.progress(going, { words: `${told.step || "beginning"}${told.total ? ` · ${Math.round(100 * share)} %` : ""}`, share, cancel: () => remove(`/api/imports/${identifier}`).catch(complain) });
-      await new Promise((resolve) => setTimeout(resolve, POLL_MILLISECONDS));
-    }
-    return null;
+  function watchTaking(identifier) {
+    const cancel = () => remove(`/api/imports/${identifier}`).catch(complain);
+    return jobDone(`/api/imports/${identifier}`, (told) => way.progress(going, { words: standing(told, "beginning"), share: shareOf(told), cancel }), () => state.stopped);
   }
 
   return {

@@ -1,10 +1,10 @@
 // Step Check: whether the motion fits the pictures, frame by frame; refining and smoothing; which track is exported.
 
-import { button, duration, element } from "./elements.js";
+import { button, element } from "./elements.js";
+import { followJob, shareOf, withTimeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 import { viewWall } from "./way_views.js";
 
-const POLL_MILLISECONDS = 700;
 const MOST_CHIPS = 24;
 const GOOD = 0.85;
 const percent = (share) => (share === null || share === undefined ? "–" : `${Math.round(100 * share)} %`);
@@ -159,8 +159,8 @@ export function mount(place, way) {
     drawBetter();
     const { job } = state;
     way.progress(going, job && {
-      words: [job.step || { refine: "refining", smooth: "smoothing", check: "comparing" }[job.verb] || "working", job.total ? `${Math.round((100 * job.done) / job.total)} %` : "", job.seconds_left > 2 ? `${duration(job.seconds_left)} left` : ""].filter(Boolean).join(" · "),
-      share: job.total ? job.done / job.total : 0, cancel: () => remove(`/api/track-jobs/${job.identifier}`).catch(complain),
+      words: withTimeLeft(job, { refine: "refining", smooth: "smoothing", check: "comparing" }[job.verb] || "working"),
+      share: shareOf(job), cancel: () => remove(`/api/track-jobs/${job.identifier}`).catch(complain),
     });
   }
 
@@ -188,15 +188,12 @@ export function mount(place, way) {
 
   /** Wait for the job's end; resolves with the name of the track that it made, "" for none. */
   async function follow() {
-    while (state.job.state === "running") {
-      await new Promise((resolve) => setTimeout(resolve, POLL_MILLISECONDS));
-      if (state.stopped) return "";
-      state.job = await fetchJson(`/api/track-jobs/${state.job.identifier}`);
-      if (state.job.state === "running") drawAll();
-    }
-    const ended = state.job;
-    if (ended.state === "failed") state.failed = ended;
-    const made = ended.state === "done" && ended.verb !== "check" ? ended.track : "";
+    let ended = null;
+    try {
+      ended = await followJob(`/api/track-jobs/${state.job.identifier}`, (told) => { state.job = told; drawAll(); }, () => state.stopped);
+    } catch (error) { state.failed = error; }
+    if (state.stopped) return "";
+    const made = ended?.state === "done" && ended.verb !== "check" ? ended.track : "";
     await load(made || state.track);
     await way.refresh();
     return made;

@@ -1,10 +1,10 @@
 // Step Start pose: found automatically with its confidence, checked in all views (left and right by colour), put right
 // by hand in the scene or by a turn, made better by a short search.
 
-import { button, duration, element } from "./elements.js";
+import { button, element } from "./elements.js";
+import { followJob, shareOf, withTimeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 
-const POLL_MILLISECONDS = 400;
 const UNSURE = 0.75;
 const PICTURE_HEIGHT = 360;
 const REDRAW_MILLISECONDS = 250;
@@ -27,21 +27,11 @@ export function mount(place, way) {
 
   /** Wait for a job of the background, its bar drawn meanwhile; what it found. */
   async function waited(path, begun, words) {
-    let stopped = false;
-    const cancel = () => { stopped = true; remove(`${path}/${begun.identifier}`).catch(complain); };
+    const cancel = () => remove(`${path}/${begun.identifier}`).catch(complain);
     try {
-      for (;;) {
-        if (state.gone) { cancel(); return null; }
-        const told = await fetchJson(`${path}/${begun.identifier}`);
-        if (told.state === "done") return told;
-        if (told.state !== "running") {
-          if (stopped || told.state === "cancelled") return null;
-          throw Object.assign(new Error(told.message), { hint: told.hint });
-        }
-        const far = [told.step || words, told.total > 1 ? `${Math.round((100 * told.done) / told.total)} %` : "", told.seconds_left > 2 ? `${duration(told.seconds_left)} left of this step` : ""];
-        way.progress(progress, { words: far.filter(Boolean).join(" · "), share: told.total ? told.done / told.total : null, cancel });
-        await new Promise((resolve) => setTimeout(resolve, POLL_MILLISECONDS));
-      }
+      const ended = await followJob(`${path}/${begun.identifier}`, (told) => way.progress(progress, { words: withTimeLeft(told, words), share: shareOf(told), cancel }), () => state.gone);
+      if (!ended) cancel();
+      return ended?.state === "done" ? ended : null;
     } finally { way.progress(progress, null); }
   }
 

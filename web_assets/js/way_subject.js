@@ -1,10 +1,10 @@
 // Step Subject: which body, how tall, what follows from it; and the fit to the footage, with lengths before and after.
 
-import { button, duration, element } from "./elements.js";
+import { button, element } from "./elements.js";
+import { followJob, shareOf, withTimeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 import { drawStature } from "./way_stature.js";
 
-const POLL_MILLISECONDS = 500;
 const PREVIEW_MILLISECONDS = 150;
 const USUAL_HEIGHT = 1750;
 const LEAST_MM = 1000;
@@ -120,21 +120,16 @@ export function mount(place, way) {
   }
 
   function drawGoing() {
-    const { step, done, total, seconds_left: left, identifier } = state.fit;
-    const share = total ? done / total : null;
-    const words = [step || "beginning", total > 1 ? `${Math.round(100 * share)} %` : "", left > 2 ? `${duration(left)} left of this step` : ""].filter(Boolean).join(" · ");
-    way.progress(fitting.querySelector(".going"), { words, share, cancel: () => remove(`/api/subject-fits/${identifier}`).catch(complain) });
+    const { identifier } = state.fit;
+    way.progress(fitting.querySelector(".going"), { words: withTimeLeft(state.fit, "beginning"), share: shareOf(state.fit), cancel: () => remove(`/api/subject-fits/${identifier}`).catch(complain) });
   }
 
-  function follow() {
-    clearTimeout(state.timer);
-    if (state.gone || state.fit?.state !== "running") return;
-    state.timer = setTimeout(async () => {
-      try { state.fit = await fetchJson(`/api/subject-fits/${state.fit.identifier}`); } catch (error) { state.fit = { state: "failed", message: error.message, hint: error.hint }; }
-      if (state.gone) return;
-      if (state.fit.state === "running") drawGoing(); else drawAll();
-      follow();
-    }, POLL_MILLISECONDS);
+  async function follow() {
+    if (state.fit.state !== "running") return;
+    try {
+      state.fit = await followJob(`/api/subject-fits/${state.fit.identifier}`, (told) => { state.fit = told; drawGoing(); }, () => state.gone);
+    } catch (error) { state.fit = { state: "failed", message: error.message, hint: error.hint }; }
+    if (!state.gone) drawAll();
   }
 
   const words = (name) => name.replaceAll("_", " ").replace(/ (length|radius)$/, "");
@@ -199,5 +194,5 @@ export function mount(place, way) {
     drawAll();
   }).catch((error) => place.append(wrong(error)));
 
-  return () => { state.gone = true; clearTimeout(state.timer); clearTimeout(state.preview); style.remove(); };
+  return () => { state.gone = true; clearTimeout(state.preview); style.remove(); };
 }

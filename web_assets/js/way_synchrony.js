@@ -1,13 +1,12 @@
 // The cameras in step: offsets by hand, by a recorder's times, or estimated; an estimate is shown and applied only by a click.
 
 import { button, element } from "./elements.js";
+import { followJob, shareOf, withTimeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
-
-const POLL_MILLISECONDS = 400;
 
 /** Draw in `place`; `offered(offsets)` applies offsets. */
 export function synchroniser(place, way, { offered }) {
-  const { fetchJson, post, remove, sessionPath } = way.api;
+  const { post, remove, sessionPath } = way.api;
   const here = sessionPath(way.session);
   const state = { told: null, estimate: null, stopped: false, from: "" };
 
@@ -57,8 +56,7 @@ export function synchroniser(place, way, { offered }) {
       told.stale_runs.length > 0 && element("p", { className: "notice", textContent: `Tracked on the footage as it was before: ${told.stale_runs.join(", ")}.` }),
     ].filter(Boolean));
     if (going) {
-      const { step, done, total } = state.estimate;
-      way.progress(bar, { words: `${step}${total ? ` · ${Math.round((100 * done) / total)} %` : ""}`, share: total ? done / total : 0, cancel: () => remove(`${here}/synchrony`).catch(complain) });
+      way.progress(bar, { words: withTimeLeft(state.estimate, "beginning"), share: shareOf(state.estimate), cancel: () => remove(`${here}/synchrony`).catch(complain) });
     }
   }
 
@@ -75,13 +73,9 @@ export function synchroniser(place, way, { offered }) {
   async function estimate() {
     state.from = "";
     try {
-      state.estimate = await post(`${here}/synchrony`, {});
-      while (!state.stopped && state.estimate.state === "running") {
-        draw(state.told);
-        await new Promise((resolve) => setTimeout(resolve, POLL_MILLISECONDS));
-        state.estimate = await fetchJson(`${here}/synchrony`);
-      }
-    } catch (error) { complain(error); }
+      await post(`${here}/synchrony`, {});
+      state.estimate = await followJob(`${here}/synchrony`, (told) => { state.estimate = told; draw(state.told); }, () => state.stopped);
+    } catch (error) { state.estimate = { state: "failed", message: error.message, hint: error.hint }; }
     if (!state.stopped) draw(state.told);
   }
 

@@ -1,6 +1,7 @@
 // Step Track: the short form of a run, how far it is, and the outlines over the pictures as they are found.
 
 import { button, duration, element } from "./elements.js";
+import { followJob } from "./jobs.js";
 import { complain } from "./messages.js";
 import { viewWall } from "./way_views.js";
 
@@ -84,16 +85,11 @@ export function mount(place, way) {
   }
 
   async function followBack() {
-    while (!state.stopped && state.job?.state === "running") {
-      drawStatus();
-      await new Promise((resolve) => setTimeout(resolve, POLL_MILLISECONDS / 2));
-      if (state.stopped) return;
-      try { state.job = await fetchJson(`/api/track-jobs/${state.job.identifier}`); } catch (error) { state.job = { state: "failed", message: error.message, hint: error.hint }; }
-    }
-    const ended = state.job;
+    try {
+      await followJob(`/api/track-jobs/${state.job.identifier}`, (told) => { state.job = told; drawStatus(); }, () => state.stopped);
+    } catch (error) { state.failed = error; }
     state.job = null;
     if (state.stopped) return;
-    if (ended?.state === "failed") state.failed = ended;
     state.frame = null;
     await loadRuns().catch(complain);
     drawStatus();
@@ -107,7 +103,7 @@ export function mount(place, way) {
     state.failed = null;
     try {
       const settings = Number(values.evaluations) ? await fetchJson(`/api/evaluations?tracker=${values.tracker}&evaluations=${values.evaluations}`) : {};
-      const made = await post(`${here}/runs`, { tracker: values.tracker, weighting: values.weighting, first: Number(values.first), last: Number(values.last) + 1, settings });
+      const made = await post(`${here}/runs`, { tracker: values.tracker, weighting: values.weighting, first: Number(values.first), last: Number(values.last) + 1, settings, despite_findings: Boolean(form.querySelector(".despite")?.checked) });
       fold.open = false;
       await loadRuns();
       await start(made.name);
@@ -118,6 +114,14 @@ export function mount(place, way) {
   function drawFailure() {
     form.querySelector(".wrong")?.remove();
     if (state.failed) form.append(element("p", { className: "wrong", role: "alert" }, state.failed.message, element("span", { className: "hint", textContent: ` ${state.failed.hint ?? ""}` })));
+  }
+
+  /** What the footage says against the calibration, and the consent to track all the same. */
+  function doubtLines() {
+    const { doubts } = way.detail;
+    if (!doubts.length) return [];
+    return [element("p", { className: "notice", textContent: `The footage speaks against the calibration. ${doubts[0]}` }),
+      element("label", { className: "check" }, element("input", { type: "checkbox", className: "despite" }), "track all the same")];
   }
 
   async function drawForm() {
@@ -140,6 +144,7 @@ export function mount(place, way) {
         element("label", {}, "Last frame", element("input", { name: "last", type: "number", min: 0, max: last, value: last }))),
       way.detail.start_pose_frame > 0 ? element("p", { className: "hint", textContent: `The start pose is of frame ${way.detail.start_pose_frame}: tracking begins there. The frames before it can be tracked backwards afterwards.` }) : "",
       !way.detail.has_start_pose ? element("p", { className: "hint", textContent: "There is no start pose yet: it is looked for in the first frame, which takes a while." }) : "",
+      ...doubtLines(),
       element("div", { className: "step-actions" }, submit));
     form.onsubmit = async (event) => {
       event.preventDefault();
