@@ -13,6 +13,7 @@ from studio.body.forward_kinematics import marker_points
 from studio.capture.trc import MarkerMotion, write_trc
 from studio.cli.main import main
 from studio.experiments.kept_comparison import BEHAVIOUR_NAME
+from studio.sessions.made_from import note
 from studio.sessions.named_rows import write_pose
 from studio.sessions.session import Session
 
@@ -86,3 +87,16 @@ def test_compare_with_a_model(started: Session) -> None:
         "behaviour"
         not in run("compare", "--help").output.partition("--evaluations")[0].partition("default:")[2]
     )
+
+
+def test_track_despite_what_the_footage_says(started: Session) -> None:
+    doubt = "Camera cam2 seems to be mirrored. Record it again."
+    note(started, "background", "in doubt", good=False, stops=(doubt,))
+    common = ("track", "toy", "--frames", "0:1", "--particles", "20", "--layers", "2", "--json")
+    refused = run(*common)
+    assert refused.exit_code == 2
+    assert doubt in refused.stderr
+    assert not started.runs()
+    tracked = run(*common, "--despite-findings")
+    assert tracked.exit_code == 0, tracked.stderr
+    assert f"Tracked despite: {doubt}" in tracked.stderr

@@ -10,10 +10,13 @@ from drawn_people import drawn_mask, ring_of_cameras
 
 from studio.body.catalogue import load_body
 from studio.capture.calibration_files import write_calibration
+from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
-from studio.runs.mask_quality import mask_quality
+from studio.runs.mask_quality import mask_quality, measure_masks
+from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.session_settings import session_settings
 from studio.runs.silhouette_doubts import silhouette_doubts
+from studio.runs.way import way_of
 from studio.sessions.session import CAMERAS_PATH, Session
 from studio.web.samples import sample_folder
 
@@ -98,3 +101,26 @@ def test_measuring_the_masks_tells_of_exchanged_cameras(walk: Session) -> None:
     assert found.doubts[0].cameras == (cameras[0].name, cameras[2].name)
     assert not found.usable
     assert "in doubt" in found.in_words()
+
+
+def test_a_session_whose_footage_contradicts_its_cameras_is_not_tracked(walk: Session) -> None:
+    """Nothing is refused before the masks are measured, nor once the calibration is set right."""
+    sound = walk.cameras()
+    assert prepare_run(walk, RunRequest(last=2)).record.notes == ()
+    write_calibration(exchanged(sound, 0, 2), walk.path / CAMERAS_PATH)
+    spoilt = Session(walk.path)
+    prepare_run(spoilt, RunRequest(last=2))
+    measure_masks(spoilt)
+
+    with pytest.raises(CalibrationError) as refused:
+        prepare_run(spoilt, RunRequest(last=2))
+    assert sound[0].name in refused.value.message
+    assert sound[2].name in refused.value.message
+    assert len(spoilt.runs()) == 2
+    (note,) = prepare_run(spoilt, RunRequest(last=2, despite_findings=True)).record.notes
+    assert note.startswith("Tracked despite: ")
+    step = next(step for step in way_of(spoilt).steps if step.step == "calibration")
+    assert (step.state, "speaks against" in step.why) == ("stale", True)
+
+    write_calibration(sound, walk.path / CAMERAS_PATH)
+    assert prepare_run(Session(walk.path), RunRequest(last=2)).record.notes == ()

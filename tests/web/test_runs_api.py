@@ -6,6 +6,7 @@ import pytest
 from web_doubles import Studio, state_of
 
 from studio.knobs import knobs_of
+from studio.sessions.made_from import note
 from studio.sessions.run_log import append_to_log
 from studio.sessions.stored_run import StoredRun
 from studio.tracking.settings import AnnealedSettings
@@ -252,3 +253,18 @@ def test_reset_and_presets(studio: Studio, tracked: StoredRun) -> None:
     assert client.put("/api/presets/odd", json={"values": {}}).status_code == 422
     assert client.delete("/api/presets/mine").status_code == 200
     assert client.delete("/api/presets/mine").status_code == 404
+
+
+def test_a_doubted_calibration_is_told_and_tracked_only_if_wished(studio: Studio) -> None:
+    """What measuring the masks finds is remembered by `made_from`; here it is written down as it would be."""
+    doubt = "Cameras cam1 and cam2 seem to be exchanged. Exchange their names."
+    note(studio.workspace.session("take1"), "background", "in doubt", good=False, stops=(doubt,))
+    assert studio.client.get("/api/sessions/take1").json()["doubts"] == [doubt]
+    refused = studio.client.post("/api/sessions/take1/runs", json={"name": "refused"})
+    assert refused.status_code == 422
+    assert doubt in refused.json()["message"]
+    assert studio.client.get("/api/sessions/take1/runs/refused").status_code == 404
+    wish = {"name": "wished", "despite_findings": True}
+    assert studio.client.post("/api/sessions/take1/runs", json=wish).status_code == 201
+    notes = studio.client.get("/api/sessions/take1/runs/wished").json()["notes"]
+    assert f"Tracked despite: {doubt}" in notes
