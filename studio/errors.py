@@ -83,6 +83,12 @@ class BehaviourError(StudioError):
     status, code = 422, "behaviour"
 
 
+class WorkCancelledError(StudioError):
+    """Long work that whoever asked for it ended; nothing of it is kept."""
+
+    status, code = 409, "cancelled"
+
+
 class ExportError(StudioError):
     """An export that cannot be made, or that did not read back as what was written."""
 

@@ -17,7 +17,7 @@ from studio.export.motion import motion_of, no_motion
 from studio.export.options import AUTO, ExportOptions
 from studio.export.overlay_video import write_videos
 from studio.export.table_files import write_csv, write_npz, write_parquet
-from studio.export.task import ExportCancelledError, ExportTask, Writer, Written
+from studio.export.task import ExportTask, Writer, Written
 from studio.knobs import changed
 from studio.progress import Progress, watched
 from studio.sessions.atomic_files import discard, new_folder_beside, sync_folder
@@ -97,7 +97,7 @@ def export_run(
     """Export a run to `place`, which is written over only when the new file has read back as it should.
 
     asked : options by name. record_scene : the writer of scene recordings. pack : several files become one zip.
-    cancelled : asked often; True ends it with ExportCancelledError. Raises ExportError and whatever a run raises that
+    cancelled : asked often; True ends it with WorkCancelledError. Raises ExportError and whatever a run raises that
     cannot be read.
     """
     options = settled(form, asked)
@@ -109,8 +109,7 @@ def export_run(
     motion = no_motion(run) if form.what == "cameras" else motion_of(run, options)
     folder = _working_folder(place)
 
-    ending = ExportCancelledError("The export was cancelled.", "Start it again when you like.")
-    step = watched(progress, cancelled, ending)
+    step = watched(progress, cancelled, "The export")
     try:
         written = writer(ExportTask(session, run, motion, options, folder / place.name, step))
         step("finishing", 1, 1)

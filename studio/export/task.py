@@ -20,18 +20,12 @@ Array = NDArray[np.float64]
 LEAST_MM, LEAST_DEGREES = 0.1, 0.01
 
 
-class ExportCancelledError(ExportError):
-    """The export was cancelled; nothing of it is kept."""
-
-    code = "cancelled"
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class ExportTask:
     """One file to be written.
 
     options : with "auto" settled. place : the file, in an empty folder of its own; more files may be written beside
-    it. step(words, done, total) : to be called while it is written; raises ExportCancelledError.
+    it. step(words, done, total) : to be called while it is written; raises WorkCancelledError.
     """
 
     session: Session

@@ -22,7 +22,7 @@ from studio.geometry.camera import Camera
 from studio.progress import Progress, watched
 from studio.runs.jumps import Jump, jumps_of
 from studio.runs.overlay_drawing import projected_silhouette
-from studio.runs.refining import REFINED, SMOOTHED, MakingCancelledError, jitter
+from studio.runs.refining import REFINED, SMOOTHED, jitter
 from studio.runs.run_footage import footage_of
 from studio.runs.tracks import RAW, Track, read_track, track_names, track_stamp
 from studio.sessions.record_files import read_record, write_record
@@ -116,7 +116,7 @@ def check_run(
 ) -> RunCheck:
     """Measure a track ("" for the usual one) in every so-many-th of its frames and keep that.
 
-    Raises RunError for a run without frames, NotFoundError, FootageError; MakingCancelledError when stopped.
+    Raises RunError for a run without frames, NotFoundError, FootageError; WorkCancelledError when stopped.
     """
     chosen = read_track(run, track or usual_track(run))
     if not len(chosen.frames):
@@ -125,8 +125,7 @@ def check_run(
     rows = range(0, len(chosen.frames), max(1, every))
     settings = _settings(run)
 
-    ending = MakingCancelledError("The check was cancelled.", "Start it again when you like.")
-    tell = watched(progress, cancelled, ending)
+    tell = watched(progress, cancelled, "The check")
     shares = []
     with contextlib.closing(footage_of(session, run)) as footage:
         maker = EvidenceMaker(cameras, footage, Backgrounds(footage), settings.evidence, "none")

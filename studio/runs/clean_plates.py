@@ -80,11 +80,10 @@ def clean_plates(
             f"Session '{session.name}' has {len(cameras)} cameras: backgrounds are cleaned with three or more.",
             "Use a plate, an empty clip or the median instead.",
         )
-    ending = RunError("Making the background was cancelled.", "Start it again when you like.")
     footage = session.footage()
     try:
         cleaning = _Cleaning(cameras, footage, dataclasses.replace(settings, **CLEARED), frames)
-        return cleaning.run(watched(progress, cancelled, ending))
+        return cleaning.run(watched(progress, cancelled, "Making the background"))
     finally:
         footage.close()
 

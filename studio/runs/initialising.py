@@ -54,12 +54,6 @@ SURE_OVERLAP, NO_OVERLAP = 0.75, 0.5
 """f_s of a start pose from which on its fit says nothing against it, and at which nothing speaks for it."""
 
 
-class InitialisationCancelledError(RunError):
-    """The search for a start pose was cancelled."""
-
-    code = "cancelled"
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class InitialPose:
     """A start pose that was found.
@@ -103,14 +97,11 @@ def initialise(
     """The pose of the session's body in a frame.
 
     body : the session's own by default. behaviour : name or path of a model whose prototypes are candidates. cancelled
-    : asked often; True ends the search with InitialisationCancelledError. Raises RunError where nothing is to be seen
+    : asked often; True ends the search with WorkCancelledError. Raises RunError where nothing is to be seen
     in the frame, NotFoundError for a frame that is not there.
     """
     tree = body or session.body()
-    ending = InitialisationCancelledError(
-        "The search for a start pose was cancelled.", "Start it again when you like."
-    )
-    tell = watched(progress, cancelled, ending)
+    tell = watched(progress, cancelled, "The search for a start pose")
     settings = session_settings(session, DEFAULT_TRACKER, weighting)
     prototypes = None
     if behaviour:

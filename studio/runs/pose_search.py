@@ -35,12 +35,6 @@ HAND_FPS = 15.0
 STEP = "searching around the pose"
 
 
-class PoseSearchCancelledError(RunError):
-    """The search around a pose was cancelled."""
-
-    code = "cancelled"
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class BetterPose:
     """pose : (D,). gain : of the weighting's log-weight, 0 where the given pose was best. overlap_before, overlap : of
@@ -66,7 +60,7 @@ def better_pose(
     """The best pose near a given one (D,) in a frame. run : whose body, cameras and weighting count; None: the
     session's.
 
-    cancelled : asked before each layer; True ends it with PoseSearchCancelledError. Raises RunError where nothing is to
+    cancelled : asked before each layer; True ends it with WorkCancelledError. Raises RunError where nothing is to
     be seen in the frame or the pose does not fit the body.
     """
     body = run.body() if run else session.body()
@@ -89,10 +83,7 @@ def better_pose(
             "Choose a frame in which the person is in view, or check the masks.",
         )
     layers, done = int(SHORT["layers"]), 0
-    ending = PoseSearchCancelledError(
-        "The search around the pose was cancelled.", "Start it again when you like."
-    )
-    tell = watched(progress, cancelled, ending)
+    tell = watched(progress, cancelled, "The search around the pose")
 
     def checked(_: object) -> None:
         nonlocal done

@@ -25,12 +25,6 @@ Array = NDArray[np.float64]
 REFINED, SMOOTHED = "refined", "smoothed"
 
 
-class MakingCancelledError(RunError):
-    """Refining or smoothing was cancelled."""
-
-    code = "cancelled"
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class MadeTrack:
     """A track that was made. moved : frames whose pose changed (refine). agreement_before, agreement_after : of the
@@ -62,16 +56,13 @@ def refine_run(
 ) -> MadeTrack:
     """Refine every frame of a track and keep the result as another (`runs.refined_frames` says how).
 
-    progress : told after each frame. cancelled : asked before each; True ends it with MakingCancelledError, nothing is
+    progress : told after each frame. cancelled : asked before each; True ends it with WorkCancelledError, nothing is
     kept. Raises SessionError where `into` is taken, RunError for a run without frames, and what reading the footage
     raises.
     """
     knobs = settings or RefinementSettings()
     track = _begun(run, source, into, replace)
-    ending = MakingCancelledError(
-        "Refining was cancelled, nothing was kept.", "Start it again when you like."
-    )
-    tell, step, total = watched(progress, cancelled, ending), f"refining {run.name}", len(track.frames)
+    tell, step, total = watched(progress, cancelled, "Refining"), f"refining {run.name}", len(track.frames)
     tell(step, 0, total)
     found = refined_frames(session, run, track, knobs, lambda done: tell(step, done, total))
     moved = int(np.count_nonzero((found.poses != track.poses).any(axis=1)))

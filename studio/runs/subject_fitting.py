@@ -99,12 +99,6 @@ class FittedSubject:
     evaluations: int
 
 
-class FitCancelledError(RunError):
-    """The fit of a subject was cancelled."""
-
-    code = "cancelled"
-
-
 def fit_session_subject(
     session: Session,
     request: FitRequest | None = None,
@@ -115,13 +109,12 @@ def fit_session_subject(
     """The subject of a session, fitted to its silhouettes. Nothing is written: see `keep_subject`.
 
     progress : the step in words, how much of it is done, and how much there is. Raises RunError where nothing is to be
-    seen in a frame or nothing may change, NotFoundError for a frame or run that is not there, FitCancelledError.
+    seen in a frame or nothing may change, NotFoundError for a frame or run that is not there, WorkCancelledError.
     """
     asked = request or FitRequest()
     if not asked.lengths and not asked.radii:
         raise RunError("Neither lengths nor radii are to be fitted.", "Choose at least one of them.")
-    ending = FitCancelledError("Fitting the subject was cancelled.", "Start it again when you like.")
-    tell = watched(progress, cancelled, ending)
+    tell = watched(progress, cancelled, "Fitting the subject")
     body, subject = _first_body(session, asked)
     tell("choosing frames", 0, 1)
     frames, start, poses_from = _first_poses(session, body, asked, tell)

@@ -16,13 +16,6 @@ from studio.geometry.rotations import axis_turn
 Array = NDArray[np.float64]
 
 SIDES = ("left", "right")
-SEGMENTS = (
-    "pelvis",
-    "thorax",
-    "head",
-    *(f"{side}_{part}" for side in SIDES for part in ("clavicle", "upper_arm", "forearm", "hand")),
-    *(f"{side}_{part}" for side in SIDES for part in ("thigh", "shin", "foot")),
-)
 MARKERS = (
     *("Hip", "Neck", "Head"),
     *(

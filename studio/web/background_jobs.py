@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, TypeVar, cast
 
-from studio.errors import NotFoundError, RunError, StudioError
+from studio.errors import NotFoundError, StudioError, WorkCancelledError
 from studio.web.error_responses import UnforeseenError, log
 from studio.web.job_schemas import SessionJob
 
@@ -40,12 +40,6 @@ class JobKind(Generic[SomeState]):
     noun: str
     states: type[SomeState]
     changes_session: bool = False
-
-
-class JobStoppedError(RunError):
-    """A person did not want a job any more."""
-
-    code = CANCELLED
 
 
 class Job:
@@ -90,9 +84,9 @@ class Job:
         self.tell(**{"step": step, "done": done, "total": total, "seconds_left": left, **more})
 
     def report_or_stop(self, step: str, done: int, total: int, **more: object) -> None:
-        """`report` for work that cannot be told to end in another way. Raises JobStoppedError once it shall."""
+        """`report` for work that cannot be told to end in another way. Raises WorkCancelledError once it shall."""
         if self.cancelled():
-            raise JobStoppedError(f"The {self._kind.noun} was cancelled.", "Start it again when you like.")
+            raise WorkCancelledError(f"The {self._kind.noun} was cancelled.", "Start it again when you like.")
         self.report(step, done, total, **more)
 
     def do(self, work: Work, log_path: Path | None) -> None:
@@ -101,7 +95,7 @@ class Job:
         try:
             self.tell(**{"state": "done", "seconds_left": 0.0, **work(self)})
         except StudioError as error:
-            unwanted = self.cancelled() or error.code == CANCELLED
+            unwanted = self.cancelled() or isinstance(error, WorkCancelledError)
             self._tell_error(error, CANCELLED if unwanted else "failed")
         except Exception as error:
             log.exception("%s '%s' of '%s' failed", kind.noun, state.key, state.session)

@@ -75,7 +75,7 @@ class _Progress:
         self._looked, self._last = 0, ""
 
     def report(self, step: str, done: int, total: int) -> None:
-        """A step got further. Raises JobStoppedError when it was stopped."""
+        """A step got further. Raises WorkCancelledError when it was stopped."""
         if step != self._last:
             self._looked += self._last.startswith(LOOKING)
             self._last = step
@@ -88,7 +88,7 @@ class _Progress:
 def _solved(
     session: Session, wish: BoardRequest, board: Board, folders: _Folders, progress: Report
 ) -> Proposal:
-    """What comes of the footage, to be looked at. Raises CalibrationError, FootageError, JobStoppedError."""
+    """What comes of the footage, to be looked at. Raises CalibrationError, FootageError, WorkCancelledError."""
     taken = how_taken(session, wish.offsets)
     found = calibrate(
         board,

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from export_runs import MADE, moving_poses, track_of
 
-from studio.errors import ExportError, NotFoundError, SettingsError
+from studio.errors import ExportError, NotFoundError, SettingsError, WorkCancelledError
 from studio.export import exporting
 from studio.export.exporting import export_run, settled
 from studio.export.formats import FORMATS, format_of_file
 from studio.export.kept_exports import discard_export, export_into_run, kept_exports, kept_file
 from studio.export.naming import joint_names, name_map
 from studio.export.options import ExportOptions
-from studio.export.task import ExportCancelledError, ExportTask, Written, agreed, apart, turned_apart
+from studio.export.task import ExportTask, Written, agreed, apart, turned_apart
 from studio.knobs import knobs_of
 
 
@@ -92,7 +92,7 @@ def test_a_file_that_does_not_read_back_is_not_offered(
 
 def test_cancelling_leaves_nothing(arm, tmp_path: Path) -> None:
     told: list[str] = []
-    with pytest.raises(ExportCancelledError):
+    with pytest.raises(WorkCancelledError):
         export_run(
             *arm,
             FORMATS["csv"],

@@ -12,9 +12,8 @@ from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.body.subject import Subject
 from studio.capture.trc import read_trc
-from studio.errors import NotFoundError, RunError
+from studio.errors import NotFoundError, RunError, WorkCancelledError
 from studio.runs.initialising import (
-    InitialisationCancelledError,
     InitialPose,
     hull_of,
     initialise,
@@ -92,7 +91,7 @@ def test_a_run_without_start_pose_finds_one(people: Session) -> None:
 
 def test_a_cancelled_search_ends(people: Session) -> None:
     asked = iter([False, False, True])
-    with pytest.raises(InitialisationCancelledError):
+    with pytest.raises(WorkCancelledError):
         initialise(people, 0, cancelled=lambda: next(asked))
 
 

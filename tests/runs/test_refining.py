@@ -8,9 +8,9 @@ from toy_session import true_poses
 from tracked_runs import finish, opened
 
 from studio.body.forward_kinematics import marker_points
-from studio.errors import NotFoundError, RunError, SettingsError
+from studio.errors import NotFoundError, RunError, SettingsError, WorkCancelledError
 from studio.runs.new_run import RunRequest, prepare_run
-from studio.runs.refining import MakingCancelledError, jitter, refine_run, smooth_run
+from studio.runs.refining import jitter, refine_run, smooth_run
 from studio.runs.tracks import Track, read_track, track_names, write_track
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -126,7 +126,7 @@ def test_a_cancelled_refinement_keeps_nothing(session_on_disk: Session, run: Sto
         asked.append(1)
         return len(asked) > 3
 
-    with pytest.raises(MakingCancelledError):
+    with pytest.raises(WorkCancelledError):
         refine_run(session_on_disk, run, cancelled=cancelled)
     assert track_names(run) == ("raw",)
 

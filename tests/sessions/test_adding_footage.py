@@ -7,11 +7,10 @@ import cv2
 import pytest
 from toy_session import FRAMES, make_session
 
-from studio.errors import CalibrationError, FootageError, SessionError
+from studio.errors import CalibrationError, FootageError, SessionError, WorkCancelledError
 from studio.runs.way import way_of
 from studio.sessions.beginning import begin_session
 from studio.sessions.importers.adding import FootageWish, add_footage
-from studio.sessions.importers.plan import ImportCancelled
 from studio.sessions.session import Session
 
 
@@ -104,7 +103,7 @@ def test_a_calibrated_session_refuses_footage_of_another_size(made, raw, tmp_pat
 
 
 def test_a_cancelled_addition_leaves_nothing(empty, raw):
-    with pytest.raises(ImportCancelled):
+    with pytest.raises(WorkCancelledError):
         add_footage(empty, raw, FootageWish(fps=60.0), cancelled=lambda: True)
     assert sorted(path.name for path in empty.path.iterdir()) == ["session.json"]
 

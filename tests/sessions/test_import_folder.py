@@ -10,10 +10,9 @@ from sources import BODY, FRAMES, everything_below, full_source, video_source, w
 from toy_footage import number_of, numbered_frame, rig, write_pictures, write_video
 
 from studio.capture.trc import read_trc
-from studio.errors import CalibrationError, FootageError, SessionError
+from studio.errors import CalibrationError, FootageError, SessionError, WorkCancelledError
 from studio.sessions.archives import ArchiveError
 from studio.sessions.importers.catalogue import import_source
-from studio.sessions.importers.plan import ImportCancelled
 
 
 def test_videos_become_a_session(tmp_path: Path) -> None:
@@ -206,7 +205,7 @@ def test_nothing_that_is_there_is_touched(tmp_path: Path) -> None:
 def test_a_cancelled_import_leaves_nothing(tmp_path: Path, step: str) -> None:
     source = video_source(tmp_path / "source")
     reached: list[str] = []
-    with pytest.raises(ImportCancelled):
+    with pytest.raises(WorkCancelledError):
         import_source(
             source,
             tmp_path / "made",

@@ -10,9 +10,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from studio.errors import FootageError, NotFoundError
+from studio.errors import FootageError, NotFoundError, WorkCancelledError
 from studio.web import background_jobs
-from studio.web.background_jobs import KEPT, BackgroundJobs, Job, JobKind, JobStoppedError, Work
+from studio.web.background_jobs import KEPT, BackgroundJobs, Job, JobKind, Work
 from studio.web.job_schemas import NumberedJob, SessionJob
 from studio.web.schemas import Number
 
@@ -257,6 +257,6 @@ def test_a_report_stops_only_who_was_cancelled(office: Office) -> None:
     job = Job(WEIGHING, WeighingState(session="take1"), office.said.append)
     job.report_or_stop("reading", 0, 2)
     job.cancel()
-    with pytest.raises(JobStoppedError):
+    with pytest.raises(WorkCancelledError):
         job.report_or_stop("reading", 1, 2)
     assert [message["done"] for message in office.said] == [0]

@@ -9,8 +9,8 @@ import pytest
 from web_doubles import Studio
 
 from studio.body.model import BodyModel
-from studio.errors import RunError
-from studio.runs.initialising import InitialisationCancelledError, InitialPose
+from studio.errors import RunError, WorkCancelledError
+from studio.runs.initialising import InitialPose
 from studio.runs.search_space import parameter_names
 from studio.sessions.session import Session
 from studio.web import initialisation_routes
@@ -134,7 +134,7 @@ def test_a_search_can_be_cancelled(studio: Studio, monkeypatch: pytest.MonkeyPat
         deadline = time.monotonic() + 30.0
         while not cancelled():
             assert time.monotonic() < deadline
-        raise InitialisationCancelledError("The search was cancelled.", "Start it again.")
+        raise WorkCancelledError("The search was cancelled.", "Start it again.")
 
     monkeypatch.setattr(initialisation_routes, "initialise", waits)
     identifier = studio.client.post("/api/sessions/take1/initialise", json={}).json()["identifier"]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from web_doubles import Studio
 
-from studio.errors import RunError
-from studio.runs.subject_fitting import FitCancelledError, FitRequest, FittedSize, FittedSubject
+from studio.errors import RunError, WorkCancelledError
+from studio.runs.subject_fitting import FitRequest, FittedSize, FittedSubject
 from studio.sessions.session import Session
 from studio.web import subject_routes
 
@@ -62,7 +62,7 @@ def test_a_failure_and_a_cancellation_are_in_words(studio: Studio, monkeypatch: 
     def waits(*_: object, cancelled: Callable[[], bool], **__: object) -> FittedSubject:
         while not cancelled():
             time.sleep(0.01)
-        raise FitCancelledError("Cancelled.", "Again.")
+        raise WorkCancelledError("Cancelled.", "Again.")
 
     monkeypatch.setattr(subject_routes, "fit_session_subject", waits)
     begun = studio.client.post(f"/api/sessions/{SESSION}/fit-subject", json={})

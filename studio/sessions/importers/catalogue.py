@@ -14,7 +14,7 @@ from studio.sessions.importers.bodytrack import is_bodytrack, plan_bodytrack
 from studio.sessions.importers.checking import check_rig
 from studio.sessions.importers.folder_layout import plan_folder
 from studio.sessions.importers.measuring import measure_source
-from studio.sessions.importers.plan import ImportCancelled, SourcePlan
+from studio.sessions.importers.plan import SourcePlan
 from studio.sessions.importers.writing import check_person, check_room, write_session
 from studio.sessions.manifest import CameraMatch, SessionManifest
 from studio.sessions.session import Session
@@ -64,7 +64,7 @@ def import_source(
     file's frame that was taken with the others' frame 0; rotations : degrees clockwise by which its pictures are
     turned; both go before what the source says. unit, up : of the calibration, as in `read_calibration`.
     despite_findings : import a calibration that would make results wrong (z not up, a wrong unit, …), with a warning.
-    cancelled : asked often; True stops the import with ImportCancelled.
+    cancelled : asked often; True stops the import with WorkCancelledError.
     All is checked before anything is written; whatever fails, nothing is left and nothing that was stored is
     touched. Raises StudioError.
     """
@@ -140,9 +140,7 @@ def check_request(source: Path, fps: float | None, copy: bool) -> None:
 
 def import_watched(progress: Progress | None, cancelled: Cancelled | None) -> Progress:
     """A progress callback that also stops a cancelled import."""
-    return watched(
-        progress, cancelled, ImportCancelled("The import was cancelled.", "Start it again when you like.")
-    )
+    return watched(progress, cancelled, "The import")
 
 
 def _taken(into: Path) -> SessionError:

@@ -8,15 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.subject import Subject
-from studio.errors import SessionError
 
 Array = NDArray[np.float64]
-
-
-class ImportCancelled(SessionError):
-    """The import was stopped by whoever asked for it; nothing of it is left."""
-
-    code = "cancelled"
 
 
 @dataclass(frozen=True, slots=True)
