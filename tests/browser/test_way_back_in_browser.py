@@ -17,6 +17,7 @@ from studio_server import StudioServer
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.start_pose_file import keep_start_pose
 from studio.runs.tracks import read_track, write_track
+from studio.sessions.made_from import note
 from studio.sessions.session import Session
 from studio.worker.batch import track_to_end
 
@@ -51,6 +52,8 @@ def page(browser: Browser, studio: StudioServer) -> Iterator[Page]:
     context.set_default_timeout(PATIENCE)
     opened = context.new_page()
     watch = PageWatch(opened, studio.origin)
+    # A calibration in doubt is not tracked at the first click.
+    watch.allow(422, "/api/sessions/walk/runs")
     opened.goto(studio.address)
     yield opened
     context.close()
@@ -115,3 +118,28 @@ def test_leaps_are_called_out_and_an_old_export_is(page: Page, studio: StudioSer
     page.get_by_role("button", name="Export", exact=True).click()
     expect(page.locator(".stale-file")).to_have_count(0)
     expect(export).to_have_attribute("data-state", "done")
+
+
+def test_a_doubted_calibration_is_tracked_only_if_wished(
+    page: Page, studio: StudioServer, artefacts: Path
+) -> None:
+    doubt = "Cameras cam1 and cam3 seem to carry each other's names. Exchange them."
+    session = Session(studio.workspace / "walk")
+    made = len(session.runs())
+    note(session, "background", "in doubt", good=False, stops=(doubt,))
+    step(page, studio, "track")
+    calibration = page.locator("#stepper [data-step=calibration]")
+    expect(calibration).to_have_attribute("data-state", "stale")
+    expect(calibration).to_contain_text(doubt)
+    page.get_by_text("Track anew").first.click()
+    expect(page.locator("form .notice")).to_contain_text(doubt)
+    page.get_by_label("Last frame").fill(str(START + 1))
+    page.screenshot(path=artefacts / "way-track-doubted.png")
+    track = page.get_by_role("button", name="Track anew", exact=True)
+    track.click()
+    expect(page.locator("form .wrong")).to_contain_text("speaks against its calibration")
+    assert len(session.runs()) == made
+    page.get_by_label("track all the same").check()
+    track.click()
+    expect(page.locator("#stepper [data-step=track]")).to_contain_text("2 of 2 frames")
+    assert f"Tracked despite: {doubt}" in session.runs()[-1].record.notes
