@@ -25,6 +25,8 @@ Masks = Mapping[int, Mapping[str, Bytes]]
 
 GOOD = 0.1
 """Share of the person's extent by which tangent planes may miss, mean over pairs of the median over frames."""
+LEAST = 0.02
+"""The same, from which on a fault is looked for that would explain it."""
 CLIPPED = 1.5
 LEAST_PIXELS = 40
 WIDEST = np.radians(150.0)
@@ -38,7 +40,9 @@ def silhouette_findings(
 ) -> tuple[Finding, ...]:
     """Whether cameras fit the silhouettes (frame → camera → mask) of one person, and the person's height."""
     outlines = outlines_of(cameras, masks)
-    found = explained(cameras, lambda tried: silhouette_disagreement(tried, outlines), GOOD, "silhouettes")
+    found = explained(
+        cameras, lambda tried: silhouette_disagreement(tried, outlines), GOOD, "silhouettes", LEAST
+    )
     if found:
         return found
     seen = height_seen(cameras, masks)

@@ -85,9 +85,9 @@ def true_lens(camera: Camera) -> Lens:
 
 
 def person_masks(
-    cameras: tuple[Camera, ...], frames: int = 6, seed: int = 5
+    cameras: tuple[Camera, ...], frames: int = 6, seed: int = 5, reach: float = 700.0
 ) -> dict[int, dict[str, NDArray]]:
-    """Silhouettes of a lopsided person of 1800 mm walking about: one arm out, a leg apart."""
+    """Silhouettes of a lopsided person of 1800 mm walking about, `reach` mm each way: one arm out, a leg apart."""
     rng = np.random.default_rng(seed)
     limbs = np.array(
         [
@@ -104,14 +104,14 @@ def person_masks(
     for frame in range(frames):
         angle = rng.uniform(0.0, 2.0 * np.pi)
         turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
-        place = np.array([*rng.uniform(-700, 700, 2), 0.0])
+        place = np.array([*rng.uniform(-reach, reach, 2), 0.0])
         for camera in cameras:
             mask = np.zeros((camera.height, camera.width), np.uint8)
             for start, end, (radius, _, _) in limbs:
                 for share in np.linspace(0.0, 1.0, 24):
                     point = turn @ (start + share * (end - start)) + place
                     pixel, depth = project(camera, point[None])
-                    reach = max(1, round(float(radius * camera.matrix[1, 1] / depth[0])))
-                    cv2.circle(mask, (round(pixel[0, 0]), round(pixel[0, 1])), reach, 255, -1)
+                    wide = max(1, round(float(radius * camera.matrix[1, 1] / depth[0])))
+                    cv2.circle(mask, (round(pixel[0, 0]), round(pixel[0, 1])), wide, 255, -1)
             found.setdefault(frame, {})[camera.name] = mask
     return found

@@ -12,7 +12,9 @@ from studio.calibration.boards import Board
 from studio.calibration.checks import Finding, check_calibration
 from studio.calibration.fault_hypotheses import inverted, rescaled, transposed
 from studio.calibration.sightings import Sighting
+from studio.calibration.silhouette_checks import Masks
 from studio.geometry.camera import Camera
+from studio.geometry.rotations import rotation_from_vector
 
 RIG = ring(4)
 POSES, SIGHTINGS = waved(CHARUCO, RIG)
@@ -39,6 +41,15 @@ def y_up(camera: Camera) -> Camera:
     """The camera of a world written with Y up: (x, y, z)_z_up = (z, x, y)_y_up."""
     turn = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     return dataclasses.replace(camera, rotation=camera.rotation @ turn)
+
+
+def turned(camera: Camera, rng: np.random.Generator, degrees: float) -> Camera:
+    """The camera turned about its own centre, about any axis."""
+    axis = rng.normal(size=3)
+    turn = rotation_from_vector(np.radians(degrees) * axis / np.linalg.norm(axis))
+    return dataclasses.replace(
+        camera, rotation=turn @ camera.rotation, translation=-turn @ camera.rotation @ camera.centre
+    )
 
 
 def swapped(one: int, two: int) -> tuple[Camera, ...]:
@@ -97,14 +108,24 @@ def test_mirrored_video_by_a_board(names: set[str]) -> None:
 
 
 @pytest.mark.parametrize("name", ["cam1", "cam2", "cam3", "cam4"])
-def test_mirrored_video_by_silhouettes(name: str) -> None:
-    masks = {
+@pytest.mark.parametrize("masks", [MASKS, person_masks(RIG, reach=100.0)], ids=["about", "in the middle"])
+def test_mirrored_video_by_silhouettes(masks: Masks, name: str) -> None:
+    mirrored = {
         frame: {camera: mask[:, ::-1] if camera == name else mask for camera, mask in views.items()}
-        for frame, views in MASKS.items()
+        for frame, views in masks.items()
     }
-    findings = with_masks(RIG, masks)
+    findings = with_masks(RIG, mirrored)
     assert code_of(findings) == "mirrored-video"
     assert findings[0].cameras == (name,)
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_cameras_that_were_knocked_have_no_other_fault(count: int) -> None:
+    """Turned by 0.3 to 1.8 degrees each, which silhouettes show, but which no fault explains."""
+    rng = np.random.default_rng(count)
+    for degrees in (0.6, 1.2) * 4:
+        knocked = tuple(turned(camera, rng, degrees * rng.uniform(0.5, 1.5)) for camera in RIG[:count])
+        assert {finding.code for finding in with_masks(knocked)} <= {"views-disagree"}
 
 
 @pytest.mark.parametrize("board", [CHESS, Board("chessboard", 7, 5, 90.0)])
