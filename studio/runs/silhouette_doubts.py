@@ -68,7 +68,7 @@ def check_believed(session: Session) -> None:
     if doubts := standing_doubts(session):
         raise CalibrationError(
             f"The footage of '{session.name}' speaks against its calibration: {doubts[0]}",
-            "Set it right and measure the masks again, or track despite the findings.",
+            "Set it right and measure the masks again, or track all the same (--despite-findings; the forms ask).",
         )
 
 
