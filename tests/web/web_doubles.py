@@ -199,7 +199,7 @@ def serving(app: FastAPI) -> Iterator[str]:
 @contextmanager
 def let_in(base: str, token: str) -> Iterator[httpx.Client]:
     """A browser's client that opened the printed address: it has the cookie and names its origin."""
-    with httpx.Client(base_url=base, headers={"origin": base}, timeout=30.0) as client:
+    with httpx.Client(base_url=base, headers={"origin": base}, timeout=120.0) as client:
         answer = client.get("/", params={"token": token})
         assert answer.status_code == 303, answer.text
         yield client
