@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.array_archives import read_archive
 from studio.behaviour.automaton import Automaton
 from studio.behaviour.feature_space import FeatureSpace
 from studio.behaviour.gaussian_mixture import GaussianMixture
@@ -76,8 +77,8 @@ def read_model(path: Path) -> BehaviourModel:
         f"'{path.name}' is no behaviour model, or it is damaged.", "Learn it again with `studio learn`."
     )
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
+        with path.open("rb") as file:
+            arrays = read_archive(file)
         head = _checked_head(path, arrays.pop("head").tobytes())
         return _model(head, arrays)
     except FileNotFoundError:

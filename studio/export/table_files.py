@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from studio.array_archives import read_archive
 from studio.body.forward_kinematics import joint_frames
 from studio.errors import ExportError
 from studio.export.axes import Axes
@@ -115,12 +116,11 @@ def write_npz(task: ExportTask) -> Written:
     task.step("writing", 0, 2)
     np.savez_compressed(task.place, about=np.array(json.dumps(about)), **arrays)
     task.step("reading back", 1, 2)
-    with np.load(task.place, allow_pickle=False) as read:
-        same = all(
-            np.array_equal(read[name], value, equal_nan=value.dtype.kind == "f")
-            for name, value in arrays.items()
-        )
-        difference = apart(axes.points_back(read["markers"]), places) if same else math.inf
+    read = read_archive(task.place)
+    same = all(
+        np.array_equal(read[name], value, equal_nan=value.dtype.kind == "f") for name, value in arrays.items()
+    )
+    difference = apart(axes.points_back(read["markers"]), places) if same else math.inf
     return Written((task.place,), agreed(task.place, difference), _point_notes(task, points.note, "NaN"))
 
 

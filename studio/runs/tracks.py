@@ -17,6 +17,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.array_archives import read_archive
 from studio.errors import NotFoundError, SessionError
 from studio.sessions.atomic_files import write_bytes
 from studio.sessions.names import checked_name, is_name
@@ -70,8 +71,8 @@ def read_track(run: StoredRun, name: str = RAW) -> Track:
             f"It has: {', '.join(track_names(run))}. Make others with 'studio refine' or 'studio smooth'.",
         )
     try:
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as archive:
-            entries = {entry: archive[entry] for entry in ENTRIES}
+        arrays = read_archive(io.BytesIO(path.read_bytes()))
+        entries = {entry: arrays[entry] for entry in ENTRIES}
         track = _from_entries(name, entries)
         _check(track, len(run.record.parameters))
     except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile, msgspec.DecodeError) as error:

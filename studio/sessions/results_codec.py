@@ -12,6 +12,7 @@ import numpy as np
 import zstandard
 from numpy.typing import NDArray
 
+from studio.array_archives import read_archive
 from studio.errors import SessionError
 from studio.tracking.tracker import TRACKING_STATES, Carried, Estimate, FrameResult, LayerRecord, ParticleSet
 
@@ -32,8 +33,7 @@ def unpack(blob: bytes) -> dict[str, Array]:
     """The arrays of a blob. Raises SessionError if it is damaged."""
     try:
         plain = zstandard.ZstdDecompressor().decompress(blob, max_output_size=LARGEST_BLOB)
-        with np.load(io.BytesIO(plain), allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
+        return read_archive(io.BytesIO(plain))
     except (zstandard.ZstdError, ValueError, OSError, EOFError, KeyError) as error:
         raise SessionError(
             f"A stored result is damaged ({error}).", "Start the run again; the footage is not touched."

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.array_archives import read_archive
 from studio.body.forward_kinematics import limb_frames, marker_points
 from studio.body.model import BodyModel
 from studio.capture.trc import MarkerMotion, read_trc
@@ -82,8 +83,8 @@ def true_motion(shelf: FootageShelf, session: Session, last: int) -> TrueMotion:
         )
 
     making = {"recipe": recipe_path.read_text(encoding="utf-8"), "body": body.name, "last": last}
-    with np.load(made_once(shelf, "truth", making, make) / FILE) as kept:
-        return TrueMotion(kept["poses"], kept["points"], kept["markers"])
+    kept = read_archive(made_once(shelf, "truth", making, make) / FILE)
+    return TrueMotion(kept["poses"], kept["points"], kept["markers"])
 
 
 def _check_rendered(session: Session, truth: MarkerMotion) -> None:

@@ -1,0 +1,51 @@
+"""Archives are read one at a time, whichever threads want them: NumPy's reading of heads is not safe otherwise."""
+
+import io
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from studio import array_archives
+from studio.array_archives import read_archive
+from studio.sessions.results_codec import pack, unpack
+
+LOAD = np.load
+
+
+def test_names_and_values_come_back_from_a_path_and_a_stream(tmp_path: Path) -> None:
+    wanted = {"one": np.arange(6.0).reshape(2, 3), "two": np.array(["a", "b"])}
+    np.savez(tmp_path / "both.npz", **wanted)
+    for source in (tmp_path / "both.npz", io.BytesIO((tmp_path / "both.npz").read_bytes())):
+        found = read_archive(source)
+        assert found.keys() == wanted.keys()
+        assert all(np.array_equal(found[name], wanted[name]) for name in wanted)
+
+
+def test_stored_results_are_never_read_by_two_threads_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    inside, most = [], []
+
+    class Watched:
+        """An archive whose reading takes a while."""
+
+        def __init__(self, source: io.BytesIO, **how: bool) -> None:
+            self.archive = LOAD(source, **how)
+
+        def __enter__(self) -> object:
+            inside.append(threading.get_ident())
+            most.append(len(inside))
+            time.sleep(0.01)
+            return self.archive
+
+        def __exit__(self, *_: object) -> None:
+            inside.pop()
+
+    monkeypatch.setattr(array_archives.np, "load", Watched)
+    blob = pack({"values": np.arange(5.0)})
+    with ThreadPoolExecutor(4) as threads:
+        read = list(threads.map(unpack, [blob] * 12))
+    assert all(np.array_equal(arrays["values"], np.arange(5.0)) for arrays in read)
+    assert most == [1] * 12
