@@ -13,9 +13,8 @@ from studio.cli.arguments import frame_numbers
 from studio.cli.knob_options import chosen_changes
 from studio.cli.output import command, note, progress
 from studio.errors import FootageError, NotFoundError
-from studio.progress import Progress
 from studio.runs.background_setup import SOURCES, set_up_background
-from studio.runs.mask_quality import MaskQuality, mask_quality, measure_masks
+from studio.runs.mask_quality import MaskQuality, measure_masks
 from studio.runs.session_settings import session_settings
 from studio.sessions.background_files import polygon_exclusion, set_backgrounds, set_exclusion
 from studio.sessions.session import Session
@@ -93,15 +92,8 @@ def background(
     comparable = len(opened.manifest.footage.cameras) > 1 and opened.is_calibrated
     if quality or (comparable if source is not None else not plates and not exclude):
         with progress(f"{opened.name}: masks") as report:
-            found = _measured(opened, frame_numbers(frames), report)
+            found = measure_masks(opened, frame_numbers(frames), report)
     return _told(opened, found)
-
-
-def _measured(session: Session, frames: tuple[int, ...], report: Progress) -> MaskQuality:
-    """The quality in some frames; in the usual ones it is remembered."""
-    if frames:
-        return mask_quality(session, session_settings(session).evidence, frames, progress=report)
-    return measure_masks(session, report)
 
 
 def _told(session: Session, found: MaskQuality | None) -> dict[str, object]:

@@ -15,8 +15,6 @@ from studio.runs.background_setup import BackgroundSetup, set_up_background
 from studio.runs.initialising import WEIGHTING, InitialPose, keep_pose
 from studio.runs.initialising import initialise as initialise_session
 from studio.runs.mask_quality import MaskQuality, measure_masks
-from studio.runs.mask_quality import mask_quality as quality_of
-from studio.runs.session_settings import session_settings
 from studio.runs.subject_choice import body_of_choice, choose_subject, keep_fitted
 from studio.runs.subject_fitting import COUNT, FitRequest, FittedSubject, fit_session_subject
 from studio.sessions.background_files import polygon_exclusion, set_backgrounds, set_exclusion
@@ -109,9 +107,7 @@ def mask_quality(session: SessionName, frames: Sequence[int] = (), *, progress: 
     """
     opened = open_session(session)
     with told(progress, f"{opened.name}: masks") as report:
-        if not frames:
-            return measure_masks(opened, report)
-        return quality_of(opened, session_settings(opened).evidence, frames, progress=report)
+        return measure_masks(opened, frames, report)
 
 
 def subject(

@@ -167,11 +167,15 @@ def mask_quality(
     return dataclasses.replace(found, doubts=doubts)
 
 
-def measure_masks(session: Session, progress: Progress | None = None) -> MaskQuality:
-    """The quality of the masks as the session makes them, remembered: a blocking doubt keeps runs from being made
-    (`silhouette_doubts.check_believed`). Raises RunError for a single camera, FootageError.
+def measure_masks(
+    session: Session, frames: Sequence[int] = (), progress: Progress | None = None
+) -> MaskQuality:
+    """The quality of the masks as the session makes them. In the usual frames it is remembered: a blocking doubt keeps
+    runs from being made (`silhouette_doubts.accepted_doubts`). Raises as `mask_quality` does.
     """
-    found = mask_quality(session, session_settings(session).evidence, progress=progress)
+    found = mask_quality(session, session_settings(session).evidence, frames, progress=progress)
+    if frames:
+        return found
     stops = tuple(str(finding) for finding in blocking(found.doubts))
     note(session, MEASURED, found.in_words(), found.usable, stops)
     return found

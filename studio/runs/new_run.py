@@ -22,7 +22,7 @@ from studio.runs.initialising import InitialPose, Progress, initialise
 from studio.runs.live_request import check_live, live_changes
 from studio.runs.search_space import parameter_names, session_sigma
 from studio.runs.session_settings import session_settings
-from studio.runs.silhouette_doubts import check_believed, standing_doubts
+from studio.runs.silhouette_doubts import accepted_doubts
 from studio.sessions.manifest import now
 from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session, free_run_name
@@ -74,9 +74,7 @@ def prepare_run(
     frame is searched for one, which takes a while. progress : told how far that is.
     """
     asked = request or RunRequest()
-    doubts = standing_doubts(session)
-    if not asked.despite_findings:
-        check_believed(session)
+    doubts = accepted_doubts(session, asked.despite_findings)
     tracker = asked.tracker or session.manifest.tracker or DEFAULT_TRACKER
     weighting = asked.weighting or session.manifest.weighting or usual_weighting(tracker)
     changes = live_changes(asked.changes) if asked.live else asked.changes

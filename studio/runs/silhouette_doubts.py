@@ -63,13 +63,15 @@ def standing_doubts(session: Session) -> tuple[str, ...]:
     return measured.stops
 
 
-def check_believed(session: Session) -> None:
-    """Raises CalibrationError where the silhouettes speak against the calibration."""
-    if doubts := standing_doubts(session):
+def accepted_doubts(session: Session, despite: bool) -> tuple[str, ...]:
+    """The standing doubts, for a run's notes. Raises CalibrationError where there are any, unless `despite`."""
+    doubts = standing_doubts(session)
+    if doubts and not despite:
         raise CalibrationError(
             f"The footage of '{session.name}' speaks against its calibration: {doubts[0]}",
             "Set it right and measure the masks again, or track all the same (--despite-findings; the forms ask).",
         )
+    return doubts
 
 
 def height_of(session: Session) -> float | None:

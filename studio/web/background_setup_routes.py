@@ -140,7 +140,7 @@ def _measured(session: Session, job: Job) -> MaskQuality | None:
     if len(session.manifest.footage.cameras) < 2 or not session.is_calibrated:
         return None
     try:
-        return measure_masks(session, job.report_or_stop)
+        return measure_masks(session, progress=job.report_or_stop)
     except StudioError:
         if job.cancelled():
             return None
