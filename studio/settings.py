@@ -1,7 +1,7 @@
 """All knobs of a run in one frozen, versioned value.
 
-A run's settings are five groups: the tracker's, the weighting's, the evidence's, the recovery's and the recording's.
-Each knob has a flat name that is unique over the five, so that a slider, `--set name=value` and `PATCH /settings`
+A run's settings are six groups: the tracker's, the weighting's, the evidence's, the refinement's, the recovery's and
+the recording's. Each knob has a flat name that is unique over the six, so that a slider, `--set name=value` and `PATCH /settings`
 need no group.
 """
 
@@ -15,10 +15,11 @@ from studio.errors import SettingsError
 from studio.evidence.settings import EvidenceSettings
 from studio.knobs import Knob, Value, changed, knob, knobs_of
 from studio.tracking.catalogue import TRACKERS
+from studio.tracking.frame_refinement import FrameRefinementSettings
 from studio.tracking.recovery_settings import RecoverySettings
 from studio.weighting.catalogue import WEIGHTINGS
 
-GROUPS = ("tracker", "weighting", "evidence", "recovery", "recording")
+GROUPS = ("tracker", "weighting", "evidence", "refinement", "recovery", "recording")
 DEFAULT_TRACKER, DEFAULT_WEIGHTING = "annealed", "edge-region"
 # What a tracker is weighed with where neither run nor session say otherwise: the swarm with its paper's fitness.
 USUAL_WEIGHTINGS = {"swarm": "edge-silhouette"}
@@ -48,6 +49,7 @@ class RunSettings:
     tracker: Any
     weighting: Any
     evidence: EvidenceSettings
+    refinement: FrameRefinementSettings
     recovery: RecoverySettings
     recording: RecordingSettings
 
@@ -111,6 +113,7 @@ def default_settings(
         tracker,
         weighting,
         EvidenceSettings(),
+        FrameRefinementSettings(),
         RecoverySettings(),
         RecordingSettings(),
     )
@@ -164,7 +167,7 @@ def knob_table() -> tuple[Knob, ...]:
     """Every knob that there is, of all trackers and weightings, for the guide; `group` says whose it is."""
     types = [tracker.settings_type for tracker in TRACKERS.values()]
     types += [weighting.settings_type for weighting in WEIGHTINGS.values()]
-    types += [EvidenceSettings, RecoverySettings, RecordingSettings]
+    types += [EvidenceSettings, FrameRefinementSettings, RecoverySettings, RecordingSettings]
     return tuple(entry for settings_type in dict.fromkeys(types) for entry in knobs_of(settings_type))
 
 

@@ -18,17 +18,21 @@ MOST_POINTS = 300
 """Border points kept of a view: about every other pixel of a person 200 pixels tall."""
 SMOOTHED = 1.5
 """Standard deviation, pixels, of the smoothing before a border's direction is read off."""
+MARGIN_SHARE = 16
+"""Distances are known this far about the silhouette: a sixteenth of the picture's longer side."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SilhouetteDistances:
     """One view's silhouette as distances.
 
-    signed : (H, W) pixels from the border, which runs between pixels; negative inside. border : (K, 2) centres of
-    silhouette pixels at its border, evenly spread; the picture's own border is none. outward : (K, 2) unit vectors
-    away from the silhouette.
+    size : width and height of the picture. corner : left and top of the part of it that `signed` (H, W) covers: pixels
+    from the border, which runs between pixels; negative inside. border : (K, 2) centres of silhouette pixels at its
+    border, evenly spread; the picture's own border is none. outward : (K, 2) unit vectors away from the silhouette.
     """
 
+    size: tuple[int, int]
+    corner: tuple[int, int]
     signed: Floats
     border: Array
     outward: Array
@@ -41,19 +45,22 @@ def silhouette_distances(evidence: FrameEvidence, most: int = MOST_POINTS) -> tu
 
 def distances_of(mask: Bytes, most: int = MOST_POINTS) -> SilhouetteDistances:
     """The distances of a mask (H, W); where nothing or everything is silhouette, there is no border."""
-    inside = (mask >= FOREGROUND).astype(np.uint8)
-    signed = np.asarray(
-        np.where(
-            inside > 0,
-            0.5 - _distances(inside),
-            _distances(1 - inside) - 0.5,
-        ),
-        dtype=np.float32,
-    )
+    size = (mask.shape[1], mask.shape[0])
+    silhouette = cv2.compare(mask, FOREGROUND, cv2.CMP_GE)
+    left, top, width, height = cv2.boundingRect(silhouette)
+    if not width:
+        return SilhouetteDistances(
+            size, (0, 0), np.zeros((0, 0), np.float32), np.zeros((0, 2)), np.zeros((0, 2))
+        )
+    margin = max(size) // MARGIN_SHARE
+    right, bottom = min(left + width + margin, size[0]), min(top + height + margin, size[1])
+    left, top = max(left - margin, 0), max(top - margin, 0)
+    inside = np.minimum(silhouette[top:bottom, left:right], 1)
+    signed = np.where(inside > 0, 0.5 - _distances(inside), _distances(1 - inside) - 0.5).astype(np.float32)
     contours, _ = cv2.findContours(inside, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     points = np.concatenate([np.zeros((0, 2), np.int64), *(contour[:, 0] for contour in contours)])
-    height, width = mask.shape
-    kept = (points > 0).all(axis=1) & (points < np.array([width - 1, height - 1])).all(axis=1)
+    at = points + np.array([left, top])
+    kept = (at > 0).all(axis=1) & (at < np.array(size) - 1).all(axis=1)
     points = points[kept][:: max(1, -(-int(kept.sum()) // most))].astype(np.int64)
     smooth = np.asarray(cv2.GaussianBlur(signed, (0, 0), SMOOTHED))
     columns, rows = points[:, 0], points[:, 1]
@@ -65,14 +72,14 @@ def distances_of(mask: Bytes, most: int = MOST_POINTS) -> SilhouetteDistances:
         axis=1,
     ).astype(np.float64)
     outward = slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
-    return SilhouetteDistances(signed, points.astype(np.float64), outward)
+    return SilhouetteDistances(size, (left, top), signed, points + np.array([left, top], np.float64), outward)
 
 
-def _distances(mask: Bytes) -> Array:
+def _distances(mask: NDArray[np.uint8]) -> Floats:
     """(H, W) from every pixel's centre to that of the nearest pixel that is 0.
 
     OpenCV's last bits depend on where in memory the mask happens to lie, and a descent makes millimetres of them.
     Squared distances between pixels are whole numbers, so what was meant is known.
     """
-    found = cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE).astype(np.float64)
+    found = cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     return np.sqrt(np.rint(found * found))

@@ -27,6 +27,7 @@ from studio.sessions.session import Session
 from studio.settings import RunSettings, changed_settings, default_settings
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.frame_loop import search_frame
+from studio.tracking.frame_refinement import FrameRefiner
 from studio.tracking.tracker import LayerRecord, start_of
 from studio.weighting.catalogue import WEIGHTINGS
 
@@ -124,7 +125,9 @@ def track(
     learner = learner_of(behaviour, settings, attempt.seed)
     weighting = WEIGHTINGS[attempt.weighting]
     cameras = _cameras(session, attempt.cameras)
-    weigher = weighting.prepare(body, spoilt.cameras(cameras), settings.weighting)
+    seen_with = spoilt.cameras(cameras)
+    weigher = weighting.prepare(body, seen_with, settings.weighting)
+    refiner = FrameRefiner(body, seen_with)
     frames = range(attempt.first, attempt.last or session.manifest.frame_count, attempt.every)
     carried = start_of(_start_pose(session, body, attempt.first, fps))
     poses, evaluations, seconds = np.zeros((len(frames), len(body.parameters))), 0, 0.0
@@ -143,9 +146,10 @@ def track(
         if learner is not None:
             space = dataclasses.replace(space, behaviour=learner.model_in(number, tracked))
             carried = learner.carried_into(number, carried, tracked)
+        problem = weigher.problem(seen)
         result = search_frame(
             TRACKERS[attempt.tracker],
-            weigher.problem(seen),
+            problem,
             carried,
             space,
             seed=attempt.seed,
@@ -154,6 +158,7 @@ def track(
             repeats=settings.tracker.start_repeats if number == 0 else 1,
             on_layer=on_layer,
         )
+        result = refiner.refined(result, seen, problem, settings.refinement)
         if number:
             seconds += time.perf_counter() - began
         carried, poses[number], evaluations = result.carried, result.estimate.pose, result.evaluations

@@ -19,13 +19,14 @@ from studio.errors import NotFoundError, RunError
 from studio.runs.frame_steps import HandedOn, space_over
 from studio.runs.pace import Pace, Progress
 from studio.runs.run_behaviour import RunBehaviour
-from studio.runs.run_watch import RunWatch
+from studio.runs.run_watch import RunWatch, Sightings
 from studio.sessions.results_codec import particle_arrays, particles_from
 from studio.sessions.results_store import ResultsReader, ResultsWriter
 from studio.sessions.stored_run import StoredRun
 from studio.settings import RunSettings, SettingsEntry, SettingsHistory, settings_from_values, values
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.frame_loop import FrameSearch, SearchState, held_over
+from studio.tracking.frame_refinement import FrameRefiner
 from studio.tracking.tracker import Carried, FrameProblem, FrameResult, LayerRecord
 
 # The newest settings and their version; asked before each layer.
@@ -68,6 +69,8 @@ class TrackingRun:
             fps=self.record.fps,
             anew=self.record.is_anew,
         )
+        seen = isinstance(problems, Sightings)
+        self._refiner = FrameRefiner(problems.body, problems.cameras) if seen else None
         self._writer = ResultsWriter(run.folder)
         self._pace = Pace()
         self._load()
@@ -151,8 +154,13 @@ class TrackingRun:
     def result_of(self, search: FrameSearch, settings: RunSettings) -> FrameResult:
         """The result of a finished search of a frame, with how the frame went."""
         found = search.result(settings.tracker)
+        held = self._held_in(search.frame, settings)
+        problem = search.problem or self.problems.problem(search.frame, held)
+        if self._refiner is not None and isinstance(self.problems, Sightings):
+            evidence = self.problems.evidence(search.frame, held)
+            found = self._refiner.refined(found, evidence, problem, settings.refinement)
         carried, sought = self.carried_into(search.frame), self._watch.is_sought(search.frame)
-        return self._watch.judged(found, carried, search.problem, sought)
+        return self._watch.judged(found, carried, problem, sought)
 
     def _store(self, result: FrameResult, settings: RunSettings) -> None:
         self._writer.write_frame(result, self._layers, settings.recording.record_particles)

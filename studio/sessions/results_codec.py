@@ -128,7 +128,8 @@ def pack_result(result: FrameResult) -> bytes:
         ],
         dtype=np.float64,
     )
-    arrays["vectors"] = np.stack([estimate.pose, estimate.mean, estimate.mode])
+    vectors = [estimate.pose, estimate.mean, estimate.mode]
+    arrays["vectors"] = np.stack(vectors if estimate.searched is None else [*vectors, estimate.searched])
     return pack(arrays)
 
 
@@ -138,7 +139,7 @@ def unpack_result(blob: bytes) -> FrameResult:
     numbers, vectors = arrays["numbers"], arrays["vectors"]
     return FrameResult(
         frame=int(numbers[0]),
-        estimate=Estimate(vectors[0], vectors[1], vectors[2], float(numbers[5])),
+        estimate=Estimate(*vectors[:3], float(numbers[5]), vectors[3] if len(vectors) > 3 else None),
         layers=int(numbers[1]),
         evaluations=int(numbers[2]),
         settings_version=int(numbers[3]),

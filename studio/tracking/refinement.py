@@ -49,6 +49,16 @@ class Distances(Protocol):
     """A view's silhouette (`evidence.distance_maps.SilhouetteDistances`)."""
 
     @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the picture."""
+        ...
+
+    @property
+    def corner(self) -> tuple[int, int]:
+        """Left and top of the part that `signed` covers."""
+        ...
+
+    @property
     def signed(self) -> NDArray[np.float32]:
         """(H, W) pixels to the border, negative inside."""
         ...
@@ -205,7 +215,7 @@ class Refiner:
             begin, border = begin + part.size, border + len(view.border)
             maps.append(part.ravel())
         points = [np.concatenate([view.border, view.outward], axis=1) for view in silhouettes]
-        sizes = np.array([view.signed.shape[::-1] for view in silhouettes], dtype=np.int64)
+        sizes = np.array([view.size for view in silhouettes], dtype=np.int64)
         return _Prepared(np.concatenate(maps), views, sizes, np.ascontiguousarray(np.concatenate(points)), mm)
 
     def _scales(self, mm: Array) -> Array:
@@ -267,9 +277,11 @@ def _about_the_border(view: Distances, margin: float) -> tuple[tuple[int, int], 
     """Left and top of the part of a view's map that lies within `margin` pixels of its border, and that part."""
     if not len(view.border):
         return (0, 0), np.ascontiguousarray(view.signed[:0, :0], dtype=np.float32)
-    left, top = np.maximum(np.floor(view.border.min(axis=0) - margin), 0.0).astype(int)
-    right, bottom = np.ceil(view.border.max(axis=0) + margin).astype(int) + 1
-    return (int(left), int(top)), np.ascontiguousarray(view.signed[top:bottom, left:right], dtype=np.float32)
+    corner, (height, width) = np.array(view.corner), view.signed.shape
+    left, top = np.maximum(np.floor(view.border.min(axis=0) - margin) - corner, 0.0).astype(int)
+    right, bottom = np.ceil(view.border.max(axis=0) + margin - corner).astype(int) + 1
+    part = view.signed[top : min(bottom, height), left : min(right, width)]
+    return (int(left + corner[0]), int(top + corner[1])), np.ascontiguousarray(part, dtype=np.float32)
 
 
 def mm_per_pixel(camera: Camera, point: Array) -> float:

@@ -29,10 +29,12 @@ def turning(quad):
 
 
 @njit(**OPTIONS)
-def in_another(x, y, quads, usable, turns, own):
+def in_another(x, y, quads, usable, turns, boxes, own):
     """Whether a point lies inside (by MARGIN pixels) the quadrilateral of another limb than `own`."""
     for limb in range(quads.shape[0]):
         if limb == own or not usable[limb]:
+            continue
+        if x < boxes[limb, 0] or x > boxes[limb, 2] or y < boxes[limb, 1] or y > boxes[limb, 3]:
             continue
         inside = True
         for corner in range(4):
@@ -49,32 +51,76 @@ def in_another(x, y, quads, usable, turns, own):
 
 
 @njit(**OPTIONS)
-def add_point(share, residual, nx, ny, slopes, first, second, u, row, matrix, gradient):
-    """Add one residual to the normal equations: its slope is that of the point at u between two corners, along (nx,
-    ny). slopes : (4, 2, D) of the limb's corners. row : (D,) scratch. matrix : (D, D) lower half.
+def add_point(share, residual, nx, ny, first, second, u, normal, pull):
+    """Add one residual to its limb's equations: it is that of the point at u between two corners, along (nx, ny).
+
+    normal : (8, 8), pull : (8,) over the limb's corners, x and y of each; `first` comes before `second`.
     """
-    size = row.shape[0]
-    for p in range(size):
-        row[p] = nx * ((1.0 - u) * slopes[first, 0, p] + u * slopes[second, 0, p]) + ny * (
-            (1.0 - u) * slopes[first, 1, p] + u * slopes[second, 1, p]
-        )
-    for p in range(size):
-        scaled = share * row[p]
-        if scaled == 0.0:
-            continue
-        gradient[p] += scaled * residual
-        for q in range(p + 1):
-            matrix[p, q] += scaled * row[q]
+    i, j = 2 * first, 2 * second
+    ax, ay, bx, by = (1.0 - u) * nx, (1.0 - u) * ny, u * nx, u * ny
+    scaled = share * residual
+    pull[i] += scaled * ax
+    pull[i + 1] += scaled * ay
+    pull[j] += scaled * bx
+    pull[j + 1] += scaled * by
+    normal[i, i] += share * ax * ax
+    normal[i + 1, i] += share * ax * ay
+    normal[i + 1, i + 1] += share * ay * ay
+    normal[j, i] += share * ax * bx
+    normal[j + 1, i] += share * ax * by
+    normal[j, i + 1] += share * ay * bx
+    normal[j + 1, i + 1] += share * ay * by
+    normal[j, j] += share * bx * bx
+    normal[j + 1, j] += share * bx * by
+    normal[j + 1, j + 1] += share * by * by
 
 
 @njit(**OPTIONS)
-def nearest_edge(x, y, ox, oy, quads, usable, turns, ends, reach):
+def add_limbs(normals, pulls, slopes, usable, which, matrix, gradient):
+    """Add what the corners of one view's limbs ask for to the equations of the parameters, lower half.
+
+    normals : (L, 8, 8) lower halves, pulls : (L, 8). slopes : (L, 4, 2, D) of the corners. which : (D,) scratch.
+    """
+    mirrored = np.zeros((8, 8))
+    for limb in range(slopes.shape[0]):
+        if not usable[limb]:
+            continue
+        own = slopes[limb]
+        count = 0
+        for p in range(own.shape[2]):
+            moves = False
+            for corner in range(4):
+                moves |= own[corner, 0, p] != 0.0 or own[corner, 1, p] != 0.0
+            if moves:
+                which[count] = p
+                count += 1
+        for i in range(8):
+            for j in range(i + 1):
+                mirrored[i, j] = mirrored[j, i] = normals[limb, i, j]
+        for a in range(count):
+            p = which[a]
+            for j in range(8):
+                asked = 0.0
+                for i in range(8):
+                    asked += mirrored[i, j] * own[i >> 1, i & 1, p]
+                gradient[p] += pulls[limb, j] * own[j >> 1, j & 1, p]
+                if asked != 0.0:
+                    for b in range(a + 1):
+                        matrix[p, which[b]] += asked * own[j >> 1, j & 1, which[b]]
+
+
+@njit(**OPTIONS)
+def nearest_edge(x, y, ox, oy, quads, usable, turns, boxes, ends, reach):
     """Limb, edge, place along it and squared distance (pixels) of the union's border nearest to a point with outward
     direction (ox, oy); limb -1 where none is within reach.
     """
     found, edge, place, nearest = -1, 0, 0.0, reach * reach
     for limb in range(quads.shape[0]):
         if not usable[limb]:
+            continue
+        aside = max(boxes[limb, 0] - x, x - boxes[limb, 2], 0.0)
+        above = max(boxes[limb, 1] - y, y - boxes[limb, 3], 0.0)
+        if aside * aside + above * above >= nearest:
             continue
         for side in range(3 if ends[limb] else 2):
             first, second = FIRST_CORNER[side], SECOND_CORNER[side]
@@ -92,7 +138,7 @@ def nearest_edge(x, y, ox, oy, quads, usable, turns, ends, reach):
             sign = -turns[limb] if side == 1 else turns[limb]
             if sign * (ox * ey - oy * ex) < SAME_WAY * np.sqrt(squared):
                 continue
-            if in_another(px, py, quads, usable, turns, limb):
+            if in_another(px, py, quads, usable, turns, boxes, limb):
                 continue
             found, edge, place, nearest = limb, side, u, distance
     return found, edge, place, nearest
@@ -112,13 +158,13 @@ def read_map(x, y, values, start, width, height):
 
 
 @njit(**OPTIONS)
-def add_border(border, quads, slopes, usable, turns, ends, mm, scale, row, matrix, gradient):
+def add_border(border, quads, usable, turns, boxes, ends, mm, scale, normals, pulls):
     """Border points (K, 4: place, outward) of one view to the outlines; returns their loss. scale : c, mm."""
     loss = 0.0
     for k in range(border.shape[0]):
         x, y = border[k, 0], border[k, 1]
         limb, side, u, squared = nearest_edge(
-            x, y, border[k, 2], border[k, 3], quads, usable, turns, ends, 4.0 * scale / mm
+            x, y, border[k, 2], border[k, 3], quads, usable, turns, boxes, ends, 4.0 * scale / mm
         )
         ratio = squared * mm * mm / (scale * scale)
         loss += scale * scale * ratio / (1.0 + ratio)
@@ -132,14 +178,12 @@ def add_border(border, quads, slopes, usable, turns, ends, mm, scale, row, matri
         px, py = quads[limb, first, 0] + u * ex, quads[limb, first, 1] + u * ey
         residual = (nx * (px - x) + ny * (py - y)) * mm
         share = 1.0 / ((1.0 + ratio) * (1.0 + ratio))
-        add_point(share, residual, nx * mm, ny * mm, slopes[limb], first, second, u, row, matrix, gradient)
+        add_point(share, residual, nx * mm, ny * mm, first, second, u, normals[limb], pulls[limb])
     return loss
 
 
 @njit(**OPTIONS)
-def add_outline(
-    values, view, size, quads, slopes, usable, turns, ends, mm, scale, part, row, matrix, gradient
-):
+def add_outline(values, view, size, quads, usable, turns, boxes, ends, mm, scale, part, normals, pulls):
     """Samples of one view's outlines to the silhouette's border; returns their loss. part : of a sample beside a
     border point. view : start, width, height of its map in `values`, and in columns 5 and 6 where that begins in the
     picture, of `size`: far from the silhouette there is no map, and the loss is its most.
@@ -156,7 +200,7 @@ def add_outline(
                 y = (1.0 - u) * quads[limb, first, 1] + u * quads[limb, second, 1]
                 if not (0.0 <= x < size[0] - 1.0 and 0.0 <= y < size[1] - 1.0):
                     continue
-                if in_another(x, y, quads, usable, turns, limb):
+                if in_another(x, y, quads, usable, turns, boxes, limb):
                     continue
                 there, value, nx, ny = read_map(x - view[5], y - view[6], values, view[0], view[1], view[2])
                 if not there:
@@ -165,18 +209,20 @@ def add_outline(
                 ratio = (value * mm / scale) ** 2
                 loss += part * scale * scale * ratio / (1.0 + ratio)
                 share = part / ((1.0 + ratio) * (1.0 + ratio))
-                add_point(
-                    share, value * mm, nx * mm, ny * mm, slopes[limb], first, second, u, row, matrix, gradient
-                )
+                add_point(share, value * mm, nx * mm, ny * mm, first, second, u, normals[limb], pulls[limb])
     return loss
 
 
 @njit(**OPTIONS)
-def look_at_limbs(quads, slopes, usable, turns):
-    """Fill usable (L,), whether a limb is seen, and turns (L,), which way round it runs, of one view's limbs."""
+def look_at_limbs(quads, slopes, usable, turns, boxes):
+    """Fill, of one view's limbs, usable (L,), whether it is seen, turns (L,), which way round it runs, and boxes
+    (L, 4): left, top, right, bottom.
+    """
     for limb in range(quads.shape[0]):
         usable[limb] = np.isfinite(quads[limb].sum()) and np.isfinite(slopes[limb].sum())
         turns[limb] = turning(quads[limb])
+        boxes[limb, 0], boxes[limb, 2] = quads[limb, :, 0].min(), quads[limb, :, 0].max()
+        boxes[limb, 1], boxes[limb, 3] = quads[limb, :, 1].min(), quads[limb, :, 1].max()
 
 
 @njit(**OPTIONS)
@@ -197,32 +243,32 @@ def normal_equations(quads, slopes, ends, maps, views, sizes, border, mm, scales
     sizes (V, 2). border : (K, 4). mm : (V,) mm per pixel. scales :
     (V,) c of the loss, mm.
     """
-    limbs, size = quads.shape[1], slopes.shape[4]
-    row, usable, turns = np.zeros(size), np.zeros(limbs, np.bool_), np.zeros(limbs)
+    limbs = quads.shape[1]
+    normals, pulls, boxes = np.zeros((limbs, 8, 8)), np.zeros((limbs, 8)), np.zeros((limbs, 4))
+    usable, turns, which = np.zeros(limbs, np.bool_), np.zeros(limbs), np.zeros(slopes.shape[4], np.int64)
     matrix[:] = 0.0
     gradient[:] = 0.0
     loss = 0.0
     for v in range(quads.shape[0]):
-        look_at_limbs(quads[v], slopes[v], usable, turns)
+        look_at_limbs(quads[v], slopes[v], usable, turns, boxes)
+        normals[:], pulls[:] = 0.0, 0.0
         seen = border[views[v, 3] : views[v, 4]]
-        loss += add_border(
-            seen, quads[v], slopes[v], usable, turns, ends, mm[v], scales[v], row, matrix, gradient
-        )
+        loss += add_border(seen, quads[v], usable, turns, boxes, ends, mm[v], scales[v], normals, pulls)
         loss += add_outline(
             maps,
             views[v],
             sizes[v],
             quads[v],
-            slopes[v],
             usable,
             turns,
+            boxes,
             ends,
             mm[v],
             scales[v],
             part,
-            row,
-            matrix,
-            gradient,
+            normals,
+            pulls,
         )
+        add_limbs(normals, pulls, slopes[v], usable, which, matrix, gradient)
     mirror_lower_half(matrix)
     return loss

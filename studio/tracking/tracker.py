@@ -102,12 +102,16 @@ def start_of(pose: tuple[float, ...] | None) -> Carried:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Estimate:
-    """The pose that is reported. pose, mean, mode : (D,). log_weight : the best particle's log w."""
+    """The pose that is reported. pose, mean, mode : (D,). log_weight : the best particle's log w, or the refined pose's.
+
+    searched : (D,) what the search reported, where `pose` was refined after it; None where it was not.
+    """
 
     pose: Array
     mean: Array
     mode: Array
     log_weight: float
+    searched: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
