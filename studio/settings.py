@@ -1,8 +1,8 @@
 """All knobs of a run in one frozen, versioned value.
 
 A run's settings are six groups: the tracker's, the weighting's, the evidence's, the refinement's, the recovery's and
-the recording's. Each knob has a flat name that is unique over the six, so that a slider, `--set name=value` and `PATCH /settings`
-need no group.
+the recording's. Each knob has a flat name that is unique over the six, so that a slider, `--set name=value` and `PATCH
+/settings` need no group.
 """
 
 import dataclasses

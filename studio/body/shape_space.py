@@ -67,17 +67,25 @@ class ShapeSpace:
 
 
 def shape_space(
-    body: BodyModel, *, symmetric: bool = True, lengths: bool = True, radii: bool = True
+    body: BodyModel,
+    *,
+    symmetric: bool = True,
+    lengths: bool | Literal["ends"] = True,
+    radii: bool = True,
 ) -> ShapeSpace:
     """The shape space of a body read from a file.
 
-    symmetric : left and right are one group. lengths, radii : what may change. Dimensions that are zero (limbs that
-    are not there) stay so. Raises BodyError where nothing can change.
+    symmetric : left and right are one group. lengths, radii : what may change; "ends": only lengths that no tape
+    measures (`end_lengths`). Dimensions that are zero (limbs that are not there) stay so. Raises BodyError where
+    nothing can change.
     """
     kinds = dimension_kinds(body.definition) if body.definition else {}
-    wanted = {"length": lengths, "radius": radii}
+    ends = end_lengths(body.definition) if body.definition else frozenset[str]()
+    wanted = {"length": bool(lengths), "radius": radii}
     found: dict[tuple[str, str], list[str]] = {}
     for name, kind in kinds.items():
+        if lengths == "ends" and kind == "length" and name not in ends:
+            continue
         if wanted[kind] and body.dimensions[name] > 0.0 and name not in SMALL:
             found.setdefault((_group_name(name, symmetric), kind), []).append(name)
     if not found:
@@ -106,6 +114,19 @@ def dimension_kinds(definition: BodyDefinition) -> dict[str, str]:
         for name in definition.dimensions
         if name in radii or name in lengths
     }
+
+
+def end_lengths(definition: BodyDefinition) -> frozenset[str]:
+    """Lengths of limbs from which nothing hangs (hands, feet, head), and the ways along joints that bear no limb of
+    their own (collar-bones).
+    """
+    parents = {joint.parent for joint in definition.joints}
+    found = {_name(limb.length) for limb in definition.limbs if limb.joint not in parents}
+    bearing = {limb.joint for limb in definition.limbs}
+    for joint in definition.joints:
+        if joint.parent and joint.parent not in bearing:
+            found |= {_name(step.by) for step in joint.sequence if step.move}
+    return frozenset(found & definition.dimensions.keys())
 
 
 def _name(value: float | str) -> str:

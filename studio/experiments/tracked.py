@@ -23,6 +23,8 @@ from studio.geometry.camera import Camera
 from studio.runs.behaviour_models import check_prediction, fitting, model_folders, model_path
 from studio.runs.run_behaviour import learner_of
 from studio.runs.search_space import search_space, session_sigma
+from studio.runs.shape_on_the_way import FITTED_FRAMES, fitted_shape
+from studio.runs.subject_frames import varied_frames
 from studio.sessions.session import Session
 from studio.settings import RunSettings, changed_settings, default_settings
 from studio.tracking.catalogue import TRACKERS
@@ -42,7 +44,8 @@ class Attempt:
     open; last None means all. every : only each so many frames are seen (fps is divided, σ0 multiplied). cameras :
     names, empty for all. body : a body's name or file, "" for the session's own. subject : a subject file beside the
     session's own, such as "subject_shape.toml" of the Lee-walk twin (no hands and feet), "" for its own. sigma_scale :
-    multiplies σ0. behaviour : a behaviour model, by its name in the workspace's models or by path.
+    multiplies σ0. behaviour : a behaviour model, by its name in the workspace's models or by path. shape_frames : that
+    many frames are tracked first, and the shape that is fitted to them (`runs.shape_on_the_way`) has the run.
     """
 
     footage: str
@@ -58,10 +61,15 @@ class Attempt:
     sigma_scale: float = 1.0
     subject: str = ""
     behaviour: str = ""
+    shape_frames: int = 0
 
     def plain(self) -> dict[str, Any]:
         """As a trial's arguments; without a model as they were before there were any, so that outcomes stay known."""
-        return {name: value for name, value in asdict(self).items() if name != "behaviour" or value}
+        return {
+            name: value
+            for name, value in asdict(self).items()
+            if value or name not in ("behaviour", "shape_frames")
+        }
 
     @classmethod
     def of_plain(cls, arguments: Mapping[str, Any]) -> "Attempt":
@@ -117,55 +125,110 @@ def track(
         raise TruthError(f"Session '{session.name}' has no truth.", "Take one made by 'studio synthesize'.")
     subject = read_subject(session.path / attempt.subject) if attempt.subject else None
     body = session.body(attempt.body or None, subject)
-    fps = session.manifest.fps
     settings = changed_settings(default_settings(attempt.tracker, attempt.weighting), attempt.changes)
-    behaviour = _behaviour(session, body, settings, attempt)
-    sigma = session_sigma(session, body, fps / attempt.every) * attempt.sigma_scale
-    space = search_space(body, sigma, behaviour)
-    learner = learner_of(behaviour, settings, attempt.seed)
-    weighting = WEIGHTINGS[attempt.weighting]
-    cameras = _cameras(session, attempt.cameras)
-    seen_with = spoilt.cameras(cameras)
-    weigher = weighting.prepare(body, seen_with, settings.weighting)
-    refiner = FrameRefiner(body, seen_with)
+    follow = _Following(attempt, session, shelf, settings, spoilt)
+    start = _start_pose(session, body, attempt.first, session.manifest.fps)
     frames = range(attempt.first, attempt.last or session.manifest.frame_count, attempt.every)
-    carried = start_of(_start_pose(session, body, attempt.first, fps))
-    poses, evaluations, seconds = np.zeros((len(frames), len(body.parameters))), 0, 0.0
-    log_weights = np.zeros(len(frames))
+    if attempt.shape_frames:
+        first = follow(body, start, frames[: attempt.shape_frames])
+        body = follow.shaped(body, first)
+        start = tuple(float(value) for value in first.poses[0])
+    found = follow(body, start, frames, on_layer=on_layer, on_frame=on_frame)
+    return measured(session, body, found.poses, np.array(frames), found.evaluations, found.seconds)
 
-    def tracked(count: int) -> tuple[Array, Array]:
-        return poses[:count], log_weights[:count]
 
-    for number, frame in enumerate(frames):
-        seen = spoilt.evidence(
-            shelf.evidence(
-                session, cameras, frame, settings.evidence, weighting.edge_kind, weighting.reads_pictures
+@dataclass(slots=True, eq=False)
+class _Followed:
+    """poses (F, D) and log_weights (F,) of frames; evaluations of one after the first; seconds of the search."""
+
+    frames: range
+    poses: Array
+    log_weights: Array
+    evaluations: int = 0
+    seconds: float = 0.0
+
+
+class _Following:
+    """A session's frames followed with one tracker and its settings, by any body."""
+
+    def __init__(
+        self, attempt: Attempt, session: Session, shelf: FootageShelf, settings: RunSettings, spoilt: Changed
+    ) -> None:
+        self.attempt, self.session, self.shelf, self.settings = attempt, session, shelf, settings
+        self.spoilt, self.cameras = spoilt, _cameras(session, attempt.cameras)
+        self.seen_with = spoilt.cameras(self.cameras)
+
+    def evidence(self, frame: int) -> FrameEvidence:
+        """What is seen in a frame."""
+        weighting = WEIGHTINGS[self.attempt.weighting]
+        return self.spoilt.evidence(
+            self.shelf.evidence(
+                self.session,
+                self.cameras,
+                frame,
+                self.settings.evidence,
+                weighting.edge_kind,
+                weighting.reads_pictures,
             )
         )
-        began = time.perf_counter()
-        if learner is not None:
-            space = dataclasses.replace(space, behaviour=learner.model_in(number, tracked))
-            carried = learner.carried_into(number, carried, tracked)
-        problem = weigher.problem(seen)
-        result = search_frame(
-            TRACKERS[attempt.tracker],
-            problem,
-            carried,
-            space,
-            seed=attempt.seed,
-            frame=frame,
-            settings_source=lambda: (1, settings.tracker),
-            repeats=settings.tracker.start_repeats if number == 0 else 1,
-            on_layer=on_layer,
-        )
-        result = refiner.refined(result, seen, problem, settings.refinement)
-        if number:
-            seconds += time.perf_counter() - began
-        carried, poses[number], evaluations = result.carried, result.estimate.pose, result.evaluations
-        log_weights[number] = result.estimate.log_weight
-        if on_frame is not None:
-            on_frame(number + 1, len(frames))
-    return measured(session, body, poses, np.array(frames), evaluations, seconds)
+
+    def shaped(self, body: BodyModel, first: _Followed) -> BodyModel:
+        """The body in the shape that fits the most different of the frames that were followed."""
+        numbers = np.array(first.frames)
+        chosen = varied_frames(body, numbers, first.poses, FITTED_FRAMES)
+        rows = np.searchsorted(numbers, chosen)
+        seen = [self.evidence(frame) for frame in chosen]
+        return fitted_shape(body, self.seen_with, seen, first.poses[rows], self.attempt.seed).body
+
+    def __call__(
+        self,
+        body: BodyModel,
+        start: tuple[float, ...] | None,
+        frames: range,
+        on_layer: Callable[[LayerRecord], None] | None = None,
+        on_frame: Callable[[int, int], None] | None = None,
+    ) -> _Followed:
+        """The frames followed from a start pose."""
+        attempt, settings = self.attempt, self.settings
+        fps = self.session.manifest.fps
+        behaviour = _behaviour(self.session, body, settings, attempt)
+        sigma = session_sigma(self.session, body, fps / attempt.every) * attempt.sigma_scale
+        space = search_space(body, sigma, behaviour)
+        learner = learner_of(behaviour, settings, attempt.seed)
+        weigher = WEIGHTINGS[attempt.weighting].prepare(body, self.seen_with, settings.weighting)
+        refiner = FrameRefiner(body, self.seen_with)
+        carried = start_of(start)
+        found = _Followed(frames, np.zeros((len(frames), len(body.parameters))), np.zeros(len(frames)))
+
+        def tracked(count: int) -> tuple[Array, Array]:
+            return found.poses[:count], found.log_weights[:count]
+
+        for number, frame in enumerate(frames):
+            seen = self.evidence(frame)
+            began = time.perf_counter()
+            if learner is not None:
+                space = dataclasses.replace(space, behaviour=learner.model_in(number, tracked))
+                carried = learner.carried_into(number, carried, tracked)
+            problem = weigher.problem(seen)
+            result = search_frame(
+                TRACKERS[attempt.tracker],
+                problem,
+                carried,
+                space,
+                seed=attempt.seed,
+                frame=frame,
+                settings_source=lambda: (1, settings.tracker),
+                repeats=settings.tracker.start_repeats if number == 0 else 1,
+                on_layer=on_layer,
+            )
+            result = refiner.refined(result, seen, problem, settings.refinement)
+            if number:
+                found.seconds += time.perf_counter() - began
+            carried, found.evaluations = result.carried, result.evaluations
+            found.poses[number], found.log_weights[number] = result.estimate.pose, result.estimate.log_weight
+            if on_frame is not None:
+                on_frame(number + 1, len(frames))
+        return found
 
 
 def measured(

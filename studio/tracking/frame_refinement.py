@@ -15,8 +15,8 @@ from studio.evidence.distance_maps import distances_of
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 from studio.knobs import knob
-from studio.tracking.refinement import Refiner, RefinementSettings
-from studio.tracking.tracker import Carried, FrameProblem, FrameResult, ParticleSet
+from studio.tracking.refinement import RefinementSettings, Refiner
+from studio.tracking.tracker import Carried, FrameProblem, FrameResult
 
 Array = NDArray[np.float64]
 

@@ -102,7 +102,8 @@ def start_of(pose: tuple[float, ...] | None) -> Carried:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Estimate:
-    """The pose that is reported. pose, mean, mode : (D,). log_weight : the best particle's log w, or the refined pose's.
+    """The pose that is reported. pose, mean, mode : (D,). log_weight : the best particle's log w, or that
+    of the refined pose.
 
     searched : (D,) what the search reported, where `pose` was refined after it; None where it was not.
     """
