@@ -117,15 +117,9 @@ def dimension_kinds(definition: BodyDefinition) -> dict[str, str]:
 
 
 def end_lengths(definition: BodyDefinition) -> frozenset[str]:
-    """Lengths of limbs from which nothing hangs (hands, feet, head), and the ways along joints that bear no limb of
-    their own (collar-bones).
-    """
+    """Lengths of limbs from which nothing hangs: hands, feet, head."""
     parents = {joint.parent for joint in definition.joints}
     found = {_name(limb.length) for limb in definition.limbs if limb.joint not in parents}
-    bearing = {limb.joint for limb in definition.limbs}
-    for joint in definition.joints:
-        if joint.parent and joint.parent not in bearing:
-            found |= {_name(step.by) for step in joint.sequence if step.move}
     return frozenset(found & definition.dimensions.keys())
 
 

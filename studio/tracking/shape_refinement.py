@@ -36,6 +36,7 @@ from studio.tracking.refinement import (
     Distances,
     free_ends,
     mm_per_pixel,
+    rigid_limbs,
 )
 from studio.tracking.shape_prior import ShapePrior
 from studio.tracking.shape_refinement_kernels import border_equations
@@ -117,7 +118,7 @@ class ShapeRefiner:
         self._programs, self._cameras, self._prior = programs, cameras, prior
         self._silhouettes = silhouettes
         self._projector = OutlineProjector.of_body(body, cameras)
-        self._body, self._ends = body, free_ends(body)
+        self._body, self._ends, self._rigid = body, free_ends(body), rigid_limbs(body)
         angle = np.array([entry.kind == "angle" for entry in body.parameters])
         self._unit = np.where(angle, 1.0, MM_PER_RADIAN)
         self._shaken = np.where(angle, SHAKEN_POSE, SHAKEN_PLACE)
@@ -234,6 +235,7 @@ class ShapeRefiner:
         for k, (pose, frame) in enumerate(zip(poses, frames, strict=True)):
             corners, _ = projector.corners(np.concatenate([pose[None], pose + steps, pose - steps]))
             by_pose = (corners[1 : size + 1] - corners[size + 1 :]) / (2.0 * DIFFERENCE)
+            by_pose[:, :, self._rigid] = 0.0
             slopes = np.moveaxis(np.concatenate([by_pose, by_shape[:, k]]), 0, -1)
             borders[k] = border_equations(
                 *(corners[0].copy(), np.ascontiguousarray(slopes), self._ends),

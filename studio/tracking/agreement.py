@@ -1,0 +1,58 @@
+"""How well a pose explains all views, both ways and limb by limb: model that no silhouette bears out, and silhouette
+that no limb explains.
+
+A limb that lies on another one costs nothing in what the model covers; what gives it away is the silhouette that it
+left bare. So both are counted, in every view, beyond a distance that clothes and rough masks do not reach, and given to the
+limb that is nearest. Everything is in mm² at the body, so that cameras and rates do not matter.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.body.forward_kinematics import limb_ends
+from studio.body.model import BodyModel
+from studio.geometry.camera import Camera
+from studio.tracking.agreement_kernels import FIELDS, view_counts
+from studio.tracking.refinement import Distances, mm_per_pixel
+from studio.weighting.outlines import OutlineProjector
+
+Array = NDArray[np.float64]
+
+FAR_MM = 45.0
+"""Clothes, hair and rough masks reach less far."""
+GRID_MM = 14.0
+"""Between points that are counted, about; at least a pixel."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Disagreement:
+    """Of V views and L drawn limbs, mm² at the body. area : (V, L) that a limb covers. outside : (V, L) of it farther
+    than FAR_MM from the silhouette. bare : (V, L) silhouette farther than FAR_MM from every limb, given to the nearest.
+    """
+
+    area: Array
+    outside: Array
+    bare: Array
+
+
+class Agreement:
+    """Compares poses of a body with silhouettes in some cameras."""
+
+    def __init__(self, body: BodyModel, cameras: tuple[Camera, ...]) -> None:
+        self.body, self.cameras = body, cameras
+        self._projector = OutlineProjector.of_body(body, cameras)
+
+    def of(self, pose: Array, silhouettes: Sequence[Distances]) -> Disagreement:
+        """Where a pose (D,) and a frame's silhouettes, one a camera, disagree."""
+        corners, _ = self._projector.corners(pose[None])
+        middle = limb_ends(self.body, pose[None])[0].reshape(-1, 3).mean(axis=0)
+        counts = np.zeros((len(silhouettes), corners.shape[2], FIELDS))
+        for own, quads, view, camera in zip(counts, corners[0], silhouettes, self.cameras, strict=True):
+            mm = mm_per_pixel(camera, middle)
+            step = max(1, round(GRID_MM / mm))
+            view_counts(quads, view.signed, view.corner, view.size, step, FAR_MM / mm, own)
+            own *= (step * mm) ** 2
+        return Disagreement(counts[..., 0], counts[..., 1], counts[..., 2])
