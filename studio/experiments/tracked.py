@@ -23,8 +23,7 @@ from studio.geometry.camera import Camera
 from studio.runs.behaviour_models import check_prediction, fitting, model_folders, model_path
 from studio.runs.run_behaviour import learner_of
 from studio.runs.search_space import search_space, session_sigma
-from studio.runs.shape_on_the_way import FITTED_FRAMES, fitted_shape
-from studio.runs.subject_frames import varied_frames
+from studio.runs.shape_on_the_way import WEIGHTING, FittedShape, shaped_body
 from studio.sessions.session import Session
 from studio.settings import RunSettings, changed_settings, default_settings
 from studio.tracking.catalogue import TRACKERS
@@ -129,10 +128,9 @@ def track(
     follow = _Following(attempt, session, shelf, settings, spoilt)
     start = _start_pose(session, body, attempt.first, session.manifest.fps)
     frames = range(attempt.first, attempt.last or session.manifest.frame_count, attempt.every)
-    if attempt.shape_frames:
-        first = follow(body, start, frames[: attempt.shape_frames])
-        body = follow.shaped(body, first)
-        start = tuple(float(value) for value in first.poses[0])
+    if attempt.shape_frames and start is not None:
+        shaped = follow.shaped(body, start, frames[: attempt.shape_frames])
+        body, start = shaped.body, tuple(float(value) for value in shaped.start)
     found = follow(body, start, frames, on_layer=on_layer, on_frame=on_frame)
     return measured(session, body, found.poses, np.array(frames), found.evaluations, found.seconds)
 
@@ -158,27 +156,31 @@ class _Following:
         self.spoilt, self.cameras = spoilt, _cameras(session, attempt.cameras)
         self.seen_with = spoilt.cameras(self.cameras)
 
-    def evidence(self, frame: int) -> FrameEvidence:
-        """What is seen in a frame."""
-        weighting = WEIGHTINGS[self.attempt.weighting]
+    def evidence(self, frame: int, weighting: str = "") -> FrameEvidence:
+        """What is seen in a frame, as a weighting wants it ("": the attempt's)."""
+        reader = WEIGHTINGS[weighting or self.attempt.weighting]
         return self.spoilt.evidence(
             self.shelf.evidence(
                 self.session,
                 self.cameras,
                 frame,
                 self.settings.evidence,
-                weighting.edge_kind,
-                weighting.reads_pictures,
+                reader.edge_kind,
+                reader.reads_pictures,
             )
         )
 
-    def shaped(self, body: BodyModel, first: _Followed) -> BodyModel:
-        """The body in the shape that fits the most different of the frames that were followed."""
-        numbers = np.array(first.frames)
-        chosen = varied_frames(body, numbers, first.poses, FITTED_FRAMES)
-        rows = np.searchsorted(numbers, chosen)
-        seen = [self.evidence(frame) for frame in chosen]
-        return fitted_shape(body, self.seen_with, seen, first.poses[rows], self.attempt.seed).body
+    def shaped(self, body: BodyModel, start: tuple[float, ...], frames: range) -> FittedShape:
+        """The body in the shape that the first frames show, and its pose in the first."""
+        sigma = session_sigma(self.session, body, self.session.manifest.fps / self.attempt.every)
+        return shaped_body(
+            body,
+            self.seen_with,
+            lambda frame: self.evidence(frame, WEIGHTING),
+            frames,
+            np.array(start),
+            sigma,
+        )
 
     def __call__(
         self,

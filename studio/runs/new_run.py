@@ -22,6 +22,7 @@ from studio.runs.initialising import InitialPose, Progress, initialise
 from studio.runs.live_request import check_live, live_changes
 from studio.runs.search_space import parameter_names, session_sigma
 from studio.runs.session_settings import session_settings
+from studio.runs.shape_on_the_way import session_shape
 from studio.runs.silhouette_doubts import accepted_doubts
 from studio.sessions.manifest import now
 from studio.sessions.run_record import RunRecord
@@ -45,7 +46,8 @@ class RunRequest:
     run-2, … behaviour : a behaviour model, by its name in the workspace's models or by path; "" for the only one that
     fits where the settings need one. live : frames come on the footage's clock and are dropped where they come too
     fast (`live_run`). to_and_fro : a live run goes forth and back through the footage; `last` may lie behind its end.
-    despite_findings : also where the footage speaks against the calibration.
+    despite_findings : also where the footage speaks against the calibration. fit_shape : the first frames show the
+    body's radii, hands, feet and head (`shape_on_the_way`); not for live runs, which cannot look ahead.
     """
 
     tracker: str = ""
@@ -63,6 +65,7 @@ class RunRequest:
     live: bool = False
     to_and_fro: bool = False
     despite_findings: bool = False
+    fit_shape: bool = True
 
 
 def prepare_run(
@@ -100,6 +103,9 @@ def prepare_run(
         found = _found(session, first, body, model, asked.seed, progress)
         start, source = within_limits(body, found.pose), found.source
         notes = (*notes, *([found.note] if found.note else []))
+    if asked.fit_shape and not asked.live and start is not None:
+        body, start, words = session_shape(session, body, settings, start, first, last, progress)
+        notes = (*notes, *([words] if words else []))
     record = RunRecord(
         name=asked.name or free_run_name(session),
         session=session.name,

@@ -1,56 +1,235 @@
 """The subject's shape from the first frames of a run: all radii, and the lengths that no tape measures.
 
-Cones that are too thin or too thick for the clothed body pull joints along (arms ride up by centimetres), hands, feet
-and head end where the silhouettes say. So a run's first frames are tracked, the shape is fitted to the most different
-of them (`tracking.shape_refinement`), and the run begins again with it. Known bone lengths are kept: a fit of all of
-them is unsafe, as silhouettes hardly tell a knee ten millimetres higher from one that is bent a little more.
+Cones that are too thin or too thick for the clothed body pull joints along (arms ride up by centimetres), and hands,
+feet and head end where the silhouettes say. So before a run begins, its first frames are tracked, the shape is fitted
+to the most different of them (`tracking.shape_refinement`), and the run begins again with it. Bone lengths are kept: a
+fit of all of them is unsafe, as silhouettes hardly tell a knee ten millimetres higher from one that is bent a little
+more (`subject_fitting` does that with more frames and more care).
+
+The frames are tracked with the default tracker and seed 0 whatever the run has, so that all runs of a session have one
+body; it is kept in the session's folder `shapes` until footage, calibration, masks, subject or start pose change.
 """
 
-from collections.abc import Sequence
+import dataclasses
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.body.dimensions import with_dimensions
 from studio.body.model import BodyModel
-from studio.body.shape_space import ShapeSpace, shape_space
+from studio.body.shape_space import ShapeSpace, dimension_kinds, shape_space
+from studio.errors import NotFoundError, SessionError
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
+from studio.progress import Progress
+from studio.runs.problem_source import ProblemSource
+from studio.runs.search_space import search_space, session_sigma
+from studio.runs.subject_frames import varied_frames
+from studio.sessions.made_from import digests
+from studio.sessions.record_files import read_record, write_record
+from studio.sessions.session import Session
+from studio.settings import RunSettings, default_settings
+from studio.tracking.catalogue import TRACKERS
+from studio.tracking.frame_loop import search_frame
+from studio.tracking.frame_refinement import FrameRefiner
+from studio.tracking.loss_detection import Onlooker, anything_seen
 from studio.tracking.shape_prior import ShapePrior, ShapeSpreads
 from studio.tracking.shape_refinement import ShapeRefiner
+from studio.tracking.tracker import start_of
+from studio.weighting.catalogue import WEIGHTINGS
 from studio.weighting.shape_silhouettes import ShapePrograms
 
 Array = NDArray[np.float64]
 
-FIRST_FRAMES, FITTED_FRAMES = 30, 8
-"""Frames that are tracked before the fit, and the most different ones of them that it looks at."""
+TRACKER, WEIGHTING = "annealed", "edge-region-silhouette"
+FIRST_FRAMES, FEWEST_FRAMES, FITTED_FRAMES = 30, 8, 8
+"""Frames tracked before the fit (with fewer there is none), and the most different of them that it looks at."""
+LEAST_OVERLAP = 0.6
+"""Masks that agree less with the body, even with the shape, show something else."""
+STEP = "fitting the shape"
+SCHEMA_VERSION, FOLDER = 1, "shapes"
+WORDED = 5.0
+"""mm: smaller changes are not worth a word."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FittedShape:
-    """body : with the shape. poses : (F, D) of the frames with it. sizes : group to mm, before and after."""
+    """body : with the shape. start : (D,) its pose in the first frame. sizes : group to mm, before and after. overlap :
+    f_s before and after, mean over the fitted frames.
+    """
 
     body: BodyModel
-    poses: Array
-    sizes: dict[str, tuple[float, float]]
+    start: Array
+    sizes: Mapping[str, tuple[float, float]]
+    overlap: tuple[float, float]
+
+
+class _Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A fit as it lies in a session. dimensions : of the fitted body, mm. words : for a run's notes; a fit that was of
+    no use has the reason there, and no dimensions.
+    """
+
+    schema: int = SCHEMA_VERSION
+    dimensions: dict[str, float] = {}
+    start: tuple[float, ...] = ()
+    words: str
+
+
+def session_shape(
+    session: Session,
+    body: BodyModel,
+    settings: RunSettings,
+    start: Array,
+    first: int,
+    last: int,
+    progress: Progress | None = None,
+) -> tuple[BodyModel, Array, str]:
+    """The body in the shape that a session's frames from `first` on show, its pose there (D,), and words for the notes.
+
+    settings : whose evidence counts. The body as it is, and "", where it has no radii to fit or there are too few
+    frames.
+    """
+    frames = range(first, min(last, first + FIRST_FRAMES))
+    if len(frames) < FEWEST_FRAMES or not can_be_fitted(body):
+        return body, start, ""
+    path = session.path / FOLDER / f"{_key(session, body, settings, start, frames)}.json"
+    try:
+        kept = read_record(
+            path,
+            _Kept,
+            SCHEMA_VERSION,
+            missing=("There is no such shape.", "Fit it."),
+            what="a fitted shape",
+            remedy="Delete it.",
+        )
+    except (NotFoundError, SessionError):
+        kept = _fitted_now(session, body, settings, start, frames, progress)
+        path.parent.mkdir(exist_ok=True)
+        write_record(path, kept)
+    if not kept.dimensions:
+        return body, start, kept.words
+    return with_dimensions(body, kept.dimensions), np.array(kept.start), kept.words
+
+
+def can_be_fitted(body: BodyModel) -> bool:
+    """Whether a body has named radii (people and animals have, arms of the samples have not)."""
+    return body.definition is not None and "radius" in dimension_kinds(body.definition).values()
+
+
+def _fitted_now(
+    session: Session,
+    body: BodyModel,
+    settings: RunSettings,
+    start: Array,
+    frames: range,
+    progress: Progress | None,
+) -> _Kept:
+    with closing(ProblemSource(session, body)) as problems:
+        wanted = _judging(settings)
+        cameras = problems.cameras
+        if any(problems.footage.absent(frame) for frame in frames):
+            return _Kept(words="The shape was not fitted: not every camera has the first frames.")
+        fps = session.manifest.fps
+        found = shaped_body(
+            body,
+            cameras,
+            lambda frame: problems.evidence(frame, wanted),
+            frames,
+            start,
+            session_sigma(session, body, fps),
+            progress=progress,
+        )
+    before, after = found.overlap
+    if after < max(LEAST_OVERLAP, before):
+        return _Kept(words="The shape was not fitted: the masks agree too little with the body.")
+    return _Kept(
+        dimensions=dict(found.body.dimensions),
+        start=tuple(float(value) for value in found.start),
+        words=_words(found, frames),
+    )
+
+
+def shaped_body(
+    body: BodyModel,
+    cameras: tuple[Camera, ...],
+    evidence: Callable[[int], FrameEvidence],
+    frames: Sequence[int],
+    start: Array,
+    sigma: Array,
+    *,
+    progress: Progress | None = None,
+) -> FittedShape:
+    """The shape of a body that the first frames show. evidence : of a frame, with edge proximity maps. start : (D,) of
+    the first of `frames`. sigma : (D,) σ0 from frame to frame.
+    """
+    rules = default_settings(TRACKER, WEIGHTING)
+    weigher = WEIGHTINGS[WEIGHTING].prepare(body, cameras, rules.weighting)
+    refiner, space = FrameRefiner(body, cameras), search_space(body, sigma)
+    carried, poses = start_of(tuple(start.tolist())), []
+    for number, frame in enumerate(frames):
+        if progress is not None:
+            progress(STEP, number, len(frames) + 1)
+        seen = evidence(frame)
+        if not anything_seen(seen):
+            break
+        problem = weigher.problem(seen)
+        result = search_frame(
+            TRACKERS[TRACKER],
+            problem,
+            carried,
+            space,
+            seed=0,
+            frame=frame,
+            settings_source=lambda: (1, rules.tracker),
+            repeats=1 if number else rules.tracker.start_repeats,
+        )
+        result = refiner.refined(result, seen, problem, rules.refinement)
+        carried = result.carried
+        poses.append(result.estimate.pose)
+    numbers, followed = np.array(frames[: len(poses)]), np.array(poses).reshape(len(poses), len(start))
+    if not poses:
+        return FittedShape(body, start, {}, (0.0, 0.0))
+    chosen = varied_frames(body, numbers, followed, FITTED_FRAMES)
+    rows = np.searchsorted(numbers, chosen)
+    found = fitted_shape(body, cameras, [evidence(frame) for frame in chosen], followed[rows])
+    if progress is not None:
+        progress(STEP, len(frames) + 1, len(frames) + 1)
+    return FittedShape(found.body, followed[0], found.sizes, found.overlap)
 
 
 def fitted_shape(
-    body: BodyModel,
-    cameras: tuple[Camera, ...],
-    frames: Sequence[FrameEvidence],
-    poses: Array,
-    seed: int = 0,
+    body: BodyModel, cameras: tuple[Camera, ...], frames: Sequence[FrameEvidence], poses: Array
 ) -> FittedShape:
     """The shape of a body on some frames' masks, from its poses there (F, D), which are in the right valley."""
     space = shape_space(body, lengths="ends")
     prior = ShapePrior(space, ShapeSpreads(), None)
     borders = [silhouette_distances(frame) for frame in frames]
     found = ShapeRefiner(ShapePrograms(space), cameras, borders, prior).refine(
-        np.zeros(len(space.groups)), poses, seed
+        np.zeros(len(space.groups)), poses
     )
-    return FittedShape(space.body_of(found.shape), found.poses, _sizes(space, found.shape))
+    shaped = space.body_of(found.shape)
+    overlap = _overlap(body, cameras, frames, poses), _overlap(shaped, cameras, frames, found.poses)
+    return FittedShape(shaped, found.poses[0], _sizes(space, found.shape), overlap)
+
+
+def _overlap(
+    body: BodyModel, cameras: tuple[Camera, ...], frames: Sequence[FrameEvidence], poses: Array
+) -> float:
+    onlooker = Onlooker(body, cameras)
+    return float(
+        np.mean([onlooker.sight(frame, pose).overlap for frame, pose in zip(frames, poses, strict=True)])
+    )
+
+
+def _judging(settings: RunSettings) -> RunSettings:
+    """The settings that the first frames are tracked with: the run's evidence, all else the studio's defaults."""
+    return dataclasses.replace(default_settings(TRACKER, WEIGHTING), evidence=settings.evidence)
 
 
 def _sizes(space: ShapeSpace, shape: Array) -> dict[str, tuple[float, float]]:
@@ -58,3 +237,30 @@ def _sizes(space: ShapeSpace, shape: Array) -> dict[str, tuple[float, float]]:
     return {
         name: (float(one), float(other)) for name, one, other in zip(space.names, before, after, strict=True)
     }
+
+
+def _words(found: FittedShape, frames: range) -> str:
+    changed = [
+        f"{name.replace('_', ' ')} {one:.0f} → {other:.0f}"
+        for name, (one, other) in found.sizes.items()
+        if abs(other - one) >= WORDED
+    ]
+    listed = f": {', '.join(changed)} mm" if changed else ""
+    return (
+        f"The body's shape was fitted to frames {frames[0]} to {frames[-1]}{listed}; the silhouettes agree by "
+        f"{100.0 * found.overlap[1]:.0f} % (before: {100.0 * found.overlap[0]:.0f} %). Bone lengths were kept."
+    )
+
+
+def _key(session: Session, body: BodyModel, settings: RunSettings, start: Array, frames: range) -> str:
+    """A digest of all that the fit depends on."""
+    made_of = (
+        SCHEMA_VERSION,
+        digests(session, ("footage", "calibration", "masks")),
+        body.name,
+        dict(body.dimensions),
+        repr(settings.evidence),
+        start.tolist(),
+        (frames.start, frames.stop),
+    )
+    return hashlib.sha256(msgspec.json.encode(made_of)).hexdigest()[:32]

@@ -2,8 +2,8 @@
 that no limb explains.
 
 A limb that lies on another one costs nothing in what the model covers; what gives it away is the silhouette that it
-left bare. So both are counted, in every view, beyond a distance that clothes and rough masks do not reach, and given to the
-limb that is nearest. Everything is in mm² at the body, so that cameras and rates do not matter.
+left bare. So both are counted, in every view, beyond a distance that clothes and rough masks do not reach, and given to
+the limb that is nearest. Everything is in mm² at the body, so that cameras and rates do not matter.
 """
 
 from collections.abc import Sequence

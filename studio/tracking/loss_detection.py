@@ -179,4 +179,5 @@ def anything_seen(evidence: FrameEvidence) -> bool:
 
 def is_blank(view: ViewEvidence) -> bool:
     """Whether a picture shows nothing at all: one grey, black or white."""
-    return float(view.picture[::BLANK_STEP, ::BLANK_STEP].std()) < BLANK_SPREAD
+    seen = view.picture[::BLANK_STEP, ::BLANK_STEP]
+    return seen.size > 0 and float(seen.std()) < BLANK_SPREAD

@@ -280,8 +280,8 @@ def rigid_limbs(body: BodyModel) -> NDArray[np.bool_]:
 
     A person's wrists and ankles do turn, so where such a limb and the silhouette disagree, neither the shin nor the
     forearm is wrong: it explains what is seen, so that nothing else has to, but does not pull the limbs above it.
-    Measured on a rendered walk with turns: rigid feet pull the legs and the trunk 20 to 30 mm down, rigid hands the arms
-    10 mm.
+    Measured on a rendered walk with turns: rigid feet pull the legs and the trunk 20 to 30 mm down, rigid hands the
+    arms 10 mm.
     """
     ends = free_ends(body)
     still = [all(step.parameter < 0 for step in body.joints[limb.joint].steps) for limb in body.drawn]
