@@ -198,7 +198,7 @@ class _Following:
         space = search_space(body, sigma, behaviour)
         learner = learner_of(behaviour, settings, attempt.seed)
         weigher = WEIGHTINGS[attempt.weighting].prepare(body, self.seen_with, settings.weighting)
-        refiner = FrameRefiner(body, self.seen_with)
+        refiner = FrameRefiner(body, self.seen_with, attempt.seed)
         carried = start_of(start)
         found = _Followed(frames, np.zeros((len(frames), len(body.parameters))), np.zeros(len(frames)))
 

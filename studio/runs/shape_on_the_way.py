@@ -170,7 +170,7 @@ def shaped_body(
     """
     rules = default_settings(TRACKER, WEIGHTING)
     weigher = WEIGHTINGS[WEIGHTING].prepare(body, cameras, rules.weighting)
-    refiner, space = FrameRefiner(body, cameras), search_space(body, sigma)
+    refiner, space = FrameRefiner(body, cameras, 0), search_space(body, sigma)
     carried, poses = start_of(tuple(start.tolist())), []
     for number, frame in enumerate(frames):
         if progress is not None:

@@ -70,7 +70,7 @@ class TrackingRun:
             anew=self.record.is_anew,
         )
         seen = isinstance(problems, Sightings)
-        self._refiner = FrameRefiner(problems.body, problems.cameras) if seen else None
+        self._refiner = FrameRefiner(problems.body, problems.cameras, self.record.seed) if seen else None
         self._writer = ResultsWriter(run.folder)
         self._pace = Pace()
         self._load()

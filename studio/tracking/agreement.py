@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 
 FAR_MM = 45.0
 """Clothes, hair and rough masks reach less far."""
+LEAST_AREA = 1000.0
+"""mm²: a limb that no view shows."""
 GRID_MM = 14.0
 """Between points that are counted, about; at least a pixel."""
 
@@ -37,12 +39,24 @@ class Disagreement:
     outside: Array
     bare: Array
 
+    def shares(self, agreement: "Agreement") -> dict[str, float]:
+        """Of each of the body's limbs (as its parameters name them), what disagrees as a share of its area."""
+        area = np.maximum(self.area.sum(axis=0), LEAST_AREA)
+        off = (self.outside + self.bare).sum(axis=0)
+        groups = np.array(agreement.limbs)
+        return {
+            limb: float(off[groups == limb].sum() / area[groups == limb].sum())
+            for limb in dict.fromkeys(agreement.limbs)
+        }
+
 
 class Agreement:
     """Compares poses of a body with silhouettes in some cameras."""
 
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...]) -> None:
         self.body, self.cameras = body, cameras
+        self.limbs = limb_names(body)
+        """(L,) the limb that each drawn one belongs to, as the body's parameters name them."""
         self._projector = OutlineProjector.of_body(body, cameras)
 
     def of(self, pose: Array, silhouettes: Sequence[Distances]) -> Disagreement:
@@ -56,3 +70,15 @@ class Agreement:
             view_counts(quads, view.signed, view.corner, view.size, step, FAR_MM / mm, own)
             own *= (step * mm) ** 2
         return Disagreement(counts[..., 0], counts[..., 1], counts[..., 2])
+
+
+def limb_names(body: BodyModel) -> tuple[str, ...]:
+    """(L,) the limb that each drawn one belongs to: that of the nearest parameter on the way to the root."""
+    found = []
+    for limb in body.drawn:
+        joint, moved = limb.joint, list[int]()
+        while joint >= 0 and not moved:
+            moved = [step.parameter for step in body.joints[joint].steps if step.parameter >= 0]
+            joint = body.joints[joint].parent
+        found.append(body.parameters[moved[-1]].limb if moved else "")
+    return tuple(found)

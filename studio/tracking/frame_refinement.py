@@ -1,10 +1,12 @@
 """Refinement inside the loop: each frame's pose is moved onto the silhouettes, and the next frame starts from there.
 
-The search finds the valley, the local descent (`refinement`) its floor; neither does without the other. Measured on the
-choosing half of the generalisation suite (`studio reproduce generalisation`).
+The search finds the valley, the local descent (`refinement`) its floor; neither does without the other. Where the
+frame's own silhouettes say that a limb is off (`agreement`), that limb alone is drawn anew over all its range, the best
+of these poses are refined as well, and one of them is taken where the silhouettes agree with it clearly better.
 """
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,12 +17,22 @@ from studio.evidence.distance_maps import distances_of
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 from studio.knobs import knob
-from studio.tracking.refinement import RefinementSettings, Refiner
+from studio.tracking.agreement import Agreement
+from studio.tracking.refinement import Distances, RefinementSettings, Refiner, bounded_angles
 from studio.tracking.tracker import Carried, FrameProblem, FrameResult
 
 Array = NDArray[np.float64]
 
 POSE, CLOUD = "pose", "cloud"
+DOUBTFUL_SHARE = 0.04
+"""Of a limb's area in all views, outside the silhouettes or left bare: 98 of 100 sound limbs have less."""
+DRAWS, REFINED_DRAWS, APART = 1024, 3, 0.4
+"""Poses drawn of a doubtful limb; how many are refined; radians by which these differ at least in some joint."""
+SPREADS = (0.1, 0.3)
+"""Half of the draws lie about where the limb is, by shares of its range; the others anywhere in it."""
+BETTER = 0.95
+"""Share of the descent's loss below which another pose is taken."""
+REDRAWN = 0x11A6
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +53,10 @@ class FrameRefinementSettings:
         150, 20, 1000, 10, label="border points", takes_effect="next frame",
         help="Points of each view's silhouette border that the descent looks at.",
     )  # fmt: skip
+    redraw_limbs: bool = knob(
+        True, label="draw lost limbs anew", takes_effect="next frame",
+        help="Where the silhouettes say that a limb is off, look for that limb in all its range and refine the best.",
+    )  # fmt: skip
     next_frame_from: str = knob(
         POSE, choices=(POSE, CLOUD), label="next frame starts from", takes_effect="next frame",
         help="Where every particle of the next frame starts: at the refined pose, or in the cloud moved with it.",
@@ -48,11 +64,12 @@ class FrameRefinementSettings:
 
 
 class FrameRefiner:
-    """Refines the frames of one body; refiners are kept by the cameras that see a frame."""
+    """Refines the frames of one body; what is prepared for some cameras is kept. seed : of the run."""
 
-    def __init__(self, body: BodyModel, cameras: tuple[Camera, ...]) -> None:
+    def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], seed: int) -> None:
         self._body, self._cameras = body, {camera.name: camera for camera in cameras}
-        self._refiners: dict[tuple[object, ...], Refiner] = {}
+        self._seed = seed
+        self._refiners: dict[tuple[object, ...], tuple[Refiner, Agreement]] = {}
 
     def refined(
         self,
@@ -67,22 +84,79 @@ class FrameRefiner:
         if not settings.refine_frames or not any(view.mask.any() for view in evidence.views):
             return result
         silhouettes = [distances_of(view.mask, settings.refine_frame_points) for view in evidence.views]
-        refiner = self._refiner(tuple(view.camera for view in evidence.views), settings)
-        found = refiner.refine(result.estimate.pose, silhouettes)
-        weight = float(problem.weigh(found.pose[None])[0])
+        refiner, agreement = self._prepared(tuple(view.camera for view in evidence.views), settings)
+        pose = refiner.refine(result.estimate.pose, silhouettes).pose
+        evaluations = result.evaluations
+        if settings.redraw_limbs:
+            rng = np.random.Generator(
+                np.random.Philox(np.random.SeedSequence((self._seed, result.frame, 0, 0, REDRAWN)))
+            )
+            pose, drawn = _redrawn(rng, pose, silhouettes, problem, refiner, agreement)
+            evaluations += drawn
+        weight = float(problem.weigh(pose[None])[0])
         estimate = dataclasses.replace(
-            result.estimate, pose=found.pose, searched=result.estimate.pose, log_weight=weight
+            result.estimate, pose=pose, searched=result.estimate.pose, log_weight=weight
         )
-        carried = _carried(result, found.pose, settings.next_frame_from, refiner)
-        return dataclasses.replace(result, estimate=estimate, carried=carried)
+        carried = _carried(result, pose, settings.next_frame_from, refiner)
+        return dataclasses.replace(result, estimate=estimate, carried=carried, evaluations=evaluations)
 
-    def _refiner(self, names: tuple[str, ...], settings: FrameRefinementSettings) -> Refiner:
+    def _prepared(
+        self, names: tuple[str, ...], settings: FrameRefinementSettings
+    ) -> tuple[Refiner, Agreement]:
         key = (names, settings.refine_frame_steps)
         if key not in self._refiners:
             cameras = tuple(self._cameras[name] for name in names)
             knobs = RefinementSettings(refinement_steps=settings.refine_frame_steps)
-            self._refiners[key] = Refiner(self._body, cameras, knobs)
+            self._refiners[key] = Refiner(self._body, cameras, knobs), Agreement(self._body, cameras)
         return self._refiners[key]
+
+
+def _redrawn(
+    rng: np.random.Generator,
+    pose: Array,
+    silhouettes: Sequence[Distances],
+    problem: FrameProblem,
+    refiner: Refiner,
+    agreement: Agreement,
+) -> tuple[Array, int]:
+    """The pose (D,) with its doubtful limbs where the silhouettes agree with them best, and how many were weighed."""
+    body, evaluations = agreement.body, 0
+    shares = agreement.of(pose, silhouettes).shares(agreement)
+    bounded = bounded_angles(body)
+    loss = refiner.settled_loss(pose, silhouettes)
+    for limb in sorted(shares, key=lambda name: -shares[name]):
+        own = np.array([n for n, entry in enumerate(body.parameters) if entry.limb == limb and bounded[n]])
+        if shares[limb] < DOUBTFUL_SHARE or len(own) < 2:
+            continue
+        tried = np.repeat(pose[None], DRAWS, axis=0)
+        tried[:, own] = _draws(rng, pose[own], refiner.lower[own], refiner.upper[own])
+        weights = problem.weigh(tried)
+        evaluations += DRAWS
+        for candidate in _best_apart(tried, weights, own):
+            offered = refiner.refine(candidate, silhouettes).pose
+            reached = refiner.settled_loss(offered, silhouettes)
+            if reached < BETTER * loss:
+                pose, loss = offered, reached
+    return pose, evaluations
+
+
+def _draws(rng: np.random.Generator, now: Array, lower: Array, upper: Array) -> Array:
+    """(DRAWS, P) places of a limb: one part about where it is, one anywhere in its range."""
+    reach, part = upper - lower, DRAWS // (2 * len(SPREADS))
+    near = [now + spread * reach * rng.standard_normal((part, len(now))) for spread in SPREADS]
+    anywhere = lower + reach * rng.random((DRAWS - part * len(SPREADS), len(now)))
+    return np.clip(np.concatenate([*near, anywhere]), lower, upper)
+
+
+def _best_apart(tried: Array, weights: Array, own: NDArray[np.int64]) -> list[Array]:
+    """The heaviest of the poses tried (N, D) that differ from one another."""
+    found: list[Array] = []
+    for row in np.argsort(-weights, kind="stable"):
+        if all(np.abs(tried[row, own] - other[own]).max() > APART for other in found):
+            found.append(tried[row])
+        if len(found) == REFINED_DRAWS:
+            break
+    return found
 
 
 def _carried(result: FrameResult, pose: Array, start: str, refiner: Refiner) -> Carried:

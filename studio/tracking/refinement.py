@@ -40,6 +40,9 @@ SETTLED = 2e-4
 """A step below this (radians, or mm / MM_PER_RADIAN) ends the search."""
 FEWEST_PIXELS = 3.0
 """The robust loss is at least this wide: below, it is the mask's pixels that are rough."""
+HIDDEN_PULL, REST_PULL = 270.0, 20.0
+"""Pull towards the rest pose, mm per radian, of angles that move no limb of their own (collar-bones) and of the others.
+An arm's outline inside the trunk costs nothing, so that without it shoulders sink into the chest."""
 HALFWAY = 0.5
 REACH = 4.0
 """Times c: farther than this from a silhouette's border its map is not kept, the loss has nearly reached its most."""
@@ -132,6 +135,11 @@ class Refiner:
         self.upper = np.array([entry.upper for entry in body.parameters])
         self.ends = free_ends(body)
         self.rigid = rigid_limbs(body)
+        self.neutral, self.stiffness = (
+            body.neutral,
+            np.where(hidden_angles(body), HIDDEN_PULL**2, REST_PULL**2),
+        )
+        self.stiffness[~bounded_angles(body)] = 0.0
 
     def refine(
         self, pose: Array, silhouettes: Sequence[Distances], problem: FrameProblem | None = None
@@ -156,6 +164,11 @@ class Refiner:
         """The loss at a pose, and gradient (D,) and matrix (D, D) of half of it per unit of each parameter."""
         return self._equations(pose, self._prepared(pose, silhouettes))
 
+    def settled_loss(self, pose: Array, silhouettes: Sequence[Distances]) -> float:
+        """The loss at a pose with what keeps joints near rest, to compare poses found in different valleys."""
+        bent = (pose - self.neutral) / self.unit
+        return self.loss(pose, silhouettes)[0] + float(self.stiffness @ np.square(bent))
+
     def frame_loss(self, start: Array, silhouettes: Sequence[Distances]) -> "FrameLoss":
         """A frame as a function of poses near `start` (D,); without silhouettes only the pull is left of it."""
         prepared = self._prepared(start, silhouettes) if silhouettes else None
@@ -168,8 +181,13 @@ class Refiner:
                 else self._equations(pose, prepared)
             )
             pull = self.settings.refinement_pull**2
-            away = (pose - start) / self.unit
-            return own[0] + pull * float(away @ away), own[1] + pull * away, own[2] + pull * np.eye(size)
+            away, bent = (pose - start) / self.unit, (pose - self.neutral) / self.unit
+            loss = own[0] + pull * float(away @ away) + float(self.stiffness @ np.square(bent))
+            return (
+                loss,
+                own[1] + pull * away + self.stiffness * bent,
+                own[2] + pull * np.eye(size) + np.diag(self.stiffness),
+            )
 
         return equations
 
@@ -273,6 +291,25 @@ def free_ends(body: BodyModel) -> NDArray[np.bool_]:
 
     carrying = set[int]().union(*(above(limb.joint) for limb in body.limbs))
     return np.array([limb.joint not in carrying for limb in body.drawn], dtype=np.bool_)
+
+
+def hidden_angles(body: BodyModel) -> NDArray[np.bool_]:
+    """(D,) whether a parameter moves only joints that bear no drawn limb themselves."""
+    bearing = {limb.joint for limb in body.drawn}
+    moves = [{s.parameter for s in joint.steps if s.parameter >= 0} for joint in body.joints]
+    shown = set[int]().union(*(moves[number] for number in bearing)) if bearing else set[int]()
+    return np.array([number not in shown for number in range(len(body.parameters))], dtype=np.bool_)
+
+
+def bounded_angles(body: BodyModel) -> NDArray[np.bool_]:
+    """(D,) whether a parameter is an angle with limits on both sides."""
+    return np.array(
+        [
+            entry.kind == "angle" and np.isfinite(entry.lower) and np.isfinite(entry.upper)
+            for entry in body.parameters
+        ],
+        dtype=np.bool_,
+    )
 
 
 def rigid_limbs(body: BodyModel) -> NDArray[np.bool_]:

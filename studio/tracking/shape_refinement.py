@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import limb_ends
-from studio.body.model import BodyModel
 from studio.geometry.camera import Camera
 from studio.tracking.refinement import (
     DAMPING,
@@ -34,7 +33,9 @@ from studio.tracking.refinement import (
     MOST_DAMPING,
     TIGHTENED,
     Distances,
+    bounded_angles,
     free_ends,
+    hidden_angles,
     mm_per_pixel,
     rigid_limbs,
 )
@@ -123,9 +124,8 @@ class ShapeRefiner:
         self._unit = np.where(angle, 1.0, MM_PER_RADIAN)
         self._shaken = np.where(angle, SHAKEN_POSE, SHAKEN_PLACE)
         self._limits = np.array([[e.lower, e.upper] for e in body.parameters]).T
-        spread = np.where(_of_hidden_joints(body), HIDDEN_SPREAD, ANGLE_SPREAD)
-        bounded = np.isfinite(self._limits).all(axis=0)
-        self.stiffness = np.where(angle & bounded, 1.0 / np.square(spread), 0.0)
+        spread = np.where(hidden_angles(body), HIDDEN_SPREAD, ANGLE_SPREAD)
+        self.stiffness = np.where(bounded_angles(body), 1.0 / np.square(spread), 0.0)
         self._variance = FIRST_VARIANCE
 
     def refine(
@@ -260,11 +260,3 @@ class ShapeRefiner:
         return np.stack(
             [(corners(shape + step) - corners(shape - step)) / (2.0 * DIFFERENCE) for step in steps]
         )
-
-
-def _of_hidden_joints(body: BodyModel) -> NDArray[np.bool_]:
-    """(D,) whether a parameter moves only joints that bear no drawn limb themselves."""
-    bearing = {limb.joint for limb in body.drawn}
-    moves = [{s.parameter for s in joint.steps if s.parameter >= 0} for joint in body.joints]
-    shown = set[int]().union(*(moves[number] for number in bearing)) if bearing else set[int]()
-    return np.array([number not in shown for number in range(len(body.parameters))], dtype=np.bool_)
