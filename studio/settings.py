@@ -20,11 +20,11 @@ from studio.tracking.recovery_settings import RecoverySettings
 from studio.weighting.catalogue import WEIGHTINGS
 
 GROUPS = ("tracker", "weighting", "evidence", "refinement", "recovery", "recording")
-DEFAULT_TRACKER, DEFAULT_WEIGHTING = "annealed", "edge-region"
-# What a tracker is weighed with where neither run nor session say otherwise: the swarm with its paper's fitness.
-USUAL_WEIGHTINGS = {"swarm": "edge-silhouette"}
+DEFAULT_TRACKER, DEFAULT_WEIGHTING = "annealed", "edge-region-silhouette"
 # Knobs of older records: the new name, and the new value where an old one is gone.
 RENAMED: dict[str, tuple[str, dict[object, Value]]] = {"limits": ("constraints", {"reflect": "clamp"})}
+# Knobs that older records do not have, as those runs were tracked.
+BEFORE: dict[str, Value] = {"refine_frames": False}
 JSON_TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
 
 
@@ -93,11 +93,6 @@ class SettingsHistory:
         return tuple(named)
 
 
-def usual_weighting(tracker_name: str) -> str:
-    """The weighting of a tracker where nobody asks for another."""
-    return USUAL_WEIGHTINGS.get(tracker_name, DEFAULT_WEIGHTING)
-
-
 def default_settings(
     tracker_name: str = DEFAULT_TRACKER, weighting_name: str = DEFAULT_WEIGHTING
 ) -> RunSettings:
@@ -138,9 +133,10 @@ def settings_from_values(
     tracker_name: str, weighting_name: str, recorded: Mapping[str, object]
 ) -> RunSettings:
     """The settings that a record describes: defaults, changed to the recorded values; knobs that have another
-    name today are understood.
+    name today are understood, and what a record does not have yet was not done.
     """
-    return changed_settings(default_settings(tracker_name, weighting_name), in_todays_names(recorded))
+    known = in_todays_names(recorded)
+    return changed_settings(default_settings(tracker_name, weighting_name), {**BEFORE, **known})
 
 
 def in_todays_names(recorded: Mapping[str, Any]) -> dict[str, Any]:

@@ -46,7 +46,7 @@ def silhouette_distances(evidence: FrameEvidence, most: int = MOST_POINTS) -> tu
 def distances_of(mask: Bytes, most: int = MOST_POINTS) -> SilhouetteDistances:
     """The distances of a mask (H, W); where nothing or everything is silhouette, there is no border."""
     size = (mask.shape[1], mask.shape[0])
-    silhouette = cv2.compare(mask, FOREGROUND, cv2.CMP_GE)
+    silhouette = np.greater_equal(mask, FOREGROUND).astype(np.uint8)
     left, top, width, height = cv2.boundingRect(silhouette)
     if not width:
         return SilhouetteDistances(
@@ -55,7 +55,7 @@ def distances_of(mask: Bytes, most: int = MOST_POINTS) -> SilhouetteDistances:
     margin = max(size) // MARGIN_SHARE
     right, bottom = min(left + width + margin, size[0]), min(top + height + margin, size[1])
     left, top = max(left - margin, 0), max(top - margin, 0)
-    inside = np.minimum(silhouette[top:bottom, left:right], 1)
+    inside = np.ascontiguousarray(silhouette[top:bottom, left:right])
     signed = np.where(inside > 0, 0.5 - _distances(inside), _distances(1 - inside) - 0.5).astype(np.float32)
     contours, _ = cv2.findContours(inside, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     points = np.concatenate([np.zeros((0, 2), np.int64), *(contour[:, 0] for contour in contours)])

@@ -212,7 +212,7 @@ def _attempt(plan: Plan, entrant: Entrant, seed: int) -> Attempt:
         entrant.tracker,
         entrant.weighting,
         seed,
-        dict(entrant.changes),
+        {"refine_frames": entrant.settings().refinement.refine_frames, **entrant.changes},
         plan.first,
         plan.last,
         body=plan.body,

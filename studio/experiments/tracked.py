@@ -28,11 +28,15 @@ from studio.sessions.session import Session
 from studio.settings import RunSettings, changed_settings, default_settings
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.frame_loop import search_frame
-from studio.tracking.frame_refinement import FrameRefiner
+from studio.tracking.frame_refinement import FrameRefiner, space_after
 from studio.tracking.tracker import LayerRecord, start_of
 from studio.weighting.catalogue import WEIGHTINGS
 
 Array = NDArray[np.float64]
+
+
+AS_PUBLISHED: Mapping[str, Any] = {"refine_frames": False}
+"""The papers' trackers end where their search does; an attempt that refines says so."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +128,8 @@ def track(
         raise TruthError(f"Session '{session.name}' has no truth.", "Take one made by 'studio synthesize'.")
     subject = read_subject(session.path / attempt.subject) if attempt.subject else None
     body = session.body(attempt.body or None, subject)
-    settings = changed_settings(default_settings(attempt.tracker, attempt.weighting), attempt.changes)
+    changes = {**AS_PUBLISHED, **attempt.changes}
+    settings = changed_settings(default_settings(attempt.tracker, attempt.weighting), changes)
     follow = _Following(attempt, session, shelf, settings, spoilt)
     start = _start_pose(session, body, attempt.first, session.manifest.fps)
     frames = range(attempt.first, attempt.last or session.manifest.frame_count, attempt.every)
@@ -216,7 +221,7 @@ class _Following:
                 TRACKERS[attempt.tracker],
                 problem,
                 carried,
-                space,
+                space_after(space, carried, settings.refinement),
                 seed=attempt.seed,
                 frame=frame,
                 settings_source=lambda: (1, settings.tracker),

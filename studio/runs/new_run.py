@@ -28,7 +28,7 @@ from studio.sessions.manifest import now
 from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session, free_run_name
 from studio.sessions.stored_run import StoredRun
-from studio.settings import DEFAULT_TRACKER, usual_weighting, values
+from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, values
 
 Array = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ def prepare_run(
     asked = request or RunRequest()
     doubts = accepted_doubts(session, asked.despite_findings)
     tracker = asked.tracker or session.manifest.tracker or DEFAULT_TRACKER
-    weighting = asked.weighting or session.manifest.weighting or usual_weighting(tracker)
+    weighting = asked.weighting or session.manifest.weighting or DEFAULT_WEIGHTING
     changes = live_changes(asked.changes) if asked.live else asked.changes
     settings = session_settings(session, tracker, weighting, changes)
     check_live(settings, live=asked.live, to_and_fro=asked.to_and_fro)

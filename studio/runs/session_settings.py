@@ -6,10 +6,10 @@ from studio.sessions.background_files import SessionEvidence, read_evidence
 from studio.sessions.session import Session
 from studio.settings import (
     DEFAULT_TRACKER,
+    DEFAULT_WEIGHTING,
     RunSettings,
     changed_settings,
     default_settings,
-    usual_weighting,
     values,
 )
 
@@ -23,7 +23,7 @@ def session_settings(
     knobs of another version is passed over.
     """
     tracker = tracker or DEFAULT_TRACKER
-    settings = default_settings(tracker, weighting or usual_weighting(tracker))
+    settings = default_settings(tracker, weighting or DEFAULT_WEIGHTING)
     evidence: SessionEvidence = read_evidence(session)
     known = values(settings)
     own = {name: value for name, value in evidence.knobs.items() if name in known}

@@ -37,7 +37,7 @@ from studio.sessions.session import Session
 from studio.settings import RunSettings, default_settings
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.frame_loop import search_frame
-from studio.tracking.frame_refinement import FrameRefiner
+from studio.tracking.frame_refinement import FrameRefiner, space_after
 from studio.tracking.loss_detection import Onlooker, anything_seen
 from studio.tracking.shape_prior import ShapePrior, ShapeSpreads
 from studio.tracking.shape_refinement import ShapeRefiner
@@ -183,7 +183,7 @@ def shaped_body(
             TRACKERS[TRACKER],
             problem,
             carried,
-            space,
+            space_after(space, carried, rules.refinement),
             seed=0,
             frame=frame,
             settings_source=lambda: (1, rules.tracker),

@@ -26,7 +26,7 @@ from studio.sessions.stored_run import StoredRun
 from studio.settings import RunSettings, SettingsEntry, SettingsHistory, settings_from_values, values
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.frame_loop import FrameSearch, SearchState, held_over
-from studio.tracking.frame_refinement import FrameRefiner
+from studio.tracking.frame_refinement import FrameRefiner, space_after
 from studio.tracking.tracker import Carried, FrameProblem, FrameResult, LayerRecord
 
 # The newest settings and their version; asked before each layer.
@@ -254,6 +254,7 @@ class TrackingRun:
         repeats = 1
         if self._handed.is_first(frame) or sought:
             repeats = self._settings_at(frame)[1].tracker.start_repeats
+        space = space_after(space, carried, self._settings_at(frame)[1].refinement)
         return FrameSearch(
             self.tracker,
             carried,

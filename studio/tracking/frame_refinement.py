@@ -19,7 +19,7 @@ from studio.geometry.camera import Camera
 from studio.knobs import knob
 from studio.tracking.agreement import Agreement
 from studio.tracking.refinement import Distances, RefinementSettings, Refiner, bounded_angles
-from studio.tracking.tracker import Carried, FrameProblem, FrameResult
+from studio.tracking.tracker import Carried, FrameProblem, FrameResult, SearchSpace
 
 Array = NDArray[np.float64]
 
@@ -57,10 +57,21 @@ class FrameRefinementSettings:
         True, label="draw lost limbs anew", takes_effect="next frame",
         help="Where the silhouettes say that a limb is off, look for that limb in all its range and refine the best.",
     )  # fmt: skip
+    refined_spread: float = knob(
+        0.5, 0.05, 3.0, 0.05, label="spread after refinement", takes_effect="next frame",
+        help="Multiplies σ0 where a frame starts from a refined pose, which is nearer to the body than a searched one.",
+    )  # fmt: skip
     next_frame_from: str = knob(
         POSE, choices=(POSE, CLOUD), label="next frame starts from", takes_effect="next frame",
         help="Where every particle of the next frame starts: at the refined pose, or in the cloud moved with it.",
     )  # fmt: skip
+
+
+def space_after(space: SearchSpace, carried: Carried, settings: FrameRefinementSettings) -> SearchSpace:
+    """The search space of a frame that follows a refined one: a smaller σ0. carried : into the frame."""
+    if not settings.refine_frames or carried.estimate is None or settings.refined_spread == 1.0:
+        return space
+    return dataclasses.replace(space, sigma=settings.refined_spread * space.sigma)
 
 
 class FrameRefiner:

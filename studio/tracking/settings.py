@@ -22,7 +22,7 @@ class AnnealedSettings:
         help="α: share of the particles that survive a layer (Eq. 12); lower is faster and misses more.",
     )  # fmt: skip
     layers: int = knob(10, 1, 60, 1, takes_effect="next frame", help="M: annealing layers in a frame.")
-    particles: int = knob(200, 1, 20000, 10, takes_effect="next frame", help="N: particles in every layer.")
+    particles: int = knob(100, 1, 20000, 10, takes_effect="next frame", help="N: particles in every layer.")
     crossover: float = knob(
         0.5, 0.0, 1.0, 0.05, label="crossover share",
         help="Share of the particles that are made from two parents (Eq. 19).",

@@ -12,7 +12,7 @@ from studio.sessions.beginning import next_step
 from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session
 from studio.sessions.workspace import SessionSummary
-from studio.settings import DEFAULT_TRACKER, usual_weighting
+from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING
 from studio.web.run_errors import mean_error
 from studio.web.schemas import BodyView, CameraView, ParameterView, RunLine, SessionDetail, SessionLine
 
@@ -69,7 +69,7 @@ def describe(record: RunRecord) -> str:
     known = record.settings
     stages = ["×".join(str(known[name]) for name in names if name in known) for names in SIZES]
     size = " + ".join(stage for stage in stages if stage)
-    unusual = "" if record.weighting == usual_weighting(record.tracker) else f" · {record.weighting}"
+    unusual = "" if record.weighting == DEFAULT_WEIGHTING else f" · {record.weighting}"
     return f"{record.tracker} {size}".strip() + unusual
 
 
@@ -80,7 +80,7 @@ def _tracker(session: Session | None) -> str:
 
 def _weighting(session: Session | None) -> str:
     """What runs of a session are weighed with unless told otherwise."""
-    return (session and session.manifest.weighting) or usual_weighting(_tracker(session))
+    return (session and session.manifest.weighting) or DEFAULT_WEIGHTING
 
 
 def session_detail(session: Session) -> SessionDetail:

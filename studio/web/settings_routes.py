@@ -23,7 +23,6 @@ from studio.settings import (
     default_settings,
     json_schema,
     settings_from_values,
-    usual_weighting,
     values,
 )
 from studio.tracking.catalogue import TRACKERS
@@ -63,7 +62,7 @@ def choices(doors: Door) -> Choices:
             TrackerChoice(
                 name=name,
                 label=_title(entry.settings_type),
-                weighting=usual_weighting(name),
+                weighting=DEFAULT_WEIGHTING,
                 needs_behaviour=needs_model(name, None),
             )
             for name, entry in TRACKERS.items()
