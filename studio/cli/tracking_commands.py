@@ -23,7 +23,7 @@ from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
 from studio.settings import knob_table
 from studio.tracking.catalogue import TRACKERS
-from studio.tracking.tracker import LOST, NO_EVIDENCE, RECOVERED
+from studio.tracking.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED
 from studio.weighting.catalogue import WEIGHTINGS
 from studio.worker.batch import BatchResult, track_to_end
 
@@ -195,6 +195,7 @@ def _went(run: StoredRun) -> dict[str, int]:
         states = results.timeline().tracking
     return {
         "frames_lost": states.count(LOST),
+        "frames_with_a_limb_lost": states.count(LIMB_LOST),
         "frames_without_evidence": states.count(NO_EVIDENCE),
         "times_recovered": states.count(RECOVERED),
     }
@@ -205,6 +206,7 @@ def _how_it_went(run: StoredRun) -> str:
     went = _went(run)
     words = (
         f"{went['frames_lost']} frames lost",
+        f"{went['frames_with_a_limb_lost']} with a limb lost",
         f"{went['frames_without_evidence']} without evidence",
         f"found again {went['times_recovered']} times",
     )

@@ -24,6 +24,7 @@ from studio.tracking.particles import unweighted
 from studio.tracking.recovery_settings import INITIALISE, OFF
 from studio.tracking.start_candidates import start_candidates
 from studio.tracking.tracker import (
+    LIMB_LOST,
     LOST,
     NO_EVIDENCE,
     RECOVERED,
@@ -150,7 +151,8 @@ class RunWatch:
         watch = before.watch if before.weighed == _weighed(settings) else WeightWatch(settings.weighting_name)
         if not watch.is_lost(result.estimate.log_weight, sight):
             back = sought or before.state in (LOST, NO_EVIDENCE)
-            return dataclasses.replace(result, tracking=RECOVERED if back else TRACKED, overlap=sight.overlap)
+            state = LIMB_LOST if result.limbs_lost else RECOVERED if back else TRACKED
+            return dataclasses.replace(result, tracking=state, overlap=sight.overlap)
         doubts = before.doubts + 1
         lost = sought or before.state == LOST or doubts >= settings.recovery.lost_after
         return dataclasses.replace(

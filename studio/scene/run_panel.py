@@ -10,7 +10,7 @@ from studio.errors import StudioError
 from studio.runs.colour_tokens import ColourTokens
 from studio.scene.playback import SPEEDS, Playback
 from studio.scene.wishes import Wishes
-from studio.tracking.tracker import LOST, NO_EVIDENCE, RECOVERED
+from studio.tracking.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED
 from studio.worker.events import StateChanged
 from studio.worker.search_pace import in_words, offered
 
@@ -19,6 +19,7 @@ _STEP = ("layer", "frame", "re-anneal")
 _MOVE = ("|◀", "◀", "play", "▶", "▶|")
 MARKS = {
     LOST: ("bad", "the tracker is off the body and searches for it"),
+    LIMB_LOST: ("warn", "a limb is off, the silhouettes deny it"),
     NO_EVIDENCE: ("text-quiet", "nothing is to be seen, the pose is held"),
     RECOVERED: ("good", "the body was found again"),
 }

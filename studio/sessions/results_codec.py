@@ -128,6 +128,9 @@ def pack_result(result: FrameResult) -> bytes:
         ],
         dtype=np.float64,
     )
+    if result.disagreement:
+        arrays["limbs"] = np.array(list(result.disagreement))
+        arrays["disagreement"] = np.array(list(result.disagreement.values()))
     vectors = [estimate.pose, estimate.mean, estimate.mode]
     arrays["vectors"] = np.stack(vectors if estimate.searched is None else [*vectors, estimate.searched])
     return pack(arrays)
@@ -149,6 +152,9 @@ def unpack_result(blob: bytes) -> FrameResult:
         tracking=TRACKING_STATES[int(numbers[6]) if len(numbers) > 6 else 0],
         overlap=float(numbers[7]) if len(numbers) > 7 else math.nan,
         doubts=int(numbers[8]) if len(numbers) > 8 else 0,
+        disagreement=dict(zip(map(str, arrays["limbs"]), map(float, arrays["disagreement"]), strict=True))
+        if "limbs" in arrays
+        else {},
     )
 
 

@@ -109,7 +109,13 @@ class FrameRefiner:
             result.estimate, pose=pose, searched=result.estimate.pose, log_weight=weight
         )
         carried = _carried(result, pose, settings.next_frame_from, refiner)
-        return dataclasses.replace(result, estimate=estimate, carried=carried, evaluations=evaluations)
+        return dataclasses.replace(
+            result,
+            estimate=estimate,
+            carried=carried,
+            evaluations=evaluations,
+            disagreement=agreement.of(pose, silhouettes).shares(agreement),
+        )
 
     def _prepared(
         self, names: tuple[str, ...], settings: FrameRefinementSettings

@@ -120,6 +120,9 @@ def frame_detail(run: OpenRun, frame: int) -> FrameDetail:
         milliseconds=result.milliseconds if result else sum(layer.milliseconds for layer in layers),
         settings_version=layers[-1].settings_version,
         tracking=result.tracking if result else None,
+        searched=estimate.searched.tolist() if estimate and estimate.searched is not None else None,
+        disagreement=dict(result.disagreement) if result else {},
+        limbs_lost=list(result.limbs_lost) if result else [],
         settings=dict(entry.values if entry else run.record.settings),
     )
 

@@ -19,7 +19,7 @@ class FrameLine(Answer):
     settings_version: int
     error_mm: Number = None
     lost: bool = False
-    tracking: str = Field("tracked", description="tracked, lost, no evidence or recovered.")
+    tracking: str = Field("tracked", description="tracked, limb lost, lost, no evidence or recovered.")
 
 
 class LiveView(Answer):
@@ -102,6 +102,13 @@ class FrameDetail(Answer):
     milliseconds: Number
     settings_version: int
     tracking: str | None = Field(None, description="As in the timeline; null in an unfinished frame.")
+    searched: list[float] | None = Field(
+        None, description="The pose that the search found, where `pose` was refined after it."
+    )
+    disagreement: dict[str, float] = Field(
+        {}, description="Of each limb, the share of its area that silhouettes and pose do not agree about."
+    )
+    limbs_lost: list[str] = Field([], description="Limbs that the silhouettes deny.")
     settings: dict[str, Value]
 
 

@@ -15,7 +15,7 @@ const KEYS = [
   ["Shift →", "next layer", (event) => event.key === "ArrowRight" && event.shiftKey, () => stepLayer(1)],
   ["Home", "first frame", (event) => event.key === "Home", () => goTo(-Infinity)],
   ["End", "last frame", (event) => event.key === "End", () => goTo(Infinity)],
-  ["n", "next mark: lost, no evidence, recovered, corrected", (event) => event.key === "n", () => goToMark(1)],
+  ["n", "next mark: lost, a limb lost, no evidence, recovered, corrected", (event) => event.key === "n", () => goToMark(1)],
   ["p", "mark before", (event) => event.key === "p", () => goToMark(-1)],
   ["1 – 9", "look through a camera", (event) => /^[1-9]$/.test(event.key), (event) => lookThrough(Number(event.key) - 1)],
   ["0", "free view", (event) => event.key === "0", () => lookThrough(null)],

@@ -12,6 +12,7 @@ const PADDING = 6;
 // How a frame went, its colour, and what is said of it; frames that were simply tracked carry no mark.
 const STATES = {
   lost: ["bad", "the tracker lost the body here and searches for it"],
+  "limb lost": ["warn", "a limb is off: the silhouettes deny it"],
   "no evidence": ["text-quiet", "nothing to be seen: the pose is held"],
   recovered: ["good", "found again"],
 };
