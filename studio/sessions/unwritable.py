@@ -1,6 +1,5 @@
 """Why something could not be written, in words: a full disk is called one, whatever the system or SQLite says of it."""
 
-import errno
 import shutil
 import sqlite3
 from collections.abc import Iterator
@@ -8,8 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from studio.errors import SessionError
+from studio.foreign_files import NO_ROOM
 
-NO_ROOM = frozenset((errno.ENOSPC, errno.EDQUOT))
 NO_ROOM_BYTES = 64 * 1024
 """SQLite makes its shared memory in steps of 32 KiB, and says "disk I/O error" where there is no room for one."""
 
