@@ -5,6 +5,8 @@ end the process (seen with msgspec 0.22: a page asks for a session and its thumb
 """
 
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TypeVar
 
 import msgspec
@@ -14,13 +16,24 @@ T = TypeVar("T")
 _one_at_a_time = threading.Lock()
 
 
+@contextmanager
+def _refusals_as_one_kind() -> Iterator[None]:
+    """What parsers raise of texts that are nested too deep, or of numbers with thousands of digits, as DecodeError."""
+    try:
+        yield
+    except (UnicodeDecodeError, msgspec.DecodeError):
+        raise
+    except (RecursionError, ValueError, OverflowError) as problem:
+        raise msgspec.DecodeError(str(problem)) from None
+
+
 def decode_toml(content: bytes | str, wanted: type[T]) -> T:
     """The value in a TOML text. Raises msgspec.DecodeError, UnicodeDecodeError."""
-    with _one_at_a_time:
+    with _one_at_a_time, _refusals_as_one_kind():
         return msgspec.toml.decode(content, type=wanted)
 
 
 def decode_json(content: bytes | str, wanted: type[T]) -> T:
     """The value in a JSON text. Raises msgspec.DecodeError, UnicodeDecodeError."""
-    with _one_at_a_time:
+    with _one_at_a_time, _refusals_as_one_kind():
         return msgspec.json.decode(content, type=wanted)

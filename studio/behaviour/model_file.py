@@ -3,7 +3,6 @@
 import contextlib
 import json
 import os
-import zipfile
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
@@ -22,6 +21,7 @@ from studio.behaviour.reduction import Reduction
 from studio.behaviour.root_motion import RootFrame, RootMotion
 from studio.behaviour.settings import LearningSettings
 from studio.errors import BehaviourError
+from studio.foreign_files import foreign_file
 from studio.typed_decoding import decode_json
 
 VERSION = 2
@@ -73,22 +73,15 @@ def read_model(path: Path) -> BehaviourModel:
 
     Raises BehaviourError for a file that is missing, damaged, no behaviour model, or of another version.
     """
-    damaged = BehaviourError(
-        f"'{path.name}' is no behaviour model, or it is damaged.", "Learn it again with `studio learn`."
-    )
-    try:
+    if not path.exists():
+        raise BehaviourError(
+            f"There is no behaviour model '{path.name}'.", "`studio models` lists those there are."
+        )
+    with foreign_file(path, BehaviourError, "a behaviour model", "Learn it again with `studio learn`."):
         with path.open("rb") as file:
             arrays = read_archive(file)
         head = _checked_head(path, arrays.pop("head").tobytes())
         return _model(head, arrays)
-    except FileNotFoundError:
-        raise BehaviourError(
-            f"There is no behaviour model '{path.name}'.", "`studio models` lists those there are."
-        ) from None
-    except (OSError, EOFError, ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
-        raise damaged from error
-    except (zipfile.BadZipFile, zipfile.LargeZipFile, msgspec.DecodeError, NotImplementedError) as error:
-        raise damaged from error
 
 
 def _head(model: BehaviourModel) -> bytes:

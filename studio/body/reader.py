@@ -10,6 +10,7 @@ from studio.body.definition import BodyDefinition
 from studio.body.model import BodyModel
 from studio.body.validation import check_definition
 from studio.errors import BodyError
+from studio.foreign_files import foreign_file
 from studio.typed_decoding import decode_toml
 
 
@@ -18,12 +19,13 @@ def read_body(path: Path) -> BodyModel:
 
     Raises BodyError when the file cannot be read, is no TOML, or does not describe a body.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as problem:
-        hint = "Check the path and that it is a text file."
-        raise BodyError(f"Body file {path} cannot be read ({problem}).", hint) from None
-    return parse_body(text, path.stem, path.name)
+    with foreign_file(path, BodyError, "a body file", "Check that it is a text file, or correct it."):
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as problem:
+            hint = "Check the path and that it is a text file."
+            raise BodyError(f"Body file {path} cannot be read ({problem}).", hint) from None
+        return parse_body(text, path.stem, path.name)
 
 
 def parse_body(text: str, name: str, file: str) -> BodyModel:

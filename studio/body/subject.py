@@ -42,6 +42,7 @@ from studio.body.dimensions import with_dimensions
 from studio.body.marker_distances import MarkerDistances
 from studio.body.model import BodyModel
 from studio.errors import BodyError
+from studio.foreign_files import check_regular
 from studio.typed_decoding import decode_toml
 
 Array = NDArray[np.float64]
@@ -80,6 +81,7 @@ class _SubjectFile(msgspec.Struct, forbid_unknown_fields=True):
 
 def read_subject(path: Path) -> Subject:
     """The subject of a TOML file. Raises BodyError naming the file, the entry and the remedy."""
+    check_regular(path, BodyError)
     try:
         entries = decode_toml(path.read_bytes(), _SubjectFile)
     except OSError as problem:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from studio.calibration.floor import floor_from_points, triangulated, world_from_points
 from studio.errors import CalibrationError
+from studio.foreign_files import foreign_file
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.geometry.rigid import transform
@@ -39,13 +40,9 @@ class Clicks(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 def read_clicks(path: Path) -> Clicks:
     """The points of a file. Raises CalibrationError."""
-    try:
+    remedy = 'Write {"points": [{"pixels": {"cam1": [x, y], "cam2": [x, y]}, "world": [x, y, z]}]}; world is optional.'
+    with foreign_file(path, CalibrationError, "a list of clicked points", remedy):
         return msgspec.json.decode(path.read_bytes(), type=Clicks)
-    except (OSError, msgspec.DecodeError) as problem:
-        raise CalibrationError(
-            f"'{path.name}' holds no clicked points ({problem}).",
-            'Write {"points": [{"pixels": {"cam1": [x, y], "cam2": [x, y]}, "world": [x, y, z]}]}; world is optional.',
-        ) from None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -27,6 +27,7 @@ from studio.capture.calibration_writers import CALIBRATION_WRITERS, CalibrationW
 from studio.capture.naming import listed, natural_key
 from studio.capture.sanity import quarter_turns
 from studio.errors import CalibrationError
+from studio.foreign_files import foreign_file
 from studio.geometry.camera import Camera
 
 __all__ = [
@@ -53,6 +54,8 @@ WORLDS = {
     "-z": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
 }
 """By the axis that points up: the new world's axes in the old one, rows."""
+CALIBRATION = ("a calibration", "Export it again, or calibrate again.")
+"""What is read here, and what to do where it is not that."""
 PICKLES = frozenset((".pickle", ".pkl"))
 
 
@@ -103,8 +106,14 @@ def read_calibration(path: Path, unit: str = "", up: str = "z") -> Calibration:
     unit : "mm" or "m" goes before what the file or the distances say. up : the axis of the file's world that points up
     (x, y, z, -x, -y, -z); the cameras' world has z up.
     Raises CalibrationError naming file, camera and entry: wrong shapes, numbers that are not finite or no camera's,
-    a rotation that is none, a fisheye camera, a name given twice.
+    a rotation that is none, a fisheye camera, a name given twice, a damaged file, one that is a pipe.
     """
+    with foreign_file(path, CalibrationError, *CALIBRATION):
+        return _calibration(path, unit, up)
+
+
+def _calibration(path: Path, unit: str, up: str) -> Calibration:
+    """`read_calibration` itself."""
     found = _read(path)
     if not found.cameras:
         raise CalibrationError(
@@ -141,7 +150,8 @@ def read_intrinsics(path: Path) -> tuple[Intrinsics, ...]:
 
     Raises CalibrationError as `read_calibration` does.
     """
-    found = _read(path)
+    with foreign_file(path, CalibrationError, *CALIBRATION):
+        found = _read(path)
     posed = [
         Intrinsics(camera.name, camera.width, camera.height, camera.matrix, camera.distortion)
         for camera in found.cameras

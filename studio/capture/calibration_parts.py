@@ -18,6 +18,7 @@ DISTORTION_NUMBERS = (4, 5)
 FOCAL_SHARES = (0.1, 100.0)
 """Focal lengths as shares of the longer side: 160 degrees at the one end, half a degree at the other."""
 WIDEST_PIXEL = 2.0
+LARGEST_CENTRE = 100_000.0
 CENTRE_SHARES = (-0.5, 1.5)
 RADIAL_FACTORS = (0.2, 5.0)
 LARGEST_TANGENTIAL = 0.5
@@ -118,6 +119,11 @@ def checked_intrinsics(
         )
     coefficients = five_distortions(where, distortion)
     if size is None:
+        if np.abs(matrix[:2, 2]).max() > LARGEST_CENTRE:
+            raise CalibrationError(
+                f"{where}: the principal point ({matrix[0, 2]:.4g}, {matrix[1, 2]:.4g}) is no camera's.",
+                "It is in pixels: calibrate or export again.",
+            )
         width, height = (max(1, round(2.0 * float(matrix[axis, 2]))) for axis in (0, 1))
     else:
         if min(size) < 1 or size[0] != round(size[0]) or size[1] != round(size[1]):

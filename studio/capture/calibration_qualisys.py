@@ -6,15 +6,14 @@ makes them OpenCV's. Distortion coefficients are OpenCV's as they stand; they ar
 makes of such a file divides them). `viewrotation` says how the picture is turned for people; pixels are the sensor's.
 """
 
-import xml.parsers.expat
 from pathlib import Path
-from xml.etree.ElementTree import Element, ParseError, TreeBuilder
+from xml.etree.ElementTree import Element
 
 import numpy as np
 from numpy.typing import NDArray
 
 from studio.capture.calibration_parts import FoundCameras, Intrinsics, checked_intrinsics
-from studio.capture.calibration_storage import storage_text
+from studio.capture.calibration_storage import storage_text, xml_root
 from studio.capture.naming import listed
 from studio.capture.sanity import check_rotation
 from studio.errors import CalibrationError
@@ -65,30 +64,10 @@ def read_qualisys(path: Path) -> FoundCameras:
 
 
 def _document(path: Path, where: str) -> Element:
-    """The XML tree; declarations of entities and document types are refused, nothing is fetched."""
     text = storage_text(path)
     if text is None:
         raise CalibrationError(f"{where} cannot be read as text.", "Export it from QTM again.")
-    builder = TreeBuilder()
-    parser = xml.parsers.expat.ParserCreate()
-
-    def refuse(*_: object) -> int:
-        raise CalibrationError(
-            f"{where} declares a document type or entities, which QTM does not write.",
-            "Export it from QTM again.",
-        )
-
-    parser.StartDoctypeDeclHandler = refuse
-    parser.EntityDeclHandler = refuse
-    parser.ExternalEntityRefHandler = refuse
-    parser.StartElementHandler = builder.start
-    parser.EndElementHandler = builder.end
-    parser.CharacterDataHandler = builder.data
-    try:
-        parser.Parse(text.encode(), True)
-        return builder.close()
-    except (xml.parsers.expat.ExpatError, ParseError, AssertionError) as problem:
-        raise CalibrationError(f"{where} is not XML: {problem}.", "Export it from QTM again.") from None
+    return xml_root(path, text, "Export it from QTM again.")
 
 
 def _camera(where: str, name: str, entry: Element) -> Camera:

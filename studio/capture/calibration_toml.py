@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from studio.capture.calibration_parts import AssumedCrop, FoundCameras, Intrinsics, checked_intrinsics
 from studio.capture.sanity import check_rotation
 from studio.errors import CalibrationError
+from studio.foreign_files import foreign_file
 from studio.geometry.camera import Camera
 
 Array = NDArray[np.float64]
@@ -28,18 +29,15 @@ def looks_like_calibration(path: Path) -> bool:
     """Whether a TOML file holds cameras (or cannot be parsed but it, or its folder, is named after
     calibration)."""
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        document = _document(path)
+    except CalibrationError:
         return "calib" in f"{path.parent.name}/{path.name}".lower() or path.name == "cameras.toml"
     return bool(_camera_tables(document))
 
 
 def read_toml(path: Path) -> FoundCameras:
     """The cameras of a TOML calibration. Raises CalibrationError naming file, camera and entry."""
-    try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as problem:
-        raise CalibrationError(f"'{path.name}' is not TOML: {problem}.", "Export it again.") from None
+    document = _document(path)
     metadata = document.get("metadata")
     metadata = metadata if isinstance(metadata, dict) else {}
     cameras: list[Camera] = []
@@ -93,10 +91,16 @@ def write_toml(cameras: tuple[Camera, ...], path: Path, crops: dict[str, Assumed
 def is_canonical(path: Path) -> bool:
     """Whether a file is the studio's own calibration."""
     try:
-        metadata = tomllib.loads(path.read_text(encoding="utf-8")).get("metadata", {})
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):
+        metadata = _document(path).get("metadata", {})
+    except CalibrationError:
         return False
     return isinstance(metadata, dict) and metadata.get("format") == CANONICAL
+
+
+def _document(path: Path) -> dict[str, object]:
+    """The file's entries. Raises CalibrationError."""
+    with foreign_file(path, CalibrationError, "TOML", "Export it again."):
+        return tomllib.loads(path.read_text(encoding="utf-8"))
 
 
 def _camera_tables(document: dict[str, object]) -> dict[str, dict[str, object]]:
@@ -146,7 +150,7 @@ def _numbers(where: str, table: dict[str, object], entry: str, shape: tuple[int,
         values = np.array(table[entry], dtype=np.float64)
     except KeyError:
         raise CalibrationError(f"{where} has no '{entry}'.", "Export the calibration again.") from None
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise CalibrationError(
             f"{where}: '{entry}' is not numbers.", "Export the calibration again."
         ) from None

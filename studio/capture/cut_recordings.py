@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 from studio.errors import FootageError
+from studio.foreign_files import check_regular
 
 HEADER, LONG_HEADER = 8, 16
 
@@ -30,6 +31,7 @@ def whole_boxes(path: Path) -> int:
 
 def mend_recording(path: Path) -> int:
     """Cut a recording back to what is whole of it; returns the bytes that went. Raises FootageError if nothing is."""
+    check_regular(path, FootageError)
     size, whole = path.stat().st_size, whole_boxes(path)
     if not whole:
         raise FootageError(f"'{path.name}' holds no whole piece of a recording.", "Leave that camera out.")

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from studio.capture.naming import natural_key
 from studio.capture.video_probe import MAX_PIXELS
 from studio.errors import FootageError
+from studio.foreign_files import check_regular
 
 Bytes = NDArray[np.uint8]
 
@@ -49,6 +50,7 @@ def is_picture(path: Path) -> bool:
 
 def read_picture(path: Path) -> Bytes:
     """(H, W, 3) uint8 BGR; grey pictures become three equal channels. Raises FootageError naming the file."""
+    check_regular(path, FootageError)
     try:
         content = np.frombuffer(path.read_bytes(), np.uint8)
     except OSError as problem:
@@ -68,6 +70,7 @@ def read_picture(path: Path) -> Bytes:
 
 def check_picture(path: Path) -> tuple[int, int]:
     """Width and height of a picture that decodes whole. Raises FootageError for damage or an absurd size."""
+    check_regular(path, FootageError)
     if path.suffix.lower() in STRICTLY_DECODED:
         try:
             with av.open(str(path), options={"protocol_whitelist": "file"}) as container:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from studio.capture.naming import listed, natural_key
 from studio.errors import FootageError
+from studio.foreign_files import check_regular
 
 Array = NDArray[np.float64]
 
@@ -50,6 +51,7 @@ def read_timestamps(path: Path) -> dict[str, Array]:
 
     Raises FootageError naming file and line.
     """
+    check_regular(path, FootageError)
     try:
         if path.stat().st_size > LARGEST_FILE:
             raise FootageError(

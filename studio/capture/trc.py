@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.errors import TruthError
+from studio.foreign_files import foreign_file
 
 Array = NDArray[np.float64]
 
@@ -57,6 +58,12 @@ def read_trc(path: Path) -> MarkerMotion:
 
     Raises TruthError naming file, line and column for anything that is not a complete, finite table.
     """
+    with foreign_file(path, TruthError, "a TRC file", "Export it again."):
+        return _read(path)
+
+
+def _read(path: Path) -> MarkerMotion:
+    """`read_trc` itself."""
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except OSError as problem:

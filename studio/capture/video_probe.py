@@ -14,6 +14,7 @@ import av.video
 import numpy as np
 
 from studio.errors import FootageError
+from studio.foreign_files import check_regular, foreign_file
 
 MAX_PIXELS = 64_000_000
 MAX_FRAMES = 2_000_000
@@ -46,7 +47,10 @@ class VideoProbe:
 
 def probe_video(path: Path) -> VideoProbe:
     """What a video announces; only its first frame is decoded. Raises FootageError for what is refused or no video."""
-    with open_video(path) as container:
+    with (
+        foreign_file(path, FootageError, "a video", "Copy or export it again."),
+        open_video(path) as container,
+    ):
         stream = container.streams.video[0]
         try:
             first = next(iter(container.decode(stream)), None)
@@ -72,10 +76,13 @@ def probe_video(path: Path) -> VideoProbe:
 
 
 def open_video(path: Path) -> av.container.InputContainer:
-    """The container, its first video stream checked and set to stop at damage. Raises FootageError."""
+    """The container, its first video stream checked and set to stop at damage. Raises FootageError, also for what is no
+    regular file.
+    """
+    check_regular(path, FootageError)
     try:
-        container = av.open(str(path), options={"protocol_whitelist": "file"})
-    except (av.error.FFmpegError, OSError) as problem:
+        container = av.open(str(path), options={"protocol_whitelist": "file"}, metadata_errors="replace")
+    except (av.error.FFmpegError, OSError, ValueError) as problem:
         raise FootageError(
             f"'{path.name}' cannot be opened as a video at frame 0 ({reason(problem)}).",
             "The file is damaged, was cut short or is no video: copy or export it again.",

@@ -93,13 +93,7 @@ class KeptComparison:
 
     def is_running(self) -> bool:
         """Whether a living process works at it."""
-        if not (self.folder / LOCK_NAME).exists():
-            return False
-        lock = ProcessLock.take(self.folder / LOCK_NAME)
-        if lock is None:
-            return True
-        lock.free()
-        return False
+        return ProcessLock.is_held(self.folder / LOCK_NAME)
 
     def lock(self) -> ProcessLock | None:
         """The right to work at it, None while another process does."""

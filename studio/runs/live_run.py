@@ -8,9 +8,10 @@ Frames come by `take`; a frame at hand is searched by `step_layer` as always. It
 order, a moment later.
 """
 
+import contextlib
 import dataclasses
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 
 from studio.errors import RunError
@@ -47,9 +48,8 @@ class LiveRun(TrackingRun):
         self.latency_ms = float("nan")
         super().__init__(run, problems)
         self._behind = StoringBehind(storing)
-        with run.results() as results:
-            self.meter = LiveMeter(results.frames(), SetNumbers(run.folder.parents[1]))
-            self._over = results.ended() == OVER
+        self._measure_again()
+        self._over = self._reader.ended() == OVER
 
     @property
     def standing(self) -> LiveStanding:
@@ -64,10 +64,12 @@ class LiveRun(TrackingRun):
     @property
     def between_frames(self) -> bool:
         """Whether a frame can be taken."""
-        return self._search is None
+        return self._astray or self._search is None
 
     def take(self, ready: Ready) -> None:
         """Make a frame the next one to be searched; those between are dropped."""
+        if self._astray:
+            self._load_again()
         self._live_problems.take(ready)
         self.next_frame = ready.frame
         self._came = (ready.frame, ready.arrival.complete)
@@ -83,19 +85,20 @@ class LiveRun(TrackingRun):
     def end(self) -> None:
         """No further frame will come."""
         self.meter.passed(self.record.last - 1)
-        self._behind.wait()
+        self._wait_for_disk()
         self._over = True
         self._writer.mark_ended(OVER)
 
     def when_stored(self, action: Callable[[], None]) -> None:
         """Do something once all that is finished is stored: in the thread that stores, at the run's end at once."""
-        self._behind.do(action)
+        with self._astray_where_it_fails():
+            self._behind.do(action)
         if self.finished:
-            self._behind.wait()
+            self._wait_for_disk()
 
     def save(self) -> None:
         """As `TrackingRun.save`, with everything stored that waits to be."""
-        self._behind.wait()
+        self._wait_for_disk()
         self._came = None
         self.meter.paused()
         super().save()
@@ -153,11 +156,31 @@ class LiveRun(TrackingRun):
         alone: bool = False,
     ) -> None:
         """As `TrackingRun.keep`; a run that was over goes on from there."""
-        self._behind.wait()
+        self._wait_for_disk()
         super().keep(result, layers, version, settings, alone=alone)
+        self._over = False
+
+    def _wait_for_disk(self) -> None:
+        """Return when all is stored. Raises SessionError where a frame was not: those after it are not either."""
+        with self._astray_where_it_fails():
+            self._behind.wait()
+
+    @contextlib.contextmanager
+    def _astray_where_it_fails(self) -> Iterator[None]:
+        try:
+            yield
+        except BaseException:
+            self._astray = True
+            raise
+
+    def _load_again(self) -> None:
+        self._wait_for_disk()
+        super()._load_again()
+        self._measure_again()
+
+    def _measure_again(self) -> None:
         with self.run.results() as results:
             self.meter = LiveMeter(results.frames(), SetNumbers(self.run.folder.parents[1]))
-        self._over = False
 
 
 def without_particles(result: FrameResult) -> FrameResult:

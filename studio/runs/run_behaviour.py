@@ -54,8 +54,13 @@ class RunBehaviour:
             return carried
         return self._learner.carried_into(frame - self._run.record.first, carried, self._tracked)
 
+    def keep_missing(self) -> None:
+        """As `keep`, where that failed before."""
+        if self._learner is not None and not (self._run.folder / LEARNT_NAME).exists():
+            self.keep()
+
     def keep(self) -> None:
-        """Write what the run has learnt beside its results, once all its frames have some."""
+        """Write what the run has learnt beside its results, once all its frames have some. Raises BehaviourError."""
         record = self._run.record
         model = self.space_in(record.last).behaviour
         if self._learner is not None and model is not None:

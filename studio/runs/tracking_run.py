@@ -73,16 +73,29 @@ class TrackingRun:
         self._refiner = FrameRefiner(problems.body, problems.cameras, self.record.seed) if seen else None
         self._writer = ResultsWriter(run.folder)
         self._pace = Pace()
-        self._load()
+        try:
+            self._load()
+        except BaseException:
+            self._free()
+            raise
 
     def close(self) -> None:
-        """Save the frame at hand, if the search stands inside one, and free the run for others."""
-        self.save()
+        """Save the frame at hand, if the search stands inside one, and free the run for others, also where saving
+        fails.
+        """
+        try:
+            self.save()
+        finally:
+            self._free()
+
+    def _free(self) -> None:
         self._writer.close()
         self._reader.close()
 
     def _load(self) -> None:
         """Take up the run where its store says it stands."""
+        self._astray = False
+        """Whether a frame is searched to its end but not stored: what is in memory is no place to go on from."""
         self.history = SettingsHistory(tuple(self._reader.settings_history()))
         self.settings_source: SettingsSource = self.latest_settings
         self._settings: dict[int, RunSettings] = {}
@@ -98,6 +111,8 @@ class TrackingRun:
         self._spent: list[float] = []
         self._saved = True
         self._take_up_partial()
+        if self.next_frame >= self.record.last:
+            self._behaviour.keep_missing()
 
     def _take_up_partial(self) -> None:
         partial = self._reader.partial()
@@ -106,6 +121,7 @@ class TrackingRun:
         numbers = partial.state["search_numbers"]
         held = self._settings_at(partial.frame)[1].tracker
         particles = particles_from(partial.state)
+        # Of the search of a whole frame more is needed than was saved: older versions stored such.
         state = SearchState(
             layers_done=partial.next_layer,
             layer_count=int(numbers[0]),
@@ -116,13 +132,22 @@ class TrackingRun:
             milliseconds=float(numbers[3]),
             expected=partial.state.get("search_expected"),
         )
-        self._search = self._new_search(partial.frame, state)
-        self._layers = self._reader.layers(partial.frame)
+        search = self._new_search(partial.frame, state)
+        if not search.finished:
+            self._search, self._layers = search, self._reader.layers(partial.frame)
+
+    def _load_again(self) -> None:
+        """Forget all that is not in the store; the source of the settings stays."""
+        source = self.settings_source
+        self._behaviour.forget()
+        self._watch.forget()
+        self._load()
+        self.settings_source = source
 
     @property
     def finished(self) -> bool:
         """Whether every frame has a result."""
-        return self.next_frame >= self.record.last
+        return not self._astray and self.next_frame >= self.record.last
 
     @property
     def layers_done(self) -> int:
@@ -130,7 +155,11 @@ class TrackingRun:
         return self._search.state.layers_done if self._search else 0
 
     def step_layer(self) -> Stepped:
-        """Do one layer of the next frame; with its last layer the frame is stored. Raises RunError when finished."""
+        """Do one layer of the next frame; with its last layer the frame is stored. Raises RunError when finished,
+        SessionError where it cannot be stored: then the run goes on from what is.
+        """
+        if self._astray:
+            self._load_again()
         if self.finished:
             raise RunError(f"Run '{self.run.name}' has no frame left.", "Start a new run.")
         began = time.perf_counter()
@@ -139,12 +168,13 @@ class TrackingRun:
         search = self._search or self._new_search(frame)
         problem = self.problems.problem(frame, self._held_in(frame, settings))
         record = search.step(problem, version, settings.tracker)
-        self._search, self._saved = search, False
+        self._search, self._saved, self._astray = search, False, search.finished
         self._layers.append(record)
         result = self.result_of(search, settings) if search.finished else None
         if result is not None:
             self._store(result, settings)
             self._next(result)
+            self._astray = False
         self._spent.append(time.perf_counter() - began)
         if result is not None:
             self._pace.add(self._spent)
@@ -175,8 +205,11 @@ class TrackingRun:
             self._behaviour.keep()
 
     def save(self) -> None:
-        """Store where the search stands inside a frame, whole, so that another process can go on from there."""
-        if self._search is None or self._saved or self._search.state.particles is None:
+        """Store where the search stands inside a frame, whole, so that another process can go on from there.
+
+        A frame that is searched to its end, but could not be stored, is none of these: it is searched again.
+        """
+        if self._astray or self._search is None or self._saved or self._search.state.particles is None:
             return
         state = self._search.state
         assert state.particles is not None
@@ -193,7 +226,9 @@ class TrackingRun:
         self._writer.mark_ended("cancelled")
 
     def mark_going_on(self) -> None:
-        """Note that a cancelled run goes on after all."""
+        """Note that a cancelled run goes on after all, or one whose disk was full."""
+        if self._astray:
+            self._load_again()
         if self._reader.ended():
             self._writer.mark_ended("")
 
@@ -233,8 +268,9 @@ class TrackingRun:
         )
 
     def _apply(self, version: int, settings: RunSettings, frame: int, layer: int) -> None:
-        self.history = self.history.with_applied(version, frame, layer, settings)
-        self._writer.write_settings(version, frame, layer, self.history.entries[-1].values)
+        history = self.history.with_applied(version, frame, layer, settings)
+        self._writer.write_settings(version, frame, layer, history.entries[-1].values)
+        self.history = history
 
     def _read(self, entry: SettingsEntry) -> RunSettings:
         """The settings of an entry; those in use are read once."""
@@ -298,11 +334,8 @@ class TrackingRun:
             self._writer.write_frame(result, layers, settings.recording.record_particles)
             self._watch.forget()
             return
-        self._writer.forget_from(result.frame)
-        self._writer.write_settings(version, result.frame, 0, values(settings))
-        self._writer.write_frame(result, layers, settings.recording.record_particles)
-        source = self.settings_source
-        self._behaviour.forget()
-        self._watch.forget()
-        self._load()
-        self.settings_source = source
+        with self._writer.together():
+            self._writer.forget_from(result.frame)
+            self._writer.write_settings(version, result.frame, 0, values(settings))
+            self._writer.write_frame(result, layers, settings.recording.record_particles)
+        self._load_again()

@@ -7,7 +7,6 @@ refining or smoothing never writes over what was found. Frames that are missing 
 import io
 import itertools
 import math
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 
 from studio.array_archives import read_archive
 from studio.errors import NotFoundError, SessionError
+from studio.foreign_files import foreign_file
 from studio.sessions.atomic_files import write_bytes
 from studio.sessions.names import checked_name, is_name
 from studio.sessions.stored_run import StoredRun
@@ -70,17 +70,13 @@ def read_track(run: StoredRun, name: str = RAW) -> Track:
             f"Run '{run.name}' has no track '{name[:64]}'.",
             f"It has: {', '.join(track_names(run))}. Make others with 'studio refine' or 'studio smooth'.",
         )
-    try:
+    what = f"the track '{name}' of run '{run.name}'"
+    with foreign_file(path, SessionError, what, "Make it again with 'studio refine' or 'studio smooth'."):
         arrays = read_archive(io.BytesIO(path.read_bytes()))
         entries = {entry: arrays[entry] for entry in ENTRIES}
         track = _from_entries(name, entries)
         _check(track, len(run.record.parameters))
-    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile, msgspec.DecodeError) as error:
-        raise SessionError(
-            f"Track '{name}' of run '{run.name}' cannot be read ({error}).",
-            "Make it again with 'studio refine' or 'studio smooth', or delete its file.",
-        ) from None
-    return track
+        return track
 
 
 def pose_in_track(run: StoredRun, name: str, frame: int) -> Array:

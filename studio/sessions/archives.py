@@ -5,12 +5,10 @@ names that lead out and names that appear twice are refused before anything is w
 """
 
 import contextlib
-import lzma
 import shutil
 import stat
 import tarfile
 import zipfile
-import zlib
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from fnmatch import fnmatch
@@ -18,6 +16,7 @@ from pathlib import Path
 from typing import IO
 
 from studio.errors import StudioError
+from studio.foreign_files import foreign_file
 from studio.sessions.atomic_files import discard, new_folder_beside
 from studio.sessions.inner_paths import place_in, relative_path
 
@@ -29,16 +28,6 @@ ENDINGS = (".zip", *TARS)
 FOOTAGE_PARTS = ("videos", "pictures", "calibration")
 """Folders that are part of a source even where they stand alone in it."""
 LITTER = frozenset(("__MACOSX", "Thumbs.db", "desktop.ini"))
-BROKEN = (
-    zipfile.BadZipFile,
-    tarfile.TarError,
-    zlib.error,
-    lzma.LZMAError,
-    EOFError,
-    NotImplementedError,
-    RuntimeError,
-    FileExistsError,
-)
 
 
 class ArchiveError(StudioError):
@@ -104,26 +93,20 @@ def unpack(archive: Path, folder: Path, limits: ArchiveLimits | None = None) -> 
     Raises ArchiveError, PathRefused; what was written until then is the caller's to remove.
     """
     allowed = limits or ArchiveLimits()
-    try:
-        with _entries(archive) as found:
-            entries = _checked(found, allowed)
-            most = min(allowed.total, max(allowed.free, int(archive.stat().st_size * allowed.ratio)))
-            most = min(most, shutil.disk_usage(folder).free - GIGABYTE)
-            written = 0
-            for entry in entries:
-                place = place_in(folder, relative_path(entry.name))
-                if entry.is_folder:
-                    place.mkdir(parents=True, exist_ok=True)
-                    continue
-                place.parent.mkdir(parents=True, exist_ok=True)
-                written += _unpack_one(entry, place, most - written)
-            return written
-    except BROKEN as error:
-        raise _broken(archive, error) from None
-    except OSError as error:
-        if error.errno is None:  # what gzip and bz2 say of data that are none
-            raise _broken(archive, error) from None
-        raise
+    words = ("an archive that can be unpacked", "Pack the folder again.")
+    with foreign_file(archive, ArchiveError, *words), _entries(archive) as found:
+        entries = _checked(found, allowed)
+        most = min(allowed.total, max(allowed.free, int(archive.stat().st_size * allowed.ratio)))
+        most = min(most, shutil.disk_usage(folder).free - GIGABYTE)
+        written = 0
+        for entry in entries:
+            place = place_in(folder, relative_path(entry.name))
+            if entry.is_folder:
+                place.mkdir(parents=True, exist_ok=True)
+                continue
+            place.parent.mkdir(parents=True, exist_ok=True)
+            written += _unpack_one(entry, place, most - written)
+        return written
 
 
 def unpacked(folder: Path) -> Path:
@@ -231,12 +214,6 @@ def _unpack_one(entry: _Entry, place: Path, most: int) -> int:
                 raise _too_much(entry)
             target.write(chunk)
     return written
-
-
-def _broken(archive: Path, error: Exception) -> ArchiveError:
-    return ArchiveError(
-        f"'{archive.name}' is not an archive that can be unpacked ({error}).", "Pack the folder again."
-    )
 
 
 def _too_much(entry: _Entry) -> ArchiveError:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.errors import BodyError
+from studio.foreign_files import check_regular
 from studio.sessions.atomic_files import write_text
 
 Array = NDArray[np.float64]
@@ -96,6 +97,7 @@ def _as_csv(rows: list[list[str]]) -> str:
 
 def _read(path: Path) -> tuple[list[str], list[list[float]]]:
     """Header and rows of numbers; at least one row."""
+    check_regular(path, BodyError)
     try:
         lines = [line for line in csv.reader(path.read_text(encoding="utf-8-sig").splitlines()) if any(line)]
     except OSError as error:

@@ -4,6 +4,10 @@ import sqlite3
 from dataclasses import dataclass
 from pathlib import Path
 
+from studio.sessions.unwritable import unwritable
+
+HELD = frozenset((sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED))
+
 
 @dataclass(frozen=True, slots=True)
 class ProcessLock:
@@ -13,15 +17,47 @@ class ProcessLock:
 
     @staticmethod
     def take(path: Path) -> "ProcessLock | None":
-        """The lock that the file `path` stands for (made where missing), None while another holds it."""
-        connection = sqlite3.connect(path, timeout=0.0, isolation_level=None, check_same_thread=False)
+        """The lock that the file `path` stands for (made where missing), None while another holds it.
+
+        It needs no room on the disk but for the file's name. Raises SessionError where the file cannot be made or
+        written.
+        """
+        connection = None
         try:
+            connection = sqlite3.connect(path, timeout=0.0, isolation_level=None, check_same_thread=False)
+            # Nothing is ever written, so nothing has to be undone from a file.
+            connection.execute("PRAGMA journal_mode = MEMORY")
             connection.execute("BEGIN EXCLUSIVE")
-        except sqlite3.OperationalError:
-            connection.close()
-            return None
+        except sqlite3.DatabaseError as error:
+            if connection is not None:
+                connection.close()
+            if _is_held(error):
+                return None
+            raise unwritable("The lock", path, error) from None
         return ProcessLock(connection)
+
+    @staticmethod
+    def is_held(path: Path) -> bool:
+        """Whether another holds the lock. Looking takes nothing, writes nothing and needs no permission to write."""
+        if not path.exists():
+            return False
+        try:
+            address = f"{path.resolve().as_uri()}?mode=ro"
+            connection = sqlite3.connect(address, uri=True, timeout=0.0, isolation_level=None)
+        except sqlite3.DatabaseError:
+            return False
+        try:
+            connection.execute("SELECT 1 FROM sqlite_master").fetchall()
+        except sqlite3.DatabaseError as error:
+            return _is_held(error)
+        finally:
+            connection.close()
+        return False
 
     def free(self) -> None:
         """Let others take it."""
         self.connection.close()
+
+
+def _is_held(error: sqlite3.DatabaseError) -> bool:
+    return getattr(error, "sqlite_errorcode", 0) & 0xFF in HELD

@@ -8,6 +8,7 @@ from typing import TypeVar
 import msgspec
 
 from studio.errors import NotFoundError, SessionError
+from studio.foreign_files import check_regular
 from studio.sessions.atomic_files import write_bytes
 from studio.typed_decoding import decode_json
 
@@ -22,6 +23,7 @@ def read_record(
     schema : the newest version that this studio knows. missing : cause and remedy where there is no file; what,
     remedy : what the file should be, and what to do where it is not. Raises NotFoundError, SessionError.
     """
+    check_regular(path, SessionError)
     try:
         content = path.read_bytes()
     except (FileNotFoundError, NotADirectoryError):

@@ -34,7 +34,7 @@ def unpack(blob: bytes) -> dict[str, Array]:
     try:
         plain = zstandard.ZstdDecompressor().decompress(blob, max_output_size=LARGEST_BLOB)
         return read_archive(io.BytesIO(plain))
-    except (zstandard.ZstdError, ValueError, OSError, EOFError, KeyError) as error:
+    except Exception as error:
         raise SessionError(
             f"A stored result is damaged ({error}).", "Start the run again; the footage is not touched."
         ) from None

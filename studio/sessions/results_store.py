@@ -6,10 +6,12 @@ and frames are compressed blobs (see `results_codec`); what lists and timelines 
 columns. Neither side holds more than the frame at hand.
 """
 
+import contextlib
 import json
 import math
 import sqlite3
-from collections.abc import Iterable, Mapping
+import threading
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +21,7 @@ from studio.errors import RunError, SessionError
 from studio.sessions.process_lock import ProcessLock
 from studio.sessions.results_codec import pack, pack_layer, pack_result
 from studio.sessions.results_reader import FILE_NAME, ResultsReader
+from studio.sessions.unwritable import unwritable
 from studio.tracking.tracker import FrameResult, LayerRecord
 
 Array = NDArray[np.float64]
@@ -27,6 +30,7 @@ Value = bool | int | float | str
 __all__ = ["ResultsReader", "ResultsWriter", "is_being_written"]
 
 LOCK_NAME = "results.lock"
+RESULTS = "The results in"
 SCHEMA_VERSION = "1"
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
@@ -49,24 +53,19 @@ CREATE TABLE IF NOT EXISTS arrivals (frame INTEGER PRIMARY KEY, arrived REAL NOT
 
 def is_being_written(run_folder: Path) -> bool:
     """Whether some living process has this run open for tracking."""
-    if not (run_folder / LOCK_NAME).exists():
-        return False
-    lock = ProcessLock.take(run_folder / LOCK_NAME)
-    if lock is None:
-        return True
-    lock.free()
-    return False
+    return ProcessLock.is_held(run_folder / LOCK_NAME)
 
 
 def create_store(run_folder: Path) -> None:
-    """Make the empty store of a new run."""
-    connection = sqlite3.connect(run_folder / FILE_NAME, isolation_level=None)
+    """Make the empty store of a new run. Raises SessionError."""
+    path = run_folder / FILE_NAME
     try:
-        connection.execute("PRAGMA journal_mode = WAL")
-        connection.executescript(SCHEMA)
-        connection.execute("INSERT OR IGNORE INTO meta VALUES ('schema', ?)", (SCHEMA_VERSION,))
-    finally:
-        connection.close()
+        with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as connection:
+            connection.execute("PRAGMA journal_mode = WAL")
+            connection.executescript(SCHEMA)
+            connection.execute("INSERT OR IGNORE INTO meta VALUES ('schema', ?)", (SCHEMA_VERSION,))
+    except sqlite3.DatabaseError as error:
+        raise unwritable(RESULTS, path, error) from None
 
 
 def copy_frames(source: Path, into: Path, last: int | None = None) -> None:
@@ -99,7 +98,7 @@ def copy_frames(source: Path, into: Path, last: int | None = None) -> None:
 class ResultsWriter:
     """The one writer of a run's store; a second one, in this process or another, is refused with RunError.
 
-    To be used by one thread at a time. Close it (or use it as a context) to free the run for others.
+    Threads take turns, a transaction each. Close it (or use it as a context) to free the run for others.
     """
 
     def __init__(self, run_folder: Path) -> None:
@@ -111,16 +110,29 @@ class ResultsWriter:
             )
         self._lock = lock
         self._path = run_folder / FILE_NAME
+        self._one_at_a_time, self._within = threading.RLock(), False
         try:
-            self._connection = sqlite3.connect(
+            self._connection = self._opened()
+        except BaseException:
+            lock.free()
+            raise
+
+    def _opened(self) -> sqlite3.Connection:
+        """A connection to the store, its tables made where they are missing. Raises SessionError."""
+        try:
+            connection = sqlite3.connect(
                 self._path, timeout=30.0, isolation_level=None, check_same_thread=False
             )
-            self._connection.execute("PRAGMA journal_mode = WAL")
-            self._connection.execute("PRAGMA synchronous = NORMAL")
-            self._connection.executescript(SCHEMA)
+            try:
+                connection.execute("PRAGMA journal_mode = WAL")
+                connection.execute("PRAGMA synchronous = NORMAL")
+                connection.executescript(SCHEMA)
+            except BaseException:
+                connection.close()
+                raise
         except sqlite3.DatabaseError as error:
-            lock.free()
-            raise _unwritable(self._path, error) from None
+            raise unwritable(RESULTS, self._path, error) from None
+        return connection
 
     def __enter__(self) -> "ResultsWriter":
         return self
@@ -224,29 +236,48 @@ class ResultsWriter:
         else:
             self._transaction([("DELETE FROM meta WHERE key = 'ended'", ())])
 
+    @contextlib.contextmanager
+    def together(self) -> Iterator[None]:
+        """All that is written inside arrives in one transaction, or nothing of it. Raises SessionError."""
+        with self._one_at_a_time:
+            if self._within:
+                yield
+                return
+            self._within = True
+            try:
+                with self._begun():
+                    yield
+            except sqlite3.DatabaseError as error:
+                raise unwritable(RESULTS, self._path, error) from None
+            finally:
+                self._within = False
+
+    @contextlib.contextmanager
+    def _begun(self) -> Iterator[None]:
+        """A transaction. Raises what went wrong first, and leaves none open."""
+        if self._connection.in_transaction:
+            # An earlier one could not even be rolled back: closing does that.
+            self._connection.close()
+            self._connection = self._opened()
+        self._connection.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+            self._connection.execute("COMMIT")
+        except BaseException:
+            # Where the disk is full or broken SQLite has rolled back by itself.
+            if self._connection.in_transaction:
+                with contextlib.suppress(sqlite3.Error):
+                    self._connection.execute("ROLLBACK")
+            raise
+
     def _transaction(self, statements: list[tuple[str, tuple[object, ...]]]) -> None:
         """All statements or none."""
-        try:
-            self._connection.execute("BEGIN IMMEDIATE")
-            try:
-                for sql, values in statements:
-                    self._connection.execute(sql, values)
-                self._connection.execute("COMMIT")
-            except BaseException:
-                self._connection.execute("ROLLBACK")
-                raise
-        except sqlite3.DatabaseError as error:
-            raise _unwritable(self._path, error) from None
+        with self.together():
+            for sql, values in statements:
+                self._connection.execute(sql, values)
 
 
 _FORGET_PARTIAL: tuple[tuple[str, tuple[object, ...]], ...] = (
     ("DELETE FROM partial", ()),
     ("DELETE FROM partial_layers", ()),
 )
-
-
-def _unwritable(path: Path, error: sqlite3.DatabaseError) -> SessionError:
-    return SessionError(
-        f"The results in '{path}' cannot be written ({error}).",
-        "Check the free disk space and the folder's permissions, or start a new run.",
-    )

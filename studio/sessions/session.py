@@ -25,6 +25,7 @@ from studio.sessions.results_store import create_store
 from studio.sessions.run_record import BEHAVIOUR_NAME, CAMERAS_NAME, RunRecord, write_run_record
 from studio.sessions.stored_run import BODY_FOLDER, StoredRun
 from studio.sessions.thumbnails import thumbnail_of
+from studio.sessions.unwritable import room_for
 
 CAMERAS_PATH = Path("calibration") / "cameras.toml"
 SUBJECT_NAME, START_POSE_NAME, SIGMA_NAME = "subject.toml", "start_pose.csv", "sigma.csv"
@@ -185,27 +186,28 @@ class Session:
 
         It appears whole or not at all. `runs.new_run.prepare_run` fills in the record. body_text : content of
         the body's file, "" where it is not to be kept. behaviour : the file of its behaviour model, to be copied.
-        Raises SessionError if the name is taken.
+        Raises SessionError if the name is taken, or the disk is full.
         """
         place = self.path / RUNS_NAME / checked_name(record.name, "run")
-        folder = atomic_files.new_folder_beside(place)
-        try:
-            atomic_files.copy_file(self.path / CAMERAS_PATH, folder / CAMERAS_NAME)
-            if body_text:
-                (folder / BODY_FOLDER).mkdir()
-                name = Path(record.body).stem
-                atomic_files.write_text(folder / BODY_FOLDER / f"{name}.toml", body_text)
-            if behaviour is not None:
-                atomic_files.copy_file(behaviour, folder / BEHAVIOUR_NAME)
-            create_store(folder)
-            write_run_record(folder, record)
-            atomic_files.move_into_place(folder, place)
-        except FileExistsError:
-            raise SessionError(
-                f"Session '{self.name}' has a run '{record.name}'.", "Choose another name."
-            ) from None
-        finally:
-            shutil.rmtree(folder, ignore_errors=True)
+        with room_for("The run", place):
+            folder = atomic_files.new_folder_beside(place)
+            try:
+                atomic_files.copy_file(self.path / CAMERAS_PATH, folder / CAMERAS_NAME)
+                if body_text:
+                    (folder / BODY_FOLDER).mkdir()
+                    name = Path(record.body).stem
+                    atomic_files.write_text(folder / BODY_FOLDER / f"{name}.toml", body_text)
+                if behaviour is not None:
+                    atomic_files.copy_file(behaviour, folder / BEHAVIOUR_NAME)
+                create_store(folder)
+                write_run_record(folder, record)
+                atomic_files.move_into_place(folder, place)
+            except FileExistsError:
+                raise SessionError(
+                    f"Session '{self.name}' has a run '{record.name}'.", "Choose another name."
+                ) from None
+            finally:
+                shutil.rmtree(folder, ignore_errors=True)
         return StoredRun(place)
 
 

@@ -201,13 +201,7 @@ def taken_set(row: list[str]) -> TakenSet:
 
 def is_being_recorded(folder: Path) -> bool:
     """Whether somebody records this take now."""
-    path = folder / LIVE / LOCK_NAME
-    if not path.exists():
-        return False
-    lock = ProcessLock.take(path)
-    if lock is not None:
-        lock.free()
-    return lock is None
+    return ProcessLock.is_held(folder / LIVE / LOCK_NAME)
 
 
 def let_go_on(folder: Path) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.errors import StudioError
+from studio.foreign_files import check_regular
 
 Array = NDArray[np.float64]
 
@@ -92,6 +93,7 @@ def at_line(path: Path, line: int, what: str, remedy: str) -> StudioError:
 
 def text_lines(path: Path) -> list[str]:
     """The lines of a motion file. Raises StudioError where it cannot be read or is no text."""
+    check_regular(path, StudioError)
     try:
         return path.read_text(encoding="utf-8").splitlines()
     except OSError as problem:

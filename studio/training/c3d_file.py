@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from studio.capture.trc import MM_PER_UNIT, MarkerMotion
 from studio.errors import StudioError
+from studio.foreign_files import foreign_file
 
 Array = NDArray[np.float64]
 
@@ -22,17 +23,13 @@ def read_c3d(path: Path) -> MarkerMotion:
     """
     if not path.is_file():
         raise StudioError(f"'{path}' does not exist.", "Check the path.")
-    try:
+    with foreign_file(path, StudioError, "a C3D file that can be read", REMEDY):
         content = ezc3d.c3d(str(path))
         settings = content["parameters"]["POINT"]
         labels = [str(label).strip() for label in settings["LABELS"]["value"]]
         unit = str(next(iter(settings["UNITS"]["value"]), "mm")).strip().lower() or "mm"
         rate = float(settings["RATE"]["value"][0])
         points = np.array(content["data"]["points"], dtype=np.float64)[:3].transpose(2, 1, 0)
-    except (OSError, RuntimeError, ValueError, KeyError, IndexError, TypeError) as problem:
-        raise StudioError(
-            f"'{path.name}' is not a C3D file that can be read ({str(problem).splitlines()[0]}).", REMEDY
-        ) from None
     if not points.size or len(labels) < points.shape[1]:
         raise StudioError(f"'{path.name}' has no labelled points.", REMEDY)
     if unit not in MM_PER_UNIT or not 1.0 <= rate <= 10_000.0:

@@ -1,8 +1,10 @@
 """A run tracked to its end in this process, for commands and scripts; Ctrl-C keeps what is done."""
 
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 
+from studio.errors import StudioError
 from studio.progress import Progress
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -39,9 +41,13 @@ def track_to_end(session: Session, run: StoredRun, report: Progress) -> BatchRes
             if stepped is not None and stepped.result is not None:
                 evaluations, beta = stepped.result.evaluations, stepped.record.beta
                 report(f"{session.name} / {run.name}", at_hand.tracking.done, total)
-    except KeyboardInterrupt:
-        at_hand.tracking.mark_cancelled()
+    except BaseException as problem:
+        # What went wrong first is what counts, not that a full disk refuses the rest, too.
+        with suppress(StudioError):
+            if isinstance(problem, KeyboardInterrupt):
+                at_hand.tracking.mark_cancelled()
+        with suppress(StudioError):
+            at_hand.close()
         raise
-    finally:
-        at_hand.close()
+    at_hand.close()
     return BatchResult(evaluations, beta, time.perf_counter() - began)

@@ -1,6 +1,7 @@
 """What the process says of its work: states, settings in use, log lines, each with the names of session and
 run."""
 
+import contextlib
 import math
 import time
 from collections.abc import Callable
@@ -89,8 +90,11 @@ class Reporter:
         run.when_stored(lambda: self.post(event))
 
     def log(self, run: OpenRun | None, level: str, text: str) -> None:
-        """Write a line into the run's log and say it."""
-        stamp = run.log(level, text) if run is not None else time.time()
+        """Write a line into the run's log and say it; a disk that refuses the line is no reason to stop."""
+        stamp = time.time()
+        if run is not None:
+            with contextlib.suppress(OSError):
+                stamp = run.log(level, text)
         self.post(LogLine(*names_of(run), level, stamp, text))
 
 

@@ -75,7 +75,7 @@ def _zip() -> bytes:
 def test_no_model_at_all(content: bytes, tmp_path: Path) -> None:
     path = tmp_path / "odd.behaviour"
     path.write_bytes(content)
-    with pytest.raises(BehaviourError, match=r"'odd.behaviour' is no behaviour model") as refusal:
+    with pytest.raises(BehaviourError, match=r"'odd.behaviour' is not a behaviour model") as refusal:
         read_model(path)
     assert "studio learn" in refusal.value.hint
 
@@ -100,10 +100,10 @@ def test_damaged_files(model: BehaviourModel, tmp_path: Path) -> None:
     ("changes", "words"),
     [
         ({"version": VERSION + 1}, f"version {VERSION + 1}; this program reads version {VERSION}"),
-        ({"kind": "something else"}, "no behaviour model"),
-        ({"parameters": ["one"]}, "no behaviour model"),
-        ({"settings": {"memory": "long", "unknown": 3}}, "no behaviour model"),
-        ({"fps": "fast"}, "no behaviour model"),
+        ({"kind": "something else"}, "not a behaviour model"),
+        ({"parameters": ["one"]}, "not a behaviour model"),
+        ({"settings": {"memory": "long", "unknown": 3}}, "not a behaviour model"),
+        ({"fps": "fast"}, "not a behaviour model"),
     ],
 )
 def test_other_heads(model: BehaviourModel, tmp_path: Path, changes: dict[str, object], words: str) -> None:

@@ -179,7 +179,7 @@ def test_a_file_keeps_it_and_refuses_what_does_not_fit(model: BehaviourModel, tm
     np.testing.assert_array_equal(gone[0], gone[1])
     short = RootMotion(model.root.frame, model.root.changes.chosen(np.arange(model.clusters - 1)))
     write_model(dataclasses.replace(model, root=short), path)
-    with pytest.raises(BehaviourError, match=r"'turning\.behaviour' is no behaviour model"):
+    with pytest.raises(BehaviourError, match=r"'turning\.behaviour' is not a behaviour model"):
         read_model(path)
 
 

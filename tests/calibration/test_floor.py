@@ -81,7 +81,7 @@ def test_clicks_that_contradict_the_boards_scale_are_refused(rig: Rig, tmp_path:
 
 def test_clicks_that_cannot_be_used(rig: Rig, tmp_path: Path) -> None:
     (tmp_path / "bad.json").write_text('{"points": [{"pixel": {}}]}')
-    with pytest.raises(CalibrationError, match="holds no clicked points"):
+    with pytest.raises(CalibrationError, match="is not a list of clicked points"):
         read_clicks(tmp_path / "bad.json")
     with pytest.raises(CalibrationError, match="is no camera"):
         triangulated(CAMERAS, {"cam9": np.zeros((3, 2))})

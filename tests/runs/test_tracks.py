@@ -114,7 +114,7 @@ def test_missing_and_damaged_tracks_are_named(run: StoredRun) -> None:
     whole = path.read_bytes()
     for damaged in (whole[: len(whole) // 2], b"", b"not an archive"):
         path.write_bytes(damaged)
-        with pytest.raises(SessionError, match="cannot be read"):
+        with pytest.raises(SessionError, match="is not the track 'refined' of run"):
             read_track(run, "refined")
 
 

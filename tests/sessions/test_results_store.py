@@ -208,6 +208,7 @@ def test_a_writer_killed_in_the_middle_of_a_frame_leaves_whole_frames_only(tmp_p
 
         class Deadly:
             def __init__(self, connection): self.inner, self.count = connection, 0
+            def __getattr__(self, name): return getattr(self.inner, name)
             def execute(self, sql, *values):
                 self.count += "INSERT INTO layers" in sql
                 if self.count == 8:

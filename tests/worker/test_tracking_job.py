@@ -1,10 +1,12 @@
 """What each command does, between two layers of a frame (no process here: the job is stepped by hand)."""
 
+import errno
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from full_disk import ROLLED_BACK, break_at
 from toy_session import make_session, true_poses
 
 from studio.runs.new_run import RunRequest, prepare_run
@@ -71,6 +73,38 @@ class Desk:
     @property
     def settings(self) -> SettingsApplied:
         return [event for event in self.events if isinstance(event, SettingsApplied)][-1]
+
+
+def test_a_full_disk_fails_the_frame_and_start_goes_on(
+    desk: Desk, session_on_disk: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither the results nor the log find room; the process lives, and says why it stands."""
+    whole, run = new_run(session_on_disk, "whole"), new_run(session_on_disk, "a")
+    desk.open(whole)
+    desk.ask(commands.Start())
+    desk.work()
+    desk.open(run)
+    desk.ask(commands.Start())
+    desk.advance(LAYERS)
+    assert desk.job._run is not None
+    fault = break_at(desk.job._run.tracking._writer, 3, ROLLED_BACK)
+
+    def refuse(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as full:
+        full.setattr("studio.worker.open_run.append_to_log", refuse)
+        desk.work()
+        assert desk.state.state == "failed"
+        assert "disk full" in desk.state.message
+        assert "Make room" in desk.state.hint
+        assert not desk.ask(commands.Cancel()).ok
+    fault.mend()
+    assert desk.ask(commands.Start()).ok
+    desk.work()
+    assert desk.state.state == "finished"
+    with run.results() as found, whole.results() as wanted:
+        assert np.array_equal(found.poses()[1], wanted.poses()[1])
 
 
 @pytest.fixture
