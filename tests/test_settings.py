@@ -9,6 +9,7 @@ from studio.errors import SettingsError
 from studio.evidence.settings import EvidenceSettings
 from studio.knobs import knobs_of
 from studio.settings import (
+    DEFAULT_WEIGHTING,
     RecordingSettings,
     SettingsEntry,
     SettingsHistory,
@@ -18,7 +19,6 @@ from studio.settings import (
     json_schema,
     knob_table,
     settings_from_values,
-    usual_weighting,
     values,
 )
 from studio.tracking.catalogue import TRACKERS
@@ -63,7 +63,7 @@ def test_the_table_has_every_settings_class_once() -> None:
 
 def test_the_issues_defaults() -> None:
     now = values(default_settings())
-    assert (now["layers"], now["particles"], now["crossover"]) == (10, 200, 0.5)
+    assert (now["layers"], now["particles"], now["crossover"]) == (10, 100, 0.5)
     assert now["adaptive_diffusion"] is True
     assert now["carry"] == "weighted"
     assert now["record_particles"] == 2000
@@ -116,11 +116,11 @@ def test_a_record_with_an_older_knob_is_understood(limits: str, constraints: str
         changed_settings(default_settings(), {"limits": limits})
 
 
-def test_each_tracker_has_a_usual_weighting() -> None:
-    usual = {tracker: usual_weighting(tracker) for tracker in TRACKERS}
-    assert set(usual.values()) <= set(WEIGHTINGS)
-    assert usual["swarm"] == "edge-silhouette"
-    assert usual["annealed"] == usual["condensation"] == "edge-region"
+def test_a_record_from_before_frames_were_refined_stays_unrefined() -> None:
+    recorded = values(default_settings())
+    assert settings_from_values("annealed", DEFAULT_WEIGHTING, recorded).refinement.refine_frames
+    del recorded["refine_frames"]
+    assert not settings_from_values("annealed", DEFAULT_WEIGHTING, recorded).refinement.refine_frames
 
 
 def test_another_trackers_knob_says_whose_settings_these_are() -> None:

@@ -43,6 +43,11 @@ def silhouette_distances(evidence: FrameEvidence, most: int = MOST_POINTS) -> tu
     return tuple(distances_of(view.mask, most) for view in evidence.views)
 
 
+def silhouettes_by_camera(evidence: FrameEvidence, most: int = MOST_POINTS) -> dict[str, SilhouetteDistances]:
+    """The distances of every view's mask by its camera."""
+    return {view.camera: distances_of(view.mask, most) for view in evidence.views}
+
+
 def distances_of(mask: Bytes, most: int = MOST_POINTS) -> SilhouetteDistances:
     """The distances of a mask (H, W); where nothing or everything is silhouette, there is no border."""
     size = (mask.shape[1], mask.shape[0])

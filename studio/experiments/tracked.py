@@ -17,6 +17,7 @@ from studio.body.subject import read_subject
 from studio.capture.trc import read_trc
 from studio.errors import NotFoundError, TruthError
 from studio.evaluation.errors import evaluate, rows_of_frames
+from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.experiments.footage_shelf import FootageShelf
 from studio.geometry.camera import Camera
@@ -228,7 +229,9 @@ class _Following:
                 repeats=settings.tracker.start_repeats if number == 0 else 1,
                 on_layer=on_layer,
             )
-            result = refiner.refined(result, seen, problem, settings.refinement)
+            result = refiner.refined(
+                result, partial(silhouettes_by_camera, seen), problem, settings.refinement
+            )
             if number:
                 found.seconds += time.perf_counter() - began
             carried, found.evaluations = result.carried, result.evaluations

@@ -151,7 +151,7 @@ class RunWatch:
         watch = before.watch if before.weighed == _weighed(settings) else WeightWatch(settings.weighting_name)
         if not watch.is_lost(result.estimate.log_weight, sight):
             back = sought or before.state in (LOST, NO_EVIDENCE)
-            state = LIMB_LOST if result.limbs_lost else RECOVERED if back else TRACKED
+            state = RECOVERED if back else LIMB_LOST if result.limbs_lost else TRACKED
             return dataclasses.replace(result, tracking=state, overlap=sight.overlap)
         doubts = before.doubts + 1
         lost = sought or before.state == LOST or doubts >= settings.recovery.lost_after

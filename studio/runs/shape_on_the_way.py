@@ -15,6 +15,7 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 
 import msgspec
 import numpy as np
@@ -24,7 +25,7 @@ from studio.body.dimensions import with_dimensions
 from studio.body.model import BodyModel
 from studio.body.shape_space import ShapeSpace, dimension_kinds, shape_space
 from studio.errors import NotFoundError, SessionError
-from studio.evidence.distance_maps import silhouette_distances
+from studio.evidence.distance_maps import silhouette_distances, silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 from studio.progress import Progress
@@ -50,6 +51,8 @@ Array = NDArray[np.float64]
 TRACKER, WEIGHTING = "annealed", "edge-region-silhouette"
 FIRST_FRAMES, FEWEST_FRAMES, FITTED_FRAMES = 30, 8, 8
 """Frames tracked before the fit (with fewer there is none), and the most different of them that it looks at."""
+FEWEST_CAMERAS = 2
+"""One camera does not tell a larger body from a nearer one."""
 LEAST_OVERLAP = 0.6
 """Masks that agree less with the body, even with the shape, show something else."""
 STEP = "fitting the shape"
@@ -93,10 +96,11 @@ def session_shape(
     """The body in the shape that a session's frames from `first` on show, its pose there (D,), and words for the notes.
 
     settings : whose evidence counts. The body as it is, and "", where it has no radii to fit or there are too few
-    frames.
+    frames or cameras.
     """
     frames = range(first, min(last, first + FIRST_FRAMES))
-    if len(frames) < FEWEST_FRAMES or not can_be_fitted(body):
+    few = len(frames) < FEWEST_FRAMES or len(session.cameras()) < FEWEST_CAMERAS
+    if few or not can_be_fitted(body):
         return body, start, ""
     path = session.path / FOLDER / f"{_key(session, body, settings, start, frames)}.json"
     try:
@@ -118,7 +122,7 @@ def session_shape(
 
 
 def can_be_fitted(body: BodyModel) -> bool:
-    """Whether a body has named radii (people and animals have, arms of the samples have not)."""
+    """Whether a body has named radii."""
     return body.definition is not None and "radius" in dimension_kinds(body.definition).values()
 
 
@@ -189,7 +193,7 @@ def shaped_body(
             settings_source=lambda: (1, rules.tracker),
             repeats=1 if number else rules.tracker.start_repeats,
         )
-        result = refiner.refined(result, seen, problem, rules.refinement)
+        result = refiner.refined(result, partial(silhouettes_by_camera, seen), problem, rules.refinement)
         carried = result.carried
         poses.append(result.estimate.pose)
     numbers, followed = np.array(frames[: len(poses)]), np.array(poses).reshape(len(poses), len(start))

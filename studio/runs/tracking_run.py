@@ -11,11 +11,13 @@ import dataclasses
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
 
 from studio.errors import NotFoundError, RunError
+from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.runs.frame_steps import HandedOn, space_over
 from studio.runs.pace import Pace, Progress
 from studio.runs.run_behaviour import RunBehaviour
@@ -188,7 +190,9 @@ class TrackingRun:
         problem = search.problem or self.problems.problem(search.frame, held)
         if self._refiner is not None and isinstance(self.problems, Sightings):
             evidence = self.problems.evidence(search.frame, held)
-            found = self._refiner.refined(found, evidence, problem, settings.refinement)
+            found = self._refiner.refined(
+                found, partial(silhouettes_by_camera, evidence), problem, settings.refinement
+            )
         carried, sought = self.carried_into(search.frame), self._watch.is_sought(search.frame)
         return self._watch.judged(found, carried, problem, sought)
 

@@ -6,15 +6,13 @@ of these poses are refined as well, and one of them is taken where the silhouett
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.model import BodyModel
-from studio.evidence.distance_maps import distances_of
-from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 from studio.knobs import knob
 from studio.tracking.agreement import Agreement
@@ -85,17 +83,20 @@ class FrameRefiner:
     def refined(
         self,
         result: FrameResult,
-        evidence: FrameEvidence,
+        silhouettes_of: Callable[[int], Mapping[str, Distances]],
         problem: FrameProblem,
         settings: FrameRefinementSettings,
     ) -> FrameResult:
         """The result with its pose refined, and what the next frame starts from; as it is where it shall not be refined
         or no mask shows anything.
+
+        silhouettes_of : the frame's silhouettes by camera, with at most so many border points each.
         """
-        if not settings.refine_frames or not any(view.mask.any() for view in evidence.views):
+        seen = silhouettes_of(settings.refine_frame_points) if settings.refine_frames else {}
+        if not any(len(view.border) for view in seen.values()):
             return result
-        silhouettes = [distances_of(view.mask, settings.refine_frame_points) for view in evidence.views]
-        refiner, agreement = self._prepared(tuple(view.camera for view in evidence.views), settings)
+        silhouettes = tuple(seen.values())
+        refiner, agreement = self._prepared(tuple(seen), settings)
         pose = refiner.refine(result.estimate.pose, silhouettes).pose
         evaluations = result.evaluations
         if settings.redraw_limbs:

@@ -22,8 +22,8 @@ TRACKED, LOST, NO_EVIDENCE, RECOVERED = "tracked", "lost", "no evidence", "recov
 LIMB_LOST = "limb lost"
 TRACKING_STATES = (TRACKED, LOST, NO_EVIDENCE, RECOVERED, LIMB_LOST)
 """How a frame went. Lost: its pose does not explain the pictures. No evidence: nothing is to be seen, the pose is held.
-Recovered: tracked again by a search for the body, having been lost. Limb lost: the body is followed, but the silhouettes
-deny one of its limbs (`FrameResult.limbs_lost`)."""
+Recovered: tracked again by a search for the body, having been lost. Limb lost: the body is followed, but the
+silhouettes deny one of its limbs (`FrameResult.limbs_lost`)."""
 
 LIMB_LOST_SHARE = 0.06
 """Of a limb's area: beyond this share it is lost. On the choosing half of the drawn suite (eleven clips, refined; lost:
@@ -158,8 +158,8 @@ class LayerRecord:
 class FrameResult:
     """The result of one frame. evaluations : poses weighed. carried : what the next frame starts from. tracking : one
     of TRACKING_STATES. overlap : how well the silhouettes of pose and masks agree (f_s, 0 to 1), NaN where unknown.
-    doubts : frames in a row, this one included, that looked lost. disagreement : of each limb the share of its area that
-    silhouettes and pose do not agree about (`agreement.Disagreement.shares`); empty where nothing was compared.
+    doubts : frames in a row, this one included, that looked lost. disagreement : of each limb the share of its area
+    that silhouettes and pose do not agree about (`agreement.Disagreement.shares`); empty where nothing was compared.
     """
 
     frame: int

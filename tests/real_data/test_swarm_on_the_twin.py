@@ -17,7 +17,7 @@ from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import sign_test
 from studio.experiments.tracked import Attempt, Tracked, track
 from studio.experiments.tracking_trials import Contender
-from studio.settings import usual_weighting
+from studio.settings import DEFAULT_WEIGHTING
 from studio.synthesis.recipes import synthesize
 from studio.tracking.evaluations import knobs_for_evaluations
 
@@ -97,9 +97,7 @@ def test_the_bundled_walk_with_defaults_and_1000_evaluations(tracker: str) -> No
     shelf = FootageShelf(SAMPLES)
     changes = knobs_for_evaluations(tracker, EVALUATIONS)
     try:
-        found = [
-            track(Attempt("walk", tracker, usual_weighting(tracker), seed, changes), shelf) for seed in SEEDS
-        ]
+        found = [track(Attempt("walk", tracker, DEFAULT_WEIGHTING, seed, changes), shelf) for seed in SEEDS]
     finally:
         shelf.close()
     assert mean(found) <= 40.0
