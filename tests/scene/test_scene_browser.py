@@ -58,7 +58,6 @@ def control() -> FakeControl:
 @pytest.fixture
 def stage(workspace: Workspace, control: FakeControl) -> Iterator[SceneStage]:
     made = SceneStage(workspace, control)
-    made.start()
     yield made
     made.stop()
 
@@ -136,7 +135,7 @@ def test_a_person_sees_the_run_and_moves_the_survival_rate(
     page.get_by_text("In use since frame 4, layer 1.").wait_for(timeout=PATIENCE * 1000)
     page.get_by_text("• survival rate").wait_for(timeout=PATIENCE * 1000)
     control.say(LayerFinished("swaying", "run-1", cloud_record(human, 4, 0), True))
-    clouds = stage._director.state.run.drawing.particles  # pyright: ignore[reportOptionalMemberAccess]
+    clouds = stage._director.state.run.drawing.particles
     until(page, lambda: [handle.visible for handle in clouds.handles] == [True, False, False, False])
 
     page.get_by_role("tab", name="Show").click()

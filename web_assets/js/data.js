@@ -5,6 +5,7 @@ import { onEvent } from "./live.js";
 import { complain } from "./messages.js";
 import { paced } from "./pace.js";
 import { refreshSessions } from "./rail.js";
+import { dressScene } from "./scene_window.js";
 import { isWatched } from "./search_speed.js";
 import { get, set, watch } from "./state.js";
 
@@ -164,7 +165,7 @@ export function startData() {
   onEvent("scene", takeScene);
   let before = false;
   watch(["connected"], () => {
-    if (get("connected") && before) { scene = {}; sessionsLater(); summaryLater(); }
+    if (get("connected") && before) { scene = {}; dressScene(); sceneLater(); sessionsLater(); summaryLater(); }
     before ||= get("connected");
   });
 }
