@@ -85,7 +85,7 @@ class WindowScenes:
             for window, entry in self._entries.items():
                 if window in windows or entry.stage.is_viewed:
                     entry.used = now
-            gone = [window for window, entry in self._entries.items() if now - entry.used >= self.grace]
+            gone = [window for window, entry in self._entries.items() if now - entry.used > self.grace]
             closing = [self._entries.pop(window) for window in gone]
         for entry in closing:
             _close(entry)

@@ -193,7 +193,8 @@ def test_a_window_that_is_gone_frees_its_scene_and_one_that_is_loaded_again_find
             threads += [scene._director._presenter._thread, scene._server._websock_server._server_thread]
     assert all(thread.is_alive() for thread in threads)
     # Loaded again, it is as it was; without a view of the scene it is kept as long as the page hears events.
-    with windows.socket("/api/events?window=w2"):
+    with windows.socket("/api/events?window=w2") as events:
+        events.recv(timeout=60)
         windows.scenes.grace = 0.0
         until(lambda: set(windows.scenes.open_scenes()) == {"w2"})
         assert windows.scenes.scene("w2") is scene
