@@ -90,9 +90,11 @@ function takeScene(event) {
 /** A layer: those of a what-if stand beside the stored answer; those of a frame in progress are shown when it is slow. */
 function takeLayer(event) {
   if (event.reannealed) {
+    // What another window anneals again, or this one did before it moved on, changes nothing here.
+    if (event.frame !== get("frame")) return;
     const before = get("whatIf");
     const goesOn = event.layer > 0 && before?.[0].frame === event.frame;
-    return set({ frame: event.frame, whatIf: [...(goesOn ? before.filter((layer) => layer.layer < event.layer) : []), event] });
+    return set({ whatIf: [...(goesOn ? before.filter((layer) => layer.layer < event.layer) : []), event] });
   }
   layers = [...layers.filter((layer) => layer.frame === event.frame && layer.layer < event.layer), event];
   if (!get("follow")) return;
