@@ -57,9 +57,9 @@ export function enterScene() {
   (tab ?? frame).focus();
 }
 
-/** Escape gives the keyboard back to the timeline. */
+/** Escape gives the keyboard back to the timeline, unless it closes something first. */
 function leaveScene(event) {
-  if (event.key !== "Escape" || event.defaultPrevented) return;
+  if (event.key !== "Escape" || event.target.closest?.("[aria-expanded=true], [role=dialog]")) return;
   event.target.blur?.();
   document.getElementById("track").focus();
 }
@@ -71,7 +71,7 @@ export function startSceneFrame() {
     dress();
     for (const kind of ["keydown", "keyup"]) frame.contentDocument.body.addEventListener(kind, keepToControls);
     frame.contentWindow.addEventListener("keydown", takeFirst, true);
-    frame.contentWindow.addEventListener("keydown", leaveScene);
+    frame.contentWindow.addEventListener("keydown", leaveScene, true);
     // Whoever clicks a tab goes on with the timeline's keys.
     frame.contentWindow.addEventListener("click", (event) => { if (event.detail) event.target.closest?.("[role=tab]")?.blur(); });
   });
