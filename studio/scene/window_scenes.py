@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
+from studio.capture.freed_memory import give_back_freed_memory
 from studio.errors import StudioError
 from studio.scene.recording import record_scene
 from studio.scene.stage import SceneStage
@@ -14,7 +15,7 @@ from studio.scene.wishes import Control
 from studio.sessions.workspace import Workspace
 
 MOST_SCENES = 32
-"""A scene takes two threads, six file descriptors and about 7 MB, its footage's pictures aside."""
+"""A scene takes two threads, six file descriptors and about 25 MB with four cameras of 640 × 480."""
 GRACE_SECONDS = 60.0
 """How long a scene outlives its window: a page that is loaded again finds it as it was."""
 _LOG = logging.getLogger(__name__)
@@ -87,8 +88,10 @@ class WindowScenes:
                     entry.used = now
             gone = [window for window, entry in self._entries.items() if now - entry.used > self.grace]
             closing = [self._entries.pop(window) for window in gone]
-        for entry in closing:
-            _close(entry)
+        while closing:
+            _close(closing.pop())
+        if gone:
+            give_back_freed_memory()
 
     def stop(self) -> None:
         """Close all scenes, for good."""
