@@ -67,14 +67,14 @@ def address(stage: SceneStage) -> Iterator[str]:
     """Where the scene is served, by the web application's relay without its access guard."""
     app = FastAPI()
     app.include_router(router)
-    app.state.doors = SimpleNamespace(scene_port=stage.port, stage=stage)
+    app.state.doors = SimpleNamespace(scenes=SimpleNamespace(scene=lambda window: stage))
     listening = socket.socket()
     listening.bind(("127.0.0.1", 0))
     listening.listen()
     server = uvicorn.Server(uvicorn.Config(app, log_level="error", ws="websockets-sansio"))
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
     thread.start()
-    yield f"http://127.0.0.1:{listening.getsockname()[1]}/scene/?fixedDpr=1"
+    yield f"http://127.0.0.1:{listening.getsockname()[1]}/scene/a-window/?fixedDpr=1"
     server.should_exit = True
     thread.join(10.0)
     listening.close()
