@@ -13,7 +13,7 @@ import uvicorn
 from studio.errors import StudioError
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.scene.presets import PRESETS
-from studio.scene.stage import SceneStage
+from studio.scene.window_scenes import WindowScenes
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 from studio.web.access import binding_rule, new_token
@@ -66,7 +66,7 @@ def serve(
             app = build_app(
                 workspace,
                 control,
-                SceneStage(workspace, control),
+                WindowScenes(workspace, control),
                 token,
                 hosts=hosts,
                 footage_roots=default_footage_roots(workspace.root),

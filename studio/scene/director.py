@@ -117,11 +117,20 @@ class Director:
 
     def reanneal_shown(self) -> None:
         """Anneal the shown frame again with the settings in use; the stored answer stays beside it."""
-        run, frame = self.state.run, self.state.shown.frame
-        if run is None or run.opened.run is None or frame is None:
+        frame = self.state.shown.frame
+        if frame is None:
             raise StudioError("No frame is shown.", "Open a run and choose a frame first.")
+        self.search(lambda: self.wishes.reanneal(frame))
+
+    def search(self, command: Callable[[], None]) -> None:
+        """Give the tracking process a command about the run that is shown here. Raises StudioError while another
+        run is tracked, or none is shown.
+        """
+        run = self.state.run
+        if run is None or run.opened.run is None:
+            raise StudioError("No run is open.", "Open or start a run first.")
         self.wishes.make_current(run.opened.session.path, run.opened.run.folder)
-        self.wishes.reanneal(frame)
+        command()
 
     def propose(self, proposal: Proposal) -> None:
         """Show a start pose that was found, in its session and frame."""

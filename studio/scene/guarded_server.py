@@ -8,6 +8,7 @@ that do not carry a secret header (which only the web application's relay knows)
 import contextlib
 import hmac
 import secrets
+import threading
 from collections.abc import Iterator
 
 import rich
@@ -16,6 +17,7 @@ from viser.infra import WebsockClientConnection
 
 RELAY_HEADER = "X-Studio-Relay"
 _POLICY_VIOLATION = 1008
+_CONSOLE = threading.Lock()
 
 
 class GuardedServer(viser.ViserServer):
@@ -36,6 +38,11 @@ class GuardedServer(viser.ViserServer):
     def relay_headers(self) -> dict[str, str]:
         """What the relay must send when it opens the socket; never written to a log or a page."""
         return {RELAY_HEADER: self._relay_secret}
+
+    @property
+    def is_viewed(self) -> bool:
+        """Whether a browser is connected, be it only just."""
+        return bool(self._websock_server._live_connections)
 
     def request_share_url(self, verbose: bool = True) -> str | None:
         """None: the scene is never published, whoever asks."""
@@ -58,9 +65,11 @@ class GuardedServer(viser.ViserServer):
 @contextlib.contextmanager
 def _quietly() -> Iterator[None]:
     """viser prints its own address and its end, told to be quiet or not: a second address would mislead people."""
-    console = rich.get_console()
-    before, console.quiet = console.quiet, True
-    try:
-        yield
-    finally:
-        console.quiet = before
+    # One at a time: two that overlap would leave the console quiet for good.
+    with _CONSOLE:
+        console = rich.get_console()
+        before, console.quiet = console.quiet, True
+        try:
+            yield
+        finally:
+            console.quiet = before

@@ -42,7 +42,7 @@ def track_watched(
     try:
         if scene:
             stage = SceneStage(workspace, control)
-            viewer = LightViewer(stage.start(), stage.relay_headers())
+            viewer = LightViewer(stage.port, stage.relay_headers())
             stage.show_run(session.name, run.name)
         events = control.subscribe()
         control.open_run(session.name, run.name)

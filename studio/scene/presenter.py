@@ -31,7 +31,7 @@ class Presenter:
 
     def __init__(
         self,
-        events: "Subscription | queue.Queue[Event]",
+        events: Subscription,
         *,
         heard: Callable[[Event], None],
         tick: Callable[[float], bool],
@@ -54,9 +54,9 @@ class Presenter:
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread; returns when it has ended."""
+        """Take no more events and end the thread; returns when it has ended."""
         self._stopping.set()
-        self._events.put(_WAKE)
+        self._events.close()
         if self._thread.is_alive() and threading.current_thread() is not self._thread:
             self._thread.join(timeout=10.0)
 
@@ -99,7 +99,7 @@ class Presenter:
         try:
             event = self._events.get(timeout=max(0.0, patience))
         except queue.Empty:
-            if getattr(self._events, "closed", False):
+            if self._events.closed:
                 self._stopping.wait(REDRAW_SECONDS)
             return
         while True:

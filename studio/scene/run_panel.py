@@ -52,6 +52,10 @@ class Transport(Protocol):
         """Anneal the shown frame again."""
         ...
 
+    def search(self, command: Callable[[], None]) -> None:
+        """Give a command about the shown run. Raises StudioError while another is tracked."""
+        ...
+
 
 class RunPanel:
     """refused : tells the person about a command that was refused."""
@@ -165,15 +169,13 @@ class RunPanel:
             self.follow.value = follow
 
     async def _track_clicked(self, event: viser.GuiEvent) -> None:
-        self._obey(
-            {_TRACK[0]: self._wishes.start, _TRACK[1]: self._wishes.pause}.get(
-                event.target.value, self._cancel
-            )
-        )
+        commands = {_TRACK[0]: self._wishes.start, _TRACK[1]: self._wishes.pause}
+        self._obey(lambda: self._transport.search(commands.get(event.target.value, self._wishes.cancel)))
 
     async def _step_clicked(self, event: viser.GuiEvent) -> None:
-        actions = {_STEP[0]: self._wishes.step_layer, _STEP[1]: self._wishes.step_frame}
-        self._obey(actions.get(event.target.value, self._transport.reanneal_shown))
+        steps = {_STEP[0]: self._wishes.step_layer, _STEP[1]: self._wishes.step_frame}
+        step = steps.get(event.target.value)
+        self._obey((lambda: self._transport.search(step)) if step else self._transport.reanneal_shown)
 
     async def _pace_chosen(self, event: viser.GuiEvent) -> None:
         chosen = {choice.label: choice.seconds_a_layer for choice in offered(self._pace)}
@@ -209,9 +211,6 @@ class RunPanel:
 
     async def _follow_ticked(self, event: viser.GuiEvent) -> None:
         self._transport.set_playback(follow=bool(event.target.value))
-
-    def _cancel(self) -> None:
-        self._wishes.cancel()
 
     def _obey(self, action: Callable[[], None]) -> None:
         try:

@@ -18,7 +18,7 @@ from studio.scene.proposal import EditWish, Proposal
 from studio.scene.scene_drawing import SceneDrawing
 from studio.scene.shown_run import ShownRun
 from studio.scene.view_options import Shown, ViewOptions
-from studio.scene.wishes import Control, Wishes
+from studio.scene.wishes import SEARCHING, Control, Wishes
 from studio.sessions.workspace import Workspace
 from studio.worker.events import Event, FrameFinished, LayerFinished, SettingsApplied, StateChanged
 
@@ -46,6 +46,7 @@ class SceneState:
         self.live = LiveSearch()
         self.run: ShownRun | None = None
         self._proposal: Proposal | None = None
+        self._searching = False
         self._dress()
 
     def attach(self, panel: Panel, presenter: Presenter, posing: PoseDesk) -> None:
@@ -179,20 +180,18 @@ class SceneState:
         self._presenter.redraw()
 
     def propose(self, proposal: Proposal) -> None:
-        """Show a start pose that was found, if it is one of the body that is shown.
+        """Show a start pose that was found, with its session alone, if it is one of the session's body.
 
-        It stays when another run of its session is opened, until a person saves it or ends the editing.
+        It stays until a person saves it or ends the editing, opens a run or another session, or tracks.
         """
         tell(self._server, "Start pose found", proposal.said)
         self._proposal = proposal
-        if self.shown.session != proposal.session:
-            self._open(proposal.session, "")
-        else:
-            self._show_proposal()
+        self.show_run(proposal.session, "", None, None)
+        self._show_proposal()
 
     def _show_proposal(self) -> None:
         found, run = self._proposal, self.run
-        if found is None or run is None or run.opened.session.name != found.session:
+        if found is None or run is None or (self.shown.session, self.shown.run) != (found.session, ""):
             self._proposal = None
             return
         if len(run.opened.body.parameters) == len(found.pose):
@@ -209,8 +208,6 @@ class SceneState:
         if isinstance(event, StateChanged):
             self._presenter.yield_to_live(event.live is not None and event.state == "tracking")
             self._show_state()
-            if event.run and not self.shown.session and self.shown.follow:
-                self._open(event.session, event.run)
         if self.run is None or (event.session, event.run) != (self.shown.session, self.shown.run):
             return
         if isinstance(event, SettingsApplied):
@@ -222,12 +219,12 @@ class SceneState:
 
     def _show_state(self) -> None:
         state, shown = self._control.state, self.shown
+        is_shown = (state.session, state.run) == (shown.session, shown.run)
+        before, self._searching = self._searching, is_shown and state.state in SEARCHING
+        if self._searching and not before and shown.editing:
+            self._posing.end()  # what is searched is to be seen now
         self._panel.run.show_pace(state.seconds_a_layer)
-        if (
-            self.run is None
-            or (state.session, state.run) == (shown.session, shown.run)
-            or state.state == "lost"
-        ):
+        if self.run is None or is_shown or state.state == "lost":
             self._panel.run.show_state(state)
         else:
             first, last = self.run.opened.span

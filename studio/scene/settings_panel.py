@@ -93,7 +93,11 @@ class SettingsPanel:
             self._add(tracker[:_FOREMOST], now)
             self._add_folded("More of the search", tracker[_FOREMOST:], now)
             others = ()
-            for title, group in (("When lost", settings.recovery), ("Recording", settings.recording)):
+            for title, group in (
+                ("Refinement", settings.refinement),
+                ("When lost", settings.recovery),
+                ("Recording", settings.recording),
+            ):
                 declared = knobs_of(type(group))
                 self._add_folded(title, declared, now)
                 others += declared

@@ -50,7 +50,7 @@ from studio.web import (
 from studio.web.access import AccessGuard, HostRule, binding_rule
 from studio.web.body_limit import BodyLimit
 from studio.web.content_policy import PolicyHeaders
-from studio.web.doors import Control, Doors, Stage
+from studio.web.doors import Control, Doors, Scenes
 from studio.web.error_responses import ErrorsInWords, add_error_handlers, log
 from studio.web.event_stream import EventStream
 from studio.web.pages import assets_folder
@@ -96,12 +96,13 @@ ROUTERS = (
     scene_relay.router,
     event_stream.router,
 )
+SWEEP_SECONDS = 5.0
 
 
 def build_app(
     workspace: Workspace,
     control: Control,
-    stage: Stage,
+    scenes: Scenes,
     token: str,
     *,
     hosts: HostRule | None = None,
@@ -109,13 +110,13 @@ def build_app(
     presets: Sequence[Preset] = (),
     log_path: Path | None = None,
 ) -> FastAPI:
-    """The application. Serving it starts `stage`, and ends `stage` and `control` when it stops.
+    """The application. It ends `scenes` and `control` when it stops.
 
     token : what lets a browser in. hosts : the Host headers that are answered (default: this machine's
     loopback). presets : the studio's own. footage_roots : folders from which footage may be imported by
     path. log_path : named in answers to unforeseen errors.
     """
-    doors = Doors(workspace, control, stage, EventStream(control), footage_roots, presets, log_path)
+    doors = Doors(workspace, control, scenes, EventStream(control), footage_roots, presets, log_path)
     app = FastAPI(
         title="Capture studio",
         responses={status: {"model": ErrorAnswer} for status in (403, 404, 409, 422, 500)},
@@ -140,23 +141,30 @@ def build_app(
 
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
-    """Start the scene and the stream; end them and the tracking process, whatever happens."""
+    """Start the stream and the tracking process; end them and the scenes, whatever happens."""
     doors: Doors = app.state.doors
+    sweeping = asyncio.create_task(_close_unused_scenes(doors))
     try:
-        doors.scene_port = await asyncio.to_thread(doors.stage.start)
         doors.events.start()
-        scene_routes.tell_moves(doors)
+        scene_routes.report_moves(doors)
         await asyncio.to_thread(doors.control.start)
         yield
     finally:
-        doors.scene_port = 0
+        sweeping.cancel()
         await doors.jobs.end()
         await asyncio.to_thread(doors.desk.close)
         await asyncio.to_thread(doors.learning.close)
         await asyncio.to_thread(doors.cameras.close)
         await doors.events.stop()
         await asyncio.to_thread(forget_composers)
-        ends = (asyncio.to_thread(doors.stage.stop), asyncio.to_thread(doors.control.close))
+        ends = (asyncio.to_thread(doors.scenes.stop), asyncio.to_thread(doors.control.close))
         for problem in await asyncio.gather(*ends, return_exceptions=True):
             if isinstance(problem, BaseException):
                 log.error("closing failed", exc_info=problem)
+
+
+async def _close_unused_scenes(doors: Doors) -> None:
+    """Let the scenes of windows that are gone go, over and over."""
+    while True:
+        await asyncio.sleep(SWEEP_SECONDS)
+        await asyncio.to_thread(doors.scenes.close_unused, doors.events.windows())

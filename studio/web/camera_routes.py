@@ -46,7 +46,7 @@ def cameras(doors: Door) -> CamerasView:
 async def preview(wish: PreviewWish, request: Request, doors: Door) -> CamerasView:
     """Open these cameras instead of those before. They close when nobody asks for them for a while."""
     server = request.scope.get("server") or ("", 0)
-    ports = {int(server[1] or 0), doors.scene_port}
+    ports = {int(server[1] or 0), *(scene.port for scene in doors.scenes.open_scenes().values())}
     addresses = [_address(one, doors) for one in wish.cameras]
     await asyncio.to_thread(_open, doors, addresses, ports)
     return _view(doors)

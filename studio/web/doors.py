@@ -6,7 +6,7 @@ brings them together.
 """
 
 import dataclasses
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Protocol
@@ -20,6 +20,7 @@ from studio.web.background_jobs import BackgroundJobs
 from studio.web.calibration_proposals import Proposals
 from studio.web.event_stream import EventStream
 from studio.web.presets import Preset
+from studio.web.windows import Window
 from studio.worker.camera_desk import CameraDesk, DeskRecording
 from studio.worker.commands import Close, Command
 from studio.worker.comparison_desk import ComparisonDesk, ComparisonState
@@ -132,14 +133,11 @@ class ScenePoses(Protocol):
 
 
 class Stage(Protocol):
-    """The 3-D scene (`scene.stage.SceneStage`)."""
+    """A window's 3-D scene (`scene.stage.SceneStage`)."""
 
-    def start(self) -> int:
-        """Build the scene; the loopback port that it listens on."""
-        ...
-
-    def stop(self) -> None:
-        """Close it."""
+    @property
+    def port(self) -> int:
+        """The loopback port that it listens on."""
         ...
 
     def relay_headers(self) -> Mapping[str, str]:
@@ -149,10 +147,6 @@ class Stage(Protocol):
     @property
     def shown(self) -> Shown:
         """What is shown now."""
-        ...
-
-    def watch(self, callback: Callable[[Shown], None]) -> None:
-        """Hear of every move that the scene's own controls make."""
         ...
 
     def show_run(
@@ -190,9 +184,31 @@ class Stage(Protocol):
         """Play stored frames, or stop."""
         ...
 
-    @property
-    def record_scene(self) -> Writer:
-        """Writes a run's scene as a recording, beside the one that is shown."""
+
+class Scenes(Protocol):
+    """The scenes of all windows (`scene.window_scenes.WindowScenes`)."""
+
+    record_scene: Writer
+    """Writes a run's scene as a recording, beside those that are shown."""
+
+    def scene(self, window: str) -> Stage:
+        """The scene of a window, built where there is none yet. Raises TooManyScenesError (503)."""
+        ...
+
+    def open_scenes(self) -> Mapping[str, Stage]:
+        """The scenes that there are, by window."""
+        ...
+
+    def watch(self, moved: Callable[[str, Shown], None]) -> None:
+        """Call `moved` with the window and what it shows whenever a scene's own controls move it."""
+        ...
+
+    def close_unused(self, windows: Collection[str]) -> None:
+        """Close the scenes whose window is gone. windows : those that are known to be there."""
+        ...
+
+    def stop(self) -> None:
+        """Close all scenes."""
         ...
 
 
@@ -200,21 +216,19 @@ class Stage(Protocol):
 class Doors:
     """Everything a route may use, kept in `app.state.doors`.
 
-    scene_port : of the inner viser server, 0 while it is not running. footage_roots : folders that may be
-    imported from. presets : the studio's own. log_path : the server's log file. proposals :
-    calibrations not in use yet. uploads : those under way, by their identifiers. jobs : work in the background. desk :
-    where comparisons are worked at, learning : where behaviour models are learnt, cameras : where live ones are looked
-    at and recorded.
+    scenes : of all windows. footage_roots : folders that may be imported from. presets : the studio's own. log_path :
+    the server's log file. proposals : calibrations not in use yet. uploads : those under way, by their identifiers.
+    jobs : work in the background. desk : where comparisons are worked at, learning : where behaviour models are
+    learnt, cameras : where live ones are looked at and recorded.
     """
 
     workspace: Workspace
     control: Control
-    stage: Stage
+    scenes: Scenes
     events: EventStream
     footage_roots: tuple[Path, ...] = ()
     presets: Sequence[Preset] = ()
     log_path: Path | None = None
-    scene_port: int = 0
     proposals: Proposals = field(default_factory=Proposals)
     uploads: dict[str, dict[str, int]] = field(default_factory=dict)
     jobs: BackgroundJobs = field(init=False)
@@ -255,6 +269,14 @@ def doors_of(request: Request) -> Doors:
 Door = Annotated[Doors, Depends(doors_of)]
 
 
+def scene_of(doors: Door, window: Window = "") -> Stage:
+    """The scene of the window that asks, as a dependency of routes."""
+    return doors.scenes.scene(window)
+
+
+Scene = Annotated[Stage, Depends(scene_of)]
+
+
 def let_go(doors: Doors, session: str, run: str = "") -> None:
     """Free a session (or only a run of it) for renaming or deleting: footage, results and scene are closed.
 
@@ -266,7 +288,7 @@ def let_go(doors: Doors, session: str, run: str = "") -> None:
     state = doors.control.state
     if state.state != "lost" and state.session == session and (not run or state.run == run) and state.run:
         doors.control.request(Close())
-    shown = doors.stage.shown
-    if shown.session == session and (not run or shown.run == run):
-        doors.stage.show_run(session if run else "")
+    for scene in doors.scenes.open_scenes().values():
+        if scene.shown.session == session and (not run or scene.shown.run == run):
+            scene.show_run(session if run else "")
     forget_composers()

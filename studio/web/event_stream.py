@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
 from studio.web.event_encoding import as_json, key_of, message_of
+from studio.web.windows import WindowInQuery
 from studio.worker.events import Event, SettingsApplied, StateChanged
 from studio.worker.watchers import Subscription
 
@@ -26,10 +27,11 @@ LIMIT = 256
 
 
 class Watcher:
-    """One browser's messages that have not been sent yet. Used from the event loop only."""
+    """One window's messages that have not been sent yet. Used from the event loop only."""
 
-    def __init__(self, limit: int = LIMIT) -> None:
+    def __init__(self, limit: int = LIMIT, window: str = "") -> None:
         self.dropped = 0
+        self.window = window
         self._limit = limit
         self._number = 0
         self._waiting: OrderedDict[object, str] = OrderedDict()
@@ -79,9 +81,9 @@ class EventStream:
             await asyncio.gather(self._task, return_exceptions=True)
             self._task = None
 
-    def watch(self) -> Watcher:
-        """A new watcher, greeted with the present state and settings."""
-        watcher = Watcher()
+    def watch(self, window: str = "") -> Watcher:
+        """A new watcher, greeted with the present state and settings. window : that it belongs to, "" for none."""
+        watcher = Watcher(window=window)
         for message in (message_of(self._control.state), self._settings):
             if message is not None:
                 watcher.offer(key_of(message), as_json(message))
@@ -92,20 +94,25 @@ class EventStream:
         """Forget a watcher."""
         self._watchers.discard(watcher)
 
-    def publish(self, message: dict[str, object]) -> None:
-        """Send a message of the web's own to all; from any thread."""
+    def windows(self) -> set[str]:
+        """The windows that watch."""
+        return {watcher.window for watcher in self._watchers}
+
+    def publish(self, message: dict[str, object], window: str | None = None) -> None:
+        """Send a message of the web's own to one window, or to all (None); from any thread."""
         if self._loop is not None and not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._offer, message)
+            self._loop.call_soon_threadsafe(self._offer, message, window)
 
     def session_changed(self, session: str, run: str = "") -> None:
         """Tell all pages that a session is not as it was; "" for the list of them. run : that it concerns, if one."""
         self.publish({"type": "sessions", "session": session, "run": run})
 
-    def _offer(self, message: dict[str, object]) -> None:
-        if not self._watchers:
+    def _offer(self, message: dict[str, object], window: str | None = None) -> None:
+        watchers = [watcher for watcher in self._watchers if window in (None, watcher.window)]
+        if not watchers:
             return
         text, key = as_json(message), key_of(message)
-        for watcher in self._watchers:
+        for watcher in watchers:
             watcher.offer(key, text)
 
     def _take(self, event: Event) -> None:
@@ -129,11 +136,13 @@ class EventStream:
 
 
 @router.websocket("/api/events")
-async def events(socket: WebSocket) -> None:
-    """Every event as one JSON text message, state and settings first; what a browser sends is ignored."""
+async def events(socket: WebSocket, window: WindowInQuery = "") -> None:
+    """Every event as one JSON text message, state and settings first; what a browser sends is ignored. Of the
+    `scene` events only those of `window`'s own scene.
+    """
     stream: EventStream = socket.app.state.doors.events
     await socket.accept()
-    watcher = stream.watch()
+    watcher = stream.watch(window)
     listening = asyncio.create_task(_until_it_leaves(socket))
     sending = asyncio.create_task(_send_all(socket, watcher))
     try:

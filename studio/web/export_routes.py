@@ -74,7 +74,7 @@ async def begin_export(session: OpenSession, run: OpenRun, wish: ExportRequest, 
             wish.options,
             progress=job.report,
             cancelled=job.cancelled,
-            record_scene=doors.stage.record_scene,
+            record_scene=doors.scenes.record_scene,
         )
         return {"result": kept}
 

@@ -1,10 +1,11 @@
 """Finding a start pose, in the background, with progress as `initialise` events; the scene shows what is found."""
 
 import asyncio
+from contextlib import suppress
 
 from fastapi import APIRouter
 
-from studio.errors import SettingsError
+from studio.errors import SettingsError, StudioError
 from studio.runs.initialising import WEIGHTING, InitialPose, initialise, keep_pose
 from studio.runs.new_run import checked_frames
 from studio.web.background_jobs import Job
@@ -13,6 +14,7 @@ from studio.web.initialisation_schemas import InitialisationRequest, Initialisat
 from studio.web.job_kinds import START_POSE
 from studio.web.job_routes import add_job_routes
 from studio.web.session_routes import OpenSession
+from studio.web.windows import Window
 from studio.weighting.catalogue import WEIGHTINGS
 
 router = APIRouter(prefix="/api", tags=["start poses"])
@@ -20,7 +22,7 @@ router = APIRouter(prefix="/api", tags=["start poses"])
 
 @router.post("/sessions/{session}/initialise", status_code=202)
 async def begin_initialisation(
-    session: OpenSession, wish: InitialisationRequest, doors: Door
+    session: OpenSession, wish: InitialisationRequest, doors: Door, window: Window = ""
 ) -> InitialisationState:
     """Begin to look for the pose in a frame. Ask for its state, or wait for `initialise` events."""
     checked_frames(session, wish.frame, wish.frame + 1)
@@ -42,7 +44,9 @@ async def begin_initialisation(
             cancelled=job.cancelled,
         )
         place = keep_pose(session, found, wish.replace)
-        doors.stage.poses.propose(session.name, found.pose.tolist(), found.source, found.frame)
+        with suppress(StudioError):  # without room for a scene the pose is found all the same
+            scene = doors.scenes.scene(window)
+            scene.poses.propose(session.name, found.pose.tolist(), found.source, found.frame)
         return {"file": place.name, **_answer(found)}
 
     state = InitialisationState(session=session.name, frame=wish.frame)

@@ -16,7 +16,7 @@ from studio.runs.start_pose_file import keep_start_pose
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.web.background_jobs import Job
-from studio.web.doors import Door
+from studio.web.doors import Door, Scene
 from studio.web.pose_schemas import (
     BetterPoseRequest,
     DragRequest,
@@ -103,9 +103,9 @@ async def begin_refining_pose(session: OpenSession, wish: BetterPoseRequest, doo
 
 
 @router.get("/scene/edit")
-def editing(doors: Door) -> EditState:
-    """What is being edited in the scene, with the pose as it is now."""
-    found = doors.stage.poses.editing
+def editing(scene: Scene) -> EditState:
+    """What is being edited in the asking window's scene, with the pose as it is now."""
+    found = scene.poses.editing
     if found is None:
         return EditState()
     return EditState(
@@ -119,7 +119,7 @@ def editing(doors: Door) -> EditState:
 
 
 @router.post("/scene/edit", status_code=202)
-def edit(wish: EditRequest, doors: Door) -> None:
+def edit(wish: EditRequest, doors: Door, scene: Scene) -> None:
     """Let a start pose, or a frame of a run, be edited in the scene."""
     session = doors.workspace.session(wish.session)
     run = session.run(wish.run) if wish.run else None
@@ -131,13 +131,13 @@ def edit(wish: EditRequest, doors: Door) -> None:
         _fitting(run.body() if run else session.body(), wish.pose)
     if wish.frame is not None:
         checked_frames(session, wish.frame, wish.frame + 1)
-    doors.stage.poses.edit(session.name, run.name if run else "", wish.frame, wish.pose)
+    scene.poses.edit(session.name, run.name if run else "", wish.frame, wish.pose)
 
 
 @router.delete("/scene/edit", status_code=202)
-def leave(doors: Door) -> None:
+def leave(scene: Scene) -> None:
     """Leave off editing; what was not saved is gone when another run is opened."""
-    doors.stage.poses.leave()
+    scene.poses.leave()
 
 
 def _body(session: Session, wish: PoseRequest) -> tuple[BodyModel, StoredRun | None]:

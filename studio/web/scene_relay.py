@@ -1,5 +1,5 @@
-"""viser behind our own door: its one-file client at `GET /scene/`, its socket relayed at `WebSocket
-/scene`.
+"""viser behind our own door: its one-file client at `GET /scene/WINDOW/`, its socket relayed at `WebSocket
+/scene/WINDOW` to the scene of that window. Without a window's name: the scene of all callers that send none.
 
 The client derives its socket's address from the page's, without the trailing slash. Both come through the
 access guard like everything else; the inner server listens on loopback and wants a secret header that only
@@ -20,6 +20,7 @@ from websockets.typing import Subprotocol
 
 from studio.errors import StudioError
 from studio.web.doors import Doors
+from studio.web.windows import WindowInPath
 
 router = APIRouter(tags=["scene"], include_in_schema=False)
 
@@ -44,14 +45,16 @@ def client_page() -> tuple[bytes, bytes]:
 
 
 @router.get("/scene")
-def scene_without_slash() -> Response:
-    """To `/scene/`, from which the client finds its socket."""
-    return RedirectResponse("/scene/", status_code=308)
+@router.get("/scene/{window}")
+def scene_without_slash(request: Request) -> Response:
+    """To the address with a slash, from which the client finds its socket."""
+    return RedirectResponse(f"{request.url.path}/", status_code=308)
 
 
 @router.get("/scene/")
+@router.get("/scene/{window}/")
 def scene_page(request: Request) -> Response:
-    """viser's client."""
+    """viser's client, the same for every window."""
     plain, packed = client_page()
     # The browser keeps the page and asks whether it changed: the client must be of the server's version.
     tag = f'"viser-{viser.__version__}"'
@@ -64,27 +67,34 @@ def scene_page(request: Request) -> Response:
 
 
 @router.websocket("/scene")
-async def scene_socket(browser: WebSocket) -> None:
-    """Carry messages both ways until either side ends."""
+async def common_scene_socket(browser: WebSocket) -> None:
+    """The scene of all callers that name no window."""
+    await scene_socket(browser, "")
+
+
+@router.websocket("/scene/{window}")
+async def scene_socket(browser: WebSocket, window: WindowInPath) -> None:
+    """Carry messages between a window and its own scene until either side ends."""
     doors: Doors = browser.app.state.doors
     offered = [
         Subprotocol(name)
         for name in browser.scope.get("subprotocols", [])
         if name.startswith(SUBPROTOCOL_PREFIX)
     ]
-    if not doors.scene_port:
-        await browser.close(TRY_AGAIN, "the scene is not running")
-        return
     try:
+        scene = await asyncio.to_thread(doors.scenes.scene, window)
         inner = await connect(
-            f"ws://127.0.0.1:{doors.scene_port}",
+            f"ws://127.0.0.1:{scene.port}",
             subprotocols=offered or None,
-            additional_headers=dict(doors.stage.relay_headers()),
+            additional_headers=dict(scene.relay_headers()),
             compression=None,
             max_size=None,
             proxy=None,
             ping_interval=None,
         )
+    except StudioError as problem:
+        await browser.close(TRY_AGAIN, problem.message)
+        return
     except (OSError, InvalidHandshake, TimeoutError):
         await browser.close(TRY_AGAIN, "the scene cannot be reached")
         return

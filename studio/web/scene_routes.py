@@ -3,7 +3,7 @@
 from fastapi import APIRouter
 from pydantic import Field
 
-from studio.web.doors import Door, Doors, Shown
+from studio.web.doors import Door, Doors, Scene, Shown
 from studio.web.schemas import Request, RunName
 
 router = APIRouter(prefix="/api/scene", tags=["scene"])
@@ -30,43 +30,45 @@ class SceneWish(Request):
 
 
 @router.post("/show", status_code=204)
-def show(wish: SceneWish, doors: Door) -> None:
-    """Show a moment of a run (or a session without one). Names are checked before anything changes."""
-    stage, given = doors.stage, wish.model_fields_set
+def show(wish: SceneWish, doors: Door, scene: Scene) -> None:
+    """Show a moment of a run (or a session without one) in the asking window's scene. Names are checked before
+    anything changes.
+    """
+    given = wish.model_fields_set
     if wish.session is not None:
         session = doors.workspace.session(wish.session)
         run = session.run(wish.run).name if wish.run else ""
-        stage.show_run(session.name, run, wish.frame, wish.layer)
+        scene.show_run(session.name, run, wish.frame, wish.layer)
     else:
         if wish.frame is not None:
-            stage.show_frame(wish.frame)
+            scene.show_frame(wish.frame)
         if "layer" in given:
-            stage.show_layer(wish.layer)
+            scene.show_layer(wish.layer)
     if wish.follow is not None:
-        stage.follow(wish.follow)
+        scene.follow(wish.follow)
     if "look_through" in given:
-        stage.look_through(wish.look_through or None)
+        scene.look_through(wish.look_through or None)
     options = {
         name: tuple(value) if isinstance(value, list) else value for name, value in wish.options.items()
     }
     if wish.dark is not None:
         options["dark"] = wish.dark
     if options:
-        stage.set_options(**options)
+        scene.set_options(**options)
     if wish.playing is not None:
-        stage.play(wish.playing)
+        scene.play(wish.playing)
 
 
 @router.post("/view", status_code=204)
-def view(wish: SceneWish, doors: Door) -> None:
+def view(wish: SceneWish, doors: Door, scene: Scene) -> None:
     """The same under a name that says what it is for: the theme, the camera looked through."""
-    show(wish, doors)
+    show(wish, doors, scene)
 
 
-def tell_moves(doors: Doors) -> None:
-    """From now on, tell all watchers of the moves that the scene's own controls make (`scene` events)."""
+def report_moves(doors: Doors) -> None:
+    """From now on, report the moves that a scene's own controls make to its window (`scene` events)."""
 
-    def moved(shown: Shown) -> None:
+    def moved(window: str, shown: Shown) -> None:
         doors.events.publish(
             {
                 "type": "scene",
@@ -77,7 +79,8 @@ def tell_moves(doors: Doors) -> None:
                 "look_through": shown.look_through,
                 "follow": shown.follow,
                 "editing": shown.editing,
-            }
+            },
+            window,
         )
 
-    doors.stage.watch(moved)
+    doors.scenes.watch(moved)

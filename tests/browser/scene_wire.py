@@ -4,11 +4,8 @@ from collections.abc import Callable
 
 import msgspec
 import numpy as np
-import zstandard
 from playwright.sync_api import Page, WebSocket
-
-HEAD = 16
-ALIGNMENT = 8
+from scene_messages import decoded
 
 
 class SceneWire:
@@ -23,7 +20,7 @@ class SceneWire:
         page.on("websocket", self._opened)
 
     def _opened(self, socket: WebSocket) -> None:
-        if socket.url.endswith("/scene"):
+        if "/scene/" in socket.url:
             socket.on("framereceived", lambda content: self._raw.append(content))
             socket.on("framesent", self._sent)
 
@@ -74,31 +71,6 @@ class SceneWire:
         points = changes.get("points")
         if isinstance(points, np.ndarray) and name.startswith("/particles/"):
             self.clouds[name] = points.reshape(-1, 3)
-
-
-def decoded(content: bytes) -> list[dict]:
-    """The messages of one window: zstd-compressed msgpack, then the arrays that it points to, each aligned."""
-    packed = int.from_bytes(content[8:HEAD], "little")
-    plain = zstandard.ZstdDecompressor().decompress(
-        content[HEAD : HEAD + packed], max_output_size=int.from_bytes(content[:8], "little")
-    )
-    window = msgspec.msgpack.decode(plain)
-    place, buffers = HEAD + packed, []
-    for length in window["binaryBufferLengths"]:
-        place += -place % ALIGNMENT
-        buffers.append(content[place : place + length])
-        place += length
-    return [_with_arrays(message, buffers) for message in window["messages"]]
-
-
-def _with_arrays(value: object, buffers: list[bytes]) -> dict:
-    if isinstance(value, dict):
-        if "__binary_index" in value:
-            return np.frombuffer(buffers[value["__binary_index"]], value["dtype"])  # pyright: ignore[reportReturnType]
-        return {key: _with_arrays(entry, buffers) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_with_arrays(entry, buffers) for entry in value]  # pyright: ignore[reportReturnType]
-    return value  # pyright: ignore[reportReturnType]
 
 
 def until(page: Page, condition: Callable[[], object], patience: float = 60.0) -> None:

@@ -15,14 +15,27 @@ READ = "async (name) => (await import('/assets/js/state.js')).get(name)"
 
 
 class StudioPage:
-    """A browser window on a studio. with_scene : False leaves the 3-D scene blank (it takes long to draw)."""
+    """A browser window on a studio. with_scene : False leaves the 3-D scene blank (it takes long to draw). beside : the
+    window whose browser it is opened in, else one of its own.
+    """
 
     def __init__(
-        self, browser: Browser, studio: StudioServer, *, open_at: str = "", with_scene: bool = True
+        self,
+        browser: Browser,
+        studio: StudioServer,
+        *,
+        open_at: str = "",
+        with_scene: bool = True,
+        beside: "StudioPage | None" = None,
     ) -> None:
         self.studio = studio
-        self.context: BrowserContext = browser.new_context(
-            viewport={"width": 1280, "height": 800}, color_scheme="dark", accept_downloads=True
+        self._beside = beside
+        self.context: BrowserContext = (
+            beside.context
+            if beside is not None
+            else browser.new_context(
+                viewport={"width": 1280, "height": 800}, color_scheme="dark", accept_downloads=True
+            )
         )
         self.context.set_default_timeout(PATIENCE)
         self.page: Page = self.context.new_page()
@@ -39,6 +52,11 @@ class StudioPage:
     def scene(self) -> FrameLocator:
         """viser's own page."""
         return self.page.frame_locator("#scene")
+
+    @property
+    def name(self) -> str:
+        """The window's name, by which the studio knows its scene."""
+        return self.page.evaluate("async () => (await import('/assets/js/window.js')).windowName")
 
     def get(self, name: str) -> object:
         """An entry of the page's state."""
@@ -100,5 +118,8 @@ class StudioPage:
 
     def close(self) -> None:
         """Close the window; nothing went wrong in it."""
-        self.context.close()
+        if self._beside is None:
+            self.context.close()
+        else:
+            self.page.close()
         self.watch.check()

@@ -53,9 +53,9 @@ class StudioServer:
                 raise AssertionError(f"no address was printed: {text}")
             time.sleep(0.1)
 
-    def get(self, path: str) -> dict:
-        """A JSON answer of the API."""
-        answer = self._client.get(path)
+    def get(self, path: str, window: str = "") -> dict:
+        """A JSON answer of the API. window : that asks, by its name."""
+        answer = self._client.get(path, headers={"x-studio-window": window})
         assert answer.is_success, answer.text
         return answer.json()
 
@@ -65,9 +65,9 @@ class StudioServer:
         assert answer.is_success, answer.text
         return answer.text
 
-    def post(self, path: str, body: object = None, method: str = "POST") -> dict:
-        """Ask for something."""
-        answer = self._client.request(method, path, json=body)
+    def post(self, path: str, body: object = None, method: str = "POST", window: str = "") -> dict:
+        """Ask for something. window : that asks, by its name."""
+        answer = self._client.request(method, path, json=body, headers={"x-studio-window": window})
         assert answer.is_success, answer.text
         return answer.json() if answer.content else {}
 

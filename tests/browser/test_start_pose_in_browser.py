@@ -35,9 +35,9 @@ def test_a_start_pose_is_made_better_and_edited(browser: Browser, studio: Studio
     use = page.get_by_role("button", name="Use this pose")
     use.wait_for()
     wanted = true_poses()[0].tolist()
-    studio.post("/api/scene/edit", {"session": "toy", "frame": 0, "pose": wanted})
+    studio.post("/api/scene/edit", {"session": "toy", "frame": 0, "pose": wanted}, window=window.name)
     for _ in range(500):
-        told = studio.get("/api/scene/edit")
+        told = studio.get("/api/scene/edit", window.name)
         if told["editing"] and told["pose"] == wanted:
             break
         page.wait_for_timeout(20)

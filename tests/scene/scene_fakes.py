@@ -1,10 +1,10 @@
 """A tracking process that only remembers what it was asked."""
 
 import math
-import queue
 
 from studio.worker.commands import Command
 from studio.worker.events import Acknowledged, Event, StateChanged
+from studio.worker.watchers import Subscription, Watchers
 
 
 class FakeControl:
@@ -13,23 +13,21 @@ class FakeControl:
     def __init__(self, session: str = "", run: str = "", state: str = "idle") -> None:
         self.state = StateChanged(session, run, state, 0, 0, 0, 6, 5, math.nan, math.nan)
         self.commands: list[Command] = []
-        self.watchers: list[queue.Queue[Event]] = []
+        self.watchers = Watchers()
 
     def send(self, command: Command) -> None:
         """Remember a command."""
         self.commands.append(command)
 
-    def subscribe(self) -> "queue.Queue[Event]":
+    def subscribe(self) -> Subscription:
         """A queue that `say` fills."""
-        self.watchers.append(queue.Queue())
-        return self.watchers[-1]
+        return self.watchers.subscribe()
 
     def say(self, event: Event) -> None:
         """Tell all watchers an event."""
         if isinstance(event, StateChanged):
             self.state = event
-        for watcher in self.watchers:
-            watcher.put(event)
+        self.watchers.publish(event)
 
     def answer(self, command: Command, message: str = "", hint: str = "") -> None:
         """Acknowledge a command; with a message it is refused."""

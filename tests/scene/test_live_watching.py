@@ -26,7 +26,7 @@ def test_a_light_viewer_takes_part() -> None:
     workspace = Workspace()
     control = StudioControl(workspace)
     stage = SceneStage(workspace, control)
-    viewer = LightViewer(stage.start(), stage.relay_headers())
+    viewer = LightViewer(stage.port, stage.relay_headers())
     assert viewer.messages > 0
     assert viewer.size > 0
     viewer.close()

@@ -1,6 +1,7 @@
 """A pose under a person's hands: sliders, balls, gizmos, undo, mirror, the search around it, saving."""
 
 import asyncio
+import dataclasses
 import math
 import threading
 from collections.abc import Callable, Iterator
@@ -44,9 +45,13 @@ def drag(gizmo, place: np.ndarray, phase: str = "update") -> None:
 
 
 @pytest.fixture
-def stage(workspace: Workspace) -> Iterator[SceneStage]:
-    made = SceneStage(workspace, cast("Any", FakeControl("swaying", "run-1", "paused")))
-    made.start()
+def control() -> FakeControl:
+    return FakeControl("swaying", "run-1", "paused")
+
+
+@pytest.fixture
+def stage(workspace: Workspace, control: FakeControl) -> Iterator[SceneStage]:
+    made = SceneStage(workspace, control)
     made.show_run("swaying", "run-1")
     until(lambda: made.shown.run == "run-1" and len(editor_of(made).sliders) == 31)
     yield made
@@ -54,11 +59,11 @@ def stage(workspace: Workspace) -> Iterator[SceneStage]:
 
 
 def desk_of(stage: SceneStage) -> PoseDesk:
-    return stage._director.posing  # pyright: ignore[reportOptionalMemberAccess]
+    return stage._director.posing
 
 
 def editor_of(stage: SceneStage) -> PoseEditor:
-    return stage._director.state._panel.pose  # pyright: ignore[reportOptionalMemberAccess]
+    return stage._director.state._panel.pose
 
 
 def pose_is(stage: SceneStage, wanted: np.ndarray) -> bool:
@@ -175,7 +180,7 @@ def test_a_dragged_ball_takes_the_limb_along_and_only_the_newest_place_counts(
     drag(handles.gizmo, target, "end")
     gate.set()
     until(lambda: stage.poses.editing is not None and stage.poses.editing.moved)
-    pose = stage.poses.editing.pose  # pyright: ignore[reportOptionalMemberAccess]
+    pose = stage.poses.editing.pose
     assert len(solved) == 1
     wrist = [marker.name for marker in human.markers].index("LWrist")
     assert np.linalg.norm(marker_points(human, pose)[0, wrist] - target) < 10.0
@@ -193,7 +198,7 @@ def test_the_root_gizmo_carries_the_body(stage: SceneStage, human: BodyModel) ->
     start = swaying_pose(human, 0)
     drag(handles.root, np.array(handles.root.position) * 1000.0 + [100.0, -50.0, 20.0], "end")
     until(lambda: stage.poses.editing is not None and stage.poses.editing.moved)
-    pose = stage.poses.editing.pose  # pyright: ignore[reportOptionalMemberAccess]
+    pose = stage.poses.editing.pose
     gone = marker_points(human, pose)[0] - marker_points(human, start)[0]
     np.testing.assert_allclose(gone, np.tile([100.0, -50.0, 20.0], (len(gone), 1)), atol=1.0)
 
@@ -228,6 +233,33 @@ def test_a_frame_is_corrected_from_the_pose_that_is_shown_there(stage: SceneStag
     until(lambda: stage.poses.editing is not None and stage.poses.editing.frame is None)
     assert stage.poses.editing is not None
     assert stage.poses.editing.run == ""
+
+
+def test_the_editing_ends_when_the_run_is_tracked_or_another_is_opened(
+    stage: SceneStage, control: FakeControl
+) -> None:
+    stage.poses.edit("swaying", "run-1", 2)
+    until(lambda: stage.shown.editing and stage.shown.frame == 2)
+    paused = control.state
+    control.say(dataclasses.replace(paused, run="run-9", state="tracking"))
+    control.say(paused)
+    desk_of(stage).ask_value(4, 250.0)
+    until(lambda: stage.poses.editing is not None and stage.poses.editing.moved)
+    control.say(dataclasses.replace(paused, state="tracking"))
+    until(lambda: not stage.shown.editing)
+    assert stage.poses.editing is None
+    handles = desk_of(stage)._handles
+    assert handles is not None
+    assert not any(ball.visible for ball in handles.balls)
+    # Whoever begins to edit while it goes on is left to it.
+    stage.poses.edit("swaying", "run-1", 1)
+    until(lambda: stage.shown.editing)
+    control.say(dataclasses.replace(paused, state="tracking", frame=3))
+    stage.show_layer(1)
+    until(lambda: stage.shown.layer == 1)
+    assert stage.shown.editing
+    stage.show_run("swaying")
+    until(lambda: stage.shown.run == "" and not stage.shown.editing)
 
 
 def test_refining_tells_shows_and_can_fail(

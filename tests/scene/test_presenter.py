@@ -1,18 +1,18 @@
 """The drawing thread: newest wins, a held pace, and nothing that goes wrong ends it."""
 
-import queue
 import threading
 from collections.abc import Callable
 
 from studio.errors import StudioError
 from studio.scene.presenter import PICTURE_SECONDS, REDRAW_SECONDS, Presenter, _Due
 from studio.worker.events import Event, LogLine
+from studio.worker.watchers import Subscription
 
 PATIENCE = 10.0
 
 
 def presenter(
-    events: "queue.Queue[Event]",
+    events: Subscription,
     *,
     heard: Callable[[Event], None] = lambda event: None,
     draw: Callable[[], None] = lambda: None,
@@ -39,7 +39,7 @@ def test_a_drawing_waits_until_its_pause_is_over() -> None:
 def test_many_wishes_are_one_redraw_and_posts_keep_their_order() -> None:
     drawn, order = [], []
     finished = threading.Event()
-    made = presenter(queue.Queue(), draw=lambda: drawn.append(len(order)))
+    made = presenter(Subscription(), draw=lambda: drawn.append(len(order)))
 
     def wish(number: int) -> None:
         order.append(number)
@@ -59,7 +59,7 @@ def test_many_wishes_are_one_redraw_and_posts_keep_their_order() -> None:
 def test_what_goes_wrong_is_told_or_logged_and_the_thread_goes_on() -> None:
     told: list[str] = []
     finished = threading.Event()
-    events: queue.Queue[Event] = queue.Queue()
+    events: Subscription = Subscription()
 
     def heard(event: Event) -> None:
         if isinstance(event, LogLine) and event.text == "bad file":

@@ -58,7 +58,6 @@ def control() -> FakeControl:
 @pytest.fixture
 def stage(workspace: Workspace, control: FakeControl) -> Iterator[SceneStage]:
     made = SceneStage(workspace, control)
-    made.start()
     yield made
     made.stop()
 
@@ -68,14 +67,14 @@ def address(stage: SceneStage) -> Iterator[str]:
     """Where the scene is served, by the web application's relay without its access guard."""
     app = FastAPI()
     app.include_router(router)
-    app.state.doors = SimpleNamespace(scene_port=stage.port, stage=stage)
+    app.state.doors = SimpleNamespace(scenes=SimpleNamespace(scene=lambda window: stage))
     listening = socket.socket()
     listening.bind(("127.0.0.1", 0))
     listening.listen()
     server = uvicorn.Server(uvicorn.Config(app, log_level="error", ws="websockets-sansio"))
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
     thread.start()
-    yield f"http://127.0.0.1:{listening.getsockname()[1]}/scene/?fixedDpr=1"
+    yield f"http://127.0.0.1:{listening.getsockname()[1]}/scene/a-window/?fixedDpr=1"
     server.should_exit = True
     thread.join(10.0)
     listening.close()
@@ -136,7 +135,7 @@ def test_a_person_sees_the_run_and_moves_the_survival_rate(
     page.get_by_text("In use since frame 4, layer 1.").wait_for(timeout=PATIENCE * 1000)
     page.get_by_text("• survival rate").wait_for(timeout=PATIENCE * 1000)
     control.say(LayerFinished("swaying", "run-1", cloud_record(human, 4, 0), True))
-    clouds = stage._director.state.run.drawing.particles  # pyright: ignore[reportOptionalMemberAccess]
+    clouds = stage._director.state.run.drawing.particles
     until(page, lambda: [handle.visible for handle in clouds.handles] == [True, False, False, False])
 
     page.get_by_role("tab", name="Show").click()

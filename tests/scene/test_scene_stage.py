@@ -3,6 +3,8 @@
 import asyncio
 import dataclasses
 from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -34,27 +36,26 @@ def control() -> FakeControl:
 @pytest.fixture
 def stage(workspace: Workspace, control: FakeControl) -> Iterator[SceneStage]:
     made = SceneStage(workspace, control)
-    made.start()
     yield made
     made.stop()
 
 
 def drawing(stage: SceneStage):
-    return stage._director.state.run.drawing  # pyright: ignore[reportOptionalMemberAccess]
+    return stage._director.state.run.drawing
 
 
 def open_run(stage: SceneStage) -> None:
     stage.show_run("swaying", "run-1")
 
     def is_drawn() -> bool:
-        run = stage._director.state.run  # pyright: ignore[reportOptionalMemberAccess]
+        run = stage._director.state.run
         return stage.shown.run == "run-1" and run is not None and run.drawing.body.handles[0].visible
 
     until(is_drawn)
 
 
 def body_stands_at(stage: SceneStage, body: BodyModel, pose: np.ndarray) -> bool:
-    if stage._director.state.run is None:  # pyright: ignore[reportOptionalMemberAccess]
+    if stage._director.state.run is None:
         return False  # being opened
     places = limb_frames(body, pose)[0, :, :, 3] / 1000.0
     return np.allclose([handle.position for handle in drawing(stage).body.handles], places, atol=1e-9)
@@ -131,7 +132,7 @@ def test_a_setting_selects_the_shown_frame_and_is_asked_for(stage: SceneStage, c
     open_run(stage)
     stage.show_frame(2)
     until(lambda: stage.shown.frame == 2)
-    panel = stage._director.state._panel  # pyright: ignore[reportOptionalMemberAccess]
+    panel = stage._director.state._panel
     default = panel.settings.inputs["survival"].knob.default
     panel.settings.inputs["survival"].handle.value = 0.7
     until(lambda: len(control.commands) == 2)
@@ -150,23 +151,25 @@ def test_a_setting_selects_the_shown_frame_and_is_asked_for(stage: SceneStage, c
 def test_a_run_that_is_not_open_is_opened_first(stage: SceneStage, control: FakeControl) -> None:
     control.state = dataclasses.replace(control.state, session="other", run="run-9")
     open_run(stage)
-    stage._director.reanneal_shown()  # pyright: ignore[reportOptionalMemberAccess]
+    stage._director.reanneal_shown()
     assert [type(command) for command in control.commands] == [commands.Open, commands.Reanneal]
     control.say(dataclasses.replace(control.state, state="tracking"))
     with pytest.raises(Exception, match=r"run-9.*is being tracked"):
-        stage._director.reanneal_shown()  # pyright: ignore[reportOptionalMemberAccess]
+        stage._director.reanneal_shown()
 
 
-def test_playback_shows_one_frame_after_another_and_tells_the_page(stage: SceneStage) -> None:
-    open_run(stage)
+def test_playback_shows_one_frame_after_another_and_tells_the_page(
+    workspace: Workspace, control: FakeControl
+) -> None:
     told: list[Shown] = []
-    stage.watch(told.append)
+    stage = SceneStage(workspace, control, told.append)
+    open_run(stage)
     stage.show_frame(0)
     until(lambda: stage.shown.frame == 0)
     assert told == [], "who asked is not told"
     stage.play(True)
     until(lambda: {shown.frame for shown in told} >= set(range(1, FRAMES - 1)) and len(told) > 6)
-    stage.play(False)
+    stage.stop()
 
 
 def test_looking_through_a_camera_by_its_name(stage: SceneStage) -> None:
@@ -184,8 +187,8 @@ def test_the_theme_changes_every_colour(stage: SceneStage) -> None:
     stage.set_options(dark=False)
     stage.set_options(colour_by="weight")
     until(lambda: drawing(stage).body.handles[0].color != before)
-    until(lambda: stage._director.state.options.colour_by == "weight")  # pyright: ignore[reportOptionalMemberAccess]
-    assert not stage._director.state.options.dark, "one change does not take back another"  # pyright: ignore[reportOptionalMemberAccess]
+    until(lambda: stage._director.state.options.colour_by == "weight")
+    assert not stage._director.state.options.dark, "one change does not take back another"
     with pytest.raises(SettingsError, match="no option 'colour'"):
         stage.set_options(colour="red")
 
@@ -195,13 +198,13 @@ def test_a_session_without_a_run_and_none_at_all(stage: SceneStage, human: BodyM
     until(lambda: stage.shown.session == "swaying" and stage.shown.run == "")
     until(lambda: body_stands_at(stage, human, human.neutral))
     stage.show_run("")
-    until(lambda: stage.shown.session == "" and stage._director.state.run is None)  # pyright: ignore[reportOptionalMemberAccess]
+    until(lambda: stage.shown.session == "" and stage._director.state.run is None)
 
 
 def test_what_cannot_be_opened_leaves_the_scene_alive(stage: SceneStage) -> None:
     open_run(stage)
     stage.show_run("no-such-session", "run-1")
-    until(lambda: stage.shown.session == "" and stage._director.state.run is None)  # pyright: ignore[reportOptionalMemberAccess]
+    until(lambda: stage.shown.session == "" and stage._director.state.run is None)
     open_run(stage)
 
 
@@ -228,40 +231,43 @@ def test_strangers_are_refused_and_nothing_is_ever_shared(stage: SceneStage) -> 
     assert asyncio.run(knock({"X-Studio-Relay": "guess"})) == (1008, 0)
     assert asyncio.run(knock(stage.relay_headers())) == (None, 1)
     server = stage._server
-    assert server is not None
     assert server.get_host() == "127.0.0.1"
     assert server.request_share_url() is None
 
 
-def test_a_stopped_stage_can_be_started_again(workspace: Workspace) -> None:
-    made = SceneStage(workspace, FakeControl())
-    assert made.port == 0
-    first = made.start()
-    assert made.start() == first
-    made.stop()
-    assert made.port == 0
-    made.start()
-    made.show_run("swaying", "run-1")
-    until(lambda: made.shown.run == "run-1")
-    made.stop()
-    made.stop()
-
-
-def test_the_state_of_the_process_opens_its_run(workspace: Workspace) -> None:
-    control = FakeControl()
-    made = SceneStage(workspace, control)
-    made.start()
+def test_how_slowly_the_search_goes_is_shown_and_a_run_is_opened_only_by_its_window(
+    stage: SceneStage, control: FakeControl
+) -> None:
+    panel = stage._director.state._panel
     state = StateChanged("swaying", "run-1", "tracking", 0, 0, 0, 6, 5, 30.0, 0.1, seconds_a_layer=0.1)
     control.say(state)
-    until(lambda: made.shown.run == "run-1")
-    director = made._director
-    assert director is not None
-    until(lambda: director.state._panel.run.pace.value == "10 layers/s")
-    director.wishes.set_pace(1.0)
+    until(lambda: panel.run.pace.value == "10 layers/s")
+    assert stage.shown == Shown()
+    stage._director.wishes.set_pace(1.0)
     (asked,) = control.commands
     assert isinstance(asked, commands.SetPace)
     assert asked.seconds_a_layer == 1.0
-    made.stop()
+
+
+def test_commands_are_about_the_run_that_is_shown(stage: SceneStage, control: FakeControl) -> None:
+    panel = stage._director.state._panel.run
+
+    def click(word: str) -> None:
+        asyncio.run(panel._track_clicked(cast("Any", SimpleNamespace(target=SimpleNamespace(value=word)))))
+
+    click("▶ track")
+    assert control.commands == [], "no run is shown"
+    control.state = dataclasses.replace(control.state, session="other", run="run-9")
+    open_run(stage)
+    click("▶ track")
+    assert [type(command) for command in control.commands] == [commands.Open, commands.Start]
+    control.commands.clear()
+    control.say(dataclasses.replace(control.state, state="tracking"))
+    click("pause")
+    assert control.commands == [], "another window's run goes on"
+    control.say(dataclasses.replace(control.state, session="swaying", run="run-1"))
+    click("pause")
+    assert [type(command) for command in control.commands] == [commands.Pause]
 
 
 def test_a_kept_answer_takes_the_place_of_the_stored_one_and_of_what_followed(
@@ -275,7 +281,7 @@ def test_a_kept_answer_takes_the_place_of_the_stored_one_and_of_what_followed(
         writer.forget_from(2)
         writer.write_frame(kept, [cloud_record(human, 2, 0)])
     control.say(FrameFinished("swaying", "run-1", kept))
-    until(lambda: stage._director.state.run.frames == (0, 1, 2))  # pyright: ignore[reportOptionalMemberAccess]
+    until(lambda: stage._director.state.run.frames == (0, 1, 2))
     until(lambda: body_stands_at(stage, human, kept.estimate.pose))
 
 
@@ -291,7 +297,7 @@ def test_a_frame_that_did_not_simply_go_on_says_so(
     stage.show_run("")
     until(lambda: stage.shown.session == "")
     open_run(stage)
-    mark = stage._director.state._panel.run.mark  # pyright: ignore[reportOptionalMemberAccess]
+    mark = stage._director.state._panel.run.mark
     until(lambda: mark.visible and f"<b>{tracking}</b>" in mark.content)
     until(lambda: (drawing(stage).body.handles[0].opacity < 0.5) == faint)
     stage.show_frame(1)
@@ -306,17 +312,26 @@ def test_a_start_pose_that_was_found_is_shown_with_its_confidence_until_it_is_le
     until(lambda: stage.shown.session == "")
     stage.poses.propose("swaying", found.tolist(), "found in frame 2, confidence 92 %", 2)
     until(lambda: stage.shown.session == "swaying" and body_stands_at(stage, human, found))
-    state = stage._director.state  # pyright: ignore[reportOptionalMemberAccess]
+    state = stage._director.state
     assert stage.shown.run == ""
     assert stage.shown.frame == 2
     until(lambda: "confidence 92 %" in state._panel.run.mark.content)
-    # The page opens a run of that session meanwhile: what was found is not lost over it.
-    stage.show_run("swaying", "run-1")
-    until(lambda: stage.shown.run == "run-1" and body_stands_at(stage, human, found))
-    assert stage.shown.frame == 2
+    stage.show_run("swaying")
     stage.poses.leave()
-    until(lambda: body_stands_at(stage, human, swaying_pose(human, 2)))
+    until(lambda: body_stands_at(stage, human, human.neutral))
     until(lambda: not state._panel.run.mark.visible)
+    # A run that is opened shows itself, not what was found.
+    stage.poses.propose("swaying", found.tolist(), "found in frame 2, confidence 92 %", 2)
+    until(lambda: stage.shown.editing and body_stands_at(stage, human, found))
+    stage.show_run("swaying", "run-1")
+    until(lambda: stage.shown.run == "run-1" and body_stands_at(stage, human, swaying_pose(human, 4)))
+    until(lambda: not state._panel.run.mark.visible)
+    assert not stage.shown.editing
+    assert stage.poses.editing is None
+    stage.poses.propose("swaying", found.tolist(), "found in frame 2, confidence 92 %", 2)
+    until(lambda: stage.shown.run == "" and body_stands_at(stage, human, found))
+    stage.show_run("swaying", "run-1")
+    until(lambda: stage.shown.run == "run-1")
     stage.poses.propose("swaying", [0.0] * 4, "found in frame 1, confidence 50 %", 1)
-    stage.show_frame(3)
-    until(lambda: body_stands_at(stage, human, swaying_pose(human, 3)))
+    until(lambda: stage.shown.run == "" and body_stands_at(stage, human, human.neutral))
+    assert not stage.shown.editing, "a pose of another body is not edited"

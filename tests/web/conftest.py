@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from web_doubles import TOKEN, RecordingControl, RecordingStage, Studio, let_in, serving
+from web_doubles import TOKEN, RecordingControl, RecordingScenes, Studio, let_in, serving
 
 from studio.capture.calibration_files import write_calibration
 from studio.geometry.camera import Camera
@@ -115,19 +115,19 @@ def control() -> RecordingControl:
 
 
 @pytest.fixture
-def stage() -> RecordingStage:
-    """The scene's double."""
-    return RecordingStage()
+def scenes() -> RecordingScenes:
+    """The scenes' double."""
+    return RecordingScenes()
 
 
 @pytest.fixture
 def studio(
-    workspace: Workspace, control: RecordingControl, stage: RecordingStage, source: Path, tmp_path: Path
+    workspace: Workspace, control: RecordingControl, scenes: RecordingScenes, source: Path, tmp_path: Path
 ) -> Iterator[Studio]:
     """The application on the workspace, served, and a client that was let in."""
     log_path = tmp_path / "server.log"
     app = build_app(
-        workspace, control, stage, TOKEN, footage_roots=(source.parent.resolve(),), log_path=log_path
+        workspace, control, scenes, TOKEN, footage_roots=(source.parent.resolve(),), log_path=log_path
     )
     with serving(app) as base, let_in(base, TOKEN) as client:
-        yield Studio(base, client, control, stage, workspace, app, log_path)
+        yield Studio(base, client, control, scenes, workspace, app, log_path)

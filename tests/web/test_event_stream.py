@@ -122,8 +122,8 @@ def test_changes_of_the_workspace_and_moves_of_the_scene_are_told(studio: Studio
         next_of(socket, "state")
         studio.client.post("/api/sessions/take1/duplicate", json={"name": "take2"})
         assert next_of(socket, "sessions")["session"] == "take2"
-        assert studio.stage.moved is not None
-        studio.stage.moved(studio.stage.shown)
+        assert studio.scenes.moved is not None
+        studio.scenes.moved("", studio.stage.shown)
         assert next_of(socket, "scene")["frame"] is None
 
 

@@ -139,7 +139,7 @@ def test_an_export_can_be_cancelled(
             task.step("recording", 1, 4)
             time.sleep(0.01)
 
-    monkeypatch.setattr(studio.stage, "record_scene", endless)
+    monkeypatch.setattr(studio.scenes, "record_scene", endless)
     begun = studio.client.post(f"{RUN}/exports", json={"format": "viser"}).json()
     listed = studio.client.get(f"{RUN}/exports").json()
     assert [entry["identifier"] for entry in listed["running"]] == [begun["identifier"]]

@@ -10,7 +10,7 @@ import pytest
 from web_doubles import TOKEN, cookie_header, let_in, serving
 from websockets.sync.client import ClientConnection, connect
 
-from studio.scene.stage import SceneStage
+from studio.scene.window_scenes import WindowScenes
 from studio.sessions.workspace import Workspace
 from studio.web.app import build_app
 from studio.worker.control import StudioControl
@@ -43,7 +43,7 @@ class Page:
 def page(workspace: Workspace, tmp_path: Path) -> Iterator[Page]:
     """A page in front of the whole studio."""
     control = StudioControl(workspace)
-    app = build_app(workspace, control, SceneStage(workspace, control), TOKEN, log_path=tmp_path / "log")
+    app = build_app(workspace, control, WindowScenes(workspace, control), TOKEN, log_path=tmp_path / "log")
     with serving(app) as base, let_in(base, TOKEN) as client:
         socket = connect(
             base.replace("http", "ws") + "/api/events",

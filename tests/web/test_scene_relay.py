@@ -9,7 +9,16 @@ import msgspec
 import pytest
 import viser
 import zstandard
-from web_doubles import TOKEN, RecordingControl, RecordingStage, Studio, cookie_header, let_in, serving
+from web_doubles import (
+    TOKEN,
+    RecordingControl,
+    RecordingScenes,
+    RecordingStage,
+    Studio,
+    cookie_header,
+    let_in,
+    serving,
+)
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
@@ -34,10 +43,10 @@ def inner() -> Iterator[GuardedServer]:
 def relayed(tmp_path: Path, inner: GuardedServer) -> Iterator[Studio]:
     """The application in front of the real viser server."""
     workspace, control = Workspace(tmp_path), RecordingControl()
-    stage = RecordingStage(inner.get_port(), inner.relay_headers())
-    app = build_app(workspace, control, stage, TOKEN)
+    scenes = RecordingScenes(RecordingStage(inner.get_port(), inner.relay_headers()))
+    app = build_app(workspace, control, scenes, TOKEN)
     with serving(app) as base, let_in(base, TOKEN) as client:
-        yield Studio(base, client, control, stage, workspace, app, tmp_path / "log")
+        yield Studio(base, client, control, scenes, workspace, app, tmp_path / "log")
 
 
 def opened(studio: Studio, path: str = "/scene", protocol: str = VISER) -> ClientConnection:
@@ -136,7 +145,7 @@ def test_viser_cannot_be_reached_around_the_relay(relayed: Studio, inner: Guarde
     )
     with friend:
         assert shows_the_mark(friend)
-    for path in ("/scene/websocket", "/scene/ws", "/"):
+    for path in ("/scene/a/b", "/scene/no window", "/"):
         with pytest.raises(InvalidStatus):
             opened(relayed, path)
 

@@ -2,7 +2,7 @@
 
 import socket
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -73,30 +73,16 @@ class RecordingControl:
 
 @dataclass
 class RecordingStage:
-    """A scene that notes what it is told to show; `port` may be that of any WebSocket server."""
+    """A window's scene that notes what it is asked to show; `port` may be that of any WebSocket server."""
 
     port: int = 0
     headers: Mapping[str, str] = field(default_factory=dict)
     calls: list[tuple[object, ...]] = field(default_factory=list)
-    moved: Callable[[object], None] | None = None
     editing: SimpleNamespace | None = None
-
-    def start(self) -> int:
-        self.calls.append(("start",))
-        return self.port
-
-    def stop(self) -> None:
-        self.calls.append(("stop",))
+    shown: Shown = field(default_factory=Shown)
 
     def relay_headers(self) -> Mapping[str, str]:
         return self.headers
-
-    @property
-    def shown(self) -> Shown:
-        return Shown()
-
-    def watch(self, callback: Callable[[object], None]) -> None:
-        self.moved = callback
 
     def show_run(
         self, session: str, run: str = "", frame: int | None = None, layer: int | None = None
@@ -125,8 +111,36 @@ class RecordingStage:
     def play(self, playing: bool) -> None:
         self.calls.append(("play", playing))
 
-    def record_scene(self, task: ExportTask) -> Written:
-        self.calls.append(("record", task.run.name))
+
+@dataclass
+class RecordingScenes:
+    """The scenes of all windows; that of no window in particular is `plain`."""
+
+    plain: RecordingStage = field(default_factory=RecordingStage)
+    by_window: dict[str, RecordingStage] = field(default_factory=dict)
+    moved: Callable[[str, Shown], None] | None = None
+    unused: list[set[str]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.record_scene = self._record
+
+    def scene(self, window: str) -> RecordingStage:
+        return self.by_window.setdefault(window, RecordingStage() if window else self.plain)
+
+    def open_scenes(self) -> Mapping[str, RecordingStage]:
+        return self.by_window
+
+    def watch(self, moved: Callable[[str, Shown], None]) -> None:
+        self.moved = moved
+
+    def close_unused(self, windows: Collection[str]) -> None:
+        self.unused.append(set(windows))
+
+    def stop(self) -> None:
+        self.by_window.clear()
+
+    def _record(self, task: ExportTask) -> Written:
+        self.plain.calls.append(("record", task.run.name))
         task.place.write_bytes(b"scene")
         return Written((task.place,), "read back")
 
@@ -163,10 +177,15 @@ class Studio:
     base: str
     client: httpx.Client
     control: RecordingControl
-    stage: RecordingStage
+    scenes: RecordingScenes
     workspace: Workspace
     app: FastAPI
     log_path: Path
+
+    @property
+    def stage(self) -> RecordingStage:
+        """The scene of callers that name no window."""
+        return self.scenes.plain
 
 
 @contextmanager

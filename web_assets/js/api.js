@@ -1,7 +1,9 @@
-// The JSON API. Errors carry the server's cause and remedy.
+// The JSON API. Errors carry the server's cause and remedy; every call names the window, whose scene it may concern.
+
+import { windowName } from "./window.js";
 
 async function call(method, path, body, options = {}) {
-  const request = { method, headers: {}, ...options };
+  const request = { method, headers: { "x-studio-window": windowName }, ...options };
   if (body !== undefined) {
     request.body = JSON.stringify(body);
     request.headers["content-type"] = "application/json";

@@ -5,6 +5,7 @@ import { onEvent } from "./live.js";
 import { complain } from "./messages.js";
 import { paced } from "./pace.js";
 import { refreshSessions } from "./rail.js";
+import { dressScene } from "./scene_window.js";
 import { isWatched } from "./search_speed.js";
 import { get, set, watch } from "./state.js";
 
@@ -89,9 +90,11 @@ function takeScene(event) {
 /** A layer: those of a what-if stand beside the stored answer; those of a frame in progress are shown when it is slow. */
 function takeLayer(event) {
   if (event.reannealed) {
+    // What another window anneals again, or this one did before it moved on, changes nothing here.
+    if (event.frame !== get("frame")) return;
     const before = get("whatIf");
     const goesOn = event.layer > 0 && before?.[0].frame === event.frame;
-    return set({ frame: event.frame, whatIf: [...(goesOn ? before.filter((layer) => layer.layer < event.layer) : []), event] });
+    return set({ whatIf: [...(goesOn ? before.filter((layer) => layer.layer < event.layer) : []), event] });
   }
   layers = [...layers.filter((layer) => layer.frame === event.frame && layer.layer < event.layer), event];
   if (!get("follow")) return;
@@ -164,7 +167,7 @@ export function startData() {
   onEvent("scene", takeScene);
   let before = false;
   watch(["connected"], () => {
-    if (get("connected") && before) { scene = {}; sessionsLater(); summaryLater(); }
+    if (get("connected") && before) { scene = {}; dressScene(); sceneLater(); sessionsLater(); summaryLater(); }
     before ||= get("connected");
   });
 }

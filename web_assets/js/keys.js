@@ -4,6 +4,7 @@ import { lookThrough } from "./cameras.js";
 import { openList } from "./dialogs.js";
 import { reanneal } from "./header.js";
 import { togglePlay, toggleLoop } from "./playback.js";
+import { enterScene } from "./scene_frame.js";
 import { get } from "./state.js";
 import { goTo, goToMark, stepLayer } from "./timeline.js";
 
@@ -22,6 +23,7 @@ const KEYS = [
   ["r", "anneal this frame again", (event) => event.key === "r", reanneal],
   ["c", "correct this frame by hand", (event) => event.key === "c", () => document.getElementById("correct").click()],
   ["l", "loop", (event) => event.key === "l", toggleLoop],
+  ["s", "into the scene's panel; Escape leads back", (event) => event.key === "s", () => enterScene()],
   ["?", "this list", (event) => event.key === "?", () => showKeys()],
 ];
 
@@ -29,9 +31,14 @@ function showKeys() {
   openList("Keys", KEYS.map(([key, what]) => [key, what]));
 }
 
+// What needs all keys for itself, and what needs the arrows only up and down or not at all.
+const TYPING = "input:not([type=checkbox]), textarea, dialog, [role=slider]:not(#track), [role=menu], [role=tab]";
+const CHOOSING = "select, input[type=checkbox]";
+
 /** Do what a key says; typing in a field and holding control are left alone. */
 export function takeKey(event) {
-  const typing = event.target.closest?.("input, select, textarea, dialog, [role=slider]:not(#track), [role=menu]");
+  const isArrow = event.key === "ArrowLeft" || event.key === "ArrowRight";
+  const typing = event.target.closest?.(isArrow ? TYPING : `${TYPING}, ${CHOOSING}`);
   if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
   if ((event.key === " " || event.key === "Enter") && event.target.closest?.("button, a")) return;
   const found = KEYS.find(([, , fits]) => fits(event));

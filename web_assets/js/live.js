@@ -3,6 +3,7 @@
 import { addLine } from "./log.js";
 import { say } from "./messages.js";
 import { get, set } from "./state.js";
+import { eventSocket } from "./window.js";
 
 const RETRY_MILLISECONDS = 1500;
 const STRANGER_MILLISECONDS = 15000;
@@ -36,7 +37,7 @@ async function isKnown() {
 
 /** Open the socket and keep it open. */
 export function startLive() {
-  const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/api/events`);
+  const socket = eventSocket();
   socket.onopen = () => set({ connected: true, stranger: false });
   socket.onmessage = ({ data }) => {
     const event = JSON.parse(data);

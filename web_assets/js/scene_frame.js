@@ -1,12 +1,12 @@
 // The scene's frame: viser's own page, in the studio's type and colours, with the page's keys working in it.
 
 import { takeKey } from "./keys.js";
+import { loadScene } from "./scene_window.js";
 import { onTheme, theme, token } from "./theme.js";
 
 const frame = document.getElementById("scene");
 const FONT = "/assets/vendor/inter.woff2";
-// viser turns the view with these itself.
-const SCENE_KEYS = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown"];
+const CONTROLS = "[role=slider], [role=tab], input, textarea, select";
 const style = document.createElement("style");
 
 function look() {
@@ -41,7 +41,27 @@ async function dress() {
 
 /** Keys for a slider or a field must not turn the view as well, which listens further out. */
 function keepToControls(event) {
-  if (event.target.closest?.("[role=slider], [role=tab], input, textarea, select")) event.stopPropagation();
+  if (event.target.closest?.(CONTROLS)) event.stopPropagation();
+}
+
+/** The page's keys come first: arrows walk the timeline wherever the focus is, and do not turn the view as well. */
+function takeFirst(event) {
+  if (event.target.closest?.(CONTROLS)) return;
+  takeKey(event);
+  if (event.defaultPrevented) event.stopImmediatePropagation();
+}
+
+/** Put the keyboard into the scene's panel: the frame is no stop of the page's own, for its many controls' sake. */
+export function enterScene() {
+  const tab = frame.contentDocument?.querySelector("[role=tab][aria-selected=true]");
+  (tab ?? frame).focus();
+}
+
+/** Escape gives the keyboard back to the timeline, unless it closes something first. */
+function leaveScene(event) {
+  if (event.key !== "Escape" || event.target.closest?.("[aria-expanded=true], [role=dialog]")) return;
+  event.target.blur?.();
+  document.getElementById("track").focus();
 }
 
 /** Load the scene, dressed as the page. */
@@ -50,8 +70,11 @@ export function startSceneFrame() {
     if (frame.src.endsWith("about:blank")) return;
     dress();
     for (const kind of ["keydown", "keyup"]) frame.contentDocument.body.addEventListener(kind, keepToControls);
-    frame.contentWindow.addEventListener("keydown", (event) => { if (!SCENE_KEYS.includes(event.key)) takeKey(event); });
+    frame.contentWindow.addEventListener("keydown", takeFirst, true);
+    frame.contentWindow.addEventListener("keydown", leaveScene, true);
+    // Whoever clicks a tab goes on with the timeline's keys.
+    frame.contentWindow.addEventListener("click", (event) => { if (event.detail) event.target.closest?.("[role=tab]")?.blur(); });
   });
   onTheme(() => { style.textContent = look(); });
-  frame.src = "/scene/";
+  loadScene(frame);
 }

@@ -51,7 +51,12 @@ export function startTabs() {
     document.dispatchEvent(new Event("panel"));
   };
   for (const tab of tabs) {
-    tab.onclick = () => { fold(false); choose(tab); };
+    tab.onclick = (event) => {
+      fold(false);
+      choose(tab);
+      // Whoever clicks goes on with the timeline's keys; whoever came by keyboard walks the tabs with the arrows.
+      if (event.detail) tab.blur();
+    };
     tab.onkeydown = (event) => {
       const by = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
       if (!by) return;

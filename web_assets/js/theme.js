@@ -1,6 +1,4 @@
-// Light or dark, remembered; the scene follows.
-
-import { post } from "./api.js";
+// Light or dark, remembered; the scene follows (scene_window.js).
 
 const root = document.documentElement;
 const listeners = new Set();
@@ -43,7 +41,6 @@ export const onTheme = (listener) => listeners.add(listener);
 function apply(name) {
   root.dataset.theme = name;
   localStorage.setItem("theme", name);
-  post("/api/scene/view", { dark: name === "dark" }).catch(() => {});
   for (const listener of listeners) listener(name);
 }
 

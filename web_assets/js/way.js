@@ -19,6 +19,7 @@ import * as api from "./api.js";
 import { closeDialog, openForm } from "./dialogs.js";
 import { button, element } from "./elements.js";
 import { complain } from "./messages.js";
+import { loadScene } from "./scene_window.js";
 import { startTheme } from "./theme.js";
 import { WORDS } from "./way_words.js";
 import { drawProgress } from "./way_progress.js";
@@ -79,7 +80,7 @@ function letGo() {
 
 /** The scene beside the panel, moved to what is wished. */
 async function scene(wish = {}) {
-  if (!aside.querySelector("iframe")) aside.replaceChildren(element("iframe", { title: "3-D scene", src: "/scene/" }));
+  if (!aside.querySelector("iframe")) aside.replaceChildren(loadScene(element("iframe", { title: "3-D scene" })));
   await api.post("/api/scene/show", { session, ...wish });
 }
 

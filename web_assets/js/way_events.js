@@ -1,5 +1,7 @@
 // The event socket of the guided way: whoever listens is told, and can stop.
 
+import { eventSocket } from "./window.js";
+
 const RETRY_MILLISECONDS = 1500;
 const listeners = new Map();
 
@@ -12,7 +14,7 @@ export function listen(type, handler) {
 
 /** Open the socket and keep it open. */
 export function startWayEvents() {
-  const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/api/events`);
+  const socket = eventSocket();
   socket.onmessage = ({ data }) => {
     const event = JSON.parse(data);
     for (const handler of [...(listeners.get(event.type) ?? [])]) handler(event);

@@ -3,6 +3,7 @@
 import { openPicture } from "./dialogs.js";
 import { element } from "./elements.js";
 import { complain } from "./messages.js";
+import { loadScene } from "./scene_window.js";
 
 const HEIGHT = 420;
 const LARGE = 1080;
@@ -53,7 +54,7 @@ export function viewWall(way) {
     if (!bar.isConnected) way.aside.replaceChildren(bar);
     if (state.scene) {
       wall.remove();
-      if (!way.aside.querySelector("iframe")) way.aside.append(element("iframe", { title: "3-D scene", src: "/scene/", className: "below-bar" }));
+      if (!way.aside.querySelector("iframe")) way.aside.append(loadScene(element("iframe", { title: "3-D scene", className: "below-bar" })));
       const { run, frame, track } = state.wish;
       way.api.post("/api/scene/show", { session: way.session, run, frame, ...(track ? { options: { track } } : {}) }).catch(complain);
       return;

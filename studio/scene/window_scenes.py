@@ -1,0 +1,122 @@
+"""One scene per window of the studio: built when its window first needs it, closed when the window is gone."""
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+
+from studio.capture.freed_memory import give_back_freed_memory
+from studio.errors import StudioError
+from studio.scene.recording import record_scene
+from studio.scene.stage import SceneStage
+from studio.scene.view_options import Shown
+from studio.scene.wishes import Control
+from studio.sessions.workspace import Workspace
+
+MOST_SCENES = 32
+"""A scene takes two threads, six file descriptors and about 25 MB with four cameras of 640 × 480."""
+GRACE_SECONDS = 60.0
+"""How long a scene outlives its window: a page that is loaded again finds it as it was."""
+_LOG = logging.getLogger(__name__)
+
+
+class TooManyScenesError(StudioError):
+    """As many windows as the studio serves show a scene already."""
+
+    status, code = 503, "windows"
+
+
+@dataclass(slots=True)
+class _Entry:
+    stage: SceneStage
+    used: float
+
+
+class WindowScenes:
+    """The scenes of a workspace by the names of their windows; may be used from any thread.
+
+    control : the tracking process, which all windows share. most : scenes at a time. `grace` : seconds for which a
+    scene without its window is kept.
+    """
+
+    def __init__(
+        self,
+        workspace: Workspace,
+        control: Control,
+        *,
+        most: int = MOST_SCENES,
+        grace: float = GRACE_SECONDS,
+    ) -> None:
+        self._workspace, self._control, self._most, self.grace = workspace, control, most, grace
+        self._entries: dict[str, _Entry] = {}
+        self._lock = threading.Lock()
+        self._stopped = False
+        self._moved: Callable[[str, Shown], None] = lambda window, shown: None
+        self.record_scene = record_scene
+
+    def watch(self, moved: Callable[[str, Shown], None]) -> None:
+        """Call `moved` with the window and what it shows when a scene's own controls, playback or the tracking
+        move it, in that scene's thread.
+        """
+        self._moved = moved
+
+    def scene(self, window: str) -> SceneStage:
+        """The scene of a window, built where there is none yet (that blocks for some 30 ms).
+
+        Raises TooManyScenesError when no other scene can make room.
+        """
+        with self._lock:
+            entry = self._entries.get(window)
+            if entry is None:
+                self._make_room()
+                stage = SceneStage(self._workspace, self._control, lambda shown: self._moved(window, shown))
+                entry = self._entries[window] = _Entry(stage, 0.0)
+            entry.used = time.monotonic()
+            return entry.stage
+
+    def open_scenes(self) -> dict[str, SceneStage]:
+        """The scenes that there are, by window."""
+        return {window: entry.stage for window, entry in list(self._entries.items())}
+
+    def close_unused(self, windows: Collection[str]) -> None:
+        """Close the scenes that had no viewer and no window for a while. windows : those that are there."""
+        now = time.monotonic()
+        with self._lock:
+            for window, entry in self._entries.items():
+                if window in windows or entry.stage.is_viewed:
+                    entry.used = now
+            gone = [window for window, entry in self._entries.items() if now - entry.used > self.grace]
+            closing = [self._entries.pop(window) for window in gone]
+        while closing:
+            _close(closing.pop())
+        if gone:
+            give_back_freed_memory()
+
+    def stop(self) -> None:
+        """Close all scenes, for good."""
+        with self._lock:
+            self._stopped = True
+            closing, self._entries = list(self._entries.values()), {}
+        for entry in closing:
+            _close(entry)
+
+    def _make_room(self) -> None:
+        if self._stopped:
+            raise StudioError("The studio is closing.", "Start it again.")
+        if len(self._entries) < self._most:
+            return
+        idle = [name for name, entry in self._entries.items() if not entry.stage.is_viewed]
+        if not idle:
+            raise TooManyScenesError(
+                f"{self._most} windows show a scene already, which is as many as the studio serves.",
+                "Close a window that is no longer needed, then load this one again.",
+            )
+        _close(self._entries.pop(min(idle, key=lambda name: self._entries[name].used)))
+
+
+def _close(entry: _Entry) -> None:
+    try:
+        entry.stage.stop()
+    except Exception:
+        _LOG.exception("A scene could not be closed.")
