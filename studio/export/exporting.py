@@ -13,6 +13,7 @@ from studio.export.calibration_file import write_cameras
 from studio.export.formats import ExportFormat
 from studio.export.glb_writing import write_glb
 from studio.export.marker_files import write_c3d_file, write_trc_file
+from studio.export.mot_file import write_mot
 from studio.export.motion import motion_of, no_motion
 from studio.export.options import AUTO, ExportOptions
 from studio.export.overlay_video import write_videos
@@ -29,6 +30,7 @@ WRITERS: dict[str, Writer] = {
     "bvh": write_bvh,
     "glb": write_glb,
     "trc": write_trc_file,
+    "mot": write_mot,
     "c3d": write_c3d_file,
     "csv": write_csv,
     "parquet": write_parquet,

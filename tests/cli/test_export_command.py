@@ -35,7 +35,7 @@ def export(*words: str):
 
 
 @pytest.mark.parametrize(
-    "ending", ["bvh", "glb", "trc", "c3d", "csv", "parquet", "npz", "mp4", "viser", "toml", "yml"]
+    "ending", ["bvh", "glb", "trc", "mot", "c3d", "csv", "parquet", "npz", "mp4", "viser", "toml", "yml"]
 )
 def test_every_ending_is_written(run: str, tmp_path: Path, ending: str) -> None:
     place = tmp_path / f"arm.{ending}"
