@@ -22,27 +22,51 @@ UNITS = {
 UNIT_TOLERANCE = 0.25
 
 
-def scale_finding(ratio: float, known: str, board: Board | None = None) -> Finding:
-    """What a wrong length says. ratio : measured by the calibration over known. known : the length, in words."""
+def unit_finding(ratio: float, known: str, tolerance: float = UNIT_TOLERANCE) -> Finding | None:
+    """The unit that was mistaken, None for none. ratio : measured by the calibration over known. known : the length, in
+    words. tolerance : of the length, a share.
+    """
     for factor, (said, remedy) in UNITS.items():
-        if abs(np.log(ratio / factor)) < np.log(1.0 + UNIT_TOLERANCE):
+        if abs(np.log(ratio / factor)) < np.log(1.0 + tolerance):
             return Finding(
                 "scale",
                 "blocks",
                 f"By the calibration {known} is {ratio:.4g} times what it is: {said}.",
                 remedy,
             )
-    side = (
-        f" ({board.square_mm / ratio:.4g} mm instead of {board.square_mm:.4g} mm)"
-        if board is not None
-        else ""
-    )
-    return Finding(
+    return None
+
+
+def scale_finding(ratio: float, known: str, board: Board | None = None) -> Finding:
+    """What a length says that was measured and comes out wrong; parameters as of `unit_finding`."""
+    return unit_finding(ratio, known) or Finding(
         "square-size",
         "blocks",
         f"By the calibration {known} is {ratio:.3f} times what it is: its board's squares were not of the size told.",
-        f"Measure the printed squares and calibrate again with their true size{side}; or divide lengths by"
-        f" {ratio:.3f}.",
+        f"Measure the printed squares and calibrate again with their true size{_true_size(ratio, board)}; or divide"
+        f" lengths by {ratio:.3f}.",
+    )
+
+
+def height_finding(seen_mm: float, known_mm: float, known: str, board: Board | None = None) -> Finding:
+    """What the height of a person who stands says: that it, or the calibration's size, is wrong. known : the height, in
+    words.
+    """
+    ratio = seen_mm / known_mm
+    return unit_finding(ratio, known) or Finding(
+        "square-size",
+        "blocks",
+        f"By the calibration the person, who stands, is {seen_mm:.0f} mm tall, {ratio:.3f} times {known}.",
+        f"Check the height. If it is right, the calibration board's squares were not of the size given: measure them"
+        f" and calibrate again{_true_size(ratio, board)}, or divide lengths by {ratio:.3f}.",
+    )
+
+
+def _true_size(ratio: float, board: Board | None) -> str:
+    return (
+        f" ({board.square_mm / ratio:.4g} mm instead of {board.square_mm:.4g} mm)"
+        if board is not None
+        else ""
     )
 
 

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from studio.calibration.silhouette_checks import WIDEST, rays_of
+from studio.calibration.rays import rays_of
+from studio.calibration.silhouette_checks import WIDEST
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
 from studio.geometry.rotations import rotation_from_vector

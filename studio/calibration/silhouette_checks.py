@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from studio.calibration.boards import Board
 from studio.calibration.fault_hypotheses import explained
 from studio.calibration.findings import Finding
-from studio.calibration.scale_checks import scale_finding
+from studio.calibration.rays import rays_of
+from studio.calibration.scale_checks import height_finding, unit_finding
+from studio.calibration.standing import Posture, postures, standing_height
 from studio.geometry.camera import Camera
-from studio.geometry.projection import project
 
 Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
@@ -30,9 +31,12 @@ LEAST = 0.02
 CLIPPED = 1.5
 LEAST_PIXELS = 40
 WIDEST = np.radians(150.0)
-STEPS = 600
 HEIGHT_TOLERANCE = 0.15
 USUAL_HEIGHT, HUMAN = 1600.0, (0.5, 1.5)
+ANY_POSTURE = (0.2, 5.0)
+POSTURE_TOLERANCE = 0.55
+"""No posture makes a person's longest extent less than this share of their height, or more than the other; most keep it
+within the tolerance."""
 
 
 def silhouette_findings(
@@ -45,14 +49,32 @@ def silhouette_findings(
     )
     if found:
         return found
-    seen = height_seen(cameras, masks)
-    if seen is None:
+    return stature_findings(postures(cameras, masks), height_mm, board)
+
+
+def stature_findings(
+    found: Sequence[Posture], height_mm: float | None = None, board: Board | None = None
+) -> tuple[Finding, ...]:
+    """What the sizes of a person say against a calibration. A wrong unit shows in any posture; all else only in the
+    height of somebody who stands: who bends or leaps is of another height than they are tall.
+    """
+    known, words = (
+        (USUAL_HEIGHT, "a usual height (about 1.6 m)")
+        if height_mm is None
+        else (height_mm, f"the height given ({height_mm:.0f} mm)")
+    )
+    extents = [posture.reach_mm / known for posture in found]
+    if extents and (max(extents) < ANY_POSTURE[0] or min(extents) > ANY_POSTURE[1]):
+        unit = unit_finding(float(np.median(extents)), "the person's size", POSTURE_TOLERANCE)
+        return (unit,) if unit is not None else ()
+    seen = standing_height(found)
+    least, most = HUMAN if height_mm is None else (1.0 - HEIGHT_TOLERANCE, 1.0 + HEIGHT_TOLERANCE)
+    if seen is None or least <= seen / known <= most:
         return ()
-    if height_mm is not None and abs(seen / height_mm - 1.0) > HEIGHT_TOLERANCE:
-        return (scale_finding(seen / height_mm, f"the person's height ({height_mm:.0f} mm)", board),)
-    if height_mm is None and not HUMAN[0] < seen / USUAL_HEIGHT < HUMAN[1]:
-        return (scale_finding(seen / USUAL_HEIGHT, "a person's height (about 1.6 m)", board),)
-    return ()
+    # Nobody is taller in one frame than they are: what is tall enough anywhere is not too small.
+    if seen < known and max(posture.height_mm for posture in found) >= least * known:
+        return ()
+    return (height_finding(seen, known, words, board),)
 
 
 def outlines_of(cameras: Sequence[Camera], masks: Masks) -> dict[int, dict[str, Array]]:
@@ -86,53 +108,6 @@ def silhouette_disagreement(cameras: Sequence[Camera], outlines: Mapping[int, Ma
         if told:
             values.append(float(np.median(told)))
     return float(np.mean(values)) if values else float("nan")
-
-
-def height_seen(cameras: Sequence[Camera], masks: Masks) -> float | None:
-    """The person's height by the calibration, mm: the upright line through the middle of the silhouettes, as far as it
-    stays inside them; the median over views, the largest of the frames. None where no frame tells.
-    """
-    heights = [height for views in masks.values() if (height := _height_in(cameras, views)) is not None]
-    return float(np.percentile(heights, 80)) if heights else None
-
-
-def _height_in(cameras: Sequence[Camera], views: Mapping[str, Bytes]) -> float | None:
-    seen = [camera for camera in cameras if camera.name in views and np.any(views[camera.name])]
-    if len(seen) < 2:
-        return None
-    normal, right = np.zeros((3, 3)), np.zeros(3)
-    for camera in seen:
-        middle = np.mean(np.nonzero(views[camera.name]), axis=1)[::-1]
-        ahead = rays_of(camera, middle[None])[0]
-        across = np.eye(3) - np.outer(ahead, ahead)
-        normal += across
-        right += across @ camera.centre
-    foot = np.linalg.solve(normal, right).astype(np.float64)
-    reach = float(np.median([np.linalg.norm(camera.centre - foot) for camera in seen]))
-    line = np.tile(foot, (STEPS, 1)).astype(np.float64)
-    line[:, 2] += np.linspace(-0.8 * reach, 0.8 * reach, STEPS)
-    tops, bottoms = [], []
-    for camera in seen:
-        mask = views[camera.name]
-        pixels, depth = project(camera, line)
-        columns, rows = (np.nan_to_num(np.round(pixels), nan=-1.0)).astype(int).T
-        inside = (
-            (depth > 0) & (columns >= 0) & (rows >= 0) & (columns < mask.shape[1]) & (rows < mask.shape[0])
-        )
-        covered = np.zeros(STEPS, bool)
-        covered[inside] = mask[rows[inside], columns[inside]] > 0
-        if covered.any():
-            heights = line[covered, 2]
-            tops.append(float(heights.max()))
-            bottoms.append(float(heights.min()))
-    return float(np.median(tops) - np.median(bottoms)) if tops else None
-
-
-def rays_of(camera: Camera, pixels: Array) -> Array:
-    """(K, 3) unit directions in the world."""
-    flat = cv2.undistortPoints(pixels[:, None], camera.matrix, camera.distortion)[:, 0]
-    ahead = np.column_stack([flat, np.ones(len(flat))]) @ camera.rotation
-    return ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
 
 
 def _miss(one: Camera, two: Camera, first: Array, second: Array) -> float:

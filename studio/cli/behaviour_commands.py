@@ -19,7 +19,6 @@ from studio.training.model_shelf import ModelSummary, keep_model, list_models, p
 from studio.training.oversampling import OversamplingSettings
 from studio.training.sources import FPS, Recording
 
-DEFAULT_BODY = "human25"
 SHOWN_BAD_FRAMES = 12
 SKELETON_HELP = "ASF file of the .amc sources; default: NN.asf beside NN_MM.amc."
 TEST_HELP = "A source for the test entropy, again for more; default: the last fifth of each source."
@@ -45,7 +44,10 @@ class _Sources(click.Command):
 @click.command("learn", cls=_Sources)
 @click.argument("sources", nargs=-1, required=True)
 @click.option(
-    "--body", default=DEFAULT_BODY, show_default=True, metavar="NAME", help="Body of the model's poses."
+    "--body",
+    default="",
+    metavar="NAME",
+    help="Body of the model's poses; default: the workspace's sessions' own.",
 )
 @click.option("--into", required=True, metavar="MODEL", help="Name in the workspace's models, or a path.")
 @click.option("--skeleton", type=click.Path(path_type=Path), metavar="FILE.asf", help=SKELETON_HELP)
@@ -75,7 +77,7 @@ def learn_command(
     varied smoothing, clustered, and their order is learnt. Nothing is written before the model is whole.
     """
     workspace = Workspace()
-    model_body = load_body(body, (workspace.root / BODIES_NAME,))
+    model_body = load_body(body or workspace.usual_body(), (workspace.root / BODIES_NAME,))
     place = place_for_model(into, workspace, replace=force)
     asked = given(knobs)
     learning, material = _settings(LearningSettings, asked), _settings(OversamplingSettings, asked)

@@ -5,6 +5,7 @@ import msgspec
 
 from studio.cli.output import command, progress
 from studio.runs.checking import EVERY, check_run
+from studio.runs.tracks import BEST
 from studio.sessions.workspace import Workspace
 
 
@@ -12,7 +13,11 @@ from studio.sessions.workspace import Workspace
 @click.argument("session")
 @click.argument("run")
 @click.option(
-    "--track", default="", metavar="NAME", help="Default: the one that is exported (smoothed, refined, raw)."
+    "--track",
+    default=BEST,
+    show_default=True,
+    metavar="NAME",
+    help="Best: smoothed, else refined, else raw, as in an export.",
 )
 @click.option(
     "--every", type=click.IntRange(1), default=EVERY, show_default=True, help="Look at so-many-th frames."

@@ -66,15 +66,17 @@ def export_command(session: str, run: str, place: Path, **asked: object) -> dict
     for line in done.notes:
         note(line)
     names = ", ".join(str(path) for path in done.files)
+    of_track = f"track '{done.track}', " if done.track else ""
     return {
         "session": opened.name,
         "run": stored.name,
         "format": done.format,
+        "track": done.track,
         "files": [str(path) for path in done.files],
         "bytes": done.size,
         "frames": done.frames,
         "fps": done.fps,
         "checked": done.checked,
         "notes": list(done.notes),
-        "text": f"{names} ({done.size / 1e6:.2f} MB): {done.checked}.",
+        "text": f"{names} ({done.size / 1e6:.2f} MB): {of_track}{done.checked}.",
     }

@@ -2,7 +2,7 @@
 
 import click
 
-from studio.cli.output import command, note, progress
+from studio.cli.output import command, note, notes_once, progress
 from studio.runs.initialising import WEIGHTING, InitialPose, initialise, keep_pose
 from studio.runs.new_run import checked_frames
 from studio.sessions.workspace import Workspace
@@ -39,8 +39,7 @@ def initialise_command(
     opened = Workspace().resolve(session)
     checked_frames(opened, frame, frame + 1)
     tree, notes = opened.body_with_notes(body or None)
-    for line in notes:
-        note(line)
+    notes_once(opened.path, notes)
     with progress(f"{opened.name}: frame {frame}") as report:
         found = initialise(
             opened,

@@ -9,7 +9,13 @@ import click
 from studio.cli.knob_options import SET_OPTION, chosen_changes, given
 from studio.cli.output import command, note, progress
 from studio.cli.recording_commands import CAMERA_OPTION, addresses_of
-from studio.cli.tracking_commands import DESPITE_OPTION, own_options, told_run, tracking_shown
+from studio.cli.tracking_commands import (
+    DESPITE_OPTION,
+    own_options,
+    say_run_notes,
+    told_run,
+    tracking_shown,
+)
 from studio.errors import RunError
 from studio.runs.live_replay import prepare_replay
 from studio.runs.live_request import last_of
@@ -123,8 +129,9 @@ def _from_cameras(
 ) -> dict[str, object]:
     with progress(f"{wish.into.name}") as report:
         found = track_cameras(session, addresses_of(cameras), wish, request, report)
-    for line in (*found.run.record.notes, *(notice.in_words for notice in found.standing.notices)):
-        note(line)
+    say_run_notes(found.run)
+    for notice in found.standing.notices:
+        note(notice.in_words)
     spreads = found.standing.spreads
     return {
         **_told(found.run, found.summary),

@@ -5,8 +5,9 @@ import functools
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import ParamSpec
 
 import click
@@ -16,6 +17,7 @@ from rich.console import Console
 from studio.errors import StudioError
 from studio.notebook.progress import bar
 from studio.progress import Progress
+from studio.sessions.atomic_files import write_bytes
 
 P = ParamSpec("P")
 
@@ -24,6 +26,8 @@ WRONG_INPUT = 2
 FAULT = 70
 REFUSED_BY_THE_DISK = frozenset((errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOSPC, errno.EDQUOT))
 TRACEBACK_VARIABLE = "STUDIO_TRACEBACK"
+SAID = ".notes-said.json"
+"""In a session's folder: notes that commands have said of it."""
 
 messages = Console(stderr=True, highlight=False, soft_wrap=True)
 
@@ -103,6 +107,23 @@ def _plain_value(value: object) -> object:
 def note(text: str) -> None:
     """A line for the person at the terminal, on standard error."""
     messages.print(_plain(text))
+
+
+def notes_once(folder: Path, lines: Iterable[str]) -> None:
+    """Lines for the person at the terminal, each but the first time that it is said of what lies in the folder (a
+    session). What cannot be remembered is said again.
+    """
+    place = folder / SAID
+    try:
+        said = set(msgspec.json.decode(place.read_bytes(), type=list[str]))
+    except (OSError, msgspec.DecodeError):
+        said = set[str]()
+    new = [line for line in lines if line not in said]
+    for line in new:
+        note(line)
+    if new:
+        with suppress(OSError):
+            write_bytes(place, msgspec.json.encode(sorted(said.union(new))))
 
 
 @contextmanager

@@ -13,10 +13,10 @@ import click
 from studio.body.subject import read_subject
 from studio.cli.arguments import frame_range
 from studio.cli.knob_options import chosen_changes, given, knob_options
-from studio.cli.output import command, note, progress
+from studio.cli.output import command, note, notes_once, progress
 from studio.errors import RunError
 from studio.progress import Progress
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import DESPITE, RunRequest, prepare_run
 from studio.runs.start_pose_file import frame_of_file, start_pose_from_file
 from studio.sessions.session import START_POSE_NAME, Session
 from studio.sessions.stored_run import StoredRun
@@ -41,12 +41,21 @@ def own_options(function: F) -> F:
     return knob_options([declared[name] for name in OPTION_KNOBS], with_defaults=False)(function)
 
 
+def say_run_notes(run: StoredRun) -> None:
+    """A run's notes: what holds for the session once, what was accepted for this run always."""
+    accepted = [line for line in run.record.notes if line.startswith(DESPITE)]
+    notes_once(run.folder.parent.parent, [line for line in run.record.notes if line not in accepted])
+    for line in accepted:
+        note(line)
+
+
 @contextmanager
 def tracking_shown(run: StoredRun, standing: Callable[[], str]) -> Iterator[Progress]:
-    """A run's notes, then how far it is. standing : in words how far it came, said when somebody interrupts it."""
+    """A run's notes, then how far it is; what earlier commands said of the session is not said again. standing : in
+    words how far it came, said when somebody interrupts it.
+    """
     where = f"{run.session_name} / {run.name}"
-    for line in run.record.notes:
-        note(line)
+    say_run_notes(run)
     try:
         with progress(where) as report:
             yield report

@@ -6,7 +6,8 @@ a frame, without any alignment, in mm. Beside it stand the two usual aligned one
 by more than LOST_MM (the threshold of MPI-INF-3DHP's PCK).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from studio.body.model import BodyModel
 from studio.capture.trc import MarkerMotion
 from studio.errors import TruthError
 from studio.evaluation.alignment import FEWEST_POINTS, moved_to_root, similarity_aligned
-from studio.runs.marker_lines import marker_sides
+from studio.runs.marker_lines import marker_links, marker_sides
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -36,6 +37,10 @@ class Evaluation:
     per_frame_mm : in the order of `frames`. root_aligned_mm : with the root marker laid on the true one.
     procrustes_mm : after the best turn, scale and move of each frame, None where no frame has three
     markers. unmatched_markers : names that only the body or only the truth knows.
+    angles_deg : by joint, how far the angle between the two limbs that meet there is off, mean over frames of the
+    absolute difference, degrees; directions_deg : by limb, the mean angle between its direction and the true one. Both
+    are of the straight lines between markers, so that a turn of a limb about itself shows in neither. mean_… : over
+    joints, over limbs; None where the markers make none.
     """
 
     frames: tuple[int, ...]
@@ -51,6 +56,10 @@ class Evaluation:
     root_aligned_mm: float
     procrustes_mm: float | None
     unmatched_markers: tuple[str, ...]
+    angles_deg: dict[str, float] = field(default_factory=dict)
+    mean_angle_deg: float | None = None
+    directions_deg: dict[str, float] = field(default_factory=dict)
+    mean_direction_deg: float | None = None
 
 
 def evaluate(poses: Array, frames: IntArray, body: BodyModel, truth: MarkerMotion, fps: float) -> Evaluation:
@@ -88,7 +97,47 @@ def evaluate(poses: Array, frames: IntArray, body: BodyModel, truth: MarkerMotio
         root_aligned_mm=_root_aligned(found, wanted, seen),
         procrustes_mm=_procrustes(found, wanted, seen),
         unmatched_markers=unmatched,
+        **_degrees_off(found, wanted, marker_links(body, names), names),
     )
+
+
+def _degrees_off(
+    found: Array, wanted: Array, links: list[tuple[int, int]], names: tuple[str, ...]
+) -> dict[str, Any]:
+    """The fields in degrees of `Evaluation`. found, wanted : (K, M, 3), NaN where missing. links : (upper, lower) pairs
+    of markers, a limb each; a joint is where one ends and another begins.
+    """
+    directions: dict[str, float] = {}
+    angles: dict[str, float] = {}
+    for upper, lower in links:
+        off = _between(found[:, lower] - found[:, upper], wanted[:, lower] - wanted[:, upper])
+        _keep_mean(directions, f"{names[upper]}_{names[lower]}", off)
+        onward = [other for start, other in links if start == lower]
+        for other in onward:
+            bent = [
+                _between(points[:, lower] - points[:, upper], points[:, other] - points[:, lower])
+                for points in (found, wanted)
+            ]
+            joint = names[lower] if len(onward) == 1 else f"{names[lower]} to {names[other]}"
+            _keep_mean(angles, joint, np.abs(bent[0] - bent[1]))
+    return {
+        "angles_deg": angles,
+        "mean_angle_deg": float(np.mean(list(angles.values()))) if angles else None,
+        "directions_deg": directions,
+        "mean_direction_deg": float(np.mean(list(directions.values()))) if directions else None,
+    }
+
+
+def _between(one: Array, other: Array) -> Array:
+    """(K,) degrees between vectors (K, 3)."""
+    across = np.linalg.norm(np.cross(one, other), axis=1)
+    return np.degrees(np.arctan2(across, np.einsum("ij,ij->i", one, other)))
+
+
+def _keep_mean(means: dict[str, float], name: str, values: Array) -> None:
+    seen = np.isfinite(values)
+    if seen.any():
+        means[name] = float(values[seen].mean())
 
 
 def rows_of_frames(truth: MarkerMotion, fps: float) -> dict[int, int]:

@@ -59,6 +59,11 @@ def in_words(evaluation: Evaluation) -> str:
     if evaluation.lost_limbs:
         lines.append(f"limbs lost           {', '.join(evaluation.lost_limbs)}")
     lines += [f"  {name:16} {value:7.1f} mm" for name, value in evaluation.per_marker_mm.items()]
+    if evaluation.mean_direction_deg is not None:
+        lines.append(f"limbs' directions     {evaluation.mean_direction_deg:.1f}° off in the mean")
+    if evaluation.mean_angle_deg is not None:
+        lines.append(f"angles between limbs  {evaluation.mean_angle_deg:.1f}° off in the mean")
+        lines += [f"  {name:24} {value:5.1f}°" for name, value in evaluation.angles_deg.items()]
     if evaluation.unmatched_markers:
         lines.append(f"not matched          {', '.join(evaluation.unmatched_markers)}")
     return "\n".join(lines)

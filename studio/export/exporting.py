@@ -13,6 +13,7 @@ from studio.export.calibration_file import write_cameras
 from studio.export.formats import ExportFormat
 from studio.export.glb_writing import write_glb
 from studio.export.marker_files import write_c3d_file, write_trc_file
+from studio.export.mot_file import write_mot
 from studio.export.motion import motion_of, no_motion
 from studio.export.options import AUTO, ExportOptions
 from studio.export.overlay_video import write_videos
@@ -20,6 +21,7 @@ from studio.export.table_files import write_csv, write_npz, write_parquet
 from studio.export.task import ExportTask, Writer, Written
 from studio.knobs import changed
 from studio.progress import Progress, watched
+from studio.runs.tracks import BEST, best_track
 from studio.sessions.atomic_files import discard, new_folder_beside, sync_folder
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -28,6 +30,7 @@ WRITERS: dict[str, Writer] = {
     "bvh": write_bvh,
     "glb": write_glb,
     "trc": write_trc_file,
+    "mot": write_mot,
     "c3d": write_c3d_file,
     "csv": write_csv,
     "parquet": write_parquet,
@@ -43,7 +46,8 @@ WRITERS: dict[str, Writer] = {
 class ExportReport:
     """What came of an export.
 
-    files : written, and nothing else. checked : what reading back showed. notes : sentences on gaps, names and axes.
+    files : written, and nothing else. track : that they hold, "" for none. checked : what reading back showed. notes :
+    sentences on gaps, names and axes, and on a better track that was passed over.
     """
 
     format: str
@@ -52,6 +56,7 @@ class ExportReport:
     fps: float
     checked: str
     notes: tuple[str, ...]
+    track: str = ""
 
     @property
     def size(self) -> int:
@@ -82,6 +87,14 @@ def settled(form: ExportFormat, asked: Mapping[str, object]) -> ExportOptions:
     return dataclasses.replace(options, unit=unit or "mm", up=up or "z")
 
 
+def with_track(run: StoredRun, options: ExportOptions) -> tuple[ExportOptions, tuple[str, ...]]:
+    """The options with the best track by its name, where the best is wanted; and notes on better ones out of date."""
+    if options.track != BEST:
+        return options, ()
+    best = best_track(run)
+    return dataclasses.replace(options, track=best.name), (best.note,) if best.note else ()
+
+
 def export_run(
     session: Session,
     run: StoredRun,
@@ -106,6 +119,9 @@ def export_run(
         raise ExportError(
             f"{form.title} cannot be written here.", "Export it from the page or the command line."
         )
+    notes: tuple[str, ...] = ()
+    if "track" in form.takes:
+        options, notes = with_track(run, options)
     motion = no_motion(run) if form.what == "cameras" else motion_of(run, options)
     folder = _working_folder(place)
 
@@ -123,8 +139,15 @@ def export_run(
     finally:
         discard(folder)
     sync_folder(place.parent)
-    notes = (*motion.notes, *written.notes)
-    return ExportReport(form.name, moved, len(motion.frames), motion.fps, written.checked, notes)
+    return ExportReport(
+        form.name,
+        moved,
+        len(motion.frames),
+        motion.fps,
+        written.checked,
+        (*notes, *motion.notes, *written.notes),
+        options.track if "track" in form.takes else "",
+    )
 
 
 def _working_folder(place: Path) -> Path:

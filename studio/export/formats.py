@@ -60,6 +60,13 @@ FORMATS = _named(
         media_type="text/plain; charset=utf-8",
     ),
     ExportFormat(
+        "mot",
+        "OpenSim motion",
+        "Opens in OpenSim beside the TRC: the body's joint angles in degrees over time, places in m.",
+        FRAMES,
+        media_type="text/plain; charset=utf-8",
+    ),
+    ExportFormat(
         "c3d",
         "C3D markers",
         "Opens in Vicon Nexus, Qualisys, Mokka, Visual3D and OpenSim; points over time, gaps marked.",

@@ -1,19 +1,18 @@
 """The exports that lie in a run's folder: `exports/<file>`, each with what was said of it when it was written."""
 
 import datetime
-import hashlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import msgspec
 
 from studio.errors import NotFoundError
-from studio.export.exporting import ExportReport, export_run, settled
+from studio.export.exporting import ExportReport, export_run
 from studio.export.formats import ExportFormat
 from studio.export.options import ExportOptions
 from studio.export.task import Writer
 from studio.progress import Progress
-from studio.runs.tracks import read_track, track_names
+from studio.runs.tracks import BEST, best_track, read_track, track_digest, track_names
 from studio.runs.way_results import ExportedFile
 from studio.sessions.atomic_files import write_bytes
 from studio.sessions.session import Session
@@ -59,8 +58,6 @@ def export_into_run(
     """
     folder = run.folder / FOLDER
     folder.mkdir(exist_ok=True)
-    track = settled(form, asked).track if "track" in form.takes else ""
-    content = _content(run, track) if track else ""
     report = export_run(
         session,
         run,
@@ -72,7 +69,8 @@ def export_into_run(
         record_scene=record_scene,
         pack=True,
     )
-    kept = msgspec.structs.replace(_said(report, asked), track=track, content=content)
+    content = _content(run, report.track) if report.track else ""
+    kept = msgspec.structs.replace(_said(report, asked), track=report.track, content=content)
     write_bytes(folder / f"{kept.file}{SAID}", msgspec.json.encode(kept))
     return kept
 
@@ -98,6 +96,9 @@ def stale_export(run: StoredRun, kept: KeptExport) -> str:
         return f"track '{kept.track}' that it was written from is not there any more"
     if _content(run, kept.track) != kept.content:
         return f"written before track '{kept.track}' changed"
+    best = best_track(run).name
+    if kept.options.get("track", BEST) == BEST and best != kept.track:
+        return f"holds track '{kept.track}', and '{best}' is the best now"
     return ""
 
 
@@ -145,10 +146,7 @@ def _stem(session: Session, run: StoredRun, asked: Mapping[str, str | int | floa
 
 def _content(run: StoredRun, track: str) -> str:
     """A digest of a track's frames and poses."""
-    found = read_track(run, track)
-    made = hashlib.sha256(found.frames.tobytes())
-    made.update(found.poses.tobytes())
-    return made.hexdigest()[:24]
+    return track_digest(read_track(run, track))
 
 
 def _counts(value: str | float) -> bool:

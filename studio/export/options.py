@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from studio.knobs import knob
+from studio.runs.tracks import BEST
 
 OWN = "own"
 AUTO = "auto"
@@ -19,7 +20,11 @@ class ExportOptions:
 
     title: ClassVar[str] = "Export"
 
-    track: str = knob("raw", help="Which track: raw is what the search found; others were made of it.")
+    track: str = knob(
+        BEST,
+        help="Which track: best is the smoothed one, else the refined, else raw, what the search found; a track that is"
+        " older than the run's frames is passed over.",
+    )
     first: int = knob(0, 0, 100_000_000, label="from frame", help="The first frame.")
     last: int = knob(0, 0, 100_000_000, label="to frame", help="The frame after the last; 0: to the end.")
     fps: float = knob(

@@ -13,8 +13,9 @@ from studio.scene.recording import record_scene
 def export_run(run: RunName, to: str | Path, *, progress: Told = None, **options: object) -> ExportReport:
     """Write the motion to a file that other programs open; its ending is the format.
 
-    .bvh .trc .c3d .glb .csv .parquet .npz .mp4 .viser. options : as of the command, such as track="smoothed", fps=30,
-    unit="m", names="mixamo". The file is read back before it takes its place. Raises ExportError, SettingsError.
+    .bvh .trc .mot .c3d .glb .csv .parquet .npz .mp4 .viser. options : as of the command, such as track="raw" (default
+    the best there is; the answer's .track names it), fps=30, unit="m", names="mixamo". The file is read back before it
+    takes its place. Raises ExportError, SettingsError.
     """
     place = Path(to)
     stored, form = open_run(run), format_of_file(place)

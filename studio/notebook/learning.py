@@ -18,8 +18,6 @@ from studio.training.model_shelf import keep_model, place_for_model
 from studio.training.oversampling import OversamplingSettings
 from studio.training.sources import FPS, Recording
 
-DEFAULT_BODY = "human25"
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LearntModel:
@@ -36,7 +34,7 @@ def learn(
     sources: Sequence[str | Path],
     into: str,
     *,
-    body: str = DEFAULT_BODY,
+    body: str | None = None,
     skeleton: str | Path | None = None,
     tests: Sequence[str | Path] = (),
     fps: float = FPS,
@@ -48,11 +46,11 @@ def learn(
     """Learn what a body tends to do from recorded motion.
 
     sources : motion files (.amc .bvh .npz .c3d .trc), folders of them, runs as "SESSION/RUN", recipes. into : a name in
-    the workspace's models, or a path. tests : for the test entropy; default the last fifth of each source. Nothing is
-    written before the model is whole. Raises StudioError.
+    the workspace's models, or a path. body : default the one that the workspace's sessions have. tests : for the test
+    entropy; default the last fifth of each source. Nothing is written before the model is whole. Raises StudioError.
     """
     workspace = Workspace()
-    tree = load_body(body, (workspace.root / BODIES_NAME,))
+    tree = load_body(body or workspace.usual_body(), (workspace.root / BODIES_NAME,))
     place = place_for_model(into, workspace, replace=replace)
     learning, material = settings_of(knobs or {})
     asf = Path(skeleton) if skeleton is not None else None

@@ -10,7 +10,7 @@ from studio.errors import TruthError
 from studio.evaluation.errors import Evaluation
 from studio.evaluation.errors import evaluate as evaluate_poses
 from studio.notebook.opening import RunName, open_run, session_of
-from studio.runs.tracks import RAW, Track, track_names
+from studio.runs.tracks import BEST, Track, track_names
 from studio.runs.tracks import read_track as read_stored_track
 
 
@@ -19,12 +19,14 @@ def list_tracks(run: RunName) -> tuple[str, ...]:
     return track_names(open_run(run))
 
 
-def read_track(run: RunName, track: str = RAW) -> Track:
-    """A track as arrays: frames (K,), poses (K, D) rad and mm, confidence (K,), states. Raises NotFoundError."""
+def read_track(run: RunName, track: str = BEST) -> Track:
+    """A track as arrays: name, frames (K,), poses (K, D) rad and mm, confidence (K,), states. track : default the best
+    (smoothed, refined, raw). Raises NotFoundError.
+    """
     return read_stored_track(open_run(run), track)
 
 
-def markers(run: RunName, track: str = RAW) -> MarkerMotion:
+def markers(run: RunName, track: str = BEST) -> MarkerMotion:
     """The body's markers along a track: names (M), times (K,) s, positions (K, M, 3) mm, z up."""
     stored = open_run(run)
     body, chosen = stored.body(), read_stored_track(stored, track)
@@ -37,8 +39,10 @@ def markers(run: RunName, track: str = RAW) -> MarkerMotion:
     )
 
 
-def evaluate(run: RunName, *, truth: str | Path | None = None, track: str = RAW) -> Evaluation:
-    """Distances from the true markers, mm. truth : a TRC; default the session's own. Raises TruthError."""
+def evaluate(run: RunName, *, truth: str | Path | None = None, track: str = BEST) -> Evaluation:
+    """Distances from the true markers, mm. truth : a TRC; default the session's own. track : default the best. Raises
+    TruthError.
+    """
     stored = open_run(run)
     opened = session_of(stored)
     path = Path(truth) if truth is not None else opened.truth_path

@@ -22,9 +22,9 @@ from studio.geometry.camera import Camera
 from studio.progress import Progress, watched
 from studio.runs.jumps import Jump, jumps_of
 from studio.runs.overlay_drawing import projected_silhouette
-from studio.runs.refining import REFINED, SMOOTHED, jitter
+from studio.runs.refining import jitter
 from studio.runs.run_footage import footage_of
-from studio.runs.tracks import RAW, Track, read_track, track_names, track_stamp
+from studio.runs.tracks import BEST, Track, read_track, track_stamp
 from studio.sessions.record_files import read_record, write_record
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -99,26 +99,20 @@ class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
         return ", ".join([*parts, f"jitter {self.jitter_mm:.1f} mm"])
 
 
-def usual_track(run: StoredRun) -> str:
-    """The track that is looked at and exported unless told otherwise: the smoothed one, else the refined, else raw."""
-    names = track_names(run)
-    return next((name for name in (SMOOTHED, REFINED) if name in names), RAW)
-
-
 def check_run(
     session: Session,
     run: StoredRun,
-    track: str = "",
+    track: str = BEST,
     every: int = EVERY,
     *,
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> RunCheck:
-    """Measure a track ("" for the usual one) in every so-many-th of its frames and keep that.
+    """Measure a track in every so-many-th of its frames and keep that.
 
     Raises RunError for a run without frames, NotFoundError, FootageError; WorkCancelledError when stopped.
     """
-    chosen = read_track(run, track or usual_track(run))
+    chosen = read_track(run, track or BEST)
     if not len(chosen.frames):
         raise RunError(f"Run '{run.name}' has no finished frame.", "Track it first.")
     body, cameras = run.body(), run.cameras()

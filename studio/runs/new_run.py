@@ -33,6 +33,8 @@ from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, values
 Array = NDArray[np.float64]
 
 DISTRIBUTION = "capture-studio"
+DESPITE = "Tracked despite: "
+"""How a run's note on an accepted fault of the calibration begins."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +92,7 @@ def prepare_run(
     if not 0 <= asked.seed < 2**63:
         raise RunError(f"The seed {asked.seed} cannot be used.", "Give a whole number of 0 or more.")
     body, notes = session.body_with_notes(asked.body or None, asked.subject)
-    notes = (*notes, *(f"Tracked despite: {doubt}" for doubt in doubts))
+    notes = (*notes, *(f"{DESPITE}{doubt}" for doubt in doubts))
     behaviour = chosen_model(session, body, settings, asked.behaviour)
     if behaviour is not None and behaviour.note:
         notes = (*notes, behaviour.note)

@@ -13,7 +13,21 @@ from studio.errors import RunError
 from studio.progress import Cancelled, Progress, watched
 from studio.runs.refined_frames import refined_frames
 from studio.runs.search_space import search_space
-from studio.runs.tracks import RAW, Track, read_track, stretches, track_names, write_track
+from studio.runs.tracks import (
+    RAW,
+    REFINED,
+    SMOOTHED,
+    SOURCE,
+    SOURCE_DIGEST,
+    Track,
+    best_track,
+    read_track,
+    stretches,
+    track_digest,
+    track_named,
+    track_names,
+    write_track,
+)
 from studio.sessions.names import checked_name
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -21,8 +35,6 @@ from studio.tracking.refinement import RefinementSettings
 from studio.tracking.smoothing import Smoothed, SmoothingSettings, rms_second_difference, smooth
 
 Array = NDArray[np.float64]
-
-REFINED, SMOOTHED = "refined", "smoothed"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,7 +78,7 @@ def refine_run(
     tell(step, 0, total)
     found = refined_frames(session, run, track, knobs, lambda done: tell(step, done, total))
     moved = int(np.count_nonzero((found.poses != track.poses).any(axis=1)))
-    made_by = {"verb": "refine", "from": source, **asdict(knobs), "moved": moved}
+    made_by = {"verb": "refine", **_origin(track), **asdict(knobs), "moved": moved}
     made = Track(into, track.frames, found.poses, found.agreement, track.states, made_by)
     write_track(run, made, replace=replace)
     return MadeTrack(
@@ -93,7 +105,7 @@ def smooth_run(
     RunError, SettingsError where no frame may be believed.
     """
     knobs = settings or SmoothingSettings()
-    chosen = source or (REFINED if REFINED in track_names(run) and into != REFINED else RAW)
+    chosen = source or best_track(run, () if into == REFINED else (REFINED,)).name
     track = _begun(run, chosen, into, replace)
     body, record = run.body(), run.record
     angles = np.array([entry.kind == "angle" for entry in body.parameters])
@@ -109,7 +121,7 @@ def smooth_run(
     )
     filled = tuple(found.frames[found.filled].tolist())
     left_out = tuple(found.left_out.tolist())
-    made_by = {"verb": "smooth", "from": chosen, **asdict(knobs), "filled": filled, "left_out": left_out}
+    made_by = {"verb": "smooth", **_origin(track), **asdict(knobs), "filled": filled, "left_out": left_out}
     made = Track(into, found.frames, found.poses, *_standing(track, found), made_by)
     write_track(run, made, replace=replace)
     before, after = jitter(run, track), jitter(run, made)
@@ -133,6 +145,7 @@ def check_making(run: StoredRun, source: str, into: str, replace: bool) -> None:
     """Refuse, before anything is done, a track that could not be kept. source : "" for the usual one. Raises RunError,
     SessionError, NotFoundError.
     """
+    source = track_named(run, source)
     if checked_name(into, "track").lower() == RAW or into == source:
         raise RunError(
             f"Track '{into}' cannot be written over by what is made from it.", "Choose another --into."
@@ -156,6 +169,11 @@ def _begun(run: StoredRun, source: str, into: str, replace: bool) -> Track:
     if not len(track.frames):
         raise RunError(f"Run '{run.name}' has no finished frame.", "Track it first.")
     return track
+
+
+def _origin(track: Track) -> dict[str, str]:
+    """What a track that is made keeps of the one that it is made from."""
+    return {SOURCE: track.name, SOURCE_DIGEST: track_digest(track)}
 
 
 def _standing(track: Track, found: Smoothed) -> tuple[Array, tuple[str, ...]]:

@@ -40,7 +40,7 @@ def silhouette_doubts(
     """Faults of a calibration that the silhouettes name; none where they agree, or where nothing explains them (poor
     masks disagree too, and are told of camera by camera). masks : frame → camera → (H, W).
 
-    A wrong size only warns where a height is given: who crouches or stretches is of another height than told.
+    A wrong size only warns where a height is given: that may be the wrong one.
     """
     known = {finding.code for finding in check_calibration(cameras)}
     seen: Masks = masks

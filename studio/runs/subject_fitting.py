@@ -26,11 +26,10 @@ from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
 from studio.progress import Cancelled, Progress, watched
 from studio.runs.initialising import initialise
-from studio.runs.refining import REFINED
 from studio.runs.search_space import parameter_names
 from studio.runs.session_settings import session_settings
 from studio.runs.subject_frames import varied_frames
-from studio.runs.tracks import RAW, read_track, track_names
+from studio.runs.tracks import REFINED, best_track, read_track
 from studio.sessions.calibration_changes import stale_runs
 from studio.sessions.names import free_name
 from studio.sessions.session import SUBJECT_NAME, Session
@@ -227,7 +226,7 @@ def _stored_poses(
     for run in runs:
         if run.record.parameters != parameter_names(body):
             continue
-        track = read_track(run, REFINED if REFINED in track_names(run) else RAW)
+        track = read_track(run, best_track(run, (REFINED,)).name)
         if len(track.frames):
             return track.frames, track.poses, run.name
     if wanted:

@@ -1,13 +1,16 @@
 """The tracks of a run: what the search found, and what was made of it since, side by side.
 
 `raw` is what the results store holds; every other track is one file `tracks/<name>.npz` in the run's folder, so that
-refining or smoothing never writes over what was found. Frames that are missing from a track are gaps.
+refining or smoothing never writes over what was found. Frames that are missing from a track are gaps. A track that was
+made of another keeps a digest of it, so that it is known when the run has gone on since (`best_track`).
 """
 
+import hashlib
 import io
 import itertools
 import math
-from collections.abc import Mapping
+import zipfile
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -29,7 +32,11 @@ Array = NDArray[np.float64]
 Plain = Any
 """What JSON can hold."""
 
-RAW = "raw"
+RAW, REFINED, SMOOTHED = "raw", "refined", "smoothed"
+BEST = "best"
+"""Stands for the best track there is (`best_track`) wherever a track is named."""
+SOURCE, SOURCE_DIGEST = "from", "from_digest"
+"""Entries of `made_by`: the track that one was made from, and what that held then."""
 FOLDER, ENDING = "tracks", ".npz"
 SCHEMA_VERSION = 1
 ENTRIES = ("frames", "poses", "confidence", "states", "made_by", "schema")
@@ -60,8 +67,76 @@ def track_names(run: StoredRun) -> tuple[str, ...]:
     return (RAW, *sorted(name for name in found if is_name(name) and name != RAW))
 
 
+@dataclass(frozen=True, slots=True)
+class BestTrack:
+    """The best track of a run. name : "smoothed", else "refined", else "raw". outdated : better ones that were made
+    before the run, or what they were made from, changed.
+    """
+
+    name: str
+    outdated: tuple[str, ...] = ()
+
+    @property
+    def note(self) -> str:
+        """A sentence on the tracks that were passed over; "" for none."""
+        if not self.outdated:
+            return ""
+        which = " and ".join(f"'{name}'" for name in self.outdated)
+        one = len(self.outdated) == 1
+        return (
+            f"Track{'' if one else 's'} {which} {'was' if one else 'were'} made before the run changed: '{self.name}'"
+            f" is taken. Make {'it' if one else 'them'} again, or name {'it' if one else 'one'}."
+        )
+
+
+def best_track(run: StoredRun, among: Sequence[str] = (SMOOTHED, REFINED)) -> BestTrack:
+    """The first track of `among` that there is, by default the smoothed, else the refined one; else the raw one. A
+    track that was made of poses that have changed since does not count. Raises SessionError where one is damaged.
+    """
+    names, outdated = track_names(run), []
+    for name in among:
+        if name in names:
+            if _up_to_date(run, read_track(run, name), names):
+                return BestTrack(name, tuple(outdated))
+            outdated.append(name)
+    return BestTrack(RAW, tuple(outdated))
+
+
+def track_digest(track: Track) -> str:
+    """24 hex digits that tell a track's frames and poses from any others."""
+    made = hashlib.sha256(track.frames.tobytes())
+    made.update(track.poses.tobytes())
+    return made.hexdigest()[:24]
+
+
+def track_named(run: StoredRun, name: str) -> str:
+    """The name of a track, of the best one for BEST."""
+    return best_track(run).name if name == BEST else name
+
+
+def _up_to_date(run: StoredRun, track: Track, names: tuple[str, ...]) -> bool:
+    """Whether what the track was made from is as it was then, down to the raw one. One of which that cannot be told
+    counts while it goes on to the raw track's end.
+    """
+    seen = {track.name}
+    while track.name != RAW:
+        source, digest = track.made_by.get(SOURCE, RAW), track.made_by.get(SOURCE_DIGEST)
+        if source not in names or source in seen or digest is None:
+            last = read_track(run, RAW).frames[-1:].tolist()
+            return set(last) <= {*track.frames.tolist(), *track.made_by.get("left_out", ())}
+        made_from = read_track(run, source)
+        if track_digest(made_from) != digest:
+            return False
+        track = made_from
+        seen.add(track.name)
+    return True
+
+
 def read_track(run: StoredRun, name: str = RAW) -> Track:
-    """A track by its name. Raises NotFoundError where there is none, SessionError where it is damaged."""
+    """A track by its name, BEST for the best. Raises NotFoundError where there is none, SessionError where it is
+    damaged.
+    """
+    name = track_named(run, name)
     if name == RAW:
         return _raw_track(run)
     path = _path(run, name)
@@ -104,10 +179,13 @@ def write_track(run: StoredRun, track: Track, *, replace: bool = False) -> Path:
     replace : write over a derived track of that name. Raises SessionError for "raw", a name that is taken, or arrays
     that do not fit each other or the run.
     """
-    if track.name.lower() == RAW:
-        raise SessionError(
-            f"Track '{RAW}' is what the search found and stays as it is.", "Choose another name with --into."
+    if track.name.lower() in (RAW, BEST):
+        what = (
+            "what the search found and stays as it is"
+            if track.name.lower() == RAW
+            else "whichever is the best"
         )
+        raise SessionError(f"Track '{track.name}' is {what}.", "Choose another name with --into.")
     path = _path(run, track.name)
     try:
         _check(track, len(run.record.parameters))

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from studio.runs.checking import kept_check, usual_track
+from studio.runs.checking import kept_check
+from studio.runs.tracks import best_track
 from studio.runs.way_step import StepStatus, counted, enumerated
 from studio.sessions.footage_changes import stale_runs
 from studio.sessions.run_record import CAMERAS_NAME
@@ -66,7 +67,7 @@ def check_step(session: Session) -> StepStatus:
     run = newest_run(session)
     if run is None:
         return StepStatus("check", "blocked", "", "It needs a run.")
-    name = usual_track(run)
+    name = best_track(run).name
     check = kept_check(run, name)
     if check is None:
         return StepStatus("check", "ready", f"{run.name}, track {name}: not looked at yet")

@@ -5,12 +5,14 @@ import os
 import shutil
 import sqlite3
 import time
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
 import platformdirs
 
+from studio.body.subject import DEFAULT_BODY
 from studio.errors import NotFoundError, SessionError, StudioError
 from studio.sessions import atomic_files
 from studio.sessions.catalogue import Catalogue, RunEntry, SessionEntry
@@ -69,6 +71,15 @@ class Workspace:
         """All sessions by name, with their runs; those that cannot be opened carry the reason."""
         entries, runs = self.catalogue.read()
         return tuple(self._summary(entry, runs) for entry in entries)
+
+    def usual_body(self) -> str:
+        """The body that most of the sessions have, of several the newest session's; that of a new session where there
+        is none.
+        """
+        usable = [entry for entry in self.sessions() if not entry.problem]
+        count = Counter(entry.body for entry in usable)
+        usable.sort(key=lambda entry: (count[entry.body], entry.created))
+        return usable[-1].body if usable else DEFAULT_BODY
 
     def session(self, name: str) -> Session:
         """The session of that name. Raises NameRefused, NotFoundError."""

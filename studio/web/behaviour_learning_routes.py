@@ -27,7 +27,6 @@ from studio.worker.learning_process import LearningOrder
 
 router = APIRouter(prefix="/api/learning", tags=["behaviours"])
 
-DEFAULT_BODY = "human25"
 SKELETON = ".asf"
 
 
@@ -39,7 +38,7 @@ def choices(doors: Door) -> LearningChoices:
     return LearningChoices(
         knobs=[knob_view(entry) for entry in knobs],
         bodies=list(list_bodies((doors.workspace.root / BODIES_NAME,))),
-        default_body=DEFAULT_BODY,
+        default_body=doors.workspace.usual_body(),
         fps=FPS,
         endings=[*MOTION_FILES, SKELETON, *ENDINGS],
         recipes=list(recipe_names()),

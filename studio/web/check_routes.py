@@ -4,8 +4,8 @@ import asyncio
 
 from fastapi import APIRouter
 
-from studio.runs.checking import RunCheck, check_run, kept_check, usual_track
-from studio.runs.tracks import read_track
+from studio.runs.checking import RunCheck, check_run, kept_check
+from studio.runs.tracks import BEST, best_track, read_track, track_named
 from studio.web.background_jobs import Job
 from studio.web.check_schemas import CheckAnswer, CheckLine, CheckWish, JumpLine
 from studio.web.doors import Door
@@ -19,17 +19,19 @@ router = APIRouter(prefix="/api", tags=["tracks"])
 
 @router.get(RUN + "/check")
 def check(run: OpenRun, track: str = "") -> CheckAnswer:
-    """What was measured of a track as it is now (empty: the one that is exported unless told otherwise)."""
-    name = track or usual_track(run)
+    """What was measured of a track as it is now (empty: the best)."""
+    best = best_track(run)
+    name = best.name if track in ("", BEST) else track
     read_track(run, name)
     found = kept_check(run, name)
-    return CheckAnswer(track=name, usual=usual_track(run), check=None if found is None else _line(found))
+    check = None if found is None else _line(found)
+    return CheckAnswer(track=name, usual=best.name, note=best.note, check=check)
 
 
 @router.post(RUN + "/check", status_code=202)
 async def begin_check(session: OpenSession, run: OpenRun, wish: CheckWish, doors: Door) -> TrackJobState:
     """Measure a track in every so-many-th frame."""
-    name = wish.track or usual_track(run)
+    name = await asyncio.to_thread(track_named, run, wish.track or BEST)
     await asyncio.to_thread(read_track, run, name)
 
     def work(job: Job) -> dict[str, object]:

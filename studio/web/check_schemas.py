@@ -6,7 +6,7 @@ from studio.web.schemas import Answer, Number, Request, RunName
 
 
 class CheckWish(Request):
-    """What is to be measured. track: null for the one that is exported unless told otherwise; every: so-many-th."""
+    """What is to be measured. track: null for the best; every: so-many-th."""
 
     track: RunName | None = None
     every: int = Field(10, ge=1, le=10_000)
@@ -43,8 +43,11 @@ class CheckLine(Answer):
 
 
 class CheckAnswer(Answer):
-    """track: the one that is asked for; usual: the one that is exported unless told otherwise; check: null before."""
+    """track: the one that is asked for; usual: the best, which is exported unless another is chosen; note: on better
+    tracks that are out of date; check: null before.
+    """
 
     track: str
     usual: str
+    note: str = ""
     check: CheckLine | None

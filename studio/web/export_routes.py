@@ -15,7 +15,7 @@ from studio.export.kept_exports import (
 )
 from studio.export.options import ExportOptions
 from studio.knobs import knobs_of
-from studio.runs.tracks import track_names
+from studio.runs.tracks import best_track, track_names
 from studio.web.background_jobs import Job
 from studio.web.doors import Door
 from studio.web.export_schemas import (
@@ -57,7 +57,15 @@ def exports(session: OpenSession, run: OpenRun, doors: Door) -> ExportList:
         for kept in kept_exports(run)
     ]
     names = [camera.name for camera in run.cameras()]
-    return ExportList(exports=lines, running=going, tracks=list(track_names(run)), cameras=names)
+    best = best_track(run)
+    return ExportList(
+        exports=lines,
+        running=going,
+        tracks=list(track_names(run)),
+        best=best.name,
+        note=best.note,
+        cameras=names,
+    )
 
 
 @router.post(RUN + "/exports", status_code=202)

@@ -61,9 +61,13 @@ class ExportState(NumberedJob):
 
 
 class ExportList(Answer):
-    """A run's exports, newest first, those under way, and its tracks and cameras to choose among."""
+    """A run's exports, newest first, those under way, and its tracks and cameras to choose among. best: the track that
+    is written unless another is chosen; note: on better ones that are out of date.
+    """
 
     exports: list[ExportLine]
     running: list[ExportState]
     tracks: list[str]
+    best: str
+    note: str = ""
     cameras: list[str]

@@ -150,6 +150,7 @@ def _line(session: Session, run: StoredRun, name: str) -> TrackLine:
     if path is not None:
         found = evaluate(track.poses, track.frames, run.body(), read_trc(path), run.record.fps)
         line.mean_mm, line.worst_mm = found.mean_mm, found.worst_mm
+        line.mean_angle_deg, line.mean_direction_deg = found.mean_angle_deg, found.mean_direction_deg
     return line
 
 

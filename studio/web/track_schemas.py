@@ -14,7 +14,8 @@ Verb = Literal["refine", "smooth", "correct", "pose", "check"]
 class TrackLine(Answer):
     """A track of a run. made_by: verb, what it was made from, settings, and of a smoothed one the frames that were
     filled and left out; empty for raw. jitter_mm: root mean square second difference of the markers. mean_mm, worst_mm:
-    against the session's truth.
+    against the session's truth; mean_angle_deg, mean_direction_deg: the same, of the angles between limbs and of the
+    limbs' directions.
     """
 
     name: str
@@ -22,6 +23,8 @@ class TrackLine(Answer):
     made_by: dict[str, object] = Field(default_factory=dict)
     jitter_mm: Number = None
     mean_mm: Number = None
+    mean_angle_deg: Number = None
+    mean_direction_deg: Number = None
     worst_mm: Number = None
 
 

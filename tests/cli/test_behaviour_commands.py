@@ -1,6 +1,7 @@
 """`studio learn` and `studio models` as a stranger calls them."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,8 @@ from moving_bodies import c3d_of, swinging
 from studio.body.catalogue import load_body
 from studio.cli import behaviour_commands
 from studio.cli.main import main
-from studio.sessions.workspace import workspace_root
+from studio.sessions.beginning import begin_session
+from studio.sessions.workspace import Workspace, workspace_root
 
 BODY = load_body("human25")
 QUICK = (
@@ -24,6 +26,7 @@ QUICK = (
     "--smoothings",
     "2",
 )
+BY_NAME = ("--body", "human25")
 
 
 def run(*arguments: str) -> Result:
@@ -42,7 +45,7 @@ def motions(tmp_path: Path) -> Path:
 
 
 def test_learn_tells_numbers_and_models_lists(motions: Path, tmp_path: Path) -> None:
-    result = run("learn", str(motions), "--into", "mine", *QUICK, "--memory", "3", "--json")
+    result = run("learn", str(motions), "--into", "mine", *QUICK, *BY_NAME, "--memory", "3", "--json")
     assert result.exit_code == 0, result.stderr
     told = json.loads(result.stdout)
     assert {"frames", "clusters", "states", "entropy_train", "entropy_test"} <= set(told)
@@ -111,3 +114,14 @@ def test_frames_that_the_body_cannot_follow_are_named(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.stderr
     assert "split: " in result.stderr
     assert "fit badly" in result.stderr
+
+
+def test_learn_takes_the_body_that_the_sessions_have(motions: Path) -> None:
+    """Where most of the workspace's sessions have another body than a new one would, that is the model's."""
+    for name, body in (("a", "human25"), ("b", "human31"), ("c", "human25")):
+        begin_session(workspace_root() / name, body=body)
+    told = json.loads(run("learn", str(motions), "--into", "mine", *QUICK, "--json").stdout)
+    assert told["body"] == "human25"
+    shutil.rmtree(workspace_root() / "a")
+    shutil.rmtree(workspace_root() / "c")
+    assert Workspace().usual_body() == "human31"

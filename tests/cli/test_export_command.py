@@ -1,5 +1,6 @@
 """`studio export`: files, JSON, exit codes, causes and remedies."""
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from click.testing import CliRunner
 from store_records import layer_of, record_of, result_of
 
 from studio.cli.main import main
-from studio.runs.tracks import Track, write_track
+from studio.runs.tracks import Track, read_track, write_track
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 
@@ -34,7 +35,7 @@ def export(*words: str):
 
 
 @pytest.mark.parametrize(
-    "ending", ["bvh", "glb", "trc", "c3d", "csv", "parquet", "npz", "mp4", "viser", "toml", "yml"]
+    "ending", ["bvh", "glb", "trc", "mot", "c3d", "csv", "parquet", "npz", "mp4", "viser", "toml", "yml"]
 )
 def test_every_ending_is_written(run: str, tmp_path: Path, ending: str) -> None:
     place = tmp_path / f"arm.{ending}"
@@ -85,3 +86,34 @@ def test_a_run_that_there_is_not(session_on_disk: Session, tmp_path: Path) -> No
     assert done.exit_code == 2
     assert "first" in done.stderr
     assert "remedy" in done.stderr
+
+
+def test_the_best_track_is_written_unless_another_is_named_and_the_answer_says_which(
+    session_on_disk: Session, run: str, tmp_path: Path
+) -> None:
+    """After `smooth`, `export` writes what was smoothed; a track of another pose tells which one it was."""
+    stored = session_on_disk.run(run)
+    raw = read_track(stored)
+    still = {"poses": np.zeros_like(raw.poses), "made_by": {"verb": "smooth", "from": "raw"}}
+    write_track(stored, dataclasses.replace(raw, name="smoothed", **still))
+    place = tmp_path / "arm.npz"
+    done = export("--to", str(place))
+    assert done.exit_code == 0, done.output
+    assert "track 'smoothed'" in done.stdout
+    with np.load(place) as arrays:
+        assert not arrays["poses"].any()
+    named = json.loads(export("--to", str(place), "--track", "raw", "--json").stdout)
+    assert named["track"] == "raw"
+    with np.load(place) as arrays:
+        assert arrays["poses"].any()
+
+
+def test_a_better_track_that_is_out_of_date_is_passed_over_and_named(
+    session_on_disk: Session, run: str, tmp_path: Path
+) -> None:
+    stored = session_on_disk.run(run)
+    short = dataclasses.replace(read_track(stored, "short"), name="smoothed")
+    write_track(stored, short)
+    done = export("--to", str(tmp_path / "arm.trc"), "--json")
+    assert json.loads(done.stdout)["track"] == "raw"
+    assert "'smoothed' was made before the run changed" in done.stderr

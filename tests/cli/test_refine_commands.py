@@ -5,8 +5,9 @@ import json
 import pytest
 from click.testing import CliRunner
 
+from studio.body.subject import Subject, write_subject
 from studio.cli.main import main
-from studio.sessions.session import Session
+from studio.sessions.session import SUBJECT_NAME, Session
 
 
 @pytest.fixture
@@ -60,3 +61,17 @@ def test_refusals(runner: CliRunner, words: list[str], cause: str) -> None:
     told = runner.invoke(main, words)
     assert told.exit_code == 2
     assert cause in " ".join(told.stderr.split())
+
+
+def test_a_note_on_the_body_is_said_once_of_a_session_not_at_every_command(session_on_disk: Session) -> None:
+    write_subject(
+        Subject(body="planar_arm4", lengths_mm={"Root_Nose": 420.0}), session_on_disk.path / SUBJECT_NAME
+    )
+    words = ["track", "toy", "--particles", "20", "--layers", "2", "--frames", "0:1", "--json"]
+    first, second = (CliRunner().invoke(main, words) for _ in range(2))
+    assert (first.exit_code, second.exit_code) == (0, 0), first.output + second.output
+    assert first.stderr.count("'Root_Nose' was ignored") == 1
+    assert "'Root_Nose' was ignored" not in second.stderr
+    assert all("'Root_Nose' was ignored" in run.record.notes[0] for run in session_on_disk.runs())
+    asked = CliRunner().invoke(main, ["subject", "toy", "--json"])
+    assert "'Root_Nose' was ignored" in asked.stderr

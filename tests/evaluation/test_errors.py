@@ -8,6 +8,7 @@ from studio.body.forward_kinematics import marker_points
 from studio.capture.trc import MarkerMotion
 from studio.errors import TruthError
 from studio.evaluation.errors import evaluate, limb_of_markers, rows_of_frames
+from studio.evaluation.report import in_words
 
 FRAMES = 6
 
@@ -126,3 +127,46 @@ def test_a_person_has_five_limbs(name: str) -> None:
     for marker in ("LShoulder", "LElbow", "LWrist"):
         assert limbs[marker] == limbs["LElbow"]
     assert limbs["Hip"] == limbs["Neck"] == limbs["Head"]
+
+
+def test_a_bent_knee_is_off_by_its_angle_and_no_other_joint_is() -> None:
+    poses, truth = moving()
+    body = load_body("human31")
+    at = next(number for number, entry in enumerate(body.parameters) if entry.name == "left_knee_ry")
+    straight, bent = poses.copy(), poses.copy()
+    straight[:, at], bent[:, at] = np.radians(20.0), np.radians(30.0)
+    truth = changed(truth, positions=marker_points(body, straight))
+    found = evaluate(bent, np.arange(FRAMES), body, truth, 60.0)
+    assert found.angles_deg["LKnee"] == pytest.approx(10.0, abs=0.5)
+    assert found.directions_deg["LKnee_LAnkle"] == pytest.approx(10.0, abs=1e-6)
+    assert [name for name, value in found.angles_deg.items() if value > 1e-6] == ["LKnee"]
+    assert found.mean_angle_deg == pytest.approx(np.mean(list(found.angles_deg.values())))
+    assert "LKnee" in in_words(found).split("angles between limbs")[1]
+
+
+def test_a_turned_body_has_limbs_of_other_directions_and_the_same_angles() -> None:
+    poses, truth = moving()
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    found = evaluate(
+        poses,
+        np.arange(FRAMES),
+        load_body("human31"),
+        changed(truth, positions=truth.positions @ turn.T),
+        60.0,
+    )
+    assert found.mean_angle_deg == pytest.approx(0.0, abs=1e-4)
+    assert found.mean_direction_deg is not None
+    assert found.mean_direction_deg > 10.0
+
+
+def test_a_marker_that_is_missing_takes_its_joints_out_of_that_frame_only() -> None:
+    poses, truth = moving()
+    positions = truth.positions.copy()
+    positions[0, truth.names.index("LKnee")] = np.nan
+    found = evaluate(
+        poses, np.arange(FRAMES), load_body("human31"), changed(truth, positions=positions), 60.0
+    )
+    assert found.angles_deg["LKnee"] == pytest.approx(0.0, abs=1e-4)
+    alone = MarkerMotion(("LKnee",), truth.times, truth.positions[:, [truth.names.index("LKnee")]])
+    none = evaluate(poses, np.arange(FRAMES), load_body("human31"), alone, 60.0)
+    assert (none.angles_deg, none.mean_angle_deg, none.directions_deg) == ({}, None, {})

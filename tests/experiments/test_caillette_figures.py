@@ -1,5 +1,6 @@
 """What follows from made-up outcomes of the third paper's experiments, either way."""
 
+import dataclasses
 import json
 from dataclasses import asdict
 
@@ -287,3 +288,17 @@ def test_ratios_and_root_mean_squares() -> None:
     assert halves.verdict == "reproduced"
     assert comparing.ratio("none", [run], [run], "").verdict == "answered"
     assert fig_12.FEW.changes["model_free_share"] == 0.0
+
+
+def test_every_column_of_a_summary_is_its_own_measure() -> None:
+    """Errors of a joint's angles, of a limb's direction and of position that differ, each under its own heading."""
+    run = dataclasses.replace(
+        followed(10.0), angle_deg=[7.0] * 90, limb_deg=[13.0] * 90, position_mm=[42.0] * 90, mean_mm=40.0
+    )
+    table = comparing.summary_table("of one", {"one": [run]})
+    (line,) = table.rows
+    shown = dict(zip(table.columns, line, strict=True))
+    assert shown["joint angle, RMS (°)"] == pytest.approx(7.0)
+    assert shown["limb direction, RMS (°)"] == pytest.approx(13.0)
+    assert shown["joint position, RMS (mm)"] == pytest.approx(42.0)
+    assert shown["mean (mm)"] == pytest.approx(40.0)

@@ -50,3 +50,15 @@ def test_the_way_says_which_file_is_old(arm) -> None:
     assert f"{written.file}: written before track '{MADE}' changed" in after.why
     run.folder.joinpath("tracks", f"{MADE}.npz").unlink()
     assert "is not there any more" in export_of_way(session, run).why
+
+
+def test_a_file_of_the_best_track_is_old_once_another_is_the_best(arm) -> None:
+    session, run = arm
+    write_track(run, dataclasses.replace(read_track(run, MADE), name="refined"))
+    written = export_into_run(session, run, FORMATS["csv"], {})
+    assert written.track == "refined"
+    write_track(run, dataclasses.replace(read_track(run, MADE), name="smoothed"))
+    assert stale_export(run, written) == "holds track 'refined', and 'smoothed' is the best now"
+    assert export_into_run(session, run, FORMATS["csv"], {}).track == "smoothed"
+    chosen = export_into_run(session, run, FORMATS["csv"], {"track": "refined"})
+    assert stale_export(run, chosen) == ""

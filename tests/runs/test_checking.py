@@ -7,10 +7,10 @@ from toy_session import FRAMES, make_session, true_poses
 from studio.body.catalogue import load_body
 from studio.body.mirroring import Mirror
 from studio.errors import RunError
-from studio.runs.checking import check_run, kept_check, sudden_turns, usual_track
+from studio.runs.checking import check_run, kept_check, sudden_turns
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.refining import SMOOTHED
-from studio.runs.tracks import Track, write_track
+from studio.runs.tracks import Track, best_track, write_track
 from studio.runs.way import way_of
 from studio.runs.way_results import check_step
 
@@ -42,7 +42,7 @@ def test_the_true_poses_fit_and_others_do_not(session):
     with pytest.raises(RunError, match="no finished frame"):
         check_run(session, run)
     kept(run, true_poses())
-    assert usual_track(run) == SMOOTHED
+    assert best_track(run).name == SMOOTHED
     found = check_run(session, run, every=3)
     assert found.frames == tuple(range(0, FRAMES, 3))
     assert found.cameras == ("front",)

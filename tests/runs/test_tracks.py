@@ -9,7 +9,17 @@ from store_records import layer_of, record_of, result_of
 from toy_session import make_session
 
 from studio.errors import NotFoundError, SessionError
-from studio.runs.tracks import Track, read_track, stretches, track_names, write_track
+from studio.runs.tracks import (
+    BEST,
+    BestTrack,
+    Track,
+    best_track,
+    read_track,
+    stretches,
+    track_digest,
+    track_names,
+    write_track,
+)
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.stored_run import StoredRun
 from studio.tracking.tracker import LOST, TRACKED
@@ -121,3 +131,50 @@ def test_missing_and_damaged_tracks_are_named(run: StoredRun) -> None:
 def test_stretches_are_rows_without_a_gap() -> None:
     assert stretches(np.array([2, 3, 4, 7, 9, 10])) == (slice(0, 3), slice(3, 4), slice(4, 6))
     assert stretches(np.zeros(0, dtype=np.int64)) == ()
+
+
+def made_of(run: StoredRun, source: str, name: str, shift: float = 0.0) -> Track:
+    """A track made of another, as refining and smoothing make theirs."""
+    track = read_track(run, source)
+    made_by = {"verb": "made", "from": source, "from_digest": track_digest(track)}
+    made = dataclasses.replace(track, name=name, poses=track.poses + shift, made_by=made_by)
+    write_track(run, made, replace=True)
+    return made
+
+
+def test_the_best_track_is_the_smoothed_else_the_refined_else_the_raw(run: StoredRun) -> None:
+    assert best_track(run) == BestTrack("raw")
+    made_of(run, "raw", "mine")
+    assert best_track(run).name == "raw"
+    made_of(run, "raw", "refined")
+    assert best_track(run) == BestTrack("refined")
+    made_of(run, "refined", "smoothed", 0.1)
+    assert best_track(run) == BestTrack("smoothed")
+    assert best_track(run).note == ""
+    assert np.array_equal(read_track(run, BEST).poses, read_track(run, "smoothed").poses)
+
+
+def test_a_track_of_what_has_changed_since_is_passed_over_and_named(run: StoredRun) -> None:
+    made_of(run, "raw", "refined")
+    made_of(run, "refined", "smoothed")
+    made_of(run, "raw", "refined", 0.2)
+    assert best_track(run) == BestTrack("refined", ("smoothed",))
+    assert "'smoothed' was made before" in best_track(run).note
+
+    writer = ResultsWriter(run.folder)
+    writer.write_frame(result_of(3), [layer_of(3, 0)], True)
+    writer.close()
+    assert best_track(run) == BestTrack("raw", ("smoothed", "refined"))
+    assert "'smoothed' and 'refined' were made before" in best_track(run).note
+
+
+def test_a_track_that_kept_no_digest_counts_to_the_end_of_the_run(run: StoredRun) -> None:
+    write_track(run, track_of("smoothed", frames=(0, 1, 2)))
+    assert best_track(run).name == "smoothed"
+    write_track(run, track_of("smoothed", frames=(0, 1)), replace=True)
+    assert best_track(run) == BestTrack("raw", ("smoothed",))
+
+
+def test_no_track_is_called_best(run: StoredRun) -> None:
+    with pytest.raises(SessionError, match="best"):
+        write_track(run, track_of("best"))

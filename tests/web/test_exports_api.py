@@ -47,6 +47,7 @@ def test_a_file_is_made_listed_downloaded_and_deleted(studio: Studio, tracked: S
     assert [entry["file"] for entry in listed["exports"]] == [file]
     assert listed["running"] == []
     assert listed["tracks"] == ["raw"]
+    assert (listed["best"], listed["exports"][0]["track"]) == ("raw", "raw")
     assert listed["cameras"] == ["cam1", "cam2"]
     answer = studio.client.get(f"{RUN}/exports/{file}")
     assert answer.text.startswith("HIERARCHY")

@@ -15,7 +15,7 @@ const EMPTY = { first: "first", last: "end", fps: "as tracked", height: "as reco
 const DOWNLOAD = '<svg viewBox="0 0 16 16"><path d="M7.2 2h1.6v6l2.1-2.1 1.1 1.1L8 11 4 7l1.1-1.1L7.2 8zM3 12.4h10V14H3z"/></svg>';
 
 let choices = null;
-let listing = { exports: [], running: [], tracks: [], cameras: [] };
+let listing = { exports: [], running: [], tracks: [], best: "raw", note: "", cameras: [] };
 let format = localStorage.getItem("export-format") || "bvh";
 const state = { wish: {}, going: null, failed: null };
 
@@ -25,7 +25,7 @@ const isHere = (told) => told.session === get("session") && told.run === get("ru
 
 /** What a select offers for an option: [value, words]. */
 function offered(option, form) {
-  if (option.name === "track") return listing.tracks.map((name) => [name, name === "raw" ? "raw (as searched)" : name]);
+  if (option.name === "track") return [["best", `best (${listing.best})`], ...listing.tracks.map((name) => [name, name === "raw" ? "raw (as searched)" : name])];
   if (option.name === "camera") return [["", "all cameras"], ...listing.cameras.map((name) => [name, name])];
   if (option.name === "calibration") return [["", "usual"], ...(choices.calibrations[`.${form.name}`] ?? []).map((name) => [name, WORDS[name] ?? name])];
   return option.choices.map((value) => [value, value === "auto" ? `auto (${form[option.name]})` : WORDS[value] ?? value]);
@@ -95,7 +95,7 @@ function actions() {
 function optionsForm() {
   const form = choices.formats.find((one) => one.name === format);
   const fields = choices.options.filter((option) => form.takes.includes(option.name)).map((option) => field(option, form));
-  return element("div", { className: "export-form" }, element("p", { className: "hint", textContent: form.opens }), actions(), element("div", { className: "export-options" }, ...fields));
+  return element("div", { className: "export-form" }, element("p", { className: "hint", textContent: form.opens }), form.takes.includes("track") && listing.note ? element("p", { className: "hint", textContent: listing.note }) : "", actions(), element("div", { className: "export-options" }, ...fields));
 }
 
 function fileLine(made) {
@@ -103,7 +103,7 @@ function fileLine(made) {
   const link = element("a", { href: address, download: made.file, title: "Download" });
   link.innerHTML = DOWNLOAD;
   link.append(element("span", { textContent: made.file }));
-  const facts = [megabytes(made.bytes), made.frames ? `${made.frames} frames` : "", made.checked].filter(Boolean).join(" · ");
+  const facts = [megabytes(made.bytes), made.track && `track ${made.track}`, made.frames ? `${made.frames} frames` : "", made.checked].filter(Boolean).join(" · ");
   const drop = button("×", async () => { try { await remove(address); await refresh(); } catch (error) { complain(error); } }, "icon quiet");
   drop.setAttribute("aria-label", `Delete ${made.file}`);
   drop.title = "Delete this file (the run stays)";
@@ -150,12 +150,6 @@ function hear(told) {
   state.going = null;
   if (told.state === "failed") state.failed = told;
   refresh();
-}
-
-/** Offer this track first, where nobody chose another. */
-export function preferTrack(name) {
-  if (name !== "raw") state.wish.track ??= name;
-  draw();
 }
 
 /** Wire the panel. */

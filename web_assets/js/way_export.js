@@ -1,7 +1,7 @@
-// Step Export: the studio's own export panel, with the track that the check chose.
+// Step Export: the studio's own export panel, which takes the best track.
 
 import { element } from "./elements.js";
-import { preferTrack, startExporting } from "./exporting.js";
+import { startExporting } from "./exporting.js";
 import { tell } from "./live.js";
 import { complain } from "./messages.js";
 import { set } from "./state.js";
@@ -19,8 +19,7 @@ export function mount(place, way) {
   set({ session: way.session, run: run.name });
   way.on("export", (event) => { tell(event); if (event.state !== "running") way.refresh().catch(() => {}); });
   way.api.fetchJson(`${way.api.runPath(way.session, run.name)}/check`).then((told) => {
-    which.textContent = `${run.name}: track "${told.usual}" is exported unless you choose another. Frames before the first and after the last tracked one are left out.`;
-    preferTrack(told.usual);
+    which.textContent = `${run.name}: track "${told.usual}" is exported unless you choose another. ${told.note} Frames before the first and after the last tracked one are left out.`;
     wall.show({ run: run.name, frame: Math.max(run.first, Math.floor((run.first + run.tracked_to) / 2)), track: told.usual === "raw" ? "" : told.usual, show: "outline" });
   }).catch(complain);
   const wall = viewWall(way);

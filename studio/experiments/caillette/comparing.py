@@ -132,7 +132,7 @@ def summary_table(title: str, groups: Groups) -> Table:
                 group,
                 len(runs),
                 runs[0].evaluations,
-                round(mean_of(runs), 1),
+                round(mean_of(runs, angle), 1),
                 round(mean_of(runs, limb), 1),
                 round(mean_of(runs, position), 1),
                 round(float(np.mean([run.mean_mm for run in runs])), 1),
