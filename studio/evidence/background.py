@@ -54,7 +54,9 @@ class GaussianBackground:
 
     def __init__(self, mean: Bytes | Floats, deviation: Floats | None = None) -> None:
         """mean, deviation : (H, W, 3) grey levels, BGR; no deviation: 0, the noise knob rules."""
-        self.mean = np.ascontiguousarray(mean, dtype=np.uint8 if mean.dtype == np.uint8 else np.float32)
+        self.mean: NDArray[np.uint8 | np.float32] = np.ascontiguousarray(
+            mean, dtype=np.uint8 if mean.dtype == np.uint8 else np.float32
+        )
         if deviation is None:
             self.variance = np.zeros((1, *self.mean.shape[1:]), np.float32)
         else:

@@ -63,9 +63,13 @@ class Backgrounds:
     def release(self, camera: str) -> None:
         """Forget what was fitted to one camera; whoever asks again fits it again."""
         with self._locks[camera]:
-            for fitted in (self._fitted, self._yuv):
-                for key in [key for key in fitted if key[0] == camera]:
-                    del fitted[key]
+            # Other cameras' models may be added meanwhile: only copies of the keys are gone through.
+            for key in list(self._fitted):
+                if key[0] == camera:
+                    del self._fitted[key]
+            for key in list(self._yuv):
+                if key[0] == camera:
+                    del self._yuv[key]
             self._exclusions.pop(camera, None)
 
     def exclusion(self, camera: str) -> Bytes | None:
@@ -96,7 +100,9 @@ class Backgrounds:
                 else:
                     frames = self._spread(camera, MEDIAN_FRAMES)
                     median = gaussian_from_median(frames)
-                    found = independent_background(median.mean, median.variance, least_noise, len(frames))
+                    found = independent_background(
+                        median.mean.astype(np.float32), median.variance, least_noise, len(frames)
+                    )
                 for old in [key for key in self._yuv if key[0] == camera]:
                     del self._yuv[old]
                 self._yuv[camera, least_noise] = found
@@ -122,8 +128,8 @@ class Backgrounds:
         most = max(FEWEST_FRAMES, min(most, count, MEDIAN_BYTES // first.nbytes))
         chosen = np.unique(np.linspace(0, count - 1, most).round().astype(int))
         stack = np.empty((len(chosen), *first.shape), np.uint8)
-        for row, frame in zip(stack, chosen, strict=True):
-            row[:] = self._footage.picture(camera, int(frame))
+        for row, frame in enumerate(chosen):
+            stack[row] = self._footage.picture(camera, int(frame))
         return stack
 
     def empty_room(self, camera: str) -> Bytes | None:

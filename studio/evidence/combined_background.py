@@ -67,14 +67,12 @@ class Origin(IntEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Combination:
-    """A combined background and how it came about, which may be done again in finer pictures of the same.
+    """How a combined background came about, which may be done again in finer pictures of the same.
 
-    doubtful : (H, W), on and around what the plate shows that is gone. origin : (H, W) uint8, of Origin. shares :
+    origin : (H, W) uint8, of Origin. shares :
     (K, h, w) of `background_nearby`. gains, offsets : (3,) of the plate's colours.
     """
 
-    model: GaussianBackground
-    doubtful: NDArray[np.bool_]
     origin: Bytes
     shares: Floats
     gains: Floats
@@ -104,8 +102,8 @@ def combine(plate: Bytes, frames: Bytes) -> tuple[GaussianBackground, NDArray[np
 
     plate : (H, W, 3). frames : (K, H, W, 3).
     """
-    found = combination(plate, frames)
-    return found.model, found.doubtful
+    model, doubtful, _ = combination(plate, frames)
+    return model, doubtful
 
 
 def fewest_of(frames: Bytes) -> int:
@@ -113,7 +111,9 @@ def fewest_of(frames: Bytes) -> int:
     return max(LEAST_FRAMES, round(LEAST_SHARE * len(frames)))
 
 
-def combination(plate: Bytes, frames: Bytes, factor: float = 1.0) -> Combination:
+def combination(
+    plate: Bytes, frames: Bytes, factor: float = 1.0
+) -> tuple[GaussianBackground, NDArray[np.bool_], Combination]:
     """`combine`, with how it came about. factor : how many times smaller these pictures were made: all that is counted
     in pixels here is of the pictures as they were taken.
     """
@@ -138,7 +138,7 @@ def combination(plate: Bytes, frames: Bytes, factor: float = 1.0) -> Combination
             origin[y, x][inside] = Origin.PLATE
     doubtful = np.asarray(cv2.dilate(gone, _disc(_fewer(DOUBT, factor)))) > 0
     model = GaussianBackground(mean, np.minimum(deviation, MOST_DEVIATION))
-    return Combination(model, doubtful, origin, shares, gains, offsets)
+    return model, doubtful, Combination(origin, shares, gains, offsets)
 
 
 Region = tuple[slice, slice, NDArray[np.bool_]]

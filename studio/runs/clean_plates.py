@@ -52,7 +52,7 @@ COMBINED_SIDE, COVER_SIDE = 480, 240
 is found who covers what."""
 REACH = 12
 """Pixels of the footage: how far around a silhouette nothing counts as empty."""
-BLUR = 1.0
+BLUR = 2.0
 """Small pixels by which a hull of small masks is wider on each side."""
 FEWEST_EMPTY = 1
 WIDE_REACH = 48
@@ -167,6 +167,8 @@ class _Cleaning:
     def _first(self, camera: Camera, middle: Camera, small: Camera) -> tuple[_First, Bytes, list[Bytes]]:
         """Plate and footage of one camera combined, its small pictures (K, h, w, 3), and small masks."""
         check_frame_count(camera.name, self.footage.frame_count)
+        plate = Backgrounds(self.footage).empty_room(camera.name)
+        plate = None if plate is None else _resized(plate, middle)
         stack = np.empty((len(self.frames), middle.height, middle.width, 3), np.uint8)
         seen = np.empty((len(self.frames), small.height, small.width, 3), np.uint8)
         for row, frame in enumerate(self.frames):
@@ -174,14 +176,12 @@ class _Cleaning:
             picture = self.footage.picture(camera.name, frame)
             stack[row] = _resized(picture, middle)
             seen[row] = _resized(picture, small)
-        plate = Backgrounds(self.footage).empty_room(camera.name)
         self.footage.release(camera.name)
         if plate is None:
             found, model = None, gaussian_from_median(stack)
             doubtful = np.ones(stack.shape[1:3], np.bool_)
         else:
-            found = combination(_resized(plate, middle), stack, camera.width / middle.width)
-            model, doubtful = found.model, found.doubtful
+            model, doubtful, found = combination(plate, stack, camera.width / middle.width)
         settings = reduced_cleaning(self.settings, camera.width / middle.width)
         masks = [reduced(cleaned(model.foreground(picture, settings), settings), small) for picture in stack]
         first = _First(_rounded(model.mean), doubtful.astype(np.uint8), found)
@@ -217,13 +217,13 @@ class _Cleaning:
 
     def _plate(self, camera: Camera, first: _First, taken: Bytes, folder: Path) -> CleanPlate:
         """taken : (K, h, w) of `_covers`."""
+        plate = None if first.combination is None else Backgrounds(self.footage).empty_room(camera.name)
         picture = _enlarged(first.picture, camera)
         empty = np.zeros(picture.shape[:2], np.uint8)
         with FrameSpool(folder) as spool:
             for frame in self.frames:
                 self._step("making the background")
                 spool.put(self.footage.picture(camera.name, frame))
-            plate = Backgrounds(self.footage).empty_room(camera.name)
             self.footage.release(camera.name)
             for top, band in spool.bands():
                 fill_medians_of_empty(band, taken, top, picture, empty)
@@ -265,7 +265,7 @@ def _enlarged(picture: Bytes, camera: Camera) -> Bytes:
     return np.array(cv2.resize(picture, size, interpolation=cv2.INTER_LINEAR), dtype=np.uint8)
 
 
-def _rounded(mean: NDArray[np.float32] | Bytes) -> Bytes:
+def _rounded(mean: NDArray[np.uint8 | np.float32]) -> Bytes:
     return np.clip(np.rint(mean), 0, 255).astype(np.uint8)
 
 
