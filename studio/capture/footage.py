@@ -96,6 +96,10 @@ class Footage:
         """Whether masks came with a camera's pictures."""
         return camera in self._masks
 
+    def size(self, camera: str) -> tuple[int, int]:
+        """Width and height of a camera's pictures."""
+        return self._by_name[camera].width, self._by_name[camera].height
+
     def background_path(self, camera: str) -> Path | None:
         """The plate picture or empty clip of a camera, if there is one."""
         entry = self._by_name[camera].background
@@ -140,6 +144,12 @@ class Footage:
         height, width = picture.shape[:2]
         turn = background_turn(source.turned, (source.width, source.height), (width, height))
         return turned_picture(picture, turn)
+
+    def release(self, camera: str) -> None:
+        """Close a camera's files and forget its last pictures; whoever reads on opens them again."""
+        for kept in filter(None, (self._pictures[camera], self._masks.get(camera))):
+            kept.release()
+        give_back_freed_memory(of_late=True)
 
     def close(self) -> None:
         """Close all files."""
@@ -240,6 +250,11 @@ class _Kept:
             while len(self._kept) > self._room:
                 self._kept.popitem(last=False)
             return prepared
+
+    def release(self) -> None:
+        with self._lock:
+            self._reader.close()
+            self._kept.clear()
 
     def close(self) -> None:
         self._reader.close()

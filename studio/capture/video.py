@@ -169,15 +169,21 @@ def upright_array(frame: av.VideoFrame) -> Bytes:
 def _decoded(
     path: Path, container: av.container.InputContainer, stream: av.video.VideoStream, number: int = 0
 ) -> Iterator[av.VideoFrame]:
-    """Frames in the order of showing, counted from `number`; damage becomes a FootageError."""
-    last = ""
+    """Frames in the order of showing, counted from `number`; damage becomes a FootageError.
+
+    How a frame is turned is looked up only where its rotation is another than the last one's: a frame that was asked
+    for its side data is part of a cycle, and stays until Python collects cycles, 3 MB of full HD each.
+    """
+    last, rotation = "", None
     try:
         for frame in container.decode(stream):
             if frame.is_corrupt:
                 raise FootageError(
                     f"'{path.name}' is damaged at frame {number}{last}.", "Copy or export the video again."
                 )
-            check_turn(path, frame)
+            if frame.rotation != rotation:
+                check_turn(path, frame)
+                rotation = frame.rotation
             yield frame
             number += 1
             last = f" after {frame.time:.3f} s" if frame.time is not None else ""

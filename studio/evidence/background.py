@@ -46,13 +46,22 @@ class BackgroundModel(Protocol):
 
 
 class GaussianBackground:
-    """A mean and a standard deviation for each pixel and colour."""
+    """A mean and a standard deviation for each pixel and colour.
 
-    def __init__(self, mean: Floats, deviation: Floats) -> None:
-        """mean, deviation : (H, W, 3) grey levels, BGR."""
-        self.mean = np.ascontiguousarray(mean, dtype=np.float32)
-        self.variance = np.ascontiguousarray(deviation, dtype=np.float32) ** 2
-        self._samples = self.mean[::GAIN_STRIDE, ::GAIN_STRIDE]
+    mean : (H, W, 3) grey levels, BGR, uint8 where a picture was given, else float32. variance : (H, W, 3) float32, or
+    (1, W, 3) where all rows have the same, as of a plate's zeros: a full-HD plate holds 6 MB so, not 50.
+    """
+
+    def __init__(self, mean: Bytes | Floats, deviation: Floats | None = None) -> None:
+        """mean, deviation : (H, W, 3) grey levels, BGR; no deviation: 0, the noise knob rules."""
+        self.mean: NDArray[np.uint8 | np.float32] = np.ascontiguousarray(
+            mean, dtype=np.uint8 if mean.dtype == np.uint8 else np.float32
+        )
+        if deviation is None:
+            self.variance = np.zeros((1, *self.mean.shape[1:]), np.float32)
+        else:
+            self.variance = np.ascontiguousarray(deviation, dtype=np.float32) ** 2
+        self._samples = self.mean[::GAIN_STRIDE, ::GAIN_STRIDE].astype(np.float32)
         self.is_grey = float(np.mean(np.ptp(self._samples, axis=2))) < GREY_SPREAD
 
     def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Bytes:
@@ -123,6 +132,8 @@ class SubtractorBackground:
 def gaussian_from_frames(frames: Sequence[Bytes]) -> GaussianBackground:
     """Mean and standard deviation of an empty clip; a single picture gives a deviation of 0 (the noise knob
     rules)."""
+    if len(frames) == 1:
+        return GaussianBackground(frames[0])
     total = np.zeros(frames[0].shape, np.float64)
     squares = np.zeros(frames[0].shape, np.float64)
     for frame in frames:
@@ -133,14 +144,14 @@ def gaussian_from_frames(frames: Sequence[Bytes]) -> GaussianBackground:
     return GaussianBackground(mean.astype(np.float32), np.sqrt(variance).astype(np.float32))
 
 
-def gaussian_from_median(frames: Sequence[Bytes]) -> GaussianBackground:
-    """Median over time and its robust deviation (1.4826 times the median distance from the median)."""
-    stack = np.stack(frames)
-    count = stack.shape[0]
-    flat = stack.reshape(count, -1)
-    median, distance = median_and_distance(flat)
-    shape = frames[0].shape
-    deviation = np.minimum(1.4826 * distance, 20.0).astype(np.float32)
+def gaussian_from_median(frames: Bytes) -> GaussianBackground:
+    """Median over time and its robust deviation (1.4826 times the median distance from the median).
+
+    frames : (K, H, W, 3).
+    """
+    median, distance = median_and_distance(frames.reshape(len(frames), -1))
+    shape = frames.shape[1:]
+    deviation = np.minimum(np.float32(1.4826) * distance, np.float32(20.0))
     return GaussianBackground(median.reshape(shape), deviation.reshape(shape))
 
 
@@ -166,7 +177,8 @@ def median_and_distance(values):
 def differing_pixels(picture, mean, variance, gain, threshold, noise, darkest, colour):
     """255 where a colour differs by more than sqrt(threshold) deviations and the pixel is no shadow.
 
-    picture : (H, W, 3) uint8. mean, variance : (H, W, 3) float32. noise : least variance. A shadow has
+    picture : (H, W, 3) uint8. mean : (H, W, 3) uint8 or float32. variance : (H or 1, W, 3) float32. noise : least
+    variance. A shadow has
     darkest <= brightness / background < 1 and a colour within `colour` of the background's, as a share of its
     brightness.
     The first loop of a row vectorises over all its colours; the shadow test runs where something differs.
@@ -178,18 +190,19 @@ def differing_pixels(picture, mean, variance, gain, threshold, noise, darkest, c
         gains[k] = gain[k % 3]
     differs = np.empty(3 * width, np.uint8)
     flat, means = picture.reshape(height, 3 * width), mean.reshape(height, 3 * width)
-    variances = variance.reshape(height, 3 * width)
+    variances = variance.reshape(len(variance), 3 * width)
     for y in range(height):
-        seen, expected, spread, row = flat[y], means[y], variances[y], out[y]
+        seen, expected, row = flat[y], means[y], out[y]
+        spread = variances[min(y, len(variances) - 1)]
         for k in range(3 * width):
-            away = np.float32(seen[k]) - gains[k] * expected[k]
+            away = np.float32(seen[k]) - gains[k] * np.float32(expected[k])
             differs[k] = np.uint8(away * away > threshold * max(spread[k], noise))
         for x in range(width):
             k = 3 * x
             if differs[k] | differs[k + 1] | differs[k + 2]:
                 dot, norm, square = np.float32(0.0), np.float32(0.0), np.float32(0.0)
                 for c in range(3):
-                    value, background = np.float32(seen[k + c]), gain[c] * expected[k + c]
+                    value, background = np.float32(seen[k + c]), gain[c] * np.float32(expected[k + c])
                     dot += value * background
                     norm += background * background
                     square += value * value

@@ -60,6 +60,18 @@ class Backgrounds:
                 self._fitted[camera, kind] = found
             return found
 
+    def release(self, camera: str) -> None:
+        """Forget what was fitted to one camera; whoever asks again fits it again."""
+        with self._locks[camera]:
+            # Other cameras' models may be added meanwhile: only copies of the keys are gone through.
+            for key in list(self._fitted):
+                if key[0] == camera:
+                    del self._fitted[key]
+            for key in list(self._yuv):
+                if key[0] == camera:
+                    del self._yuv[key]
+            self._exclusions.pop(camera, None)
+
     def exclusion(self, camera: str) -> Bytes | None:
         """(H, W) uint8, 255 where evidence does not count, None where all does. Raises FootageError."""
         with self._locks[camera]:
@@ -69,10 +81,10 @@ class Backgrounds:
 
     def combined(self, camera: str) -> tuple[GaussianBackground, NDArray[np.bool_]]:
         """Plate (or clip) and footage combined, and where (H, W) that is doubtful; without a plate everywhere."""
-        path, frames = self._footage.background_path(camera), self._spread(camera, MEDIAN_FRAMES)
-        if path is None:
-            return gaussian_from_median(frames), np.ones(frames[0].shape[:2], np.bool_)
-        return combine(self._empty_room(camera, path), frames)
+        plate, frames = self.empty_room(camera), self._spread(camera, MEDIAN_FRAMES)
+        if plate is None:
+            return gaussian_from_median(frames), np.ones(frames.shape[1:3], np.bool_)
+        return combine(plate, frames)
 
     def yuv(self, camera: str, least_noise: float) -> YuvBackground:
         """Full Gaussians in YUV of the plate or empty clip, else about the footage's median; least_noise : grey levels.
@@ -88,7 +100,9 @@ class Backgrounds:
                 else:
                     frames = self._spread(camera, MEDIAN_FRAMES)
                     median = gaussian_from_median(frames)
-                    found = independent_background(median.mean, median.variance, least_noise, len(frames))
+                    found = independent_background(
+                        median.mean.astype(np.float32), median.variance, least_noise, len(frames)
+                    )
                 for old in [key for key in self._yuv if key[0] == camera]:
                     del self._yuv[old]
                 self._yuv[camera, least_noise] = found
@@ -104,23 +118,25 @@ class Backgrounds:
             return gaussian_from_frames(self._plate(camera, path, CLIP_FRAMES))
         if path is not None and not is_picture(path):
             return SubtractorBackground(_subtractor(kind), self._plate(camera, path, TRAINING_FRAMES))
-        return SubtractorBackground(_subtractor(kind), self._spread(camera, TRAINING_FRAMES))
+        return SubtractorBackground(_subtractor(kind), list(self._spread(camera, TRAINING_FRAMES)))
 
-    def _spread(self, camera: str, most: int) -> list[Bytes]:
-        """Up to `most` frames of the footage, evenly spread, both ends included."""
+    def _spread(self, camera: str, most: int) -> Bytes:
+        """(K, H, W, 3) up to `most` frames of the footage, evenly spread, both ends included."""
         count = self._footage.frame_count
-        if count < FEWEST_FRAMES:
-            raise FootageError(
-                f"Camera {camera} has no background picture and only {count} frames to take one from.",
-                "Give masks, a plate picture or an empty clip in 'background/'.",
-            )
-        size = self._footage.picture(camera, 0).nbytes
-        most = max(FEWEST_FRAMES, min(most, count, MEDIAN_BYTES // size))
+        check_frame_count(camera, count)
+        first = self._footage.picture(camera, 0)
+        most = max(FEWEST_FRAMES, min(most, count, MEDIAN_BYTES // first.nbytes))
         chosen = np.unique(np.linspace(0, count - 1, most).round().astype(int))
-        return [self._footage.picture(camera, int(frame)) for frame in chosen]
+        stack = np.empty((len(chosen), *first.shape), np.uint8)
+        for row, frame in enumerate(chosen):
+            stack[row] = self._footage.picture(camera, int(frame))
+        return stack
 
-    def _empty_room(self, camera: str, path: Path) -> Bytes:
-        """The plate picture, or the empty clip's mean."""
+    def empty_room(self, camera: str) -> Bytes | None:
+        """(H, W, 3) the plate picture, or the empty clip's mean; None without either. Raises FootageError."""
+        path = self._footage.background_path(camera)
+        if path is None:
+            return None
         pictures = self._plate(camera, path, CLIP_FRAMES)
         if len(pictures) == 1:
             return pictures[0]
@@ -128,23 +144,32 @@ class Backgrounds:
 
     def _plate(self, camera: str, path: Path, most: int) -> list[Bytes]:
         """The plate picture, or up to `most` frames of the empty clip, of the footage's size."""
-        frame = self._footage.picture(camera, 0)
+
+        def fitted(picture: Bytes) -> Bytes:
+            turned = self._footage.turned_background(camera, picture)
+            size = self._footage.size(camera)
+            if turned.shape[1::-1] == size:
+                return turned
+            return fitted_plate(turned, self._footage.picture(camera, 0), path.name)
+
         if is_picture(path):
-            return [
-                fitted_plate(self._footage.turned_background(camera, read_picture(path)), frame, path.name)
-            ]
+            return [fitted(read_picture(path))]
         count = measure_video(path).frame_count
         reader = VideoReader(path, count)
         try:
             chosen = np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))
-            return [
-                fitted_plate(
-                    self._footage.turned_background(camera, reader.read(int(number))), frame, path.name
-                )
-                for number in chosen
-            ]
+            return [fitted(reader.read(int(number))) for number in chosen]
         finally:
             reader.close()
+
+
+def check_frame_count(camera: str, count: int) -> None:
+    """Raises FootageError if a camera's footage has too few frames to take a background from."""
+    if count < FEWEST_FRAMES:
+        raise FootageError(
+            f"Camera {camera} has no background picture and only {count} frames to take one from.",
+            "Give masks, a plate picture or an empty clip in 'background/'.",
+        )
 
 
 def check_plate_size(plate: tuple[int, int], footage: tuple[int, int], name: str) -> None:
@@ -168,14 +193,16 @@ def fitted_plate(plate: Bytes, frame: Bytes, name: str) -> Bytes:
     check_plate_size((wide, tall), (width, height), name)
     if (wide, tall) == (width, height):
         return plate
-    scaled = [
-        cv2.resize(plate, (round(wide * scale), round(tall * scale)), interpolation=cv2.INTER_AREA)
-        for scale in (1.0, width / wide, height / tall)
-    ]
-    candidates = [_centred(np.asarray(picture, dtype=np.uint8), width, height) for picture in scaled]
     seen = _gradients(frame)
-    agreement = [np.corrcoef(_gradients(candidate), seen)[0, 1] for candidate in candidates]
-    return candidates[int(np.nanargmax(agreement))]
+    best, most = None, -np.inf
+    for scale in (1.0, width / wide, height / tall):
+        resized = cv2.resize(plate, (round(wide * scale), round(tall * scale)), interpolation=cv2.INTER_AREA)
+        candidate = _centred(np.asarray(resized, dtype=np.uint8), width, height)
+        agreement = _correlation(_gradients(candidate), seen)
+        if best is None or agreement > most:
+            best, most = candidate, np.nan_to_num(agreement, nan=-np.inf)
+    assert best is not None
+    return best
 
 
 def _centred(picture: Bytes, width: int, height: int) -> Bytes:
@@ -187,6 +214,12 @@ def _centred(picture: Bytes, width: int, height: int) -> Bytes:
     out = np.zeros((height, width, 3), np.uint8)
     out[above : above + inner.shape[0], before : before + inner.shape[1]] = inner
     return out
+
+
+def _correlation(one: NDArray[np.float32], other: NDArray[np.float32]) -> float:
+    """Pearson's; NaN for a flat picture. `numpy.corrcoef` makes float64 copies, 100 MB of full-HD pictures."""
+    one, other = one - one.mean(), other - other.mean()
+    return float((one @ other) / np.sqrt((one @ one) * (other @ other)))
 
 
 def _gradients(picture: Bytes) -> NDArray[np.float32]:

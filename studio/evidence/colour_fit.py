@@ -21,14 +21,13 @@ FEWEST = 256
 MOST_GAIN = 2.0
 
 
-def fit_colours(background: NDArray[np.uint8] | Floats, frames: Bytes) -> Floats:
-    """(H, W, 3) float32, the background as the footage's camera would have taken it.
+def fitted_line(background: NDArray[np.uint8] | Floats, frames: Bytes) -> tuple[Floats, Floats]:
+    """(3,) gain and (3,) offset of each colour that make a background as the footage's camera would have taken it.
 
     background : (H, W, 3) BGR. frames : (K, H, W, 3) of the footage; the fit is to their median.
     """
     small = np.median(frames[:, ::STRIDE, ::STRIDE], axis=0).astype(np.float32)
-    gains, offsets = colour_line(np.asarray(background, np.float32)[::STRIDE, ::STRIDE], small)
-    return np.asarray(background * gains + offsets, dtype=np.float32)
+    return colour_line(np.asarray(background[::STRIDE, ::STRIDE], np.float32), small)
 
 
 def colour_line(background: Floats, picture: Floats) -> tuple[Floats, Floats]:

@@ -17,14 +17,15 @@ The method is this project's own, made of usual parts: the mode over time as bac
 a still region telling what was left there from what was taken away.
 """
 
-from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from studio.evidence.background import GaussianBackground
-from studio.evidence.colour_fit import fit_colours
+from studio.evidence.colour_fit import fitted_line
 from studio.numba_in_threads import njit
 
 Bytes = NDArray[np.uint8]
@@ -42,6 +43,8 @@ ENOUGH_KNOWN = 0.15
 VOTE = 8
 SMALLEST_REGION = 400
 """Pixels: smaller regions are specks along edges, where the footage is always taken."""
+OPENED = 4
+"""Pixels: narrower threads do not join regions."""
 RIM = 5
 """Pixels: how far inside and outside a region's border is compared."""
 PLATE_MUST_BEAT = 0.75
@@ -54,59 +57,130 @@ MOST_DEVIATION = 6.0
 """Grey levels: what varies more is no noise but people who passed by."""
 
 
-def combine(plate: Bytes, frames: Sequence[Bytes]) -> tuple[GaussianBackground, NDArray[np.bool_]]:
-    """The combined background, and where (H, W) it is doubtful: on and around what the plate shows that is gone."""
-    stack = np.stack(frames)
-    fitted = fit_colours(plate, stack)
+class Origin(IntEnum):
+    """Where a pixel's background is from."""
+
+    AGREEING = 0
+    MODE = 1
+    PLATE = 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Combination:
+    """How a combined background came about, which may be done again in finer pictures of the same.
+
+    origin : (H, W) uint8, of Origin. shares :
+    (K, h, w) of `background_nearby`. gains, offsets : (3,) of the plate's colours.
+    """
+
+    origin: Bytes
+    shares: Floats
+    gains: Floats
+    offsets: Floats
+
+    def fill(self, plate: Bytes, frames: Bytes, top: int, wanted: NDArray[np.bool_], out: Bytes) -> None:
+        """Fill a band of rows, from `top` on, of the background as finer pictures show it.
+
+        plate, out : (H, W, 3), frames : (K, rows, W, 3) of the band. wanted : (rows, W), what is filled.
+        """
+        fill_finely(
+            plate,
+            frames,
+            top,
+            wanted,
+            self.origin,
+            self.shares,
+            self.gains,
+            self.offsets,
+            fewest_of(frames),
+            out,
+        )
+
+
+def combine(plate: Bytes, frames: Bytes) -> tuple[GaussianBackground, NDArray[np.bool_]]:
+    """The combined background, and where (H, W) it is doubtful: on and around what the plate shows that is gone.
+
+    plate : (H, W, 3). frames : (K, H, W, 3).
+    """
+    model, doubtful, _ = combination(plate, frames)
+    return model, doubtful
+
+
+def fewest_of(frames: Bytes) -> int:
+    """How many of the frames must agree with the plate."""
+    return max(LEAST_FRAMES, round(LEAST_SHARE * len(frames)))
+
+
+def combination(
+    plate: Bytes, frames: Bytes, factor: float = 1.0
+) -> tuple[GaussianBackground, NDArray[np.bool_], Combination]:
+    """`combine`, with how it came about. factor : how many times smaller these pictures were made: all that is counted
+    in pixels here is of the pictures as they were taken.
+    """
+    gains, offsets = fitted_line(plate, frames)
+    fitted = np.asarray(plate * gains + offsets, dtype=np.float32)
     square = np.ones((3, 3), np.uint8)
     low = np.asarray(cv2.erode(fitted, square), dtype=np.float32) - np.float32(AGREES)
     high = np.asarray(cv2.dilate(fitted, square), dtype=np.float32) + np.float32(AGREES)
-    fewest = max(LEAST_FRAMES, round(LEAST_SHARE * len(stack)))
-    mean, deviation, count = agreeing_frames(stack, low, high)
-    unsure = np.where(count >= fewest, np.uint8(0), np.uint8(1))
-    fill_from_most_alike(stack, unsure, background_nearby(stack, mean, unsure), mean, deviation)
-    gone = np.zeros_like(unsure)
-    for region in _regions(unsure):
-        if not _goes_on_better(fitted, mean, region, unsure):
-            y, x, inside = region
+    mean, deviation, count = agreeing_frames(frames, low, high)
+    unsure = np.where(count >= fewest_of(frames), np.uint8(0), np.uint8(1))
+    shares = background_nearby(frames, mean, unsure, factor)
+    fill_from_most_alike(frames, unsure, shares, mean, deviation)
+    gone, origin = np.zeros_like(unsure), unsure.copy()
+    rim = _fewer(RIM, factor)
+    for region in _regions(unsure, rim, factor):
+        y, x, inside = region
+        if not _goes_on_better(fitted, mean, region, unsure, rim):
             gone[y, x][inside] = 1
         else:
-            y, x, inside = region
             mean[y, x][inside] = fitted[y, x][inside]
             deviation[y, x][inside] = 0.0
-    around = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * DOUBT + 1, 2 * DOUBT + 1))
-    doubtful = np.asarray(cv2.dilate(gone, around)) > 0
-    return GaussianBackground(mean, np.minimum(deviation, MOST_DEVIATION)), doubtful
+            origin[y, x][inside] = Origin.PLATE
+    doubtful = np.asarray(cv2.dilate(gone, _disc(_fewer(DOUBT, factor)))) > 0
+    model = GaussianBackground(mean, np.minimum(deviation, MOST_DEVIATION))
+    return model, doubtful, Combination(origin, shares, gains, offsets)
 
 
 Region = tuple[slice, slice, NDArray[np.bool_]]
 """Rows and columns of a rectangle and which of its pixels belong to the region."""
 
 
-def _regions(unsure: Bytes) -> list[Region]:
+def _fewer(pixels: int, factor: float) -> int:
+    """Pixels of pictures so many times smaller, at least one."""
+    return max(1, round(pixels / factor))
+
+
+def _disc(reach: int) -> Bytes:
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
+    return np.asarray(kernel, dtype=np.uint8)
+
+
+def _regions(unsure: Bytes, rim: int, factor: float) -> list[Region]:
     """The connected regions of a map that are worth a decision, each in a rectangle with a rim around it."""
-    opened = cv2.morphologyEx(unsure, cv2.MORPH_OPEN, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (9, 9)))
+    reach = _fewer(OPENED, factor)
+    opened = cv2.morphologyEx(unsure, cv2.MORPH_OPEN, _disc(reach))
     count, labels, boxes, _ = cv2.connectedComponentsWithStats(opened)
     found: list[Region] = []
     for label in range(1, count):
         left, top, width, height, area = (int(value) for value in boxes[label])
-        if area >= SMALLEST_REGION:
-            y = slice(max(0, top - 2 * RIM), top + height + 2 * RIM)
-            x = slice(max(0, left - 2 * RIM), left + width + 2 * RIM)
+        if area >= SMALLEST_REGION / factor**2:
+            y = slice(max(0, top - 2 * rim), top + height + 2 * rim)
+            x = slice(max(0, left - 2 * rim), left + width + 2 * rim)
             # Opening rounds corners off: what is unsure within its reach belongs to the region too.
-            grown = cv2.dilate((labels[y, x] == label).astype(np.uint8), np.ones((9, 9), np.uint8))
+            square = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
+            grown = cv2.dilate((labels[y, x] == label).astype(np.uint8), square)
             found.append((y, x, (grown > 0) & (unsure[y, x] > 0)))
     return found
 
 
-def _goes_on_better(plate: Floats, footage: Floats, region: Region, unsure: Bytes) -> bool:
+def _goes_on_better(plate: Floats, footage: Floats, region: Region, unsure: Bytes, reach: int) -> bool:
     """Whether the plate continues what is known around a region clearly better than the footage does."""
     y, x, inside = region
     known = (unsure[y, x] == 0).astype(np.float32)
-    window = (2 * RIM + 1, 2 * RIM + 1)
+    window = (2 * reach + 1, 2 * reach + 1)
     near = cv2.boxFilter(known, -1, window)
     around = cv2.boxFilter(footage[y, x] * known[..., None], -1, window) / np.maximum(near, 1e-6)[..., None]
-    core = cv2.erode(inside.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    core = cv2.erode(inside.astype(np.uint8), np.ones((reach | 1, reach | 1), np.uint8)) > 0
     rim = inside & ~core & (near > 0.1)
     if not rim.any():
         return False
@@ -117,7 +191,7 @@ def _goes_on_better(plate: Floats, footage: Floats, region: Region, unsure: Byte
     return edges[0] < PLATE_MUST_BEAT * edges[1]
 
 
-def background_nearby(frames: Bytes, mean: Floats, unsure: Bytes) -> Floats:
+def background_nearby(frames: Bytes, mean: Floats, unsure: Bytes, factor: float = 1.0) -> Floats:
     """(K, h, w) how much of the known surroundings is background in each frame, 0 to 1, at every STRIDE-th pixel.
 
     frames : (K, H, W, 3). mean : (H, W, 3), right where unsure (H, W) is 0. The surroundings are the smallest of
@@ -131,7 +205,7 @@ def background_nearby(frames: Bytes, mean: Floats, unsure: Bytes) -> Floats:
         away = np.abs(frame[::STRIDE, ::STRIDE] - small).max(axis=2)
         empty = known * (away <= AGREES)
         share[:] = 0.5
-        for reach in reversed(REACHES):
+        for reach in (_fewer(reach, factor) for reach in reversed(REACHES)):
             window = (2 * reach + 1, 2 * reach + 1)
             near = cv2.boxFilter(known, -1, window)
             found = cv2.boxFilter(empty, -1, window) / np.maximum(near, 1e-6)
@@ -207,6 +281,68 @@ def fill_from_most_alike(frames, unsure, shares, mean, deviation):
                         squares += votes[j] * values[j, c] ** 2
                 mean[y, x, c] = total / most
                 deviation[y, x, c] = np.sqrt(max(squares / most - (total / most) ** 2, 0.0))
+
+
+@njit(cache=True, nogil=True)
+def fill_finely(plate, frames, top, wanted, origin, shares, gains, offsets, fewest, out):
+    """`Combination.fill`: what was found of coarse pictures, pixel by pixel of finer ones."""
+    count, rows, width = frames.shape[:3]
+    height = len(out)
+    values, votes, fitted, total = np.empty((count, 3)), np.empty(count), np.empty((3, 3)), np.empty(3)
+    for row in range(rows):
+        y = top + row
+        for x in range(width):
+            if not wanted[row, x]:
+                continue
+            kind = origin[y * origin.shape[0] // height, x * origin.shape[1] // width]
+            # The plate's fitted colours there, and the least and greatest of the neighbours'.
+            for c in range(3):
+                least, most = 255, 0
+                for v in range(max(0, y - 1), min(height, y + 2)):
+                    for u in range(max(0, x - 1), min(width, x + 2)):
+                        least, most = min(least, int(plate[v, u, c])), max(most, int(plate[v, u, c]))
+                fitted[0, c] = least * gains[c] + offsets[c] - AGREES
+                fitted[1, c] = plate[y, x, c] * gains[c] + offsets[c]
+                fitted[2, c] = most * gains[c] + offsets[c] + AGREES
+            for k in range(count):
+                for c in range(3):
+                    values[k, c] = frames[k, row, x, c]
+            if kind == 0:
+                found = 0
+                total[:] = 0.0
+                for k in range(count):
+                    agrees = True
+                    for c in range(3):
+                        agrees &= fitted[0, c] <= values[k, c] <= fitted[2, c]
+                    if agrees:
+                        found += 1
+                        for c in range(3):
+                            total[c] += values[k, c]
+                if found >= fewest:
+                    for c in range(3):
+                        out[y, x, c] = np.uint8(total[c] / found + 0.5)
+                    continue
+            if kind == 2:
+                for c in range(3):
+                    out[y, x, c] = np.uint8(min(max(fitted[1, c] + 0.5, 0.0), 255.0))
+                continue
+            for k in range(count):
+                share = shares[k, y * shares.shape[1] // height, x * shares.shape[2] // width]
+                votes[k] = share**VOTE + 1e-4
+            most_votes, best = 0.0, 0
+            for k in range(count):
+                alike = 0.0
+                for j in range(count):
+                    if is_near(values, k, j):
+                        alike += votes[j]
+                if alike > most_votes:
+                    most_votes, best = alike, k
+            for c in range(3):
+                mode = 0.0
+                for j in range(count):
+                    if is_near(values, best, j):
+                        mode += votes[j] * values[j, c]
+                out[y, x, c] = np.uint8(mode / most_votes + 0.5)
 
 
 @njit(cache=True, nogil=True, inline="always")

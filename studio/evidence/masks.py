@@ -1,6 +1,7 @@
-"""Clean-up of masks: opening, closing, holes, small pieces, largest pieces."""
+"""Clean-up of masks: opening, closing, holes, small pieces, largest pieces. Masks made smaller, and packed."""
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
 
 import cv2
 import cv2.typing
@@ -8,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.evidence.settings import EvidenceSettings
+from studio.geometry.camera import Camera
 
 Bytes = NDArray[np.uint8]
 
@@ -22,6 +24,76 @@ def cleaned(mask: Bytes, settings: EvidenceSettings) -> Bytes:
     if settings.mask_fill_holes or settings.mask_min_component or settings.mask_keep_components:
         mask = _pieces(mask, settings)
     return mask
+
+
+def reduced(mask: Bytes, camera: Camera) -> Bytes:
+    """A mask (H, W) as large as a camera's pictures: 255 where at least half of what a pixel covers was foreground."""
+    if mask.shape == (camera.height, camera.width):
+        return mask
+    shares = cv2.resize(mask, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
+    return np.asarray(cv2.threshold(shares, 127, 255, cv2.THRESH_BINARY)[1], dtype=np.uint8)
+
+
+def reduced_cleaning(settings: EvidenceSettings, factor: float) -> EvidenceSettings:
+    """The settings for masks of pictures that are so many times smaller than those that the settings are for."""
+    return dataclasses.replace(
+        settings,
+        mask_opening=round(settings.mask_opening / factor),
+        mask_closing=round(settings.mask_closing / factor),
+        mask_fill_holes=round(settings.mask_fill_holes / factor**2),
+        mask_min_component=round(settings.mask_min_component / factor**2),
+    )
+
+
+def uncleaned(settings: EvidenceSettings) -> EvidenceSettings:
+    """The settings without any clean-up: those of the same raw masks are equal."""
+    return dataclasses.replace(
+        settings,
+        mask_opening=0,
+        mask_closing=0,
+        mask_fill_holes=0,
+        mask_min_component=0,
+        mask_keep_components=0,
+    )
+
+
+class PackedMask:
+    """A mask in an eighth of its bytes."""
+
+    def __init__(self, mask: Bytes) -> None:
+        """mask : (H, W) 0 or 255."""
+        self.shape = mask.shape
+        self._bits = np.packbits(mask)
+
+    @property
+    def nbytes(self) -> int:
+        """What it holds."""
+        return self._bits.nbytes
+
+    def unpacked(self) -> Bytes:
+        """(H, W) uint8, 0 or 255."""
+        flat = np.unpackbits(self._bits, count=int(np.prod(self.shape)))
+        return (flat * np.uint8(255)).reshape(self.shape)
+
+
+class PackedMasks(Mapping[str, Bytes]):
+    """Masks by camera, packed; each is unpacked anew when it is asked for."""
+
+    def __init__(self) -> None:
+        self._packed: dict[str, PackedMask] = {}
+
+    def put(self, camera: str, mask: Bytes) -> None:
+        """Keep a mask (H, W) 0 or 255."""
+        self._packed[camera] = PackedMask(mask)
+
+    def __getitem__(self, camera: str) -> Bytes:
+        return self._packed[camera].unpacked()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._packed)
+
+    def __len__(self) -> int:
+        return len(self._packed)
 
 
 def _morphed(mask: Bytes, operation: int, size: int) -> Bytes:

@@ -7,6 +7,7 @@ takes half the time.
 
 import functools
 from concurrent.futures import Executor
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -27,6 +28,14 @@ EDGE_KINDS = ("proximity", "bodytrack", "none", "hull")
 """Maps that a weighting reads; "hull": no map, but what a visual hull is carved from (knob hull_evidence)."""
 KINDS: dict[str, FittedKind] = {"median": "median", "combined": "combined", "mog2": "mog2", "knn": "knn"}
 """Models by the knob's word; what is not here is a Gaussian."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RawMask:
+    """A camera's mask (H, W), 0 or 255, before its clean-up. to_clean : whether there is to be one."""
+
+    mask: Bytes
+    to_clean: bool
 
 
 class EvidenceMaker:
@@ -65,10 +74,7 @@ class EvidenceMaker:
             nothing = _nothing(picture.shape[0], picture.shape[1])
             background = self._backgrounds.yuv(camera, self.settings.hull_noise)
             return ViewEvidence(camera, picture, nothing, nothing, background)
-        mask = self._mask(camera, frame, picture)
-        excluded = self._backgrounds.exclusion(camera)
-        if excluded is not None:
-            mask = np.where(excluded > 0, np.uint8(0), mask)
+        mask = self.finished_mask(camera, self.raw_mask(camera, frame, picture))
         return ViewEvidence(camera, picture, mask, self._edges(picture, mask))
 
     def _from_pixels(self) -> bool:
@@ -82,8 +88,8 @@ class EvidenceMaker:
             for camera in self.cameras
         )
 
-    def _mask(self, camera: str, frame: int, picture: Bytes) -> Bytes:
-        """The mask that came with the data, or the cleaned difference from a background model."""
+    def raw_mask(self, camera: str, frame: int, picture: Bytes) -> RawMask:
+        """The mask that came with the data, or the difference from a background model, before any clean-up."""
         choice = self.settings.background_model
         given = self._footage.has_masks(camera)
         if choice == "mask" and not given:
@@ -93,10 +99,16 @@ class EvidenceMaker:
         if choice == "mask" or (choice == "auto" and given):
             mask = self._footage.mask(camera, frame)
             if mask is not None:
-                return cleaned(mask, self.settings) if self.settings.mask_clean_given else mask
+                return RawMask(mask, self.settings.mask_clean_given)
         kind: FittedKind = KINDS.get(choice, "gaussian")
         model = self._backgrounds.model(camera, kind)
-        return cleaned(model.foreground(picture, self.settings), self.settings)
+        return RawMask(model.foreground(picture, self.settings), True)
+
+    def finished_mask(self, camera: str, raw: RawMask) -> Bytes:
+        """(H, W) 0 or 255: a raw mask cleaned where it is to be, without what is excluded."""
+        mask = cleaned(raw.mask, self.settings) if raw.to_clean else raw.mask
+        excluded = self._backgrounds.exclusion(camera)
+        return mask if excluded is None else np.where(excluded > 0, np.uint8(0), mask)
 
     def _edges(self, picture: Bytes, mask: Bytes) -> Bytes:
         """The edge map that the weighting asks for."""

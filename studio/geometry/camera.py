@@ -1,6 +1,6 @@
 """A calibrated camera: pinhole with radial and tangential distortion, OpenCV axes (x right, y down, z forward)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,3 +31,18 @@ class Camera:
     def centre(self) -> Array:
         """(3,) position of the camera in the world, mm."""
         return -self.rotation.T @ self.translation
+
+    def resized(self, width: int, height: int) -> "Camera":
+        """The camera of the same pictures resized to width x height pixels."""
+        across, down = width / self.width, height / self.height
+        scale = np.array([[across, 0.0, 0.5 * across - 0.5], [0.0, down, 0.5 * down - 0.5], [0.0, 0.0, 1.0]])
+        return replace(self, width=width, height=height, matrix=scale @ self.matrix)
+
+    def reduced(self, least_side: int) -> "Camera":
+        """The camera of its pictures made smaller by the largest whole factor that leaves their shorter side at least
+        `least_side` pixels; the camera itself where they are smaller than twice that.
+        """
+        factor = max(1, min(self.width, self.height) // least_side)
+        if factor == 1:
+            return self
+        return self.resized(-(-self.width // factor), -(-self.height // factor))

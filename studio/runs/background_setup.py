@@ -7,19 +7,25 @@ needs no truth (`runs.mask_quality`).
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from studio.capture.exclusions import png_of
+from studio.capture.footage import Footage
 from studio.capture.pictures import is_picture
 from studio.errors import FootageError
 from studio.evidence.backgrounds import Backgrounds
+from studio.evidence.masks import PackedMask, reduced, uncleaned
+from studio.evidence.pipeline import EvidenceMaker, RawMask
 from studio.evidence.settings import EvidenceSettings
-from studio.progress import Progress
+from studio.geometry.camera import Camera
+from studio.progress import Progress, watched
 from studio.runs.clean_plates import clean_plates
-from studio.runs.mask_quality import MaskQuality, mask_quality, spread_frames
+from studio.runs.mask_quality import JUDGED_SIDE, ROUGH, MaskQuality, count_frame, spread_frames, summed
 from studio.runs.session_settings import session_settings
 from studio.sessions.background_files import (
     EVIDENCE_NAME,
@@ -32,6 +38,8 @@ from studio.sessions.background_files import (
 )
 from studio.sessions.session import Session, described_anew
 from studio.settings import changed_settings
+
+Bytes = NDArray[np.uint8]
 
 SOURCES = ("plate", "clip", "median", "combined")
 MODEL_OF = {"plate": "gaussian", "clip": "gaussian", "median": "median", "combined": "combined"}
@@ -125,39 +133,84 @@ def _set_up(
     own: dict[str, Knob] = {"background_model": model, **chosen}
     quality = None
     if tune and len(session.manifest.footage.cameras) > 1:
-        own, quality = _tuned(session, own, progress)
+        own, quality = _tuned(session, own, watched(progress, cancelled, "Making the background"))
     write_evidence(session, msgspec.structs.replace(read_evidence(session), knobs=own))
     return BackgroundSetup(source, own, tuple(notes), quality)
 
 
-def _tuned(
-    session: Session, own: dict[str, Knob], progress: Progress | None
-) -> tuple[dict[str, Knob], MaskQuality]:
+def _tuned(session: Session, own: dict[str, Knob], tell: Progress) -> tuple[dict[str, Knob], MaskQuality]:
     """The knobs among TRIALS and then TRIED_CLEANING (beside `own`, which stay) whose worst camera agrees best, and the
     quality.
     """
-    footage = session.footage()
-    backgrounds, done = Backgrounds(footage), 0
-    frames = spread_frames(footage.frame_count, TRIED_FRAMES)
-
-    def tried(knobs: dict[str, Knob]) -> tuple[float, dict[str, Knob], MaskQuality]:
-        nonlocal done
-        if progress is not None:
-            progress("trying knobs", done, len(TRIALS) + len(TRIED_CLEANING))
-        done += 1
-        settings = _settings(session, knobs)
-        found = mask_quality(session, settings, frames, backgrounds=backgrounds, blame=False)
-        worst = min((0.0 if view.agreement != view.agreement else view.agreement) for view in found.views)
-        return round(worst, 9), knobs, found
-
+    cameras, footage = session.cameras(), session.footage()
+    small = tuple(camera.reduced(JUDGED_SIDE) for camera in cameras)
     try:
-        best = max((tried({**trial, **own}) for trial in TRIALS), key=lambda one: one[0])
-        side = min(min(camera.width, camera.height) for camera in session.manifest.footage.cameras)
-        cleaned = [_cleaning(side, more, pieces) for more, pieces in TRIED_CLEANING]
-        best = max(best, *(tried({**best[1], **knobs, **own}) for knobs in cleaned), key=lambda one: one[0])
+        trying = _Trying(session, footage, cameras, tell)
+        trials: list[dict[str, Knob]] = [{**trial, **own} for trial in TRIALS]
+        trying.look(trials)
+
+        def tried(knobs: dict[str, Knob]) -> tuple[float, dict[str, Knob], MaskQuality]:
+            counted = [
+                count_frame(masks, small, blame=False, fineness=ROUGH) for masks in trying.masks(knobs, small)
+            ]
+            found = summed(trying.frames, tuple(camera.name for camera in cameras), counted)
+            worst = min((0.0 if view.agreement != view.agreement else view.agreement) for view in found.views)
+            return round(worst, 9), knobs, found
+
+        best = max(map(tried, trials), key=lambda one: one[0])
+        side = min(min(camera.width, camera.height) for camera in cameras)
+        cleaned = [{**best[1], **_cleaning(side, more, pieces), **own} for more, pieces in TRIED_CLEANING]
+        best = max(best, *map(tried, cleaned), key=lambda one: one[0])
     finally:
         footage.close()
     return best[1], best[2]
+
+
+class _Trying:
+    """Masks of a few frames with one set of knobs after another: the footage is read once, a camera at a time, and what
+    its pixels say before any cleaning is kept, packed.
+    """
+
+    def __init__(
+        self, session: Session, footage: Footage, cameras: tuple[Camera, ...], tell: Progress
+    ) -> None:
+        self.frames = spread_frames(footage.frame_count, TRIED_FRAMES)
+        self._session, self._footage, self._cameras, self._tell = session, footage, cameras, tell
+        self._backgrounds = Backgrounds(footage)
+        self._raw: dict[EvidenceSettings, dict[tuple[int, str], tuple[PackedMask, bool]]] = {}
+        self._tried, self._total = 0, len(TRIALS) + len(TRIED_CLEANING)
+
+    def look(self, trials: Sequence[Mapping[str, Knob]]) -> None:
+        """Read the footage for all trials that are to come; others may differ from these in their cleaning only."""
+        settings = [_settings(self._session, knobs) for knobs in trials]
+        makers = {uncleaned(one): self._maker(one) for one in settings}
+        self._raw = {key: {} for key in makers}
+        for camera in self._cameras:
+            for frame in self.frames:
+                self._tell("trying knobs", 0, self._total)
+                picture = self._footage.picture(camera.name, frame)
+                for key, maker in makers.items():
+                    raw = maker.raw_mask(camera.name, frame, picture)
+                    self._raw[key][frame, camera.name] = PackedMask(raw.mask), raw.to_clean
+            self._footage.release(camera.name)
+            self._backgrounds.release(camera.name)
+
+    def masks(self, knobs: Mapping[str, Knob], small: tuple[Camera, ...]) -> Iterator[list[Bytes]]:
+        """Each frame's masks with some knobs, as large as the pictures of `small`."""
+        self._tell("trying knobs", self._tried, self._total)
+        self._tried += 1
+        settings = _settings(self._session, knobs)
+        maker, raw = self._maker(settings), self._raw[uncleaned(settings)]
+        for frame in self.frames:
+            found = []
+            for camera, lens in zip(self._cameras, small, strict=True):
+                packed, to_clean = raw[frame, camera.name]
+                mask = maker.finished_mask(camera.name, RawMask(packed.unpacked(), to_clean))
+                found.append(reduced(mask, lens))
+            yield found
+
+    def _maker(self, settings: EvidenceSettings) -> EvidenceMaker:
+        return EvidenceMaker(self._cameras, self._footage, self._backgrounds, settings, "none")
 
 
 def _cleaning(side: int, more: float, pieces: int) -> dict[str, Knob]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from studio.calibration.findings import Finding, blocking
 from studio.errors import RunError
 from studio.evidence.backgrounds import Backgrounds
-from studio.evidence.frame_evidence import FrameEvidence
+from studio.evidence.masks import PackedMasks, reduced
 from studio.evidence.pipeline import EvidenceMaker
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
@@ -37,10 +37,14 @@ Bytes = NDArray[np.uint8]
 FRAMES = 5
 COARSE = HullSettings(hull_depth=6)
 FINE = HullSettings(hull_depth=8, hull_edge_share=0.5, hull_least_views=2)
+ROUGH = dataclasses.replace(FINE, hull_depth=7)
+"""For what is asked of many hulls: which camera denies something, which knobs are better."""
 MARGIN = 120.0
 """mm around the coarse hull in which the fine one is carved."""
 LEAST_PIECE = 0.05
 """Of the largest piece's volume."""
+JUDGED_SIDE = 480
+"""Pixels of the shorter side, at least, of the masks that are compared: a voxel of the fine hull is wider than one."""
 USABLE = 0.9
 """Agreement from which on masks are called usable (issue 5)."""
 BLAMED = 0.05
@@ -133,15 +137,14 @@ def mask_quality(
     settings: EvidenceSettings,
     frames: Sequence[int] = (),
     *,
-    backgrounds: Backgrounds | None = None,
     blame: bool = True,
     progress: Progress | None = None,
 ) -> MaskQuality:
     """The quality of a session's masks in some frames (default: five, evenly spread).
 
-    backgrounds : already fitted, of this session's footage. blame : find out what each camera denies, which takes most
-    of the time (else 0), and whether the silhouettes speak against the calibration. Raises RunError for a single
-    camera, FootageError, NotFoundError.
+    blame : find out what each camera denies, which takes most of the time (else 0), and whether the silhouettes speak
+    against the calibration. Only one camera's pictures are held at a time. Raises RunError for a single camera,
+    FootageError, NotFoundError.
     """
     cameras = session.cameras()
     if len(cameras) < 2:
@@ -149,17 +152,30 @@ def mask_quality(
             f"Session '{session.name}' has one camera: masks cannot be compared between views.",
             "Look at its masks instead.",
         )
+    small = tuple(camera.reduced(JUDGED_SIDE) for camera in cameras)
     footage = session.footage()
     try:
         chosen = tuple(frames) or spread_frames(footage.frame_count, FRAMES)
-        maker = EvidenceMaker(cameras, footage, backgrounds or Backgrounds(footage), settings, "none")
-        counted, people = [], {}
+        masks: dict[int, list[Bytes]] = {frame: [] for frame in chosen}
+        people = {frame: PackedMasks() for frame in chosen}
+        backgrounds = Backgrounds(footage)
+        maker = EvidenceMaker(cameras, footage, backgrounds, settings, "none")
+        total = (len(cameras) + 1) * len(masks)
+        for camera, lens in zip(cameras, small, strict=True):
+            for frame in sorted(masks):
+                if progress is not None:
+                    progress("comparing masks", len(masks[frame]) * len(masks), total)
+                mask = maker.view(camera.name, frame).mask
+                masks[frame].append(reduced(mask, lens))
+                if blame:
+                    people[frame].put(camera.name, person_alone(mask))
+            footage.release(camera.name)
+            backgrounds.release(camera.name)
+        counted = []
         for done, frame in enumerate(chosen):
             if progress is not None:
-                progress("comparing masks", done, len(chosen))
-            evidence = maker.evidence(frame)
-            counted.append(count_frame(evidence, cameras, blame))
-            people[frame] = person_alone(evidence) if blame else {}
+                progress("comparing masks", len(cameras) * len(masks) + done, total)
+            counted.append(count_frame(masks[frame], small, blame))
     finally:
         footage.close()
     found = summed(chosen, tuple(camera.name for camera in cameras), counted)
@@ -198,39 +214,54 @@ class FrameCounts:
     litres: float
 
 
-def count_frame(evidence: FrameEvidence, cameras: tuple[Camera, ...], blame: bool = True) -> FrameCounts:
-    """The pixels that `ViewQuality`'s shares are made of."""
-    masks = [view.mask for view in evidence.views]
-    whole, box = _fine_hull(evidence, cameras)
+def count_frame(
+    masks: Sequence[Bytes], cameras: tuple[Camera, ...], blame: bool = True, fineness: HullSettings = FINE
+) -> FrameCounts:
+    """The pixels that `ViewQuality`'s shares are made of.
+
+    masks : (H, W) 0 or 255, in the order of the cameras. fineness : of the hull that the masks are compared with.
+    """
+    box = person_box(masks, cameras)
+    whole = None if box is None else _large_hull(Reconstructor(cameras, box, fineness), masks)
     mask = np.array([np.count_nonzero(one) for one in masks])
     covers = [_silhouette(whole, camera) for camera in cameras]
     both = np.array([np.count_nonzero(one & cover) for one, cover in zip(masks, covers, strict=True)])
     denied = np.zeros(len(cameras), dtype=np.int64)
-    judged = blame and len(cameras) > 2 and box is not None
-    for left_out in range(len(cameras) if judged else 0):
-        alone = _fine_hull(without(evidence, left_out), cameras, box)[0]
-        for other, camera in enumerate(cameras):
-            if other != left_out:
-                back = masks[other] & ~covers[other] & _silhouette(alone, camera)
-                denied[left_out] += np.count_nonzero(back)
+    if blame and len(cameras) > 2 and box is not None:
+        denied = denied_pixels(masks, cameras, Reconstructor(cameras, box, ROUGH))
     hull = np.array([np.count_nonzero(cover) for cover in covers])
     return FrameCounts(mask, hull, both, denied, 0.0 if whole is None else whole.volume() * 1e-6)
 
 
-def _fine_hull(
-    evidence: FrameEvidence, cameras: tuple[Camera, ...], box: Box | None = None
-) -> tuple[Hull | None, Box | None]:
-    """The large pieces, finely carved where a coarse hull found one; None where there is nothing."""
-    if box is None:
-        space = box_of(cameras)
-        coarse = Reconstructor(cameras, space, COARSE).hull(evidence)
-        if coarse.empty:
-            return None, None
-        coarse = _large_pieces(coarse)
-        reach = 0.5 * coarse.edges[:, None] + MARGIN
-        box = Box((coarse.centres - reach).min(axis=0), (coarse.centres + reach).max(axis=0))
-    found = Reconstructor(cameras, box, FINE).hull(evidence)
-    return (None if found.empty else _large_pieces(found)), box
+def denied_pixels(
+    masks: Sequence[Bytes], cameras: tuple[Camera, ...], carver: Reconstructor
+) -> NDArray[np.int64]:
+    """(V,) pixels of the other cameras' masks that the hull covers once a camera denies nothing."""
+    whole = _large_hull(carver, masks)
+    open_yet = [mask & ~_silhouette(whole, camera) for mask, camera in zip(masks, cameras, strict=True)]
+    denied = np.zeros(len(cameras), dtype=np.int64)
+    for left_out in range(len(cameras)):
+        alone = _large_hull(carver, without(masks, left_out))
+        for other, camera in enumerate(cameras):
+            if other != left_out:
+                denied[left_out] += np.count_nonzero(open_yet[other] & _silhouette(alone, camera))
+    return denied
+
+
+def person_box(masks: Sequence[Bytes], cameras: tuple[Camera, ...]) -> Box | None:
+    """Around the large pieces of a coarse hull; None where there is nothing."""
+    coarse = Reconstructor(cameras, box_of(cameras), COARSE).shape(masks)
+    if coarse.empty:
+        return None
+    coarse = _large_pieces(coarse)
+    reach = 0.5 * coarse.edges[:, None] + MARGIN
+    return Box((coarse.centres - reach).min(axis=0), (coarse.centres + reach).max(axis=0))
+
+
+def _large_hull(carver: Reconstructor, masks: Sequence[Bytes]) -> Hull | None:
+    """The large pieces, None where there is nothing."""
+    found = carver.shape(masks)
+    return None if found.empty else _large_pieces(found)
 
 
 def _large_pieces(hull: Hull) -> Hull:
@@ -239,11 +270,11 @@ def _large_pieces(hull: Hull) -> Hull:
     return chosen_voxels(hull, volumes[numbers] >= LEAST_PIECE * volumes[0])
 
 
-def without(evidence: FrameEvidence, left_out: int) -> FrameEvidence:
-    """The evidence with one camera denying nothing."""
-    views = list(evidence.views)
-    views[left_out] = dataclasses.replace(views[left_out], mask=np.full_like(views[left_out].mask, 255))
-    return dataclasses.replace(evidence, views=tuple(views))
+def without(masks: Sequence[Bytes], left_out: int) -> list[Bytes]:
+    """The masks with one camera denying nothing."""
+    changed = list(masks)
+    changed[left_out] = np.full_like(masks[left_out], 255)
+    return changed
 
 
 def _silhouette(hull: Hull | None, camera: Camera) -> Bytes:

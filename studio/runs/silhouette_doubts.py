@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from studio.calibration.checks import Masks, check_calibration
 from studio.calibration.findings import Finding
 from studio.errors import CalibrationError, StudioError
-from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.masks import cleaned
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
@@ -29,9 +28,9 @@ MEASURED = "background"
 SIZES = ("scale", "square-size")
 
 
-def person_alone(evidence: FrameEvidence) -> dict[str, Bytes]:
-    """Camera → the largest piece of its mask: specks would be touched first."""
-    return {view.camera: cleaned(view.mask, PERSON_ALONE) for view in evidence.views}
+def person_alone(mask: Bytes) -> Bytes:
+    """The largest piece of a mask (H, W): specks would be touched first."""
+    return cleaned(mask, PERSON_ALONE)
 
 
 def silhouette_doubts(

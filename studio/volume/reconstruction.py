@@ -18,6 +18,7 @@ Of the last depth's rule, volume kept of that body and its hull's volume over it
 0.5: 97.7 %, 1.34 (99.2 %, 1.34); 0.35: 98.4 %, 1.39; 0.2: 99.9 %, 1.73 (99.9 %, 1.49); 0.05: 100 %, 1.83 (100 %, 1.51).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,6 +42,7 @@ from studio.volume.tracking_space import Box
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Nodes = NDArray[np.int32]
+Bytes = NDArray[np.uint8]
 
 FIRST_DEPTH = 4
 MOST_VIEWS = 32
@@ -81,6 +83,33 @@ class Reconstructor:
         """
         self._check(evidence)
         seen = self._seen(evidence)
+        return self._coloured(self._carved(seen), seen)
+
+    def shape(self, masks: Sequence[Bytes]) -> Hull:
+        """The hull of one frame's masks, (H, W) uint8 each in the cameras' order, without colours: those are NaN.
+
+        Raises FootageError where the masks do not fit the cameras.
+        """
+        if len(masks) != len(self.cameras):
+            raise FootageError(
+                f"There are {len(masks)} masks for {len(self.cameras)} cameras.", "Give one mask a camera."
+            )
+        for camera, mask in zip(self.cameras, masks, strict=True):
+            self._check_size(camera, mask)
+        kept = self._carved(self._seen_masks(masks, np.zeros((1, 3), np.uint8)))
+        centres, edges = self._placed(kept)
+        unseen = np.float32(np.nan)
+        return Hull(
+            centres,
+            edges,
+            np.broadcast_to(unseen, (len(edges), 3)),
+            np.broadcast_to(unseen, (len(edges), len(self.cameras), 3)),
+            self.settings.hull_depth,
+            self.box,
+        )
+
+    def _carved(self, seen: "_Seen") -> list[Nodes]:
+        """The kept voxels of each depth."""
         kept: list[Nodes] = []
         nodes, states = self._first, self._first_states.copy()
         depths = range(FIRST_DEPTH, self.settings.hull_depth + 1)
@@ -102,13 +131,17 @@ class Reconstructor:
             kept.append(octree.kept_nodes(nodes, verdicts))
             if depth < depths[-1]:
                 nodes, states = octree.children(nodes, states, verdicts, grid_limits(self.box, depth + 1))
-        return self._coloured(kept, seen)
+        return kept
+
+    def _placed(self, kept: list[Nodes]) -> tuple[Array, Array]:
+        """Centres and edges of the kept voxels of each depth."""
+        sizes = [self.box.edge / 2.0 ** (FIRST_DEPTH + step) for step in range(len(kept))]
+        edges = np.repeat(sizes, [len(nodes) for nodes in kept])
+        return self.box.corner + (np.concatenate(kept) + 0.5) * edges[:, None], edges
 
     def _coloured(self, kept: list[Nodes], seen: "_Seen") -> Hull:
         """The kept voxels of each depth as a hull."""
-        sizes = [self.box.edge / 2.0 ** (FIRST_DEPTH + step) for step in range(len(kept))]
-        edges = np.repeat(sizes, [len(nodes) for nodes in kept])
-        centres = self.box.corner + (np.concatenate(kept) + 0.5) * edges[:, None]
+        centres, edges = self._placed(kept)
         views = np.empty((len(edges), len(self.cameras), 3), dtype=np.float32)
         means = np.empty((len(edges), 3), dtype=np.float32)
         rules = self._rules_at(self.settings.hull_depth, seen)
@@ -125,20 +158,19 @@ class Reconstructor:
         """The frame's pictures, and summed masks or Gaussians, one after the other for the kernels."""
         picture = np.concatenate([view.picture.reshape(-1, 3) for view in evidence.views])
         backgrounds = tuple(view.background for view in evidence.views if view.background is not None)
-        by_pixels = len(backgrounds) == len(evidence.views)
-        sums = np.zeros(1, dtype=np.int32)
-        gaussians = np.zeros((9, 1), dtype=np.float32)
-        distances = np.zeros(1, dtype=np.float32)
-        if by_pixels:
-            distances = np.full(len(picture), np.nan, dtype=np.float32)
-            gaussians = self._gaussians(backgrounds)
-        else:
-            sums = np.empty(int(self._starts[1, -1]), dtype=np.int32)
-            for view, first, end in zip(evidence.views, self._starts[1], self._starts[1, 1:], strict=False):
-                octree.summed_areas(view.mask, sums[first:end])
-        return _Seen(
-            by_pixels, (self._rows, self._starts, sums, picture, gaussians, distances, self._heights)
-        )
+        if len(backgrounds) < len(evidence.views):
+            return self._seen_masks([view.mask for view in evidence.views], picture)
+        distances = np.full(len(picture), np.nan, dtype=np.float32)
+        sums, gaussians = np.zeros(1, dtype=np.int32), self._gaussians(backgrounds)
+        return _Seen(True, (self._rows, self._starts, sums, picture, gaussians, distances, self._heights))
+
+    def _seen_masks(self, masks: Sequence[Bytes], picture: Bytes) -> "_Seen":
+        """Summed masks. picture : of all views one after the other, where colours are asked for."""
+        sums = np.empty(int(self._starts[1, -1]), dtype=np.int32)
+        for mask, first, end in zip(masks, self._starts[1], self._starts[1, 1:], strict=False):
+            octree.summed_areas(mask, sums[first:end])
+        gaussians, distances = np.zeros((9, 1), dtype=np.float32), np.zeros(1, dtype=np.float32)
+        return _Seen(False, (self._rows, self._starts, sums, picture, gaussians, distances, self._heights))
 
     def _gaussians(self, backgrounds: tuple[YuvBackground, ...]) -> NDArray[np.float32]:
         if self._packed is None or any(
@@ -157,16 +189,17 @@ class Reconstructor:
                 "Give one view a camera, in the cameras' order.",
             )
         for camera, view in zip(self.cameras, evidence.views, strict=True):
-            size = (camera.height, camera.width)
-            parts = (
-                [view.picture, view.mask] if view.background is None else [view.picture, view.background.mean]
+            self._check_size(
+                camera, view.picture, view.mask if view.background is None else view.background.mean
             )
-            if any(part.shape[:2] != size for part in parts):
-                shapes = " and ".join(f"{part.shape[1]}x{part.shape[0]}" for part in parts)
-                raise FootageError(
-                    f"Evidence of camera {camera.name} is {shapes} pixels, not {camera.width}x{camera.height}.",
-                    "Use the calibration that belongs to this footage.",
-                )
+
+    def _check_size(self, camera: Camera, *parts: NDArray[Any]) -> None:
+        if any(part.shape[:2] != (camera.height, camera.width) for part in parts):
+            shapes = " and ".join(f"{part.shape[1]}x{part.shape[0]}" for part in parts)
+            raise FootageError(
+                f"Evidence of camera {camera.name} is {shapes} pixels, not {camera.width}x{camera.height}.",
+                "Use the calibration that belongs to this footage.",
+            )
 
     def _start(self) -> tuple[Nodes, NDArray[np.uint32], int]:
         """The first depth's voxels that enough views see, their states (see `hull_kernels.judge`), and the samples

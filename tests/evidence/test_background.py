@@ -104,14 +104,14 @@ def walking(frames: int) -> list[np.ndarray]:
 
 
 def test_the_median_forgets_who_walks_through() -> None:
-    background = gaussian_from_median(walking(27))
+    background = gaussian_from_median(np.stack(walking(27)))
     assert np.abs(background.mean - ROOM).max() < 4 * NOISE
     assert np.abs(np.median(np.sqrt(background.variance)) - NOISE) < 0.6
 
 
 def test_median_and_deviation_are_numpys() -> None:
     frames = walking(9)
-    background = gaussian_from_median(frames)
+    background = gaussian_from_median(np.stack(frames))
     median = np.median(frames, axis=0)
     np.testing.assert_allclose(background.mean, median)
     deviation = np.minimum(1.4826 * np.median(np.abs(np.array(frames) - median), axis=0), 20.0)

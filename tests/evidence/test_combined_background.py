@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studio.evidence.colour_fit import colour_line, fit_colours
+from studio.evidence.colour_fit import colour_line, fitted_line
 from studio.evidence.combined_background import agreeing_frames, combine
 
 HEIGHT, WIDTH, COUNT = 160, 240, 24
@@ -31,7 +31,7 @@ def test_who_stood_in_the_plate_is_replaced_by_the_footage() -> None:
     empty = room(rng)
     plate = empty.copy()
     plate[40:140, 180:210] = (230, 30, 220)
-    model, doubtful = combine(plate.astype(np.uint8), list(frames_of(empty, rng)))
+    model, doubtful = combine(plate.astype(np.uint8), frames_of(empty, rng))
     assert np.abs(model.mean - empty).max(axis=2)[:, 150:].max() < 6.0
     assert np.mean(np.abs(model.mean - empty).max(axis=2) < 8.0) > 0.995
     assert doubtful[90, 195]
@@ -43,7 +43,7 @@ def test_where_a_person_never_leaves_the_plate_is_right() -> None:
     empty = np.full((HEIGHT, WIDTH, 3), 150.0)
     seen = frames_of(empty, rng)
     seen[:, 60:140, 180:220] = (25, 20, 30)
-    model, doubtful = combine(empty.astype(np.uint8), list(seen))
+    model, doubtful = combine(empty.astype(np.uint8), seen)
     assert np.abs(model.mean - empty)[60:140, 180:220].max() < 8.0
     assert not doubtful[100, 200]
 
@@ -52,7 +52,8 @@ def test_the_plate_is_made_the_footages_colours() -> None:
     rng = np.random.default_rng(3)
     empty = room(rng)
     plate = np.clip((empty - [4.0, -6.0, 9.0]) / [1.1, 0.9, 1.05], 0, 255)
-    fitted = fit_colours(plate.astype(np.uint8), frames_of(empty, rng))
+    gains, offsets = fitted_line(plate.astype(np.uint8), frames_of(empty, rng))
+    fitted = plate.astype(np.uint8) * gains + offsets
     assert np.median(np.abs(fitted - empty)) < 1.5
 
 

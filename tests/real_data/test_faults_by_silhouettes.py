@@ -32,7 +32,10 @@ def walk(real_data: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[tup
     footage = session.footage()
     settings = session_settings(session).evidence
     maker = EvidenceMaker(session.cameras(), footage, Backgrounds(footage), settings, "none")
-    masks = {frame: person_alone(maker.evidence(frame)) for frame in spread_frames(footage.frame_count, 5)}
+    masks = {
+        frame: {view.camera: person_alone(view.mask) for view in maker.evidence(frame).views}
+        for frame in spread_frames(footage.frame_count, 5)
+    }
     footage.close()
     return session.cameras(), masks
 
