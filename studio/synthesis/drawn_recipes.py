@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from studio.geometry.projection import project
 from studio.synthesis.damage import Damage
-from studio.synthesis.drawn_room import DRAWN
+from studio.synthesis.drawn_room import DRAWN, FLOOR_AND_WALLS
 from studio.synthesis.joined_clips import Clip
 from studio.synthesis.person import PersonMotion, Proportions, joint_points
 from studio.synthesis.recipe_file import (
@@ -31,10 +31,13 @@ from studio.synthesis.recipe_file import (
     recipe_cameras,
 )
 from studio.synthesis.recipes import recipe_motion, recipe_person
+from studio.synthesis.room import Room
 from studio.synthesis.rooms import room_called
 from studio.synthesis.wardrobes import MATERIALS
 
 Array = NDArray[np.float64]
+Colour = tuple[float, float, float]
+WORN_LARGE = ("skin", "shirt", "trousers", "stripes")
 
 CHOOSING, REPORTING = "choosing", "reporting"
 HALVES = (CHOOSING, REPORTING)
@@ -46,7 +49,17 @@ CAMERA_HEIGHT_MM, BELOW_CEILING_MM, OFF_WALL_MM = (1500.0, 2650.0), 200.0, 120.0
 TURNED_ASIDE, PERSON_PX = 0.22, (195.0, 250.0)
 LENS = (-0.24, -0.02)
 AROUND_JOINTS_MM, MARGIN_PX = 120.0, 6.0
-HARD_NOISE, HARD_CLUTTER, HARD_PX = 9.0, 6, 2.0
+HARD_NOISE, HARD_CLUTTER, HARD_PX = 7.0, 6, 2.0
+# Clothes are drawn again until they stand out from floor and walls, by colours alone: background subtraction, on which
+# all trackers depend, drops what is near the background's colour and what might be its shadow.
+DRAWS, ROOMS_TRIED = 400, 40
+DIFFERENT_LEVELS, NOISE_TIMES = 21.0, 5.5
+SHADOW_SHARE, SHADOW_COLOUR = (0.42, 1.06), 0.085
+EXPOSED = 1.8
+SURFACE_LIGHT = (0.55, 0.85)
+"""Shares of the lamp's light and of the light from all around that floor and walls get."""
+CLOTH_LIGHTS = ((0.0, 0.5), (0.2, 0.65), (0.5, 0.75), (0.85, 0.85))
+"""The same of cloth, from its dark side to its bright one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -367,6 +380,8 @@ def _person(half: str, kind: Kind, index: int, seed: int, rng: np.random.Generat
     """Somebody in some clothes in some room; the motion and the cameras are not theirs yet."""
     factors = np.exp(rng.normal(0.0, PROPORTION, len(Proportions.__struct_fields__)))
     names = Proportions.__struct_fields__
+    noise = kind.noise or round(float(rng.uniform(*NOISE)), 1)
+    room, clothes = _room_and_clothes(seed, noise, rng)
     proportions = Proportions(
         **{name: round(float(value), 3) for name, value in zip(names, factors, strict=True)}
     )
@@ -379,22 +394,61 @@ def _person(half: str, kind: Kind, index: int, seed: int, rng: np.random.Generat
         height_mm=round(float(rng.uniform(*HEIGHT_MM)), 0),
         girth=round(float(rng.uniform(*GIRTH)), 3),
         proportions=proportions,
-        colours=_clothes(rng),
-        room=f"{DRAWN}{seed}",
+        colours=clothes,
+        room=room,
         picture=Picture(
-            noise=kind.noise or round(float(rng.uniform(*NOISE)), 1),
+            samples=1,
+            noise=noise,
             quality=round(float(rng.uniform(*QUALITY)), 0),
         ),
         include=Include(start_pose_noise_mm=4.0),
     )
 
 
-def _clothes(rng: np.random.Generator) -> dict[str, tuple[float, float, float]]:
+def _room_and_clothes(
+    seed: int, noise: float, rng: np.random.Generator
+) -> tuple[str, dict[str, Colour]]:
+    """A room and clothes that stand out from its floor and walls."""
+    for attempt in range(ROOMS_TRIED):
+        name = f"{DRAWN}{ROOMS_TRIED * seed + attempt}"
+        room = room_called(name)
+        for _ in range(DRAWS // ROOMS_TRIED if attempt < ROOMS_TRIED - 1 else DRAWS):
+            clothes = _clothes(rng)
+            if all(stands_out(np.array(clothes[part]), room, noise) for part in WORN_LARGE):
+                return name, clothes
+    raise ValueError(f"No clothes stand out in the rooms of seed {seed}.")
+
+
+def stands_out(colour: Array, room: Room, noise: float) -> bool:
+    """Whether cloth of a colour differs from a drawn room's floor and walls in any light by more than the sensor's
+    noise hides, and not as a shadow does.
+    """
+    lamp, around = room.lights[2], room.lights[3]
+    for block in room.blocks[:FLOOR_AND_WALLS]:
+        for surface in (np.array(block.colour), np.array(block.second)):
+            behind = _pixel(surface * (SURFACE_LIGHT[0] * lamp + SURFACE_LIGHT[1] * around))
+            for key, sky in CLOTH_LIGHTS:
+                seen = _pixel(colour * (key * lamp + sky * around))
+                if np.abs(seen - behind).max() < max(DIFFERENT_LEVELS, NOISE_TIMES * noise):
+                    return False
+                share = float(seen @ behind / (behind @ behind))
+                off = float(np.linalg.norm(seen - share * behind) / np.linalg.norm(behind))
+                if SHADOW_SHARE[0] < share < SHADOW_SHARE[1] and off < SHADOW_COLOUR:
+                    return False
+    return True
+
+
+def _pixel(light: Array) -> Array:
+    """Grey levels of linear light."""
+    return 255.0 * (1.0 - np.exp(-EXPOSED * light))
+
+
+def _clothes(rng: np.random.Generator) -> dict[str, Colour]:
     """Colours of all that is worn; stripes of the shirt's own colour, or of another."""
-    skin = rng.uniform(0.35, 0.85) * np.array([1.0, 0.70, 0.58])
-    shirt, trousers = _colour(rng, 0.10, 0.75, 0.13), _colour(rng, 0.07, 0.45, 0.05)
-    shoes, hair = _colour(rng, 0.06, 0.6, 0.03), rng.uniform(0.05, 0.5) * np.array([1.0, 0.75, 0.5])
-    stripes = shirt if rng.random() < 0.5 else _colour(rng, 0.15, 0.75, 0.13)
+    skin = rng.uniform(0.3, 0.85) * np.array([1.0, rng.uniform(0.60, 0.74), rng.uniform(0.44, 0.60)])
+    shirt, trousers = _colour(rng, 0.10, 0.75, 0.14), _colour(rng, 0.05, 0.45, 0.10)
+    shoes, hair = _colour(rng, 0.05, 0.6, 0.05), rng.uniform(0.05, 0.5) * np.array([1.0, 0.75, 0.5])
+    stripes = shirt if rng.random() < 0.5 else _colour(rng, 0.15, 0.75, 0.14)
     found = {}
     for name, colour in zip(MATERIALS, (skin, shirt, trousers, shoes, hair, stripes), strict=True):
         values = [round(float(value), 3) for value in np.clip(colour, 0.03, 0.9)]

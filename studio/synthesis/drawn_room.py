@@ -26,6 +26,8 @@ FURNITURE_HEIGHT_MM = (350.0, 1250.0)
 """Below the cameras, which hang higher along the walls."""
 PIECES, PICTURES = (6, 12), (3, 7)
 SKIN_OF_WALL = 12.0
+FLOOR_AND_WALLS = 5
+"""The first blocks of a drawn room: the floor and four walls."""
 
 
 def drawn_room(seed: int, obstacle_height: float = 0.0) -> Room:
