@@ -19,8 +19,9 @@ Array = NDArray[np.float64]
 FREE_MM = 260.0
 """Between the joints, wherever they go, and a thing that stands in front of them."""
 TRIES = 400
-POST_HALF, POST_HEIGHT = (25.0, 55.0), (900.0, 2000.0)
-BOX_HALF, BOX_HEIGHT = (110.0, 260.0), (350.0, 850.0)
+POST_HALF, POST_HIDES = (25.0, 55.0), (700.0, 1500.0)
+BOX_HALF, BOX_HIDES = (110.0, 240.0), (250.0, 700.0)
+"""Half sizes, and up to which height of the person a thing reaches in its camera's view, mm."""
 
 
 class Damage(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -53,6 +54,19 @@ def misplaced(cameras: tuple[Camera, ...], pixels: float, seed: int) -> tuple[Ca
     return tuple(turned_camera(camera, pixels, float(rng.uniform(0.0, 2.0 * np.pi))) for camera in cameras)
 
 
+def cameras_left(cameras: tuple[Camera, ...], missing: tuple[str, ...]) -> tuple[Camera, ...]:
+    """The cameras that have footage. Raises StudioError for a missing one that is not there, and where none is left."""
+    names = [camera.name for camera in cameras]
+    unknown = sorted(set(missing) - set(names))
+    if unknown:
+        raise StudioError(
+            f"damage.missing names '{unknown[0]}'; the cameras are {', '.join(names)}.", "Correct the entry."
+        )
+    if len(set(missing)) == len(names):
+        raise StudioError("damage.missing leaves no camera.", "Leave at least one of them out of it.")
+    return tuple(camera for camera in cameras if camera.name not in missing)
+
+
 def clutter_in_front(
     count: int, cameras: tuple[Camera, ...], motion: PersonMotion, seed: int
 ) -> tuple[Block, ...]:
@@ -66,7 +80,7 @@ def clutter_in_front(
     for number in range(count):
         camera = cameras[number % len(cameras)]
         for _ in range(TRIES):
-            block = _thing(rng, way[rng.integers(len(way))], camera.centre[:2], post=number % 2 == 0)
+            block = _thing(rng, way[rng.integers(len(way))], camera.centre, post=number % 2 == 0)
             if _is_free(block, points):
                 found.append(block)
                 break
@@ -81,10 +95,12 @@ def clutter_in_front(
 def _thing(rng: np.random.Generator, person: Array, camera: Array, *, post: bool) -> Block:
     """A post or a box on the floor, on the line from the person to a camera."""
     share, aside = float(rng.uniform(0.3, 0.65)), float(rng.uniform(-90.0, 90.0))
-    along = (camera - person) / np.linalg.norm(camera - person)
-    x, y = person + share * (camera - person) + aside * np.array([-along[1], along[0]])
-    half, tall = (POST_HALF, POST_HEIGHT) if post else (BOX_HALF, BOX_HEIGHT)
-    size = (float(rng.uniform(*half)), float(rng.uniform(*half)), 0.5 * float(rng.uniform(*tall)))
+    towards = camera[:2] - person
+    along = towards / np.linalg.norm(towards)
+    x, y = person + share * towards + aside * np.array([-along[1], along[0]])
+    half, hides = (POST_HALF, POST_HIDES) if post else (BOX_HALF, BOX_HIDES)
+    tall = (1.0 - share) * float(rng.uniform(*hides)) + share * camera[2]
+    size = (float(rng.uniform(*half)), float(rng.uniform(*half)), 0.5 * float(tall))
     colour, second = (tuple(float(value) for value in rng.uniform(0.1, 0.7, 3)) for _ in range(2))
     pattern = int(rng.choice([PLAIN, GRAIN, CHECKS]))
     centre, turn = (float(x), float(y), size[2]), float(rng.uniform(0.0, np.pi))

@@ -334,9 +334,14 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
 )
 
 
+def clip_name(half: str, kind: str) -> str:
+    """The name of a kind's recipe in a half."""
+    return f"{half}-{kind}"
+
+
 def clip_names(half: str) -> tuple[str, ...]:
     """The names of a half's recipes, in the order of KINDS."""
-    return tuple(f"{half}-{kind}" for kind in KINDS)
+    return tuple(clip_name(half, kind) for kind in KINDS)
 
 
 def drawn_recipe(half: str, kind: str) -> Recipe:
@@ -369,7 +374,7 @@ def write_recipes() -> None:
     """Write the files of all drawn recipes, in the place of those that come along."""
     for half in HALVES:
         for kind in KINDS:
-            (RECIPES / f"{half}-{kind}.toml").write_text(recipe_text(half, kind), encoding="utf-8")
+            (RECIPES / f"{clip_name(half, kind)}.toml").write_text(recipe_text(half, kind), encoding="utf-8")
 
 
 def _title(half: str, kind: Kind) -> str:
@@ -405,9 +410,7 @@ def _person(half: str, kind: Kind, index: int, seed: int, rng: np.random.Generat
     )
 
 
-def _room_and_clothes(
-    seed: int, noise: float, rng: np.random.Generator
-) -> tuple[str, dict[str, Colour]]:
+def _room_and_clothes(seed: int, noise: float, rng: np.random.Generator) -> tuple[str, dict[str, Colour]]:
     """A room and clothes that stand out from its floor and walls."""
     for attempt in range(ROOMS_TRIED):
         name = f"{DRAWN}{ROOMS_TRIED * seed + attempt}"

@@ -9,7 +9,7 @@ import cv2
 from studio.geometry.camera import Camera
 from studio.progress import Progress
 from studio.synthesis.clips import ClipWriter
-from studio.synthesis.damage import clutter_in_front
+from studio.synthesis.damage import cameras_left, clutter_in_front
 from studio.synthesis.exercises import stool
 from studio.synthesis.person import PersonMotion
 from studio.synthesis.recipe_file import Picture, Recipe
@@ -28,7 +28,7 @@ def render_person(
     """Write videos/, and background/ and masks/ as the recipe includes them, into `source`; nothing of cameras that
     are missing.
     """
-    cameras = tuple(camera for camera in cameras if camera.name not in recipe.damage.missing)
+    cameras = cameras_left(cameras, recipe.damage.missing)
     picture, renderer = recipe.picture, recipe_renderer(recipe, motion, cameras)
     with ExitStack() as open_clips:
         footage = _writers(source / "videos", cameras, recipe.fps, picture.quality, open_clips)

@@ -11,6 +11,8 @@ import pytest
 import tomli_w
 
 from studio.errors import StudioError
+from studio.experiments.footage_shelf import FootageShelf
+from studio.experiments.tracked import Attempt, track
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.sessions.session import Session
@@ -85,9 +87,7 @@ def test_an_exposed_picture_is_less_sharp_where_the_person_moves(tmp_path: Path)
     cameras = tuple(replace(camera, distortion=np.zeros(5)) for camera in cameras)
     sharpness, coverage = {}, {}
     for shutter in (0.0, 0.9):
-        renderer = Renderer(
-            furnished_room(), cameras, motion, noise=0.0, samples=1, seed=3, shutter=shutter
-        )
+        renderer = Renderer(furnished_room(), cameras, motion, noise=0.0, samples=1, seed=3, shutter=shutter)
         picture, mask = renderer.picture(0, 6, renderer.shadow(6))
         grey = cv2.Laplacian(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), cv2.CV_64F)
         around = cv2.dilate(mask, np.ones((5, 5), np.uint8)) > 0
@@ -110,23 +110,20 @@ def test_clutter_hides_parts_of_the_person_and_stays_clear_of_them(tmp_path: Pat
     for index in range(len(cameras)):
         seen = []
         for blocks in (room.blocks, room.blocks + things):
-            renderer = Renderer(
-                replace(room, blocks=blocks), cameras, motion, noise=0.0, samples=1, seed=3
-            )
+            renderer = Renderer(replace(room, blocks=blocks), cameras, motion, noise=0.0, samples=1, seed=3)
             seen.append(int((renderer.picture(index, 0, renderer.shadow(0))[1] > 0).sum()))
         hidden += seen[1] < 0.97 * seen[0]
-    assert hidden >= 2
+    assert hidden >= 3
 
 
 def test_clutter_without_room_for_it_is_refused(tmp_path: Path) -> None:
-    motion = running()
-    wide = PersonMotion(motion.skeleton, motion.fps, motion.root * [3.0, 3.0, 1.0], motion.turns)
-    crowd = [replace(wide, root=wide.root + [x, y, 0.0]) for x in range(-3000, 3001, 400) for y in (-2000, 0, 2000)]
+    motion = running(2)
+    places = np.array([(x, y, 0.0) for x in range(-2800, 2801, 400) for y in range(-2400, 2401, 400)])
     everywhere = PersonMotion(
         motion.skeleton,
         motion.fps,
-        np.concatenate([entry.root for entry in crowd]),
-        {name: np.concatenate([turn] * len(crowd)) for name, turn in motion.turns.items()},
+        motion.root[:1] * [0.0, 0.0, 1.0] + places,
+        {name: np.repeat(turn[:1], len(places), axis=0) for name, turn in motion.turns.items()},
     )
     with pytest.raises(StudioError, match="no room for 3 things"):
         clutter_in_front(3, rig(tmp_path), everywhere, seed=1)
@@ -183,9 +180,6 @@ def test_drawn_rooms_differ_and_are_the_same_every_time() -> None:
 
 
 def test_a_damaged_take_can_be_tracked_from_the_height_alone(tmp_path: Path) -> None:
-    from studio.experiments.footage_shelf import FootageShelf
-    from studio.experiments.tracked import Attempt, track
-
     session = made(tmp_path, damage={"calibration_px": 1.0, "clutter": 2, "missing": ["cam2"]}, fps=60)
     shelf = FootageShelf(tmp_path)
     try:
