@@ -19,7 +19,9 @@ def test_signed_distances_are_those_of_brute_force() -> None:
     for row, column in [(28, 30), (28, 46), (28, 48), (9, 14), (47, 12), (15, 31)]:
         others = outside if mask[row, column] else inside
         away = np.hypot(*(others - [row, column]).T).min() - 0.5
-        assert found.signed[row - top, column - left] == pytest.approx(-away if mask[row, column] else away, abs=1e-4)
+        assert found.signed[row - top, column - left] == pytest.approx(
+            -away if mask[row, column] else away, abs=1e-4
+        )
 
 
 def test_border_points_lie_on_the_border_and_point_away() -> None:

@@ -17,6 +17,7 @@ from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import number
 from studio.experiments.tracked import Attempt, Tracked, track
 from studio.experiments.tracking_trials import Contender, by_group
+from studio.runs.shape_on_the_way import FIRST_FRAMES
 from studio.settings import DEFAULT_TRACKER, usual_weighting
 from studio.synthesis.drawn_recipes import CHOOSING, HALVES, KINDS, clip_name
 from studio.synthesis.recipes import SUBJECT_OF_HEIGHT
@@ -28,7 +29,8 @@ QUICK_FRAMES, QUICK_KINDS = 24, ("walk", "walk-20hz", "kick", "hard")
 WALKS = ("walk", "walk-20hz", "turns", "hard")
 """What the behaviour model, learnt from walks alone, fits."""
 TAUGHT = Training(("walk", "walk-with-turns", "circle-three-cameras"), performances=2, body="human31")
-THREE_TERMS = "edge-region-silhouette"
+THREE_TERMS, PAPERS_TERMS = "edge-region-silhouette", "edge-region"
+SEARCH_ALONE = {"refine_frames": False}
 PAPER = {
     "adaptive_diffusion": True,
     "diffusion_form": "paper",
@@ -37,6 +39,8 @@ PAPER = {
     "survival": 0.5,
 }
 """Deutscher & Reid's filter as they write it, weighed by edges and region."""
+AS_A_RUN = {"shape_frames": FIRST_FRAMES}
+"""A run begins with the shape that its first frames show."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,19 +60,27 @@ class Entry:
         return self.contender.name
 
 
-def _usual(name: str, tracker: str = DEFAULT_TRACKER, **changes: Any) -> Contender:  # noqa: ANN401
-    """A tracker with the studio's defaults and some knobs changed."""
-    return Contender(name, tracker, usual_weighting(tracker), changes)
+def _usual(name: str, tracker: str = DEFAULT_TRACKER, weighting: str = "") -> Contender:
+    """A tracker with the studio's defaults, "" for its usual weighting."""
+    return Contender(name, tracker, weighting or usual_weighting(tracker))
 
 
 ENTRIES = (
-    Entry(_usual("annealed, default")),
-    Entry(Contender("annealed, as the paper", "annealed", "edge-region", PAPER)),
-    Entry(Contender("annealed, three terms", "annealed", THREE_TERMS)),
-    Entry(_usual("swarm", "swarm")),
-    Entry(_usual("condensation", "condensation")),
-    Entry(_usual("behaviour", "behaviour"), kinds=WALKS, training=TAUGHT),
-    Entry(_usual("annealed, default, height alone"), fields={"subject": SUBJECT_OF_HEIGHT}),
+    Entry(_usual("annealed, default"), fields=AS_A_RUN),
+    *(
+        Entry(_usual(f"annealed, {weighting}", "annealed", weighting), fields=AS_A_RUN)
+        for weighting in (PAPERS_TERMS, THREE_TERMS)
+        if weighting != usual_weighting(DEFAULT_TRACKER)
+    ),
+    Entry(Contender("annealed, three terms, search alone", "annealed", THREE_TERMS, SEARCH_ALONE)),
+    Entry(Contender("annealed, as the paper", "annealed", PAPERS_TERMS, {**PAPER, **SEARCH_ALONE})),
+    Entry(_usual("swarm", "swarm"), fields=AS_A_RUN),
+    Entry(_usual("condensation", "condensation"), fields=AS_A_RUN),
+    Entry(_usual("behaviour", "behaviour"), kinds=WALKS, fields=AS_A_RUN, training=TAUGHT),
+    Entry(
+        _usual("annealed, default, height alone"),
+        fields={**AS_A_RUN, "subject": SUBJECT_OF_HEIGHT},
+    ),
 )
 """One line each; a knob that is to be switched on or off is one of the contender's changes."""
 
