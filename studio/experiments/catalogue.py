@@ -40,7 +40,7 @@ from studio.experiments.fleischmann import (
     partitions,
     table_2,
 )
-from studio.experiments.open_questions import robustness
+from studio.experiments.open_questions import generalisation, robustness
 
 # One line each: the module's EXPERIMENT, or its EXPERIMENTS. A new module is imported above and named here.
 MODULES: tuple[ModuleType, ...] = (
@@ -74,6 +74,7 @@ MODULES: tuple[ModuleType, ...] = (
     online_learning,
     best_tracker,
     robustness,
+    generalisation,
 )
 
 ALL = "all"

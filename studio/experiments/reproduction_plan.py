@@ -106,9 +106,13 @@ def footage_needed(jobs: Iterable[TrialJob]) -> dict[str, int | None]:
 
 
 def frames_of(arguments: Plain) -> int | None:
-    """The last frame that a trial's arguments name, as `Attempt` does ("last", half open); None where they do not."""
+    """The last frame that a trial's arguments name, as `Attempt` does ("last", half open); None where they do not.
+    Where there is an attempt among them, nothing else counts.
+    """
     if not isinstance(arguments, Mapping):
         return None
+    if "attempt" in arguments:
+        return frames_of(arguments["attempt"])
     if "last" in arguments:
         return arguments["last"]
     within = [frames_of(value) for value in arguments.values() if isinstance(value, Mapping)]

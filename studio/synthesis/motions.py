@@ -13,6 +13,7 @@ from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 from studio.errors import StudioError
 from studio.geometry.rotations import axis_turn
 from studio.synthesis.circuit import circuit
+from studio.synthesis.exercises import crouch, sit
 from studio.synthesis.gait import (
     Gait,
     Obstacle,
@@ -93,8 +94,10 @@ def box(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
 
 def turning_walk(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
     """A walk to and fro with bends and two quick turns on the spot (as in Deutscher & Reid 2005, Fig. 21): options
-    speed_mm_s, cadence, start_degrees of the first heading, start_x_mm, start_y_mm.
+    speed_mm_s, cadence, start_degrees of the first heading, start_x_mm, start_y_mm, start_s (how much of the beginning
+    is left out).
     """
+    times = times + options.get("start_s", 0.0)
     speed = options.get("speed_mm_s", 950.0)
     gait = Gait(speed, options.get("cadence", 1.95), 0.60, 0.10 * skeleton.height, 40.0, 0.45)
     step = speed / gait.cadence
@@ -139,6 +142,8 @@ MOTIONS: dict[str, MotionMaker] = {
     "handstand": handstand,
     "circuit": circuit,
     "stand": stand,
+    "crouch": crouch,
+    "sit": sit,
 }
 
 

@@ -7,6 +7,7 @@ thorax's z axis, which turns about the pelvis centre. Knees and elbows are hinge
 
 from dataclasses import dataclass, replace
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -85,6 +86,52 @@ def skeleton_of_height(height_mm: float, rng: np.random.Generator) -> Skeleton:
         hand=HAND * height_mm,
         foot=FOOT * height_mm,
         ankle_height=SOLE * height_mm,
+    )
+
+
+class Proportions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Factors on the published lengths of a person of some height."""
+
+    trunk: float = 1.0
+    head: float = 1.0
+    hips: float = 1.0
+    shoulders: float = 1.0
+    thighs: float = 1.0
+    shins: float = 1.0
+    upper_arms: float = 1.0
+    forearms: float = 1.0
+    hands: float = 1.0
+    feet: float = 1.0
+
+
+def proportioned(bones: Skeleton, factors: Proportions) -> Skeleton:
+    """The skeleton with other proportions and the same standing height: all is scaled alike until it is that again."""
+    if factors == Proportions():
+        return bones
+    legs = float(np.mean(bones.thigh)) * factors.thighs + float(np.mean(bones.shin)) * factors.shins
+    tall = legs + bones.ankle_height + bones.trunk * factors.trunk + bones.head * factors.head
+    before = float(np.mean(bones.thigh) + np.mean(bones.shin)) + bones.ankle_height + bones.trunk + bones.head
+    again = before / tall
+
+    def both(lengths: tuple[float, float], factor: float) -> tuple[float, float]:
+        return lengths[0] * factor * again, lengths[1] * factor * again
+
+    shoulders = tuple(
+        (forward * again, out * factors.shoulders * again, up * again) for forward, out, up in bones.shoulder
+    )
+    return replace(
+        bones,
+        trunk=bones.trunk * factors.trunk * again,
+        head=bones.head * factors.head * again,
+        hip_half_width=both(bones.hip_half_width, factors.hips),
+        thigh=both(bones.thigh, factors.thighs),
+        shin=both(bones.shin, factors.shins),
+        shoulder=(shoulders[0], shoulders[1]),
+        upper_arm=both(bones.upper_arm, factors.upper_arms),
+        forearm=both(bones.forearm, factors.forearms),
+        hand=bones.hand * factors.hands * again,
+        foot=bones.foot * factors.feet * again,
+        ankle_height=bones.ankle_height * again,
     )
 
 

@@ -1,6 +1,7 @@
 """A rendered person's footage as files: a video a camera, empty clips or plates, masks."""
 
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -8,19 +9,26 @@ import cv2
 from studio.geometry.camera import Camera
 from studio.progress import Progress
 from studio.synthesis.clips import ClipWriter
+from studio.synthesis.damage import cameras_left, clutter_in_front
+from studio.synthesis.exercises import stool
 from studio.synthesis.person import PersonMotion
 from studio.synthesis.recipe_file import Picture, Recipe
 from studio.synthesis.renderer import Renderer
-from studio.synthesis.rooms import ROOMS
-from studio.synthesis.wardrobes import WARDROBES
+from studio.synthesis.room import Block
+from studio.synthesis.rooms import room_called
+from studio.synthesis.wardrobes import dressed
 
 STEPPED_OVER, STEPPED_OVER_HEIGHT = "box", 120.0
+SAT_ON = "sit"
 
 
 def render_person(
     recipe: Recipe, motion: PersonMotion, cameras: tuple[Camera, ...], source: Path, progress: Progress | None
 ) -> None:
-    """Write videos/, and background/ and masks/ as the recipe includes them, into `source`."""
+    """Write videos/, and background/ and masks/ as the recipe includes them, into `source`; nothing of cameras that
+    are missing.
+    """
+    cameras = cameras_left(cameras, recipe.damage.missing)
     picture, renderer = recipe.picture, recipe_renderer(recipe, motion, cameras)
     with ExitStack() as open_clips:
         footage = _writers(source / "videos", cameras, recipe.fps, picture.quality, open_clips)
@@ -47,15 +55,19 @@ def render_person(
 def recipe_renderer(recipe: Recipe, motion: PersonMotion, cameras: tuple[Camera, ...]) -> Renderer:
     """The renderer of a recipe's room and person: the very pictures of its footage, and their exact masks."""
     height = recipe.options.get("height_mm", STEPPED_OVER_HEIGHT) if recipe.motion == STEPPED_OVER else 0.0
+    room = room_called(recipe.room, height)
+    things: tuple[Block, ...] = (stool(motion.skeleton, recipe.options),) if recipe.motion == SAT_ON else ()
+    things += clutter_in_front(recipe.damage.clutter, cameras, motion, recipe.seed)
     return Renderer(
-        ROOMS[recipe.room](height),
+        replace(room, blocks=room.blocks + things),
         cameras,
         motion,
         noise=recipe.picture.noise,
         samples=recipe.picture.samples,
         seed=recipe.seed,
         girth=recipe.girth,
-        wardrobe=WARDROBES[recipe.wardrobe],
+        wardrobe=dressed(recipe.wardrobe, recipe.colours),
+        shutter=recipe.damage.shutter,
     )
 
 

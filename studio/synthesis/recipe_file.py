@@ -13,9 +13,11 @@ import tomli_w
 from studio.errors import StudioError
 from studio.geometry.camera import Camera
 from studio.synthesis.cameras import RIGS, placed_camera
+from studio.synthesis.damage import Damage
 from studio.synthesis.joined_clips import Clip
-from studio.synthesis.rooms import ROOMS
-from studio.synthesis.wardrobes import WARDROBES
+from studio.synthesis.person import Proportions
+from studio.synthesis.rooms import ROOMS, is_room
+from studio.synthesis.wardrobes import MATERIALS, WARDROBES
 from studio.typed_decoding import decode_toml
 
 RECIPES = Path(__file__).parent / "recipe_files"
@@ -86,8 +88,10 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     height_mm : of a person with published proportions. shape : instead, a file of `body`'s dimensions, whose lengths
     the person's bones have; the session's subject has these dimensions, radii included, and those of the rendered
     hands and shoes; `subject_shape.toml` beside it has the file's dimensions alone. girth : how much stouter than
-    usual the flesh is. wardrobe : "striped" or "plain" clothes, which hardly stand out in the "office". room : that,
-    "furnished" or "hall".
+    usual the flesh is. proportions : of the bones, where they differ from the published ones. wardrobe : "striped" or
+    "plain" clothes, which hardly stand out in the "office". colours : other ones for some of what is worn, RGB 0...1.
+    room : "office", "furnished", "hall", or "drawn-" and a number, which furnishes a room by chance. damage : what went
+    wrong with the take.
     sigma : a file whose first numbers are the session's σ0, one for each parameter of `body`, from frame to frame at
     60 Hz. Files count from the recipe's folder, or lie in the real data after "data:" (`real_data.py`).
     """
@@ -104,7 +108,9 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     height_mm: float = 1760.0
     shape: str = ""
     girth: float = 1.0
+    proportions: Proportions = Proportions()
     wardrobe: str = "striped"
+    colours: dict[str, tuple[float, float, float]] = {}
     room: str = "furnished"
     sigma: str = ""
     weighting: str = ""
@@ -112,6 +118,7 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     cameras: Cameras = Cameras()
     picture: Picture = Picture()
     include: Include = Include()
+    damage: Damage = Damage()
 
 
 def find_recipe(name_or_path: str | Path) -> Path:
@@ -200,12 +207,41 @@ def _problem(recipe: Recipe) -> str:
         (not 1 <= recipe.frames <= 100_000, f"frames is {recipe.frames}, not 1 to 100000"),
         (not 1.0 <= recipe.fps <= 1000.0, f"fps is {recipe.fps:g}, not 1 to 1000"),
         (not 300.0 <= recipe.height_mm <= 3000.0, f"height_mm is {recipe.height_mm:g}, not 300 to 3000"),
-        (recipe.room not in ROOMS, f"room is '{recipe.room}', not one of {', '.join(ROOMS)}"),
+        (
+            not is_room(recipe.room),
+            f"room is '{recipe.room}', not one of {', '.join(ROOMS)}, or 'drawn-' and a number",
+        ),
         (
             recipe.wardrobe not in WARDROBES,
             f"wardrobe is '{recipe.wardrobe}', not one of {', '.join(WARDROBES)}",
         ),
+        (
+            not set(recipe.colours) <= set(MATERIALS),
+            f"colours are of {', '.join(MATERIALS)}, not of {', '.join(sorted(set(recipe.colours) - set(MATERIALS)))}",
+        ),
+        (
+            not all(0.0 <= value <= 1.0 for colour in recipe.colours.values() for value in colour),
+            "colours are RGB from 0 to 1",
+        ),
         (not 0.5 <= recipe.girth <= 2.0, f"girth is {recipe.girth:g}, not 0.5 to 2"),
+        (
+            not all(0.7 <= value <= 1.4 for value in msgspec.structs.astuple(recipe.proportions)),
+            "proportions are factors from 0.7 to 1.4",
+        ),
+        (bool(recipe.shape) and recipe.proportions != Proportions(), "proportions belong to no shape file"),
+        (
+            recipe.motion == "arm" and recipe.damage != Damage(),
+            "damage is done to footage of a person, not to motion 'arm'",
+        ),
+        (not 0 <= recipe.damage.clutter <= 24, f"damage.clutter is {recipe.damage.clutter}, not 0 to 24"),
+        (
+            not 0.0 <= recipe.damage.calibration_px <= 50.0,
+            f"damage.calibration_px is {recipe.damage.calibration_px:g}, not 0 to 50",
+        ),
+        (
+            not 0.0 <= recipe.damage.shutter <= 1.0,
+            f"damage.shutter is {recipe.damage.shutter:g}, not 0 to 1",
+        ),
         (
             recipe.motion == "arm" and bool(recipe.shape or recipe.sigma),
             "shape and sigma belong to a person, not to motion 'arm'",

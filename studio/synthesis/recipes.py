@@ -19,6 +19,7 @@ from studio.sessions.importers.catalogue import import_source
 from studio.sessions.manifest import read_manifest, write_manifest
 from studio.sessions.named_rows import write_pose, write_sigma
 from studio.synthesis.arm_footage import render_arm
+from studio.synthesis.damage import misplaced
 from studio.synthesis.joined_clips import joined_person
 from studio.synthesis.motions import make_motion
 from studio.synthesis.person import (
@@ -27,6 +28,7 @@ from studio.synthesis.person import (
     first_frames,
     marker_lengths,
     marker_motion,
+    proportioned,
     skeleton_of_height,
 )
 from studio.synthesis.person_footage import render_person
@@ -38,7 +40,7 @@ from studio.synthesis.shape import skeleton_of_subject, subject_of_file, with_ha
 
 ARM = "arm"
 RECIPE_COPY = "recipe.toml"
-SUBJECT_OF_SHAPE, SIGMA_NAME = "subject_shape.toml", "sigma.csv"
+SUBJECT_OF_SHAPE, SUBJECT_OF_HEIGHT, SIGMA_NAME = "subject_shape.toml", "subject_height.toml", "sigma.csv"
 
 
 def synthesize(
@@ -60,8 +62,9 @@ def synthesize(
         source.mkdir()
         render_source(wanted, path.parent, source, progress, frames)
         import_source(source, into, fps=wanted.fps, progress=progress)
-        if (source / SUBJECT_OF_SHAPE).exists():
-            (into / SUBJECT_OF_SHAPE).write_bytes((source / SUBJECT_OF_SHAPE).read_bytes())
+        for other in (SUBJECT_OF_SHAPE, SUBJECT_OF_HEIGHT):
+            if (source / other).exists():
+                (into / other).write_bytes((source / other).read_bytes())
     manifest = read_manifest(into)
     changed = msgspec.structs.replace(
         manifest, title=wanted.title, weighting=wanted.weighting, imported_from=f"recipe {path.name}"
@@ -98,9 +101,12 @@ def render_source(
             subject = with_hands_and_feet(shape, skeleton)
             if recipe.include.subject:
                 write_subject(shape, source / SUBJECT_OF_SHAPE)
+        elif recipe.include.subject:
+            write_subject(Subject(body=recipe.body, height_mm=recipe.height_mm), source / SUBJECT_OF_HEIGHT)
         if recipe.sigma:
             _write_sigma(recipe, located(recipe.sigma, recipe_folder), source / SIGMA_NAME)
         render_person(recipe, motion, cameras, source, progress)
+        cameras = misplaced(cameras, recipe.damage.calibration_px, recipe.seed)
     (source / "calibration").mkdir()
     write_calibration(cameras, source / "calibration" / "rendered.toml")
     if recipe.include.truth and len(truth.names):
@@ -136,7 +142,7 @@ def recipe_person(
     Raises BodyError for a shape that does not fit the recipe's body.
     """
     if not recipe.shape:
-        return skeleton_of_height(recipe.height_mm, rng), None
+        return proportioned(skeleton_of_height(recipe.height_mm, rng), recipe.proportions), None
     subject = subject_of_file(located(recipe.shape, recipe_folder), recipe.body)
     return skeleton_of_subject(subject), subject
 

@@ -18,6 +18,7 @@ from studio.synthesis.cameras import pixel_rays
 from studio.synthesis.flesh import BOUND, BOUND_RADIUS, clothed_pieces, piece_tables
 from studio.synthesis.noise_kernels import add_sensor_noise
 from studio.synthesis.person import PersonMotion
+from studio.synthesis.recorded_clip import sampled
 from studio.synthesis.room import Room, block_tables
 from studio.synthesis.room_kernels import trace_room
 from studio.synthesis.tracing_kernels import floor_shadow, trace_person
@@ -30,6 +31,8 @@ Bytes = NDArray[np.uint8]
 SHADOW_REACH, SHADOW_CELL = 2600.0, 26.0
 EXPOSURE, LENS_BLUR = 1.8, 0.55
 STREAMS_PER_FRAME = 64
+MOMENTS = 5
+"""Of an exposure: pictures of these many moments are averaged. The shadow is that of the middle one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,10 +61,18 @@ class Renderer:
         seed: int,
         girth: float = 1.0,
         wardrobe: Array = STRIPED,
+        shutter: float = 0.0,
     ) -> None:
+        """shutter : how long a picture is exposed, as a share of the time from frame to frame, about the frame's
+        moment.
+        """
         self._room, self._noise, self._samples, self._seed = room, noise, samples, seed
         self._wardrobe = wardrobe
-        self._tables, self._labels = piece_tables(motion, clothed_pieces(motion.skeleton, girth))
+        self._moments = MOMENTS if shutter > 0.0 else 1
+        tables, self._labels = piece_tables(
+            _moments(motion, shutter) if shutter > 0.0 else motion, clothed_pieces(motion.skeleton, girth)
+        )
+        self._tables = tables.reshape(motion.frame_count, self._moments, *tables.shape[1:])
         self._views = tuple(_view(room, camera, samples) for camera in cameras)
 
     def empty(self, camera: int, frame: int) -> Bytes:
@@ -79,7 +90,14 @@ class Renderer:
         key, ambient = np.ones((count, count), np.float32), np.ones((count, count), np.float32)
         left = -SHADOW_REACH
         floor_shadow(
-            left, left, SHADOW_CELL, self._tables[frame], self._labels, self._room.lights, key, ambient
+            left,
+            left,
+            SHADOW_CELL,
+            self._tables[frame, self._moments // 2],
+            self._labels,
+            self._room.lights,
+            key,
+            ambient,
         )
         return key, ambient
 
@@ -89,17 +107,22 @@ class Renderer:
         key, ambient = (_at_places(grid, view.shadow_place) for grid in shadow)
         light = view.key * key[..., None] + view.ambient * ambient[..., None]
         mask = np.zeros(view.depth.shape, np.uint8)
-        window = _window(view.camera, self._tables[frame])
+        tables = self._tables[frame]
+        window = _window(view.camera, tables.reshape(-1, tables.shape[-1]))
         if window is not None:
             rows, columns = window
-            person, coverage = self._person(view, frame, rows, columns)
+            person, coverage = self._person(view, tables[0], rows, columns)
+            for table in tables[1:]:
+                more, covered = self._person(view, table, rows, columns)
+                person, coverage = person + more, coverage + covered
+            person, coverage = person / np.float32(len(tables)), coverage / np.float32(len(tables))
             light[rows, columns] *= 1.0 - coverage[..., None]
             light[rows, columns] += person
             mask[rows, columns] = np.where(coverage >= 0.5, 255, 0)
         return self._developed(light, camera, frame), mask
 
-    def _person(self, view: _View, frame: int, rows: slice, columns: slice) -> tuple[Floats, Floats]:
-        """Light (h, w, 3) and coverage (h, w) of the person inside a window."""
+    def _person(self, view: _View, table: Array, rows: slice, columns: slice) -> tuple[Floats, Floats]:
+        """Light (h, w, 3) and coverage (h, w) of the person at one moment inside a window."""
         s = self._samples
         rays = view.rays[rows.start * s : rows.stop * s, columns.start * s : columns.stop * s]
         depth = np.ascontiguousarray(view.depth[rows, columns])
@@ -109,7 +132,7 @@ class Renderer:
             np.ascontiguousarray(rays),
             s,
             depth,
-            self._tables[frame],
+            table,
             self._labels,
             self._room.lights,
             self._wardrobe,
@@ -126,6 +149,13 @@ class Renderer:
         stream = (self._seed * 1_000_003 + frame) * STREAMS_PER_FRAME + camera
         add_sensor_noise(exposed, self._noise, stream, out)
         return out
+
+
+def _moments(motion: PersonMotion, shutter: float) -> PersonMotion:
+    """The motion at the MOMENTS of each frame's exposure, one after the other."""
+    within = shutter * ((np.arange(MOMENTS) + 0.5) / MOMENTS - 0.5)
+    times = (np.arange(motion.frame_count)[:, None] + within) / motion.fps
+    return sampled(motion, times.ravel(), motion.fps * MOMENTS)
 
 
 def _view(room: Room, camera: Camera, samples: int) -> _View:

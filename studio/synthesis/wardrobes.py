@@ -3,7 +3,10 @@
 Each wardrobe is (6, 3) RGB, 0...1, in the order of the materials in `flesh.py`.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
+from numpy.typing import NDArray
 
 STRIPED = np.array(
     [
@@ -27,3 +30,13 @@ PLAIN = np.array(
     ]
 )
 WARDROBES = {"striped": STRIPED, "plain": PLAIN}
+MATERIALS = ("skin", "shirt", "trousers", "shoes", "hair", "stripes")
+"""The rows of a wardrobe."""
+
+
+def dressed(wardrobe: str, colours: Mapping[str, tuple[float, float, float]]) -> NDArray[np.float64]:
+    """(6, 3) a wardrobe with other colours for some of the MATERIALS."""
+    found = WARDROBES[wardrobe].copy()
+    for material, colour in colours.items():
+        found[MATERIALS.index(material)] = colour
+    return found

@@ -9,8 +9,11 @@ import pytest
 from studio.experiments.catalogue import EXPERIMENTS
 from studio.experiments.experiment import VERDICTS, Experiment, Findings, Outcome, Scale, Trial
 from studio.experiments.lost_limbs import spells
+from studio.experiments.open_questions.generalisation import ENTRIES
+from studio.experiments.reproduction_plan import frames_of
 from studio.experiments.tracked import Attempt, Tracked
 from studio.experiments.tracking_trials import by_group, curves, group_of, tracking_trial
+from studio.synthesis.drawn_recipes import KINDS
 
 TRACKED = (
     "fleischmann-table-2",
@@ -25,6 +28,7 @@ TRACKED = (
     "robustness-calibration-error",
     "robustness-fewer-cameras",
     "robustness-fewer-frames",
+    "generalisation",
 )
 SCALE = Scale(seeds=(0, 1, 2))
 
@@ -160,3 +164,49 @@ def test_groups_keep_the_order_of_seeds_and_curves_their_mean() -> None:
     assert thick[0].y[0] == pytest.approx(
         (groups["a, b"][0].per_frame_mm[0] + groups["a, b"][1].per_frame_mm[0]) / 2
     )
+
+
+def test_generalisation_keeps_the_halves_apart_and_says_who_is_near_where() -> None:
+    def error(label: str) -> float:
+        if "reporting" in label:
+            return 50.0
+        return 20.0 if label.startswith("swarm on") else 30.0
+
+    findings = concluded("generalisation", error)
+    numbers = {entry.name: entry for entry in findings.numbers}
+    assert numbers["clips with a mean of at most 24 mm, swarm, choosing"].ours == pytest.approx(100.0)
+    assert numbers["clips with a mean of at most 24 mm, swarm, reporting"].ours == pytest.approx(0.0)
+    assert numbers["mean error, annealed, default, choosing"].ours == pytest.approx(30.0, abs=0.2)
+    assert "Half to choose by: swarm is the nearest" in findings.words
+    short, long = findings.tables[:2]
+    assert short.columns[1:] == tuple(entry.name for entry in ENTRIES)
+    (walk, *_) = short.rows
+    assert str(walk[1]).startswith("30.0 / ")
+    # Which no behaviour model fits, and which one does.
+    behaviour = short.columns.index("behaviour")
+    cells = {str(row[0]).split(" (")[0]: row[behaviour] for row in short.rows}
+    assert cells["leap"] == "–"
+    assert cells["walk"] != "–"
+    assert len(long.rows) == sum(cell != "–" for row in short.rows for cell in row[1:])
+
+
+def test_generalisation_counts_frames_with_a_limb_lost() -> None:
+    experiment = EXPERIMENTS["generalisation"]
+    outcomes = [
+        made(trial, 40.0, lost=(3, 4, 5) if trial.label.startswith("condensation on choosing-leap") else ())
+        for trial in experiment.trials(SCALE)
+    ]
+    numbers = {entry.name: entry.ours for entry in experiment.conclude(outcomes).numbers}
+    clips = len(KINDS)
+    assert numbers["frames with a limb lost, condensation, choosing"] == pytest.approx(
+        100.0 * 3 / 450 / clips
+    )
+    assert numbers["frames with a limb lost, condensation, reporting"] == pytest.approx(0.0)
+
+
+def test_generalisation_is_measured_with_a_model_where_one_is_asked_for() -> None:
+    taught = [trial for trial in EXPERIMENTS["generalisation"].trials(SCALE) if "training" in trial.arguments]
+    assert {trial.arguments["attempt"]["tracker"] for trial in taught} == {"behaviour"}
+    assert all(frames_of(trial.arguments) == trial.arguments["attempt"]["last"] for trial in taught)
+    alone = [trial for trial in EXPERIMENTS["generalisation"].trials(SCALE) if "height alone" in trial.label]
+    assert {trial.arguments["attempt"]["subject"] for trial in alone} == {"subject_height.toml"}

@@ -133,10 +133,19 @@ def learnt(shelf: FootageShelf, training: Training) -> Lesson:
     """The model of a training set, learnt once for all who ask. Models that differ in memory or ε alone have the same
     clusters.
     """
+    return _read(_learnt_folder(shelf, training))
+
+
+def model_file(shelf: FootageShelf, training: Training) -> Path:
+    """The file of that model."""
+    return _learnt_folder(shelf, training) / MODEL
+
+
+def _learnt_folder(shelf: FootageShelf, training: Training) -> Path:
     clusters = dataclasses.replace(training, memory=USUAL_MEMORY, epsilon=USUAL_EPSILON)
     first = made_once(shelf, "model", _making(clusters), lambda folder: _learn(shelf, clusters, folder))
     if clusters == training:
-        return _read(first)
+        return first
 
     def make(folder: Path) -> None:
         began = time.perf_counter()
@@ -144,7 +153,7 @@ def learnt(shelf: FootageShelf, training: Training) -> Lesson:
         model = base.model.with_automaton(training.settings())
         _write(folder, Lesson(model, base.frames, time.perf_counter() - began))
 
-    return _read(made_once(shelf, "model", _making(training), make))
+    return made_once(shelf, "model", _making(training), make)
 
 
 def lesson_of(shelf: FootageShelf, training: Training) -> Lesson:

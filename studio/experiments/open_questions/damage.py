@@ -13,7 +13,7 @@ from scipy.ndimage import gaussian_filter
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.experiments.tracked import Changed
 from studio.geometry.camera import Camera
-from studio.geometry.rotations import rotation_from_vector
+from studio.synthesis.damage import misplaced
 
 Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
@@ -134,20 +134,9 @@ def calibration_error(degree: float, seed: int) -> Changed:
     """
 
     def spoil(cameras: tuple[Camera, ...]) -> tuple[Camera, ...]:
-        rng = np.random.default_rng((seed, 7))
-        return tuple(
-            turned_camera(camera, degree, float(rng.uniform(0.0, 2.0 * np.pi))) for camera in cameras
-        )
+        return misplaced(cameras, degree, seed)
 
     return Changed(cameras=spoil)
-
-
-def turned_camera(camera: Camera, pixels: float, direction: float) -> Camera:
-    """The camera turned about its own centre so that the middle of the picture moves by so many pixels."""
-    angle = np.arctan(pixels / camera.matrix[0, 0])
-    turn = rotation_from_vector(angle * np.array([np.cos(direction), np.sin(direction), 0.0]))
-    rotation = turn @ camera.rotation
-    return replace(camera, rotation=rotation, translation=-rotation @ camera.centre)
 
 
 DAMAGES: dict[str, Callable[[float, int], Changed]] = {
