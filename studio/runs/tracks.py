@@ -9,7 +9,6 @@ import hashlib
 import io
 import itertools
 import math
-import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
