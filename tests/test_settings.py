@@ -110,7 +110,7 @@ def test_a_misspelt_name_gets_the_nearest() -> None:
 def test_a_record_with_an_older_knob_is_understood(limits: str, constraints: str) -> None:
     recorded = {**values(default_settings()), "limits": limits}
     del recorded["constraints"], recorded["limbs_apart"]
-    settings = settings_from_values("annealed", "edge-region", recorded)
+    settings = settings_from_values("annealed", DEFAULT_WEIGHTING, recorded)
     assert settings == changed_settings(default_settings(), {"constraints": constraints})
     with pytest.raises(SettingsError, match="'limits'"):
         changed_settings(default_settings(), {"limits": limits})

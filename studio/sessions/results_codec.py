@@ -142,7 +142,9 @@ def unpack_result(blob: bytes) -> FrameResult:
     numbers, vectors = arrays["numbers"], arrays["vectors"]
     return FrameResult(
         frame=int(numbers[0]),
-        estimate=Estimate(*vectors[:3], float(numbers[5]), vectors[3] if len(vectors) > 3 else None),
+        estimate=Estimate(
+            vectors[0], vectors[1], vectors[2], float(numbers[5]), vectors[3] if len(vectors) > 3 else None
+        ),
         layers=int(numbers[1]),
         evaluations=int(numbers[2]),
         settings_version=int(numbers[3]),

@@ -29,7 +29,14 @@ def off(poses: np.ndarray, frame: int) -> float:
 def wrong(session_on_disk: Session) -> StoredRun:
     """A run that begins folded the wrong way and stays there."""
     start = true_poses()[0] + np.array([1.2, -2.0, 1.8, -1.5])
-    changes = {**QUICK, "particles": 8, "layers": 2, "start_repeats": 1, "recovery": "off"}
+    changes = {
+        **QUICK,
+        "particles": 8,
+        "layers": 2,
+        "start_repeats": 1,
+        "recovery": "off",
+        "refine_frames": False,
+    }
     run = prepare_run(session_on_disk, RunRequest(name="wrong", start_pose=start, changes=changes))
     poses = finish(session_on_disk, run)
     assert off(poses, 6) > 0.3

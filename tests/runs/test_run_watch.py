@@ -18,7 +18,7 @@ from studio.runs.reannealing import Reannealing
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.synthesis.recipes import synthesize
-from studio.tracking.tracker import LOST, NO_EVIDENCE, RECOVERED, TRACKED, FrameResult
+from studio.tracking.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED, TRACKED, FrameResult
 from studio.training.sources import read_source
 
 STEP, FPS = 3, 20.0
@@ -76,7 +76,8 @@ def test_black_frames_are_held_and_the_body_is_found_after_them(
 ) -> None:
     run, results = through
     states = [result.tracking for result in results]
-    assert states == [TRACKED] * 4 + [NO_EVIDENCE] * 5 + [RECOVERED] + [TRACKED] * 3
+    assert states[:10] == [TRACKED] * 4 + [NO_EVIDENCE] * 5 + [RECOVERED]
+    assert set(states[10:]) <= {TRACKED, LIMB_LOST}
     for result in results[4:9]:
         assert np.array_equal(result.estimate.pose, results[3].estimate.pose)
     assert max(errors(black, walk, results)[9:]) < 80.0
@@ -139,6 +140,10 @@ def test_a_run_that_starts_beside_the_body_is_lost_and_finds_it(walk: Session, t
     away = start.copy()
     away[[entry.name for entry in body.parameters].index("pelvis_x")] += 1500.0
     results = tracked(session, made(session, start_pose=away, last=6))
+    print(
+        [(r.tracking, r.overlap, r.doubts, dict(r.disagreement)) for r in results],
+        errors(session, walk, results),
+    )
     states = [result.tracking for result in results]
     assert states[:4] == [TRACKED, TRACKED, LOST, RECOVERED]
     assert [result.doubts for result in results[:4]] == [1, 2, 3, 0]

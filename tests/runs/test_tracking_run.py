@@ -35,7 +35,7 @@ def assert_same_layers(ones: list[LayerRecord], others: list[LayerRecord]) -> No
 
 
 def test_it_follows_the_arm_and_records_every_layer(session_on_disk: Session) -> None:
-    run = new_run(session_on_disk, "a", particles=150, layers=8)
+    run = new_run(session_on_disk, "a", particles=150, layers=8, refine_frames=False)
     poses = finish(session_on_disk, run)
     with run.results() as results:
         assert results.frames() == [0, 1, 2, 3, 4]
