@@ -18,7 +18,7 @@ from studio.experiments.statistics import number
 from studio.experiments.tracked import Attempt, Tracked, track
 from studio.experiments.tracking_trials import Contender, by_group
 from studio.runs.shape_on_the_way import FIRST_FRAMES
-from studio.settings import DEFAULT_TRACKER, usual_weighting
+from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING
 from studio.synthesis.drawn_recipes import CHOOSING, HALVES, KINDS, clip_name
 from studio.synthesis.recipes import SUBJECT_OF_HEIGHT
 
@@ -30,7 +30,7 @@ WALKS = ("walk", "walk-20hz", "turns", "hard")
 """What the behaviour model, learnt from walks alone, fits."""
 TAUGHT = Training(("walk", "walk-with-turns", "circle-three-cameras"), performances=2, body="human31")
 THREE_TERMS, PAPERS_TERMS = "edge-region-silhouette", "edge-region"
-SEARCH_ALONE = {"refine_frames": False}
+REFINED, SEARCH_ALONE = {"refine_frames": True}, {"refine_frames": False}
 PAPER = {
     "adaptive_diffusion": True,
     "diffusion_form": "paper",
@@ -61,8 +61,8 @@ class Entry:
 
 
 def _usual(name: str, tracker: str = DEFAULT_TRACKER, weighting: str = "") -> Contender:
-    """A tracker with the studio's defaults, "" for its usual weighting."""
-    return Contender(name, tracker, weighting or usual_weighting(tracker))
+    """A tracker with the studio's defaults, "" for the usual weighting."""
+    return Contender(name, tracker, weighting or DEFAULT_WEIGHTING, REFINED)
 
 
 ENTRIES = (
@@ -70,7 +70,7 @@ ENTRIES = (
     *(
         Entry(_usual(f"annealed, {weighting}", "annealed", weighting), fields=AS_A_RUN)
         for weighting in (PAPERS_TERMS, THREE_TERMS)
-        if weighting != usual_weighting(DEFAULT_TRACKER)
+        if weighting != DEFAULT_WEIGHTING
     ),
     Entry(Contender("annealed, three terms, search alone", "annealed", THREE_TERMS, SEARCH_ALONE)),
     Entry(Contender("annealed, as the paper", "annealed", PAPERS_TERMS, {**PAPER, **SEARCH_ALONE})),
