@@ -107,12 +107,15 @@ def footage_needed(jobs: Iterable[TrialJob]) -> dict[str, int | None]:
 
 def frames_of(arguments: Plain) -> int | None:
     """The last frame that a trial's arguments name, as `Attempt` does ("last", half open); None where they do not.
-    Where there is an attempt among them, nothing else counts.
+    Where there is an attempt among them, what names no last frame does not count.
     """
     if not isinstance(arguments, Mapping):
         return None
     if "attempt" in arguments:
-        return frames_of(arguments["attempt"])
+        frames = [
+            value["last"] for value in arguments.values() if isinstance(value, Mapping) and "last" in value
+        ]
+        return None if None in frames else max(frames, default=None)
     if "last" in arguments:
         return arguments["last"]
     within = [frames_of(value) for value in arguments.values() if isinstance(value, Mapping)]

@@ -24,6 +24,7 @@ from studio.experiments.experiment import Outcome
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.tracking_trials import measure_tracking
 from studio.sessions.session import Session
+from studio.settings import DEFAULT_WEIGHTING
 
 ROOT = Path(__file__).resolve().parents[2]
 WALK = ROOT / "sample_sessions" / "walk"
@@ -143,7 +144,7 @@ def test_wrong_seeds_and_frames_are_refused(wrong: dict) -> None:
 
 
 def test_the_weighting_is_one_for_all_and_the_sessions_unless_said() -> None:
-    assert {entrant.weighting for entrant in plan("annealed", "condensation").entrants} == {"edge-region"}
+    assert {entrant.weighting for entrant in plan("annealed", "condensation").entrants} == {DEFAULT_WEIGHTING}
     with pytest.raises(StudioError, match="no weighting 'x'"):
         plan_comparison(Session(WALK), Lineup(("annealed",), "x", 200), (0,))
 

@@ -58,7 +58,8 @@ def test_only_the_frames_that_are_looked_at_are_needed(tmp_path) -> None:
     assert frames_of({"footage": "walk", "last": 90}) == 90
     assert frames_of({"footage": "walk", "last": None}) is None
     assert frames_of({"attempt": {"last": 30}, "other": {"last": 50}}) == 50
-    assert frames_of({"attempt": {"last": 30}, "changes": {"layers": 3}}) is None
+    assert frames_of({"attempt": {"last": 30}, "changes": {"layers": 3}}) == 30
+    assert frames_of({"attempt": {"last": 30}, "other": {"last": None}}) is None
     assert frames_of({"seed": 1}) is None
     jobs = [
         SimpleNamespace(footage=footage, frames=frames)

@@ -82,7 +82,7 @@ def test_frames_refined_together_move_as_one_and_lie_as_near(
     together = mover.refine(Window(found_by_a_search, losses(refiner, found_by_a_search, seen), none))
     own = rms_second_difference(marker_points(body, movement))
     jitters = [rms_second_difference(marker_points(body, poses)) for poses in (alone, together)]
-    assert jitters[0] > 10.0
+    assert jitters[0] > own + 5.0
     assert jitters[1] < own + 3.0
     assert off(body, together, movement) < off(body, alone, movement)
     assert off(body, together, movement) < 0.6 * off(body, found_by_a_search, movement)

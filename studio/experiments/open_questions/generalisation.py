@@ -30,7 +30,7 @@ WALKS = ("walk", "walk-20hz", "turns", "hard")
 """What the behaviour model, learnt from walks alone, fits."""
 TAUGHT = Training(("walk", "walk-with-turns", "circle-three-cameras"), performances=2, body="human31")
 THREE_TERMS, PAPERS_TERMS = "edge-region-silhouette", "edge-region"
-SEARCH_ALONE = {"refine_frames": False}
+REFINED, SEARCH_ALONE = {"refine_frames": True}, {"refine_frames": False}
 PAPER = {
     "adaptive_diffusion": True,
     "diffusion_form": "paper",
@@ -61,8 +61,8 @@ class Entry:
 
 
 def _usual(name: str, tracker: str = DEFAULT_TRACKER, weighting: str = "") -> Contender:
-    """A tracker with the studio's defaults, as a run has them: every frame refined."""
-    return Contender(name, tracker, weighting or DEFAULT_WEIGHTING, {"refine_frames": True})
+    """A tracker with the studio's defaults, "" for the usual weighting."""
+    return Contender(name, tracker, weighting or DEFAULT_WEIGHTING, REFINED)
 
 
 ENTRIES = (
