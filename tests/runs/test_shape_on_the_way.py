@@ -1,0 +1,100 @@
+"""The shape that a run's first frames show: found, kept, said, and left alone where it cannot be told."""
+
+import dataclasses
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from drawn_people import drawn_evidence, ring_of_cameras
+
+from studio.body.catalogue import load_body
+from studio.body.dimensions import with_dimensions
+from studio.body.shape_space import dimension_kinds, end_lengths
+from studio.body.subject import Subject, fit_subject
+from studio.runs import shape_on_the_way
+from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.search_space import default_sigma
+from studio.runs.shape_on_the_way import FOLDER, shaped_body
+from studio.sessions.session import Session
+
+WALK = Path(__file__).parents[2] / "sample_sessions" / "walk"
+CAMERAS = ring_of_cameras(4, 480, 360)
+
+
+@pytest.fixture
+def walk(tmp_path: Path) -> Session:
+    """A copy of the bundled walk without the shape that comes with it."""
+    shutil.copytree(WALK, tmp_path / "walk", ignore=shutil.ignore_patterns("runs", FOLDER))
+    return Session(tmp_path / "walk")
+
+
+def test_thicker_limbs_are_found_and_bones_are_kept() -> None:
+    body, _ = fit_subject(load_body("human31"), Subject(height_mm=1760.0))
+    assert body.definition is not None
+    kinds = dimension_kinds(body.definition)
+    radii = [name for name, kind in kinds.items() if kind == "radius" and ("arm" in name or "shin" in name)]
+    stout = with_dimensions(body, {name: 1.3 * body.dimensions[name] for name in radii})
+    names = [entry.name for entry in body.parameters]
+    pose = body.neutral.copy()
+    pose[names.index("pelvis_z")] = 950.0
+    pose[names.index("left_shoulder_rx")] += 0.6
+    pose[names.index("right_shoulder_rx")] -= 0.6
+
+    def posture(frame: int) -> np.ndarray:
+        moved = pose.copy()
+        moved[names.index("left_hip_ry")] += 0.06 * frame
+        moved[names.index("right_elbow_ry")] -= 0.05 * frame
+        return moved
+
+    found = shaped_body(
+        body,
+        CAMERAS,
+        lambda frame: drawn_evidence(stout, posture(frame), CAMERAS, frame),
+        range(8),
+        posture(0),
+        default_sigma(body, 30.0),
+    )
+    lengths = {name for name, kind in kinds.items() if kind == "length"} - end_lengths(body.definition)
+    assert all(found.body.dimensions[name] == body.dimensions[name] for name in lengths)
+    ratios = [found.body.dimensions[name] / body.dimensions[name] for name in radii]
+    assert np.mean(ratios) > 1.15
+    assert found.overlap[1] > found.overlap[0]
+
+
+def test_a_run_begins_with_the_shape_says_so_and_fits_it_once(
+    walk: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = prepare_run(walk, RunRequest(last=20)).record
+    own = walk.body().dimensions
+    assert any("shape was fitted to frames 0 to 19" in note for note in first.notes)
+    assert first.dimensions["left_thigh_length"] == own["left_thigh_length"]
+    assert first.dimensions["left_thigh_radius_start"] != own["left_thigh_radius_start"]
+    monkeypatch.setattr(shape_on_the_way, "shaped_body", lambda *_, **__: pytest.fail("fitted again"))
+    again = prepare_run(walk, RunRequest(last=20, seed=5)).record
+    assert (again.dimensions, again.start_pose) == (first.dimensions, first.start_pose)
+    plain = prepare_run(walk, RunRequest(last=20, fit_shape=False)).record
+    assert plain.dimensions == dict(own)
+
+
+def test_few_frames_and_one_camera_tell_no_shape(walk: Session, session_on_disk: Session) -> None:
+    assert prepare_run(walk, RunRequest(last=5)).record.dimensions == dict(walk.body().dimensions)
+    start = np.zeros(4)
+    arm = prepare_run(session_on_disk, RunRequest(start_pose=start)).record
+    assert arm.dimensions == dict(session_on_disk.body().dimensions)
+    assert not (session_on_disk.path / FOLDER).exists()
+
+
+def test_masks_that_show_something_else_change_nothing(
+    walk: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fitted = shape_on_the_way.fitted_shape
+
+    def worse(*given: object) -> object:
+        found = fitted(*given)  # pyright: ignore[reportArgumentType]
+        return dataclasses.replace(found, overlap=(0.5, 0.4))
+
+    monkeypatch.setattr(shape_on_the_way, "fitted_shape", worse)
+    record = prepare_run(walk, RunRequest(last=12)).record
+    assert record.dimensions == dict(walk.body().dimensions)
+    assert any("The shape was not fitted" in note for note in record.notes)

@@ -1,0 +1,148 @@
+"""Refinement inside the loop: nearer to the truth, lost limbs drawn anew, the same bits each time, off when off."""
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+import pytest
+from drawn_people import drawn_evidence, ring_of_cameras
+
+from studio.body.catalogue import load_body
+from studio.body.dimensions import with_dimensions
+from studio.body.forward_kinematics import marker_points
+from studio.body.model import BodyModel
+from studio.body.subject import Subject, fit_subject
+from studio.evidence.distance_maps import silhouettes_by_camera
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.runs.search_space import default_sigma, search_space
+from studio.sessions.results_codec import pack_result, unpack_result
+from studio.tracking.frame_refinement import FrameRefinementSettings, FrameRefiner, space_after
+from studio.tracking.refinement import RefinementSettings, Refiner, rigid_limbs
+from studio.tracking.tracker import Carried, Estimate, FrameProblem, FrameResult, ParticleSet, start_of
+from studio.weighting.catalogue import WEIGHTINGS
+
+CAMERAS = ring_of_cameras(4, 480, 360)
+SETTINGS = FrameRefinementSettings()
+
+
+@pytest.fixture(scope="module")
+def body() -> BodyModel:
+    return load_body("human31")
+
+
+@pytest.fixture(scope="module")
+def truth(body: BodyModel) -> np.ndarray:
+    names = [entry.name for entry in body.parameters]
+    pose = body.neutral.copy()
+    pose[names.index("pelvis_z")] = 950.0
+    for name, angle in {"left_shoulder_rx": 0.5, "right_shoulder_rx": -0.5, "left_hip_ry": 0.3}.items():
+        pose[names.index(name)] += angle
+    return pose
+
+
+@pytest.fixture(scope="module")
+def evidence(body: BodyModel, truth: np.ndarray) -> FrameEvidence:
+    return drawn_evidence(body, truth, CAMERAS)
+
+
+@pytest.fixture(scope="module")
+def problem(body: BodyModel, evidence: FrameEvidence) -> FrameProblem:
+    weighting = WEIGHTINGS["edge-silhouette"]
+    return weighting.prepare(body, CAMERAS, weighting.settings_type()).problem(evidence)
+
+
+def searched(pose: np.ndarray, frame: int = 3) -> FrameResult:
+    """What a search found, five particles about it."""
+    particles = ParticleSet(pose + 0.01 * np.arange(5)[:, None], np.full(5, -np.log(5.0)))
+    return FrameResult(frame, Estimate(pose, pose, pose, -1.0), 1, 5, 1, 1.0, Carried(particles, pose))
+
+
+def off(body: BodyModel, pose: np.ndarray, truth: np.ndarray) -> float:
+    return float(
+        np.linalg.norm(marker_points(body, pose[None]) - marker_points(body, truth[None]), axis=2).mean()
+    )
+
+
+@pytest.fixture
+def refined(
+    body: BodyModel, evidence: FrameEvidence, problem: FrameProblem
+) -> Callable[[np.ndarray, FrameRefinementSettings], FrameResult]:
+    def make(pose: np.ndarray, settings: FrameRefinementSettings = SETTINGS) -> FrameResult:
+        seen = partial(silhouettes_by_camera, evidence)
+        return FrameRefiner(body, CAMERAS, 7).refined(searched(pose), seen, problem, settings)
+
+    return make
+
+
+def test_a_frame_comes_nearer_and_the_next_starts_there(body: BodyModel, truth: np.ndarray, refined) -> None:
+    rng = np.random.default_rng(1)
+    unit = np.array([1.0 if entry.kind == "angle" else 250.0 for entry in body.parameters])
+    pose = truth + 0.06 * unit * rng.standard_normal(len(truth))
+    found = refined(pose)
+    assert off(body, found.estimate.pose, truth) < 0.5 * off(body, pose, truth)
+    assert np.array_equal(found.estimate.searched, pose)
+    assert found.carried.particles is not None
+    assert (found.carried.particles.poses == found.estimate.pose).all()
+    assert np.array_equal(found.carried.estimate, found.estimate.pose)
+    again = refined(pose)
+    assert np.array_equal(again.estimate.pose, found.estimate.pose)
+    cloud = refined(pose, FrameRefinementSettings(next_frame_from="cloud"))
+    assert np.ptp(cloud.carried.particles.poses, axis=0).max() > 0.03
+
+
+def test_an_arm_that_is_lost_is_drawn_anew(body: BodyModel, truth: np.ndarray, refined) -> None:
+    names = [entry.name for entry in body.parameters]
+    pose = truth.copy()
+    pose[names.index("left_shoulder_ry")] += 1.4
+    pose[names.index("left_elbow_ry")] -= 1.0
+    pose = np.clip(pose, [e.lower for e in body.parameters], [e.upper for e in body.parameters])
+    stuck = refined(pose, FrameRefinementSettings(redraw_limbs=False))
+    found = refined(pose)
+    assert stuck.limbs_lost
+    assert not found.limbs_lost
+    assert off(body, found.estimate.pose, truth) < 0.5 * off(body, stuck.estimate.pose, truth)
+    assert found.evaluations > stuck.evaluations
+
+
+def test_switched_off_or_without_masks_nothing_changes(
+    body: BodyModel, truth: np.ndarray, problem: FrameProblem, refined
+) -> None:
+    off_result = refined(truth, FrameRefinementSettings(refine_frames=False))
+    assert off_result.estimate.searched is None
+    assert off_result.disagreement == {}
+    nobody = partial(silhouettes_by_camera, drawn_evidence(body, None, CAMERAS))
+    result = searched(truth)
+    assert FrameRefiner(body, CAMERAS, 7).refined(result, nobody, problem, SETTINGS) is result
+
+
+def test_what_was_refined_is_stored_whole(truth: np.ndarray, refined) -> None:
+    found = refined(truth + 0.02)
+    stored = unpack_result(pack_result(found))
+    assert np.array_equal(stored.estimate.searched, found.estimate.searched)
+    assert stored.disagreement == dict(found.disagreement)
+    assert unpack_result(pack_result(searched(truth))).estimate.searched is None
+
+
+def test_sigma_is_smaller_after_a_refined_frame_and_whole_where_a_run_starts(
+    body: BodyModel, truth: np.ndarray
+) -> None:
+    space = search_space(body, default_sigma(body, 60.0))
+    followed = Carried(ParticleSet(truth[None], np.zeros(1)), truth)
+    assert np.allclose(space_after(space, followed, SETTINGS).sigma, SETTINGS.refined_spread * space.sigma)
+    assert space_after(space, start_of(tuple(truth)), SETTINGS) is space
+    assert space_after(space, followed, FrameRefinementSettings(refine_frames=False)) is space
+
+
+def test_rigid_feet_explain_what_is_seen_but_pull_nothing(body: BodyModel, truth: np.ndarray) -> None:
+    """A person's ankle turns, the body's does not: toes that are seen elsewhere must not move the leg."""
+    sized, _ = fit_subject(body, Subject(height_mm=1760.0))
+    rigid = [limb.name for limb, is_rigid in zip(sized.drawn, rigid_limbs(sized), strict=True) if is_rigid]
+    assert rigid == ["left foot", "right foot", "left hand", "right hand"]
+    longer = with_dimensions(
+        sized, {"left_foot_length": 400.0, "right_foot_length": 400.0, "foot_drop": 90.0}
+    )
+    seen = tuple(silhouettes_by_camera(drawn_evidence(longer, truth, CAMERAS)).values())
+    refiner, pulled = (Refiner(sized, CAMERAS, RefinementSettings()) for _ in range(2))
+    pulled.rigid[:] = False
+    moved = [off(sized, one.refine(truth, seen).pose, truth) for one in (refiner, pulled)]
+    assert moved[0] < 0.5 * moved[1]
