@@ -18,10 +18,10 @@ from studio.errors import RunError
 from studio.progress import Progress
 from studio.runs.new_run import DESPITE, RunRequest, prepare_run
 from studio.runs.start_pose_file import frame_of_file, start_pose_from_file
-from studio.sessions.session import START_POSE_NAME, Session
+from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
-from studio.settings import knob_table
+from studio.settings import DEFAULT_WEIGHTING, knob_table
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED
 from studio.weighting.catalogue import WEIGHTINGS
@@ -85,7 +85,7 @@ def told_run(run: StoredRun) -> dict[str, object]:
 @click.option(
     "--weighting",
     type=click.Choice(sorted(WEIGHTINGS)),
-    help="Default: the session's own, else edge-region (swarm: edge-silhouette).",
+    help=f"Default: the session's own, else {DEFAULT_WEIGHTING}.",
 )
 @click.option(
     "--body", default="", metavar="NAME", help="Kinematic tree; the session's subject still scales it."
@@ -112,6 +112,12 @@ def told_run(run: StoredRun) -> dict[str, object]:
 @click.option("--seed", type=int, default=0, show_default=True, help="The same seed gives the same run.")
 @DESPITE_OPTION
 @click.option(
+    "--fit-shape/--keep-shape",
+    default=True,
+    show_default=True,
+    help="Begin with the radii, hands, feet and head that the first frames show; bone lengths are kept.",
+)
+@click.option(
     "--set", "changes", multiple=True, metavar="KNOB=VALUE", help="Any other knob; the guide lists them."
 )
 @click.option("--poses", type=click.Path(path_type=Path), help="Write the poses as CSV.")
@@ -131,6 +137,7 @@ def track(
     frames: str,
     seed: int,
     despite_findings: bool,
+    fit_shape: bool,
     changes: tuple[str, ...],
     poses: Path | None,
     name: str,
@@ -158,6 +165,7 @@ def track(
             name=name,
             behaviour=behaviour,
             despite_findings=despite_findings,
+            fit_shape=fit_shape,
         )
         run = _prepared(opened, _with_start_pose(request, opened, start_pose))
 
@@ -191,10 +199,8 @@ def _with_start_pose(request: RunRequest, session: Session, path: Path | None) -
 
 
 def _prepared(session: Session, request: RunRequest) -> StoredRun:
-    """The run, with progress where its start pose has to be found first."""
-    if request.start_pose is not None or (session.path / START_POSE_NAME).exists():
-        return prepare_run(session, request)
-    with progress(f"{session.name}: start pose") as report:
+    """The run, with progress where its start pose has to be found or its shape fitted first."""
+    with progress(f"{session.name}: preparing") as report:
         return prepare_run(session, request, report)
 
 

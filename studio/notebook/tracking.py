@@ -43,13 +43,15 @@ def track(
     name: str = "",
     knobs: Mapping[str, object] | None = None,
     despite_findings: bool = False,
+    fit_shape: bool = True,
     progress: Told = None,
 ) -> Tracked:
     """Track a session and store the run; the same seed gives the same run.
 
     tracker, weighting, body : names, the session's own by default. first : default the frame that the start pose is of;
     last : the frame after the last. knobs : any, by name. despite_findings : also where the footage speaks against the
-    calibration, as `mask_quality` may find. Interrupted, what was tracked stays, and `go_on` goes on with it. Raises
+    calibration, as `mask_quality` may find. fit_shape : begin with the radii, hands, feet and head that the first frames
+    show. Interrupted, what was tracked stays, and `go_on` goes on with it. Raises
     StudioError.
     """
     opened = open_session(session)
@@ -70,6 +72,7 @@ def track(
         name=name,
         behaviour=behaviour,
         despite_findings=despite_findings,
+        fit_shape=fit_shape,
     )
     with told(progress, f"{opened.name}: tracking") as report:
         run = prepare_run(opened, request, report)

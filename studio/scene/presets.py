@@ -54,9 +54,14 @@ _PAPERS_SWARM: dict[str, Value] = {
 
 PRESETS = (
     Preset(
+        "the studio's own",
+        "The improved filter, 10 × 100, and each frame refined on its silhouettes.",
+        _IMPROVED | {"layers": 10, "particles": 100, "refine_frames": True},
+    ),
+    Preset(
         "improved filter",
-        "Adaptive diffusion with shrinkage and crossover by limbs, 10 × 200.",
-        _IMPROVED | {"layers": 10, "particles": 200},
+        "Adaptive diffusion with shrinkage and crossover by limbs, 10 × 200, nothing refined.",
+        _IMPROVED | {"layers": 10, "particles": 200, "refine_frames": False},
     ),
     Preset(
         "paper, Eq. 13",
@@ -68,6 +73,7 @@ PRESETS = (
             "survival": 0.5,
             "layers": 10,
             "particles": 200,
+            "refine_frames": False,
         },
     ),
     Preset(
@@ -81,17 +87,18 @@ PRESETS = (
             "survival": 0.5,
             "layers": 10,
             "particles": 200,
+            "refine_frames": False,
         },
     ),
     Preset(
         "paper, swarm",
         "The swarm as its paper has it: Table 1, two soft stages, impossible poses drawn again.",
-        _PAPERS_SWARM,
+        _PAPERS_SWARM | {"refine_frames": False},
     ),
-    Preset("fast preview", "A quarter of the work: 5 × 100.", _IMPROVED | {"layers": 5, "particles": 100}),
+    Preset("fast preview", "A quarter of the work: 5 × 50.", _IMPROVED | {"layers": 5, "particles": 50}),
     Preset(
         "careful",
-        "Three times the work, in more layers: 15 × 400.",
+        "Six times the work, in more layers: 15 × 400.",
         _IMPROVED | {"layers": 15, "particles": 400},
     ),
 )

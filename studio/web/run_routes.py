@@ -74,6 +74,7 @@ def make_run(session: OpenSession, wish: RunRequest, doors: Door) -> RunLine:
         live=wish.live,
         to_and_fro=wish.to_and_fro,
         despite_findings=wish.despite_findings,
+        fit_shape=wish.fit_shape,
     )
     made = prepare_run(session, request)
     doors.events.session_changed(session.name, made.name)

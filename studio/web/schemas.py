@@ -253,6 +253,9 @@ class RunRequest(Request):
     despite_findings: bool = Field(
         False, description="Also where the footage speaks against the calibration."
     )
+    fit_shape: bool = Field(
+        True, description="Begin with the radii, hands, feet and head that the first frames show; not live."
+    )
 
 
 class Frame(Request):

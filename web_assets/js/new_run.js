@@ -57,6 +57,7 @@ export async function newRunForm(entry, like = null) {
       [{ name: "seed", label: "Seed", kind: "number", min: 0, value: like ? like.seed + 1 : 0, hint: "The same seed gives the same run." },
         { name: "name", label: "Name", value: "", placeholder: "numbered", pattern: "[A-Za-z0-9_\\-]{0,64}" }],
       [{ name: "find", kind: "check", label: "find the start pose in the first frame", value: needsPose }],
+      [{ name: "shape", kind: "check", label: "fit the body's shape to the first frames (some seconds)", value: true }],
       [{ name: "live", kind: "check", label: "live: drops frames rather than falls behind", value: false }],
       ...(detail.doubts.length ? [[{ name: "despite", kind: "check", label: "track although the calibration is in doubt", value: false }]] : []),
     ],
@@ -82,7 +83,7 @@ export async function newRunForm(entry, like = null) {
       const made = await post(`${sessionPath(entry.name)}/runs`, {
         name: values.name || null, tracker: values.tracker, weighting: values.weighting, body: values.body || null, seed: Number(values.seed),
         first: Number(values.first), last: Number(values.last) + 1, settings: { ...preset?.values, ...guided },
-        behaviour: values.behaviour || null, live: values.live, despite_findings: Boolean(values.despite),
+        behaviour: values.behaviour || null, live: values.live, despite_findings: Boolean(values.despite), fit_shape: values.shape,
         ...(found ? { start_pose: found.pose, start_source: found.source } : {}),
       });
       await refreshSessions();
