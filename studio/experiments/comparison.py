@@ -23,6 +23,7 @@ from studio.runs.behaviour_models import ChosenModel, chosen_model, needs_model
 from studio.runs.new_run import checked_frames, start_pose
 from studio.sessions.session import Session
 from studio.settings import DEFAULT_WEIGHTING
+from studio.tracking.frame_refinement import FrameRefinementSettings
 from studio.weighting.catalogue import WEIGHTINGS
 
 MOST_SEEDS = 1000
@@ -212,7 +213,7 @@ def _attempt(plan: Plan, entrant: Entrant, seed: int) -> Attempt:
         entrant.tracker,
         entrant.weighting,
         seed,
-        {"refine_frames": entrant.settings().refinement.refine_frames, **entrant.changes},
+        {"refine_frames": FrameRefinementSettings().refine_frames, **entrant.changes},
         plan.first,
         plan.last,
         body=plan.body,

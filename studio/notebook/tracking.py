@@ -50,8 +50,8 @@ def track(
 
     tracker, weighting, body : names, the session's own by default. first : default the frame that the start pose is of;
     last : the frame after the last. knobs : any, by name. despite_findings : also where the footage speaks against the
-    calibration, as `mask_quality` may find. fit_shape : begin with the radii, hands, feet and head that the first frames
-    show. Interrupted, what was tracked stays, and `go_on` goes on with it. Raises
+    calibration, as `mask_quality` may find. fit_shape : begin with the radii, hands, feet and head that the first
+    frames show. Interrupted, what was tracked stays, and `go_on` goes on with it. Raises
     StudioError.
     """
     opened = open_session(session)

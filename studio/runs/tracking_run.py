@@ -175,8 +175,8 @@ class TrackingRun:
         result = self.result_of(search, settings) if search.finished else None
         if result is not None:
             self._store(result, settings)
-            self._next(result)
             self._astray = False
+            self._next(result)
         self._spent.append(time.perf_counter() - began)
         if result is not None:
             self._pace.add(self._spent)

@@ -234,7 +234,9 @@ def test_experiments_track_with_a_model(long_session: Session) -> None:
     )
     write_pose(long_session.path / "start_pose.csv", tuple(arm_model().space.parameters), true_poses()[0])
     changes = {**GUIDED["behaviour"], **LEARNING}
-    attempt = Attempt(str(long_session.path), "behaviour", "edge-region", 4, changes)
+    attempt = Attempt(
+        str(long_session.path), "behaviour", "edge-region", 4, {**changes, "refine_frames": True}
+    )
     shelf = FootageShelf(long_session.path.parent)
     with pytest.raises(SettingsError, match="no behaviour model"):
         track(attempt, shelf)

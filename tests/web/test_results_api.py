@@ -37,7 +37,7 @@ def test_the_timeline(studio: Studio, tracked: StoredRun) -> None:
     assert told["mean_milliseconds"] == 9.0
     assert [change["changed"] for change in told["settings_changes"]] == [["survival"]]
     assert told["mean_mm"] is None
-    assert told["describe"] == "annealed 10×200"
+    assert told["describe"] == "annealed 10×100"
 
 
 def test_with_truth_every_frame_has_its_error(studio: Studio, session: Session, tracked: StoredRun) -> None:

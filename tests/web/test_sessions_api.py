@@ -6,6 +6,7 @@ from web_doubles import Studio, state_of
 
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
+from studio.settings import DEFAULT_WEIGHTING
 from studio.worker.commands import Close
 
 
@@ -18,11 +19,11 @@ def test_the_list_says_what_the_rail_shows(studio: Studio, tracked: StoredRun) -
     entry = sessions(studio)["take1"]
     assert (entry["cameras"], entry["frame_count"], entry["fps"]) == (2, 4, 25.0)
     assert entry["camera_names"] == ["cam1", "cam2"]
-    assert (entry["tracker"], entry["weighting"], entry["body"]) == ("annealed", "edge-region", "human31")
+    assert (entry["tracker"], entry["weighting"], entry["body"]) == ("annealed", DEFAULT_WEIGHTING, "human31")
     [run] = entry["runs"]
     assert (run["name"], run["done"], run["first"], run["last"]) == ("first", 2, 0, 4)
     assert run["status"] == "interrupted"
-    assert run["describe"] == "annealed 10×200"
+    assert run["describe"] == "annealed 10×100"
     assert run["mean_mm"] is None
 
 
