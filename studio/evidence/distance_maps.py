@@ -44,11 +44,13 @@ def silhouette_distances(evidence: FrameEvidence, most: int = MOST_POINTS) -> tu
 
 
 def silhouettes_by_camera(evidence: FrameEvidence, most: int = MOST_POINTS) -> dict[str, SilhouetteDistances]:
-    """The distances of every view's mask by its camera."""
-    return {view.camera: distances_of(view.mask, most) for view in evidence.views}
+    """The distances of every view's mask by its camera, summed over steps from pixel to pixel: a quarter of the time,
+    and up to a fiftieth too long.
+    """
+    return {view.camera: distances_of(view.mask, most, exact=False) for view in evidence.views}
 
 
-def distances_of(mask: Bytes, most: int = MOST_POINTS) -> SilhouetteDistances:
+def distances_of(mask: Bytes, most: int = MOST_POINTS, *, exact: bool = True) -> SilhouetteDistances:
     """The distances of a mask (H, W); where nothing or everything is silhouette, there is no border."""
     size = (mask.shape[1], mask.shape[0])
     silhouette = np.greater_equal(mask, FOREGROUND).astype(np.uint8)
@@ -61,7 +63,8 @@ def distances_of(mask: Bytes, most: int = MOST_POINTS) -> SilhouetteDistances:
     right, bottom = min(left + width + margin, size[0]), min(top + height + margin, size[1])
     left, top = max(left - margin, 0), max(top - margin, 0)
     inside = np.ascontiguousarray(silhouette[top:bottom, left:right])
-    signed = np.where(inside > 0, 0.5 - _distances(inside), _distances(1 - inside) - 0.5).astype(np.float32)
+    measure = _distances if exact else _stepped_distances
+    signed = np.where(inside > 0, 0.5 - measure(inside), measure(1 - inside) - 0.5).astype(np.float32)
     contours, _ = cv2.findContours(inside, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     points = np.concatenate([np.zeros((0, 2), np.int64), *(contour[:, 0] for contour in contours)])
     at = points + np.array([left, top])
@@ -88,3 +91,8 @@ def _distances(mask: NDArray[np.uint8]) -> Floats:
     """
     found = cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     return np.sqrt(np.rint(found * found))
+
+
+def _stepped_distances(mask: NDArray[np.uint8]) -> Floats:
+    """The same, summed over steps to neighbours and knights' moves (Borgefors 1986, 5 × 5)."""
+    return np.asarray(cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_5))

@@ -98,13 +98,13 @@ class FrameRefiner:
         silhouettes = tuple(seen.values())
         refiner, agreement = self._prepared(tuple(seen), settings)
         pose = refiner.refine(result.estimate.pose, silhouettes).pose
-        evaluations = result.evaluations
-        if settings.redraw_limbs:
+        shares, evaluations = agreement.of(pose, silhouettes).shares(agreement), result.evaluations
+        if settings.redraw_limbs and max(shares.values()) >= DOUBTFUL_SHARE:
             rng = np.random.Generator(
                 np.random.Philox(np.random.SeedSequence((self._seed, result.frame, 0, 0, REDRAWN)))
             )
-            pose, drawn = _redrawn(rng, pose, silhouettes, problem, refiner, agreement)
-            evaluations += drawn
+            pose, drawn = _redrawn(rng, pose, shares, silhouettes, problem, refiner)
+            shares, evaluations = agreement.of(pose, silhouettes).shares(agreement), evaluations + drawn
         weight = float(problem.weigh(pose[None])[0])
         estimate = dataclasses.replace(
             result.estimate, pose=pose, searched=result.estimate.pose, log_weight=weight
@@ -115,7 +115,7 @@ class FrameRefiner:
             estimate=estimate,
             carried=carried,
             evaluations=evaluations,
-            disagreement=agreement.of(pose, silhouettes).shares(agreement),
+            disagreement=shares,
         )
 
     def _prepared(
@@ -132,14 +132,13 @@ class FrameRefiner:
 def _redrawn(
     rng: np.random.Generator,
     pose: Array,
+    shares: Mapping[str, float],
     silhouettes: Sequence[Distances],
     problem: FrameProblem,
     refiner: Refiner,
-    agreement: Agreement,
 ) -> tuple[Array, int]:
     """The pose (D,) with its doubtful limbs where the silhouettes agree with them best, and how many were weighed."""
-    body, evaluations = agreement.body, 0
-    shares = agreement.of(pose, silhouettes).shares(agreement)
+    body, evaluations = refiner.body, 0
     bounded = bounded_angles(body)
     loss = refiner.settled_loss(pose, silhouettes)
     for limb in sorted(shares, key=lambda name: -shares[name]):
