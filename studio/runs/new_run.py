@@ -105,6 +105,7 @@ def prepare_run(
         found = _found(session, first, body, model, asked.seed, progress)
         start, source = within_limits(body, found.pose), found.source
         notes = (*notes, *([found.note] if found.note else []))
+    subject = dict(body.dimensions)
     if asked.fit_shape and not asked.live and start is not None:
         body, start, words = session_shape(session, body, settings, start, first, last, progress)
         notes = (*notes, *([words] if words else []))
@@ -130,6 +131,7 @@ def prepare_run(
         behaviour=behaviour.name if behaviour else "",
         live=asked.live,
         to_and_fro=asked.to_and_fro,
+        subject_dimensions=subject if subject != body.dimensions else {},
     )
     text = _body_text(session, asked.body or body.name)
     return session.new_run(record, text, behaviour.path if behaviour else None)

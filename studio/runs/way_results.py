@@ -39,7 +39,8 @@ def run_changes(session: Session, run: StoredRun) -> list[str]:
     calibration = session.path / CAMERAS_PATH
     if calibration.is_file() and calibration.read_bytes() != (run.folder / CAMERAS_NAME).read_bytes():
         changed.append("the calibration")
-    if session.body(run.record.body).dimensions != run.record.dimensions:
+    measured = run.record.subject_dimensions or run.record.dimensions
+    if session.body(run.record.body).dimensions != measured:
         changed.append("the subject's measures")
     return changed
 

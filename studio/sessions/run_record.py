@@ -34,7 +34,8 @@ class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     an end (`capture.to_and_fro`), so that `last` may lie behind its end. made_from : the run that was corrected, "" if
     none: other frames are that run's. corrected : the frame that begins anew at corrected_pose. backwards_to : None
     where the frames after it follow from it; else these are the old ones, and from it down to this frame each was
-    tracked from the one after it.
+    tracked from the one after it. subject_dimensions : the subject's, where the first frames gave the body another
+    shape; empty where they did not.
     """
 
     schema: int = SCHEMA_VERSION
@@ -63,6 +64,7 @@ class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     corrected: int | None = None
     corrected_pose: tuple[float, ...] | None = None
     backwards_to: int | None = None
+    subject_dimensions: dict[str, float] = {}
 
     def is_anew(self, frame: int) -> bool:
         """Whether a frame was started by a correction: the corrected one, or one that was tracked backwards from it."""

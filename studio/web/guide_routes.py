@@ -13,6 +13,7 @@ from studio.evidence.settings import EvidenceSettings
 from studio.knobs import Knob, allowed, knobs_of
 from studio.settings import RecordingSettings
 from studio.tracking.catalogue import TRACKERS
+from studio.tracking.frame_refinement import FrameRefinementSettings
 from studio.tracking.recovery_settings import RecoverySettings
 from studio.training.oversampling import OversamplingSettings
 from studio.web.pages import assets_folder
@@ -81,7 +82,8 @@ def settings_groups() -> dict[str, type]:
     """Every settings class there is, by the words that head its table."""
     groups: dict[str, type] = {f"Tracker: {name}": entry.settings_type for name, entry in TRACKERS.items()}
     groups |= {f"Weighting: {name}": entry.settings_type for name, entry in WEIGHTINGS.items()}
-    groups |= {"Evidence": EvidenceSettings, "Recovery": RecoverySettings, "Recording": RecordingSettings}
+    groups |= {"Evidence": EvidenceSettings, "Refinement of each frame": FrameRefinementSettings}
+    groups |= {"Recovery": RecoverySettings, "Recording": RecordingSettings}
     return groups | {entry.title: entry for entry in (LearningSettings, OversamplingSettings)}
 
 

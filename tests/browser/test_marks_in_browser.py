@@ -61,5 +61,5 @@ def test_the_marks_are_named_told_and_reached_by_keys(
     assert track.get_attribute("title") == "frame 9: no evidence – nothing to be seen: the pose is held"
     window.shoot(artefacts / "timeline-marks-dark.png", part=".timeline")
     window.key("?")
-    page.get_by_text("next mark: lost, no evidence, recovered").wait_for()
+    page.get_by_text("next mark: lost, a limb lost, no evidence, recovered").wait_for()
     window.close()

@@ -35,7 +35,7 @@ def swarm(browser: Browser, studio: StudioServer, request: pytest.FixtureRequest
     name = request.node.name.replace("test_", "")[:40]
     run = f"{RUNS}/{name}"
     made = studio.post(RUNS, {"name": name, "tracker": "swarm", "seed": SEED})
-    assert (made["tracker"], made["weighting"]) == ("swarm", "edge-silhouette")
+    assert (made["tracker"], made["weighting"]) == ("swarm", "edge-region-silhouette")
     # The first frame is searched several times over, as fast as it can.
     studio.pace(0.0)
     studio.post(f"{run}/start")
@@ -154,12 +154,12 @@ def test_a_new_swarm_brings_its_weighting_and_presets(
     assert {"edge-silhouette", "edge-region-silhouette"} <= set(values_of(weighting.locator("option")))
     tracker.select_option("swarm")
     until(page, lambda: "paper, swarm" in values_of(preset.locator("option")))
-    assert weighting.input_value() == "edge-silhouette"
+    assert weighting.input_value() == "edge-region-silhouette"
     assert "paper, Eq. 13" not in values_of(preset.locator("option"))
     window.shoot(artefacts / "page-new-swarm-dark-1280x800.png")
     tracker.select_option("annealed")
     until(page, lambda: "paper, Eq. 13" in values_of(preset.locator("option")))
-    assert weighting.input_value() == "edge-region"
+    assert weighting.input_value() == "edge-region-silhouette"
     form.get_by_role("button", name="Cancel", exact=True).click()
     window.close()
 

@@ -16,6 +16,7 @@ from studio.runs import shape_on_the_way
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.search_space import default_sigma
 from studio.runs.shape_on_the_way import FOLDER, shaped_body
+from studio.runs.way_results import run_changes
 from studio.sessions.session import Session
 
 WALK = Path(__file__).parents[2] / "sample_sessions" / "walk"
@@ -75,6 +76,8 @@ def test_a_run_begins_with_the_shape_says_so_and_fits_it_once(
     assert (again.dimensions, again.start_pose) == (first.dimensions, first.start_pose)
     plain = prepare_run(walk, RunRequest(last=20, fit_shape=False)).record
     assert plain.dimensions == dict(own)
+    assert (first.subject_dimensions, plain.subject_dimensions) == (dict(own), {})
+    assert run_changes(walk, walk.run(first.name)) == []
 
 
 def test_few_frames_and_one_camera_tell_no_shape(walk: Session, session_on_disk: Session) -> None:
