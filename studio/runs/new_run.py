@@ -107,7 +107,7 @@ def prepare_run(
         notes = (*notes, *([found.note] if found.note else []))
     subject = dict(body.dimensions)
     if asked.fit_shape and not asked.live and start is not None:
-        body, start, words = session_shape(session, body, settings, start, first, last, progress)
+        body, start, words = session_shape(session, body, settings, start, first, progress)
         notes = (*notes, *([words] if words else []))
     record = RunRecord(
         name=asked.name or free_run_name(session),

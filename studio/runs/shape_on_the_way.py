@@ -90,15 +90,14 @@ def session_shape(
     settings: RunSettings,
     start: Array,
     first: int,
-    last: int,
     progress: Progress | None = None,
 ) -> tuple[BodyModel, Array, str]:
     """The body in the shape that a session's frames from `first` on show, its pose there (D,), and words for the notes.
 
-    settings : whose evidence counts. The body as it is, and "", where it has no radii to fit or there are too few
+    settings : whose evidence counts. How long a run is does not. The body as it is, and "", where it has no radii to fit or there are too few
     frames or cameras.
     """
-    frames = range(first, min(last, first + FIRST_FRAMES))
+    frames = range(first, min(session.manifest.frame_count, first + FIRST_FRAMES))
     few = len(frames) < FEWEST_FRAMES or len(session.cameras()) < FEWEST_CAMERAS
     if few or not can_be_fitted(body):
         return body, start, ""
