@@ -12,7 +12,7 @@ from studio.export.formats import ExportFormat
 from studio.export.options import ExportOptions
 from studio.export.task import Writer
 from studio.progress import Progress
-from studio.runs.tracks import BEST, best_track, read_track, track_digest, track_names
+from studio.runs.tracks import BEST, RAW, best_track, read_track, track_digest, track_names
 from studio.runs.way_results import ExportedFile
 from studio.sessions.atomic_files import write_bytes
 from studio.sessions.session import Session
@@ -63,7 +63,7 @@ def export_into_run(
         run,
         form,
         asked,
-        folder / f"{_stem(session, run, asked)}.{form.name}",
+        folder / f"{_stem(session, run, form, asked)}.{form.name}",
         progress=progress,
         cancelled=cancelled,
         record_scene=record_scene,
@@ -122,11 +122,17 @@ def discard_export(run: StoredRun, name: str) -> None:
     (path.parent / f"{name}{SAID}").unlink(missing_ok=True)
 
 
-def _stem(session: Session, run: StoredRun, asked: Mapping[str, str | int | float | bool]) -> str:
-    """A file name that says what is in it: session, run, and what differs from the usual."""
-    usual = ExportOptions()
-    parts = [session.name, run.name]
-    for name, value in sorted(asked.items()):
+def _stem(
+    session: Session, run: StoredRun, form: ExportFormat, asked: Mapping[str, str | int | float | bool]
+) -> str:
+    """A file name that says what is in it: session, run, its track unless that is the raw one, and what differs from
+    the usual.
+    """
+    usual = ExportOptions(track=RAW)
+    parts, chosen = [session.name, run.name], dict(asked)
+    if "track" in form.takes and chosen.get("track", BEST) == BEST:
+        chosen["track"] = best_track(run).name
+    for name, value in sorted(chosen.items()):
         if name != "last" and getattr(usual, name, value) != value:
             parts.append(
                 ""

@@ -94,8 +94,8 @@ def session_shape(
 ) -> tuple[BodyModel, Array, str]:
     """The body in the shape that a session's frames from `first` on show, its pose there (D,), and words for the notes.
 
-    settings : whose evidence counts. How long a run is does not. The body as it is, and "", where it has no radii to fit
-    or there are too few frames or cameras.
+    settings : whose evidence counts. How long a run is does not. The body as it is, and "", where it has no radii to
+    fit or there are too few frames or cameras.
     """
     frames = range(first, min(session.manifest.frame_count, first + FIRST_FRAMES))
     few = len(frames) < FEWEST_FRAMES or len(session.cameras()) < FEWEST_CAMERAS
