@@ -95,4 +95,4 @@ def _distances(mask: NDArray[np.uint8]) -> Floats:
 
 def _stepped_distances(mask: NDArray[np.uint8]) -> Floats:
     """The same, summed over steps to neighbours and knights' moves (Borgefors 1986, 5 × 5)."""
-    return np.asarray(cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_5))
+    return np.asarray(cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_5), dtype=np.float32)
