@@ -146,7 +146,6 @@ def track(
 class _Followed:
     """poses (F, D) and log_weights (F,) of frames; evaluations of one after the first; seconds of the search."""
 
-    frames: range
     poses: Array
     log_weights: Array
     evaluations: int = 0
@@ -207,7 +206,7 @@ class _Following:
         weigher = WEIGHTINGS[attempt.weighting].prepare(body, self.seen_with, settings.weighting)
         refiner = FrameRefiner(body, self.seen_with, attempt.seed)
         carried = start_of(start)
-        found = _Followed(frames, np.zeros((len(frames), len(body.parameters))), np.zeros(len(frames)))
+        found = _Followed(np.zeros((len(frames), len(body.parameters))), np.zeros(len(frames)))
 
         def tracked(count: int) -> tuple[Array, Array]:
             return found.poses[:count], found.log_weights[:count]

@@ -33,20 +33,22 @@ GRID_MM = 14.0
 class Disagreement:
     """Of V views and L drawn limbs, mm² at the body. area : (V, L) that a limb covers. outside : (V, L) of it farther
     than FAR_MM from the silhouette. bare : (V, L) silhouette farther than FAR_MM from every limb, given to the nearest.
+    limbs : (L,) the limb that each drawn one belongs to, as the body's parameters name them.
     """
 
     area: Array
     outside: Array
     bare: Array
+    limbs: tuple[str, ...]
 
-    def shares(self, agreement: "Agreement") -> dict[str, float]:
+    def shares(self) -> dict[str, float]:
         """Of each of the body's limbs (as its parameters name them), what disagrees as a share of its area."""
         area = np.maximum(self.area.sum(axis=0), LEAST_AREA)
         off = (self.outside + self.bare).sum(axis=0)
-        groups = np.array(agreement.limbs)
+        groups = np.array(self.limbs)
         return {
             limb: float(off[groups == limb].sum() / area[groups == limb].sum())
-            for limb in dict.fromkeys(agreement.limbs)
+            for limb in dict.fromkeys(self.limbs)
         }
 
 
@@ -55,8 +57,7 @@ class Agreement:
 
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...]) -> None:
         self.body, self.cameras = body, cameras
-        self.limbs = limb_names(body)
-        """(L,) the limb that each drawn one belongs to, as the body's parameters name them."""
+        self._limbs = limb_names(body)
         self._projector = OutlineProjector.of_body(body, cameras)
 
     def of(self, pose: Array, silhouettes: Sequence[Distances]) -> Disagreement:
@@ -69,7 +70,7 @@ class Agreement:
             step = max(1, round(GRID_MM / mm))
             view_counts(quads, view.signed, view.corner, view.size, step, FAR_MM / mm, own)
             own *= (step * mm) ** 2
-        return Disagreement(counts[..., 0], counts[..., 1], counts[..., 2])
+        return Disagreement(counts[..., 0], counts[..., 1], counts[..., 2], self._limbs)
 
 
 def limb_names(body: BodyModel) -> tuple[str, ...]:

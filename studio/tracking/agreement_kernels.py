@@ -3,9 +3,8 @@
 import numpy as np
 
 from studio.numba_in_threads import njit
-from studio.tracking.refinement_kernels import turning
+from studio.tracking.refinement_kernels import OPTIONS, turning
 
-OPTIONS = {"error_model": "numpy", "nogil": True, "cache": True}
 FIELDS = 3
 """Columns of the counts: a limb's area, its part far outside the silhouette, silhouette far from any limb."""
 
@@ -29,7 +28,7 @@ def distance_to(x, y, quad, turn):
 
 @njit(**OPTIONS)
 def count_limbs(quads, turns, signed, corner, size, step, far, counts):
-    """Fill the first two columns of counts (L, 3) of one view: see `agreement.disagreement`."""
+    """Fill the first two columns of counts (L, 3) of one view: see `agreement.Disagreement`."""
     left, top = corner
     height, width = signed.shape
     for limb in range(quads.shape[0]):

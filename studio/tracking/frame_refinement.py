@@ -98,13 +98,13 @@ class FrameRefiner:
         silhouettes = tuple(seen.values())
         refiner, agreement = self._prepared(tuple(seen), settings)
         pose = refiner.refine(result.estimate.pose, silhouettes).pose
-        shares, evaluations = agreement.of(pose, silhouettes).shares(agreement), result.evaluations
+        shares, evaluations = agreement.of(pose, silhouettes).shares(), result.evaluations
         if settings.redraw_limbs and max(shares.values()) >= DOUBTFUL_SHARE:
             rng = np.random.Generator(
                 np.random.Philox(np.random.SeedSequence((self._seed, result.frame, 0, 0, REDRAWN)))
             )
             pose, drawn = _redrawn(rng, pose, shares, silhouettes, problem, refiner)
-            shares, evaluations = agreement.of(pose, silhouettes).shares(agreement), evaluations + drawn
+            shares, evaluations = agreement.of(pose, silhouettes).shares(), evaluations + drawn
         weight = float(problem.weigh(pose[None])[0])
         estimate = dataclasses.replace(
             result.estimate, pose=pose, searched=result.estimate.pose, log_weight=weight

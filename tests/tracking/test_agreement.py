@@ -37,7 +37,7 @@ def place(body: BodyModel, **angles: float) -> np.ndarray:
 
 def shares(body: BodyModel, pose: np.ndarray, truth: np.ndarray) -> dict[str, float]:
     agreement = Agreement(body, CAMERAS)
-    return agreement.of(pose, silhouette_distances(drawn_evidence(body, truth, CAMERAS))).shares(agreement)
+    return agreement.of(pose, silhouette_distances(drawn_evidence(body, truth, CAMERAS))).shares()
 
 
 def test_the_pose_that_is_seen_is_denied_nowhere(body: BodyModel) -> None:
@@ -65,9 +65,9 @@ def test_both_legs_on_one_leave_the_other_bare(body: BodyModel) -> None:
     both[names.index("left_hip_ry")] = truth[names.index("right_hip_ry")]
     agreement = Agreement(body, CAMERAS)
     found = agreement.of(both, silhouette_distances(drawn_evidence(body, truth, CAMERAS)))
-    legs = np.isin(agreement.limbs, ["left leg", "right leg"])
+    legs = np.isin(found.limbs, ["left leg", "right leg"])
     assert found.bare[:, legs].sum() > 1.5 * found.outside[:, legs].sum()
-    by_limb = found.shares(agreement)
+    by_limb = found.shares()
     assert max(by_limb["left leg"], by_limb["right leg"]) > LIMB_LOST_SHARE
     assert by_limb["left arm"] < LIMB_LOST_SHARE
 
