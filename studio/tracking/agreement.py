@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.geometry.camera import Camera
-from studio.tracking.agreement_kernels import FIELDS, view_counts
+from studio.tracking.agreement_kernels import FIELDS, add_limb_counts, far_points, view_counts
 from studio.tracking.refinement import Distances, mm_per_pixel
 from studio.weighting.outlines import OutlineProjector
 
@@ -27,6 +27,8 @@ LEAST_AREA = 1000.0
 """mm²: a limb that no view shows."""
 GRID_MM = 14.0
 """Between points that are counted, about; at least a pixel."""
+COARSE_GRID_MM = 25.0
+"""The same where many places of a limb are compared."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,17 +62,39 @@ class Agreement:
         self._limbs = limb_names(body)
         self._projector = OutlineProjector.of_body(body, cameras)
 
+    def corners(self, pose: Array) -> Array:
+        """(V, L, 4, 2) pixels of the outlines of a pose (D,)."""
+        return self._projector.corners(pose[None])[0][0]
+
+    def mm_per_pixel(self, pose: Array) -> list[float]:
+        """mm that a pixel of each view spans at the body."""
+        middle = limb_ends(self.body, pose[None])[0].reshape(-1, 3).mean(axis=0)
+        return [mm_per_pixel(camera, middle) for camera in self.cameras]
+
     def of(self, pose: Array, silhouettes: Sequence[Distances]) -> Disagreement:
         """Where a pose (D,) and a frame's silhouettes, one a camera, disagree."""
-        corners, _ = self._projector.corners(pose[None])
-        middle = limb_ends(self.body, pose[None])[0].reshape(-1, 3).mean(axis=0)
-        counts = np.zeros((len(silhouettes), corners.shape[2], FIELDS))
-        for own, quads, view, camera in zip(counts, corners[0], silhouettes, self.cameras, strict=True):
-            mm = mm_per_pixel(camera, middle)
+        corners = self.corners(pose)
+        counts = np.zeros((*corners.shape[:2], FIELDS))
+        for own, quads, view, mm in zip(counts, corners, silhouettes, self.mm_per_pixel(pose), strict=True):
             step = max(1, round(GRID_MM / mm))
             view_counts(quads, view.signed, view.corner, view.size, step, FAR_MM / mm, own)
             own *= (step * mm) ** 2
         return Disagreement(counts[..., 0], counts[..., 1], counts[..., 2], self._limbs)
+
+    def of_places(self, poses: Array, silhouettes: Sequence[Distances]) -> Array:
+        """(N,) mm² by which poses (N, D) that differ in a limb or two disagree with a frame's silhouettes there, on a
+        coarse grid: what these limbs cover outside, and silhouette far from all limbs.
+        """
+        corners, _ = self._projector.corners(poses)
+        moving = (corners != corners[:1]).any(axis=(0, 1, 3, 4))
+        found = np.zeros(len(poses))
+        for number, (view, mm) in enumerate(zip(silhouettes, self.mm_per_pixel(poses[0]), strict=True)):
+            step, counts = max(1, round(COARSE_GRID_MM / mm)), np.zeros(len(poses))
+            others, own = corners[0, number, ~moving], np.ascontiguousarray(corners[:, number, moving])
+            points = far_points(others, view.signed, view.corner, step, FAR_MM / mm)
+            add_limb_counts(own, points, view.signed, view.corner, view.size, step, FAR_MM / mm, counts)
+            found += counts * (step * mm) ** 2
+        return found
 
 
 def limb_names(body: BodyModel) -> tuple[str, ...]:

@@ -76,6 +76,53 @@ def count_uncovered(quads, turns, signed, corner, step, far, counts):
 
 
 @njit(**OPTIONS)
+def far_points(quads, signed, corner, step, far):
+    """(K, 2) grid points of one view's silhouette that are farther than `far` pixels from every limb of quads."""
+    left, top = corner
+    height, width = signed.shape
+    first_row, last_row = -(-top // step), (top + height - 1) // step
+    first_column, last_column = -(-left // step), (left + width - 1) // step
+    most = max(0, last_row + 1 - first_row) * max(0, last_column + 1 - first_column)
+    turns = np.zeros(quads.shape[0])
+    for limb in range(quads.shape[0]):
+        turns[limb] = turning(quads[limb])
+    found, count = np.zeros((most, 2)), 0
+    for row in range(first_row, last_row + 1):
+        for column in range(first_column, last_column + 1):
+            x, y = column * step, row * step
+            if signed[y - top, x - left] < 0.0 and not is_near(x, y, quads, turns, far):
+                found[count, 0], found[count, 1] = x, y
+                count += 1
+    return found[:count]
+
+
+@njit(**OPTIONS)
+def is_near(x, y, quads, turns, far):
+    """Whether a point is within `far` pixels of one of the quadrilaterals."""
+    for limb in range(quads.shape[0]):
+        if np.isfinite(quads[limb, 0, 0]) and distance_to(x, y, quads[limb], turns[limb]) <= far:
+            return True
+    return False
+
+
+@njit(**OPTIONS)
+def add_limb_counts(quads, points, signed, corner, size, step, far, counts):
+    """Add to counts (N,), for N places (N, L, 4, 2) of a few limbs in one view, the grid points that they cover far
+    outside the silhouette, and those of points (K, 2) that they leave bare.
+    """
+    turns, own = np.zeros(quads.shape[1]), np.zeros((quads.shape[1], FIELDS))
+    for n in range(quads.shape[0]):
+        for limb in range(quads.shape[1]):
+            turns[limb] = turning(quads[n, limb])
+        own[:] = 0.0
+        count_limbs(quads[n], turns, signed, corner, size, step, far, own)
+        counts[n] += own[:, 1].sum()
+        for k in range(points.shape[0]):
+            if not is_near(points[k, 0], points[k, 1], quads[n], turns, far):
+                counts[n] += 1.0
+
+
+@njit(**OPTIONS)
 def view_counts(quads, signed, corner, size, step, far, counts):
     """Fill counts (L, 3) of one view, in grid points. quads : (L, 4, 2) pixels, NaN where a limb is not seen. signed,
     corner, size : as in `evidence.distance_maps`. step : pixels between grid points. far : pixels.
@@ -86,3 +133,32 @@ def view_counts(quads, signed, corner, size, step, far, counts):
     counts[:] = 0.0
     count_limbs(quads, turns, signed, corner, size, step, far, counts)
     count_uncovered(quads, turns, signed, corner, step, far, counts)
+
+
+@njit(**OPTIONS)
+def count_cells(quads, signed, corner, cell, far, counts):
+    """Of one view's cells: one more in counts (H, W) where a limb of quads covers the middle farther than `far` pixels
+    from the silhouette, none where that shows something.
+    """
+    left, top = corner
+    height, width = signed.shape
+    covered = np.zeros(counts.shape, np.bool_)
+    for limb in range(quads.shape[0]):
+        quad = quads[limb]
+        if not np.isfinite(quad.sum()):
+            continue
+        turn = turning(quad)
+        last_row = min(counts.shape[0] - 1.0, quad[:, 1].max() // cell)
+        last_column = min(counts.shape[1] - 1.0, quad[:, 0].max() // cell)
+        for row in range(max(0, int(quad[:, 1].min() // cell)), int(last_row) + 1):
+            for column in range(max(0, int(quad[:, 0].min() // cell)), int(last_column) + 1):
+                x, y = column * cell + cell // 2, row * cell + cell // 2
+                covered[row, column] |= distance_to(x, y, quad, turn) == 0.0
+    for row in range(counts.shape[0]):
+        for column in range(counts.shape[1]):
+            x, y = column * cell + cell // 2 - left, row * cell + cell // 2 - top
+            mapped = 0 <= x < width and 0 <= y < height
+            if mapped and signed[y, x] <= 0.0:
+                counts[row, column] = 0.0
+            elif covered[row, column] and not (mapped and signed[y, x] <= far):
+                counts[row, column] += 1.0

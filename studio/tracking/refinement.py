@@ -45,6 +45,8 @@ HIDDEN_PULL, REST_PULL = 100.0, 20.0
 An arm's outline inside the trunk costs nothing, so that without it shoulders sink into the chest (a drawn dance: 36 mm
 and limbs lost in 23 of 100 frames without, 20 mm and 1 with it and limbs drawn anew)."""
 HALFWAY = 0.5
+SLACK_MM = 50.0
+"""What a hand or foot that cannot turn (`rigid_limbs`) may be off at no cost: a wrist turns it by so much."""
 REACH = 4.0
 """Times c: farther than this from a silhouette's border its map is not kept, the loss has nearly reached its most."""
 
@@ -135,7 +137,7 @@ class Refiner:
         self.lower = np.array([entry.lower for entry in body.parameters])
         self.upper = np.array([entry.upper for entry in body.parameters])
         self.ends = free_ends(body)
-        self.rigid = rigid_limbs(body)
+        self.slack = np.where(rigid_limbs(body), SLACK_MM, 0.0)
         self.neutral = body.neutral
         self.stiffness = np.where(hidden_angles(body), HIDDEN_PULL**2, REST_PULL**2)
         self.stiffness[~bounded_angles(body)] = 0.0
@@ -245,12 +247,12 @@ class Refiner:
         steps = DIFFERENCE * np.diag(self.unit)
         corners, _ = self.projector.corners(np.concatenate([pose[None], pose + steps, pose - steps]))
         slopes = (corners[1 : size + 1] - corners[size + 1 :]) / (2.0 * DIFFERENCE)
-        slopes[:, :, self.rigid] = 0.0
         matrix, gradient = np.zeros((size, size)), np.zeros(size)
         loss = normal_equations(
             np.ascontiguousarray(corners[0]),
             np.ascontiguousarray(np.moveaxis(slopes, 0, -1)),
             self.ends,
+            self.slack,
             prepared.maps,
             prepared.views,
             prepared.sizes,
@@ -314,10 +316,11 @@ def bounded_angles(body: BodyModel) -> NDArray[np.bool_]:
 def rigid_limbs(body: BodyModel) -> NDArray[np.bool_]:
     """(L,) whether a drawn limb ends the body at a joint that cannot turn (the papers' hands and feet).
 
-    A person's wrists and ankles do turn, so where such a limb and the silhouette disagree, neither the shin nor the
-    forearm is wrong: it explains what is seen, so that nothing else has to, but does not pull the limbs above it.
-    Measured on a rendered walk with turns: rigid feet pull the legs and the trunk 20 to 30 mm down, rigid hands the
-    arms 10 mm.
+    A person's wrists and ankles do turn, so where such a limb and the silhouette disagree a little, neither the shin
+    nor the forearm is wrong: it explains what is seen, so that nothing else has to, but pulls the limbs above it only
+    by what is beyond SLACK_MM. Measured on a rendered walk with turns: rigid feet without slack pull the legs and the
+    trunk 20 to 30 mm down, rigid hands the arms 10 mm. But a hand before the trunk may be all that shows how far the
+    elbow is bent.
     """
     ends = free_ends(body)
     still = [all(step.parameter < 0 for step in body.joints[limb.joint].steps) for limb in body.drawn]

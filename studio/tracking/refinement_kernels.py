@@ -158,17 +158,28 @@ def read_map(x, y, values, start, width, height):
 
 
 @njit(**OPTIONS)
-def add_border(border, quads, usable, turns, boxes, ends, mm, scale, normals, pulls):
-    """Border points (K, 4: place, outward) of one view to the outlines; returns their loss. scale : c, mm."""
+def beyond(distance, slack):
+    """What of a signed distance lies beyond a slack."""
+    return np.sign(distance) * max(0.0, abs(distance) - slack)
+
+
+@njit(**OPTIONS)
+def add_border(border, quads, usable, turns, boxes, ends, slack, mm, scale, normals, pulls):
+    """Border points (K, 4: place, outward) of one view to the outlines; returns their loss. slack : (L,) mm by which
+    a limb's outline may be off at no cost. scale : c, mm.
+    """
     loss = 0.0
     for k in range(border.shape[0]):
         x, y = border[k, 0], border[k, 1]
         limb, side, u, squared = nearest_edge(
             x, y, border[k, 2], border[k, 3], quads, usable, turns, boxes, ends, 4.0 * scale / mm
         )
-        ratio = squared * mm * mm / (scale * scale)
+        away = np.sqrt(squared) * mm
+        if limb >= 0:
+            away = beyond(away, slack[limb])
+        ratio = (away / scale) ** 2
         loss += scale * scale * ratio / (1.0 + ratio)
-        if limb < 0:
+        if limb < 0 or away == 0.0:
             continue
         first, second = FIRST_CORNER[side], SECOND_CORNER[side]
         ex = quads[limb, second, 0] - quads[limb, first, 0]
@@ -176,14 +187,16 @@ def add_border(border, quads, usable, turns, boxes, ends, mm, scale, normals, pu
         length = np.sqrt(ex * ex + ey * ey)
         nx, ny = ey / length, -ex / length
         px, py = quads[limb, first, 0] + u * ex, quads[limb, first, 1] + u * ey
-        residual = (nx * (px - x) + ny * (py - y)) * mm
+        residual = beyond((nx * (px - x) + ny * (py - y)) * mm, slack[limb])
         share = 1.0 / ((1.0 + ratio) * (1.0 + ratio))
         add_point(share, residual, nx * mm, ny * mm, first, second, u, normals[limb], pulls[limb])
     return loss
 
 
 @njit(**OPTIONS)
-def add_outline(values, view, size, quads, usable, turns, boxes, ends, mm, scale, part, normals, pulls):
+def add_outline(
+    values, view, size, quads, usable, turns, boxes, ends, slack, mm, scale, part, normals, pulls
+):
     """Samples of one view's outlines to the silhouette's border; returns their loss. part : of a sample beside a
     border point. view : start, width, height of its map in `values`, and in columns 5 and 6 where that begins in the
     picture, of `size`: far from the silhouette there is no map, and the loss is its most.
@@ -206,10 +219,11 @@ def add_outline(values, view, size, quads, usable, turns, boxes, ends, mm, scale
                 if not there:
                     loss += part * scale * scale
                     continue
-                ratio = (value * mm / scale) ** 2
+                away = beyond(value * mm, slack[limb])
+                ratio = (away / scale) ** 2
                 loss += part * scale * scale * ratio / (1.0 + ratio)
                 share = part / ((1.0 + ratio) * (1.0 + ratio))
-                add_point(share, value * mm, nx * mm, ny * mm, first, second, u, normals[limb], pulls[limb])
+                add_point(share, away, nx * mm, ny * mm, first, second, u, normals[limb], pulls[limb])
     return loss
 
 
@@ -234,11 +248,14 @@ def mirror_lower_half(matrix):
 
 
 @njit(**OPTIONS)
-def normal_equations(quads, slopes, ends, maps, views, sizes, border, mm, scales, part, matrix, gradient):
+def normal_equations(
+    quads, slopes, ends, slack, maps, views, sizes, border, mm, scales, part, matrix, gradient
+):
     """Fill matrix (D, D) and gradient (D,) of half the squared loss; returns the loss.
 
     quads : (V, L, 4, 2) pixels, NaN for limbs that are not seen. slopes : (V, L, 4, 2, D) per unit of each parameter.
-    ends : (L,) whether a limb's far end may be border. maps : flat signed distances. views : (V, 7) where each begins,
+    ends : (L,) whether a limb's far end may be border. slack : (L,) mm by which a limb may be off at no cost.
+    maps : flat signed distances. views : (V, 7) where each begins,
     its width and height, its first and last border point, its left and top in the picture, whose width and height are
     sizes (V, 2). border : (K, 4). mm : (V,) mm per pixel. scales :
     (V,) c of the loss, mm.
@@ -253,7 +270,9 @@ def normal_equations(quads, slopes, ends, maps, views, sizes, border, mm, scales
         look_at_limbs(quads[v], slopes[v], usable, turns, boxes)
         normals[:], pulls[:] = 0.0, 0.0
         seen = border[views[v, 3] : views[v, 4]]
-        loss += add_border(seen, quads[v], usable, turns, boxes, ends, mm[v], scales[v], normals, pulls)
+        loss += add_border(
+            seen, quads[v], usable, turns, boxes, ends, slack, mm[v], scales[v], normals, pulls
+        )
         loss += add_outline(
             maps,
             views[v],
@@ -263,6 +282,7 @@ def normal_equations(quads, slopes, ends, maps, views, sizes, border, mm, scales
             turns,
             boxes,
             ends,
+            slack,
             mm[v],
             scales[v],
             part,

@@ -21,6 +21,7 @@ def border_equations(quads, slopes, ends, border, views, mm, scales, matrix, gra
     last border point. mm : (V,) mm per pixel. scales : (V,) c of the loss, mm.
     """
     limbs = quads.shape[1]
+    slack = np.zeros(limbs)
     normals, pulls, boxes = np.zeros((limbs, 8, 8)), np.zeros((limbs, 8)), np.zeros((limbs, 4))
     usable, turns, which = np.zeros(limbs, np.bool_), np.zeros(limbs), np.zeros(slopes.shape[4], np.int64)
     matrix[:] = 0.0
@@ -30,7 +31,9 @@ def border_equations(quads, slopes, ends, border, views, mm, scales, matrix, gra
         look_at_limbs(quads[v], slopes[v], usable, turns, boxes)
         normals[:], pulls[:] = 0.0, 0.0
         seen = border[views[v, 0] : views[v, 1]]
-        loss += add_border(seen, quads[v], usable, turns, boxes, ends, mm[v], scales[v], normals, pulls)
+        loss += add_border(
+            seen, quads[v], usable, turns, boxes, ends, slack, mm[v], scales[v], normals, pulls
+        )
         add_limbs(normals, pulls, slopes[v], usable, which, matrix, gradient)
     mirror_lower_half(matrix)
     return loss

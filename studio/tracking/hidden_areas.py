@@ -1,0 +1,124 @@
+"""Where something stands in front of the body: parts of a view in which the body projects frame after frame and no mask
+ever shows it.
+
+Masks are silent there, and a silhouette that ends at a box is no border of the body. What tells such a place from a
+limb that is lost: nothing of the masks is left bare. A lost limb would be seen elsewhere, a hidden one is nowhere.
+Counts of frames are kept on a grid of cells a view and handed on with the frame's state, so that a run that is resumed,
+or a frame that is searched again, knows what was known.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.geometry.camera import Camera
+from studio.tracking.agreement import FAR_MM, Agreement, Disagreement
+from studio.tracking.agreement_kernels import count_cells
+from studio.tracking.refinement import Distances
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.float64]
+
+CELLS = 160
+"""Cells along the longer side of a picture."""
+FRAMES = 6.0
+"""So many frames in which the body was expected in a cell, and none that showed it, make it hidden."""
+MOST_BARE = 0.01
+"""Of the body's area: where more of the masks is left bare, the pose is in doubt and nothing is learnt."""
+PREFIX = "hidden "
+"""Of the names under which the counts of a camera are handed on."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Uncovered:
+    """A view's silhouette without what is hidden: see `Distances`. There `signed` is 0, neither in nor out, and the
+    border that it makes is none.
+    """
+
+    size: tuple[int, int]
+    corner: tuple[int, int]
+    signed: NDArray[np.float32]
+    border: Array
+    outward: Array
+
+
+def counts_of(memory: Mapping[str, Array], camera: Camera) -> Counts:
+    """(H, W) frames by cell, so far."""
+    known = memory.get(PREFIX + camera.name)
+    if known is not None:
+        return known
+    cell = cell_size(camera)
+    return np.zeros((-(-camera.height // cell), -(-camera.width // cell)))
+
+
+def cell_size(camera: Camera) -> int:
+    """Pixels of a cell."""
+    return max(1, round(max(camera.width, camera.height) / CELLS))
+
+
+def without_hidden(
+    masks: Sequence[Distances], pose: Array, agreement: Agreement, memory: Mapping[str, Array]
+) -> list[Distances]:
+    """The silhouettes of a frame's masks, one a camera, without what is hidden. pose : (D,) about where the body is."""
+    scales = agreement.mm_per_pixel(pose)
+    return [
+        _without_hidden(view, camera, memory, mm)
+        for view, camera, mm in zip(masks, agreement.cameras, scales, strict=True)
+    ]
+
+
+def _without_hidden(view: Distances, camera: Camera, memory: Mapping[str, Array], mm: float) -> Distances:
+    """The same of one view, as far about what is hidden as masks may be rough. mm : of a pixel."""
+    counts = memory.get(PREFIX + camera.name)
+    if counts is None or not view.signed.size:
+        return view
+    hidden = counts >= FRAMES
+    if not hidden.any():
+        return view
+    cell = cell_size(camera)
+    reach = 2 * int(np.ceil(1.2 * FAR_MM / mm / cell)) + 1
+    near = cv2.dilate(hidden.astype(np.uint8), cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach)))
+    left, top, signed = _with_room(view, near, cell)
+    rows = (top + np.arange(signed.shape[0])) // cell
+    columns = (left + np.arange(signed.shape[1])) // cell
+    here = near[np.ix_(rows, columns)] > 0
+    signed = np.where(here & (signed > 0.0), np.float32(0.0), signed)
+    at = view.border.astype(np.int64) // cell
+    kept = near[at[:, 1], at[:, 0]] == 0
+    return Uncovered(view.size, (left, top), signed, view.border[kept], view.outward[kept])
+
+
+def _with_room(view: Distances, near: NDArray[np.uint8], cell: int) -> tuple[int, int, NDArray[np.float32]]:
+    """Left and top of the view's map enlarged to hold the cells of `near` too, and that map; far is far."""
+    columns, rows = np.flatnonzero(near.any(axis=0)), np.flatnonzero(near.any(axis=1))
+    (left, top), (height, width) = view.corner, view.signed.shape
+    begin = min(left, columns[0] * cell), min(top, rows[0] * cell)
+    end = (
+        min(view.size[0], max(left + width, (columns[-1] + 1) * cell)),
+        min(view.size[1], max(top + height, (rows[-1] + 1) * cell)),
+    )
+    found = np.full((end[1] - begin[1], end[0] - begin[0]), np.float32(max(view.size)))
+    found[top - begin[1] :, left - begin[0] :][:height, :width] = view.signed
+    return int(begin[0]), int(begin[1]), found
+
+
+def learnt(
+    memory: Mapping[str, Array],
+    pose: Array,
+    disagreement: Disagreement,
+    agreement: Agreement,
+    masks: Sequence[Distances],
+) -> Mapping[str, Array]:
+    """The memory after a frame of pose (D,), which disagrees so with its masks, one a camera."""
+    if disagreement.bare.sum() > MOST_BARE * disagreement.area.sum():
+        return memory
+    found = dict(memory)
+    mm, corners = agreement.mm_per_pixel(pose), agreement.corners(pose)
+    for camera, quads, view, scale in zip(agreement.cameras, corners, masks, mm, strict=True):
+        counts = counts_of(memory, camera).copy()
+        count_cells(quads, view.signed, view.corner, cell_size(camera), FAR_MM / scale, counts)
+        found[PREFIX + camera.name] = counts
+    return found
