@@ -24,7 +24,7 @@ from studio.sessions.workspace import Workspace
 )
 @command
 def check_command(session: str, run: str, track: str, every: int) -> dict[str, object]:
-    """Tell how well a RUN fits its pictures: its share in the masks, lost frames, sudden turns, jumps, jitter.
+    """Tell how well a RUN fits its pictures: share in the masks, lost frames and limbs, sudden turns, jumps, jitter.
 
     What was measured is kept beside the run, and shown in the guided way's step Check.
     """

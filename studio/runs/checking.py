@@ -2,11 +2,12 @@
 
 `checks/<track>.json`: for each looked-at frame and camera the share of the model's pixels that lie in the mask, and of
 the mask's that the model covers; beside them frames that were lost, that are doubtful, in which the body turns round
-faster than people can, into which a limb leaps (`jumps`), and how much the markers jitter.
+faster than people can, into which a limb leaps (`jumps`), limbs that the masks deny (`tracking.agreement`), and how
+much the markers jitter.
 """
 
 import contextlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import msgspec
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from studio.body.model import BodyModel
 from studio.errors import RunError
 from studio.evidence.backgrounds import Backgrounds
+from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
 from studio.geometry.camera import Camera
@@ -29,7 +31,11 @@ from studio.sessions.record_files import read_record, write_record
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.settings import RunSettings, settings_from_values
+from studio.tracking.agreement import Agreement
+from studio.tracking.hidden_areas import without_hidden
+from studio.tracking.loss_detection import anything_seen
 from studio.tracking.start_candidates import facing
+from studio.tracking.tracker import LIMB_LOST_SHARE
 from studio.weighting.overlay import overlay_points
 
 Array = NDArray[np.float64]
@@ -48,10 +54,19 @@ NAMED = 4
 """So many leaps are named in a line."""
 
 
+class DeniedLimb(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A limb that the masks of a frame deny. share : of its area, what disagrees."""
+
+    frame: int
+    limb: str
+    share: float
+
+
 class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What was measured. track : its name; stamp, count : of the track then. frames : those looked at. inside, covered
     : (F, V) shares, None where there is nothing to divide by. lost, doubtful, turned : numbers of frames. jitter_mm :
-    root mean square second difference of the markers. jumps : into which frames which limb leaps; None: not looked for.
+    root mean square second difference of the markers. jumps : into which frames which limb leaps. denied : limbs that
+    the masks deny in frames looked at. None: not looked for.
     """
 
     schema: int = SCHEMA_VERSION
@@ -67,6 +82,7 @@ class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     turned: tuple[int, ...]
     jitter_mm: float
     jumps: tuple[Jump, ...] | None = None
+    denied: tuple[DeniedLimb, ...] | None = None
 
     @property
     def poor(self) -> tuple[int, ...]:
@@ -87,13 +103,24 @@ class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     @property
     def good(self) -> bool:
         """Whether nothing stands out."""
-        return not (self.poor or self.lost or self.turned or self.jumps)
+        return not (self.poor or self.lost or self.turned or self.jumps or self.lost_limbs)
+
+    @property
+    def lost_limbs(self) -> dict[str, tuple[int, ...]]:
+        """Limbs that the masks deny in more than one of the frames looked at, with these frames; one in fifty sound
+        frames is denied one.
+        """
+        frames: dict[str, tuple[int, ...]] = {}
+        for one in self.denied or ():
+            frames[one.limb] = (*frames.get(one.limb, ()), one.frame)
+        return {limb: own for limb, own in frames.items() if len(own) > 1 or len(self.frames) == 1}
 
     def in_words(self) -> str:
         """One line; leaps by frame and limb."""
         parts = [f"{100 * self.inside_mean:.0f} % of the model in the masks"]
         parts += [f"{len(self.poor)} of {len(self.frames)} looked-at frames do not fit"] if self.poor else []
         parts += [f"{len(self.lost)} lost"] if self.lost else []
+        parts += [f"{limb} off the masks in {len(own)} of them" for limb, own in self.lost_limbs.items()]
         parts += [f"{len(self.turned)} sudden turns"] if self.turned else []
         parts += [_leaps(self.jumps)] if self.jumps else []
         return ", ".join([*parts, f"jitter {self.jitter_mm:.1f} mm"])
@@ -120,13 +147,17 @@ def check_run(
     settings = _settings(run)
 
     tell = watched(progress, cancelled, "The check")
-    shares = []
-    with contextlib.closing(footage_of(session, run)) as footage:
+    shares, denied, agreement = [], list[DeniedLimb](), Agreement(body, cameras)
+    with contextlib.closing(footage_of(session, run)) as footage, run.results() as results:
+        known = set(results.frames())
         maker = EvidenceMaker(cameras, footage, Backgrounds(footage), settings.evidence, "none")
         for done, row in enumerate(rows):
             tell("comparing with the masks", done, len(rows))
             evidence = maker.evidence(int(chosen.frames[row]))
-            shares.append(frame_shares(body, cameras, chosen.poses[row], evidence, settings))
+            frame, pose = evidence.frame, chosen.poses[row]
+            shares.append(frame_shares(body, cameras, pose, evidence, settings))
+            hidden = results.result(frame).carried.memory if frame in known else {}
+            denied += _denied(agreement, pose, evidence, hidden)
     check = RunCheck(
         track=chosen.name,
         stamp=track_stamp(run, chosen.name),
@@ -140,6 +171,7 @@ def check_run(
         turned=sudden_turns(body, chosen, run.record.fps),
         jitter_mm=jitter(run, chosen),
         jumps=jumps_of(body, chosen),
+        denied=tuple(denied),
     )
     (run.folder / FOLDER).mkdir(exist_ok=True)
     write_record(_path(run, chosen.name), check)
@@ -161,7 +193,7 @@ def kept_check(run: StoredRun, track: str) -> RunCheck | None:
     )
     found = read_track(run, track)
     same = (check.stamp, check.count) == (track_stamp(run, track), len(found.frames))
-    return check if same and check.jumps is not None else None
+    return check if same and check.denied is not None else None
 
 
 def frame_shares(
@@ -183,6 +215,22 @@ def frame_shares(
         inside.append(_share(both, int(np.count_nonzero(model))))
         covered.append(_share(both, int(np.count_nonzero(mask))))
     return tuple(inside), tuple(covered)
+
+
+def _denied(
+    agreement: Agreement, pose: Array, evidence: FrameEvidence, hidden: Mapping[str, Array]
+) -> list[DeniedLimb]:
+    """The limbs of a pose (D,) that a frame's masks deny. hidden : what the run knew to be hidden there."""
+    if len(evidence.views) < len(agreement.cameras) or not anything_seen(evidence):
+        return []
+    mm = agreement.mm_per_pixel(pose)
+    seen = without_hidden(silhouette_distances(evidence), agreement.cameras, mm, hidden)
+    shares = agreement.of(pose, seen).shares()
+    return [
+        DeniedLimb(evidence.frame, limb, round(share, 3))
+        for limb, share in shares.items()
+        if share > LIMB_LOST_SHARE
+    ]
 
 
 def sudden_turns(body: BodyModel, track: Track, fps: float) -> tuple[int, ...]:

@@ -14,13 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.evidence.distance_maps import silhouette_distances
+from studio.evidence.frame_evidence import FrameEvidence
 from studio.runs.problem_source import ProblemSource
 from studio.runs.tracks import Track, stretches
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.settings import RunSettings, SettingsHistory, default_settings, settings_from_values
+from studio.tracking.hidden_areas import without_hidden
 from studio.tracking.loss_detection import Onlooker, Sight
-from studio.tracking.refinement import FrameLoss, RefinementSettings, Refiner
+from studio.tracking.refinement import Distances, FrameLoss, RefinementSettings, Refiner, mm_at
 from studio.tracking.refinement_over_time import HELD, MovementRefiner, Window, windows
 from studio.tracking.tracker import LOST, NO_EVIDENCE
 from studio.weighting.catalogue import WEIGHTINGS
@@ -59,7 +61,7 @@ def refined_frames(
             else:
                 work.leave()
     finally:
-        work.problems.close()
+        work.close()
     return work.result()
 
 
@@ -93,16 +95,21 @@ class _Work:
         read: Callable[[int], None],
     ) -> None:
         body, self._cameras = run.body(), run.cameras()
-        with run.results() as results:
-            self._history = SettingsHistory(tuple(results.settings_history()))
+        self._results = run.results()
+        self._history = SettingsHistory(tuple(self._results.settings_history()))
         self._record, self._track, self._knobs, self._tell = run.record, track, knobs, read
         self._refiner = Refiner(body, self._cameras, knobs)
         self._onlooker = Onlooker(body, self._cameras)
-        self.problems = ProblemSource(session, body, self._cameras)
+        self._problems = ProblemSource(session, body, self._cameras)
         self._poses, self._agreement = track.poses.copy(), track.confidence.copy()
         self._before: list[float] = []
         self._after: list[float] = []
         self._read = 0
+
+    def close(self) -> None:
+        """Let go of footage and store."""
+        self._problems.close()
+        self._results.close()
 
     def result(self) -> RefinedFrames:
         """What has come of it."""
@@ -117,9 +124,10 @@ class _Work:
         """One frame by itself."""
         frame, pose = int(self._track.frames[row]), self._track.poses[row]
         settings = self._settings(frame)
-        evidence = self.problems.evidence(frame, settings)
+        evidence = self._problems.evidence(frame, settings)
         refiner = self._refiner_of(tuple(view.camera for view in evidence.views))
-        found = refiner.refine(pose, silhouette_distances(evidence), self.problems.problem(frame, settings))
+        silhouettes = self._silhouettes(refiner, frame, pose, evidence)
+        found = refiner.refine(pose, silhouettes, self._problems.problem(frame, settings))
         sight = self._onlooker.looking(evidence)
         kept = sight(found.pose).overlap < self._knobs.refinement_least_overlap
         self._keep(row, pose if kept else found.pose, sight)
@@ -156,11 +164,19 @@ class _Work:
 
     def _seen(self, row: int) -> _SeenFrame:
         frame, pose = int(self._track.frames[row]), self._track.poses[row]
-        evidence = self.problems.evidence(frame, self._settings(frame))
+        evidence = self._problems.evidence(frame, self._settings(frame))
         refiner = self._refiner_of(tuple(view.camera for view in evidence.views))
-        loss = refiner.frame_loss(pose, silhouette_distances(evidence))
+        loss = refiner.frame_loss(pose, self._silhouettes(refiner, frame, pose, evidence))
         self._told()
         return _SeenFrame(pose, loss, self._onlooker.looking(evidence))
+
+    def _silhouettes(
+        self, refiner: Refiner, frame: int, pose: Array, evidence: FrameEvidence
+    ) -> list[Distances]:
+        """A frame's silhouettes without what the run knew to be hidden."""
+        known = self._results.result(frame).carried.memory
+        mm = mm_at(refiner.body, refiner.cameras, pose)
+        return without_hidden(silhouette_distances(evidence), refiner.cameras, mm, known)
 
     def _keep(self, row: int, pose: Array, sight: Callable[[Array], Sight]) -> None:
         self._before.append(sight(self._track.poses[row]).overlap)

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.geometry.camera import Camera
 from studio.tracking.agreement_kernels import FIELDS, add_limb_counts, far_points, view_counts
-from studio.tracking.refinement import Distances, mm_per_pixel
+from studio.tracking.refinement import Distances, mm_at
 from studio.weighting.outlines import OutlineProjector
 
 Array = NDArray[np.float64]
@@ -68,8 +67,7 @@ class Agreement:
 
     def mm_per_pixel(self, pose: Array) -> list[float]:
         """mm that a pixel of each view spans at the body."""
-        middle = limb_ends(self.body, pose[None])[0].reshape(-1, 3).mean(axis=0)
-        return [mm_per_pixel(camera, middle) for camera in self.cameras]
+        return mm_at(self.body, self.cameras, pose)
 
     def of(self, pose: Array, silhouettes: Sequence[Distances]) -> Disagreement:
         """Where a pose (D,) and a frame's silhouettes, one a camera, disagree."""

@@ -102,7 +102,7 @@ class FrameRefiner:
             return result
         refiner, agreement = self._prepared(tuple(seen), settings)
         start, masks, memory = result.estimate.pose, tuple(seen.values()), result.carried.memory
-        silhouettes = without_hidden(masks, start, agreement, memory)
+        silhouettes = without_hidden(masks, agreement.cameras, agreement.mm_per_pixel(start), memory)
         pose, evaluations = refiner.refine(start, silhouettes).pose, 0
         off = agreement.of(pose, silhouettes)
         if settings.redraw_limbs and max(off.shares().values()) >= DOUBTFUL_SHARE:

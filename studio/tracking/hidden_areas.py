@@ -10,9 +10,9 @@ or a frame that is searched again, knows what was known.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 
 from studio.geometry.camera import Camera
 from studio.tracking.agreement import FAR_MM, Agreement, Disagreement
@@ -28,6 +28,8 @@ FRAMES = 6.0
 """So many frames in which the body was expected in a cell, and none that showed it, make it hidden."""
 MOST_BARE = 0.01
 """Of the body's area: where more of the masks is left bare, the pose is in doubt and nothing is learnt."""
+ROUGH = 1.5
+"""Times the reach of clothes: so far about what is hidden a border is not the body's."""
 PREFIX = "hidden "
 """Of the names under which the counts of a camera are handed on."""
 
@@ -60,13 +62,14 @@ def cell_size(camera: Camera) -> int:
 
 
 def without_hidden(
-    masks: Sequence[Distances], pose: Array, agreement: Agreement, memory: Mapping[str, Array]
+    masks: Sequence[Distances], cameras: Sequence[Camera], mm: Sequence[float], memory: Mapping[str, Array]
 ) -> list[Distances]:
-    """The silhouettes of a frame's masks, one a camera, without what is hidden. pose : (D,) about where the body is."""
-    scales = agreement.mm_per_pixel(pose)
+    """The silhouettes of a frame's masks, one a camera, without what is hidden. mm : of a pixel of each view at the
+    body. memory : what came into the frame.
+    """
     return [
-        _without_hidden(view, camera, memory, mm)
-        for view, camera, mm in zip(masks, agreement.cameras, scales, strict=True)
+        _without_hidden(view, camera, memory, scale)
+        for view, camera, scale in zip(masks, cameras, mm, strict=True)
     ]
 
 
@@ -79,19 +82,18 @@ def _without_hidden(view: Distances, camera: Camera, memory: Mapping[str, Array]
     if not hidden.any():
         return view
     cell = cell_size(camera)
-    reach = 2 * int(np.ceil(1.2 * FAR_MM / mm / cell)) + 1
-    near = cv2.dilate(hidden.astype(np.uint8), cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach)))
+    near = distance_transform_edt(~hidden) * cell <= ROUGH * FAR_MM / mm
     left, top, signed = _with_room(view, near, cell)
     rows = (top + np.arange(signed.shape[0])) // cell
     columns = (left + np.arange(signed.shape[1])) // cell
-    here = near[np.ix_(rows, columns)] > 0
+    here = near[np.ix_(rows, columns)]
     signed = np.where(here & (signed > 0.0), np.float32(0.0), signed)
     at = view.border.astype(np.int64) // cell
-    kept = near[at[:, 1], at[:, 0]] == 0
+    kept = ~near[at[:, 1], at[:, 0]]
     return Uncovered(view.size, (left, top), signed, view.border[kept], view.outward[kept])
 
 
-def _with_room(view: Distances, near: NDArray[np.uint8], cell: int) -> tuple[int, int, NDArray[np.float32]]:
+def _with_room(view: Distances, near: NDArray[np.bool_], cell: int) -> tuple[int, int, NDArray[np.float32]]:
     """Left and top of the view's map enlarged to hold the cells of `near` too, and that map; far is far."""
     columns, rows = np.flatnonzero(near.any(axis=0)), np.flatnonzero(near.any(axis=1))
     (left, top), (height, width) = view.corner, view.signed.shape

@@ -224,8 +224,7 @@ class Refiner:
 
     def _prepared(self, pose: Array, silhouettes: Sequence[Distances]) -> "_Prepared":
         """The silhouettes as the kernel reads them, with each view's mm per pixel at the body."""
-        middle = limb_ends(self.body, pose[None])[0].reshape(-1, 3).mean(axis=0)
-        mm = np.array([mm_per_pixel(camera, middle) for camera in self.cameras])
+        mm = np.array(mm_at(self.body, self.cameras, pose))
         views, maps = np.zeros((len(silhouettes), 7), dtype=np.int64), []
         begin = border = 0
         for row, view, scale in zip(views, silhouettes, self._scales(mm) / mm, strict=True):
@@ -336,6 +335,12 @@ def _about_the_border(view: Distances, margin: float) -> tuple[tuple[int, int], 
     right, bottom = np.ceil(view.border.max(axis=0) + margin - corner).astype(int) + 1
     part = view.signed[top : min(bottom, height), left : min(right, width)]
     return (int(left + corner[0]), int(top + corner[1])), np.ascontiguousarray(part, dtype=np.float32)
+
+
+def mm_at(body: BodyModel, cameras: Sequence[Camera], pose: Array) -> list[float]:
+    """How many mm a pixel of each view spans at a body of pose (D,)."""
+    middle = limb_ends(body, pose[None])[0].reshape(-1, 3).mean(axis=0)
+    return [mm_per_pixel(camera, middle) for camera in cameras]
 
 
 def mm_per_pixel(camera: Camera, point: Array) -> float:

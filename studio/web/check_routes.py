@@ -53,6 +53,7 @@ def _line(found: RunCheck) -> CheckLine:
         turned=list(found.turned),
         jitter_mm=found.jitter_mm,
         jumps=[JumpLine.model_validate(jump) for jump in found.jumps or ()],
+        lost_limbs={limb: list(frames) for limb, frames in found.lost_limbs.items()},
         inside_mean=found.inside_mean,
         good=found.good,
         words=found.in_words(),

@@ -24,7 +24,7 @@ class JumpLine(Answer):
 class CheckLine(Answer):
     """What was measured. inside: per looked-at frame and camera, the share of the model's pixels that lie in the mask;
     covered: of the mask's, under the model. poor: frames whose views have too little of it inside; turned: sudden
-    turns.
+    turns. lost_limbs: limbs that the masks deny in more than one of the frames, with these.
     """
 
     cameras: list[str]
@@ -37,6 +37,7 @@ class CheckLine(Answer):
     turned: list[int]
     jitter_mm: Number
     jumps: list[JumpLine] = Field(default_factory=list)
+    lost_limbs: dict[str, list[int]] = Field(default_factory=dict)
     inside_mean: Number
     good: bool
     words: str

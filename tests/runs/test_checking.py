@@ -55,6 +55,9 @@ def test_the_true_poses_fit_and_others_do_not(session):
     wrong = check_run(session, run, every=3)
     assert wrong.inside_mean < 0.6
     assert wrong.poor == wrong.frames
+    assert not found.lost_limbs
+    assert set().union(*wrong.lost_limbs.values()) == set(wrong.frames)
+    assert "off the masks in" in wrong.in_words()
     assert not wrong.good
     assert check_step(session).state == "done"
     assert "look at the marked frames" in check_step(session).why

@@ -57,7 +57,7 @@ export function mount(place, way) {
   function showAgain() {
     const frames = framesToSee();
     const check = state.told?.check;
-    const named = check ? [...check.lost, ...check.doubtful, ...check.turned, ...check.jumps.map((jump) => jump.frame)] : [];
+    const named = check ? [...check.lost, ...check.doubtful, ...check.turned, ...check.jumps.map((jump) => jump.frame), ...Object.values(check.lost_limbs).flat()] : [];
     show(frames.includes(state.frame) || named.includes(state.frame) ? state.frame : frames[0]);
   }
 
@@ -117,7 +117,7 @@ export function mount(place, way) {
     if (!check) {
       return found.replaceChildren(element("p", { className: "hint", textContent: `Track "${state.track}" of ${run.name}: every tenth frame is compared with the masks, in every view.` }), element("div", { className: "step-actions" }, measure));
     }
-    found.replaceChildren(...[verdict(check), strip(check), chips("Too little of the model in the masks:", check.poor), chips("Lost:", check.lost), chips("Doubtful:", check.doubtful), chips("Sudden turns:", check.turned), jumpChips(check.jumps), element("div", { className: "step-actions" }, measure)].filter(Boolean));
+    found.replaceChildren(...[verdict(check), strip(check), chips("Too little of the model in the masks:", check.poor), chips("Lost:", check.lost), ...Object.entries(check.lost_limbs).map(([limb, frames]) => chips(`The ${limb} is off the masks:`, frames)), chips("Doubtful:", check.doubtful), chips("Sudden turns:", check.turned), jumpChips(check.jumps), element("div", { className: "step-actions" }, measure)].filter(Boolean));
     markShown();
   }
 
