@@ -36,7 +36,9 @@ class Evaluation:
     lost_by_frame : the limbs lost in each of `frames`.
     per_frame_mm : in the order of `frames`. root_aligned_mm : with the root marker laid on the true one.
     procrustes_mm : after the best turn, scale and move of each frame, None where no frame has three
-    markers. unmatched_markers : names that only the body or only the truth knows.
+    markers. without_offsets_mm : with each marker's constant offset removed, which two definitions of a joint or a
+    calibration that is shifted make; offsets_mm : how long these are; common_offset_mm : the length of their mean.
+    unmatched_markers : names that only the body or only the truth knows.
     angles_deg : by joint, how far the angle between the two limbs that meet there is off, mean over frames of the
     absolute difference, degrees; directions_deg : by limb, the mean angle between its direction and the true one. Both
     are of the straight lines between markers, so that a turn of a limb about itself shows in neither. mean_… : over
@@ -60,6 +62,9 @@ class Evaluation:
     mean_angle_deg: float | None = None
     directions_deg: dict[str, float] = field(default_factory=dict)
     mean_direction_deg: float | None = None
+    without_offsets_mm: float | None = None
+    common_offset_mm: float | None = None
+    offsets_mm: dict[str, float] = field(default_factory=dict)
 
 
 def evaluate(poses: Array, frames: IntArray, body: BodyModel, truth: MarkerMotion, fps: float) -> Evaluation:
@@ -98,7 +103,23 @@ def evaluate(poses: Array, frames: IntArray, body: BodyModel, truth: MarkerMotio
         procrustes_mm=_procrustes(found, wanted, seen),
         unmatched_markers=unmatched,
         **_degrees_off(found, wanted, marker_links(body, names), names),
+        **_constant_part(found - wanted, names),
     )
+
+
+def _constant_part(off: Array, names: tuple[str, ...]) -> dict[str, Any]:
+    """The fields of `Evaluation` about constant offsets. off : (K, M, 3), NaN where the truth has nothing."""
+    known = np.isfinite(off[..., 0]).any(axis=0)
+    off = off[:, known]
+    offsets = np.nanmean(off, axis=0)
+    lengths = np.linalg.norm(offsets, axis=1)
+    return {
+        "without_offsets_mm": float(np.nanmean(np.linalg.norm(off - offsets, axis=2))),
+        "common_offset_mm": float(np.linalg.norm(offsets.mean(axis=0))),
+        "offsets_mm": {
+            name: float(length) for name, length in zip(np.array(names)[known].tolist(), lengths, strict=True)
+        },
+    }
 
 
 def _degrees_off(

@@ -45,6 +45,16 @@ def as_document(evaluation: Evaluation) -> dict[str, object]:
     return {**asdict(evaluation), "lost_threshold_mm": LOST_MM, "alignment": "none"}
 
 
+def _constant_part(evaluation: Evaluation) -> list[str]:
+    """What is left without each marker's constant offset; nothing where that was not measured or is one frame."""
+    if evaluation.without_offsets_mm is None or len(evaluation.frames) < 2:
+        return []
+    left, common = evaluation.without_offsets_mm, evaluation.common_offset_mm
+    return [
+        f"without each marker's constant offset  {left:.1f} mm (all are shifted by {common:.1f} mm in common)"
+    ]
+
+
 def in_words(evaluation: Evaluation) -> str:
     """Lines for a person: every number with its alignment and threshold."""
     procrustes = evaluation.procrustes_mm
@@ -54,6 +64,7 @@ def in_words(evaluation: Evaluation) -> str:
         f"worst frame          {evaluation.worst_mm:.1f} mm",
         f"root aligned         {evaluation.root_aligned_mm:.1f} mm",
         f"after Procrustes     {'-' if procrustes is None else f'{procrustes:.1f} mm'}",
+        *_constant_part(evaluation),
         f"frames with a limb lost (a marker off by more than {LOST_MM:.0f} mm)  {evaluation.lost_frames}",
     ]
     if evaluation.lost_limbs:

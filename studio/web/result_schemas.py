@@ -127,6 +127,7 @@ class EvaluationView(Answer):
     """A run against the session's truth, in mm, without alignment unless said.
 
     lost_frames: how many frames have a limb that is off by more than 150 mm; lost_frame_numbers: which.
+    without_offsets_mm: with each marker's constant offset removed; common_offset_mm: the mean of these offsets.
     """
 
     frames: list[int]
@@ -140,4 +141,6 @@ class EvaluationView(Answer):
     per_frame_mm: Numbers
     root_aligned_mm: Number
     procrustes_mm: Number
+    without_offsets_mm: Number
+    common_offset_mm: Number
     unmatched_markers: list[str]

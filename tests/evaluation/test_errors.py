@@ -49,6 +49,21 @@ def test_a_shifted_body_is_off_by_the_shift_and_not_when_aligned() -> None:
     np.testing.assert_allclose(list(found.per_marker_mm.values()), 50.0)
     assert found.root_aligned_mm == pytest.approx(0.0, abs=1e-9)
     assert found.procrustes_mm == pytest.approx(0.0, abs=1e-8)
+    assert found.common_offset_mm == pytest.approx(50.0)
+    assert found.without_offsets_mm == pytest.approx(0.0, abs=1e-9)
+
+
+def test_what_is_constant_of_a_marker_is_told_apart_from_what_changes() -> None:
+    poses, truth = moving()
+    moved = truth.positions.copy()
+    wrist = truth.names.index("LWrist")
+    moved[:, wrist] += np.array([0.0, 60.0, 0.0])
+    moved[::2, wrist, 2] += 10.0
+    found = evaluate(poses, np.arange(FRAMES), load_body("human31"), changed(truth, positions=moved), 60.0)
+    count, high = len(truth.names), len(range(0, FRAMES, 2))
+    drift = 2.0 * 10.0 * high * (FRAMES - high) / FRAMES**2
+    assert found.offsets_mm["LWrist"] == pytest.approx(np.hypot(60.0, 10.0 * high / FRAMES))
+    assert found.without_offsets_mm == pytest.approx(drift / count)
 
 
 def test_one_marker_off_counts_by_its_share_and_loses_its_limb() -> None:
