@@ -23,6 +23,7 @@ from studio.runs.initial_limbs import limbs_put_right
 from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import parameter_names, search_space, session_sigma
 from studio.runs.session_settings import session_settings
+from studio.runs.way_step import enumerated
 from studio.sessions.made_from import note
 from studio.sessions.named_rows import write_pose
 from studio.sessions.names import free_name
@@ -31,7 +32,7 @@ from studio.settings import DEFAULT_TRACKER, RunSettings
 from studio.tracking.initialisation import PER_FAMILY, THOROUGH, Effort, FoundStart, StartSearch
 from studio.tracking.loss_detection import Onlooker, anything_seen
 from studio.tracking.start_candidates import facing, start_candidates
-from studio.tracking.tracker import FrameProblem, SearchSpace
+from studio.tracking.tracker import LIMB_LOST_SHARE, FrameProblem, SearchSpace
 from studio.volume.alignment import root_parameters
 from studio.volume.body_space import space_of
 from studio.volume.hull import Hull
@@ -50,8 +51,8 @@ HULL_DEPTH = 6
 FEWEST_VIEWS = 2
 HIPS, NEAR, FAR, AHEAD, AROUND = 950.0, 1500.0, 8000.0, 3500.0, 1500.0
 """mm, where a single camera looks: height of hips, how far they may be, how far they are taken to be, and about."""
-SURE_OVERLAP, NO_OVERLAP = 0.75, 0.5
-"""f_s of a start pose from which on its fit says nothing against it, and at which nothing speaks for it."""
+EVEN_SHARE, STEEPNESS = 0.1, 4.0
+"""Of `trust`: where right and wrong are as likely, and how quickly that changes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,26 +134,35 @@ def initialise(
         prototypes=prototypes,
         progress=lambda done, total: tell("searching for the pose", done, total),
     )
-    pose = found.pose
-    if len(cameras) >= FEWEST_VIEWS:
-        tell("looking for each limb", 0, 1)
-        pose = limbs_put_right(tree, cameras, masks, pose, seed)
-    overlap = Onlooker(tree, cameras).sight(masks, pose).overlap
-    fit = float(np.clip((overlap - NO_OVERLAP) / (SURE_OVERLAP - NO_OVERLAP), 0.0, 1.0))
+    tell("looking for each limb", 0, 1)
+    stands = limbs_put_right(tree, cameras, masks, found.pose, seed, draw=len(cameras) >= FEWEST_VIEWS)
+    shares = stands.off.shares()
+    denied = [limb for limb, share in shares.items() if share > LIMB_LOST_SHARE]
+    if denied:
+        note = f"{note} The masks do not agree with the {enumerated(denied)}: look there.".strip()
     return InitialPose(
         frame=evidence.frame,
         body=tree.name,
         names=parameter_names(tree),
-        pose=pose,
-        confidence=found.confidence * fit,
+        pose=stands.pose,
+        confidence=found.confidence * trust(max(shares.values(), default=0.0)),
         margin=found.margin,
         rival=found.rival,
         agreement=found.agreement,
-        overlap=overlap,
+        overlap=Onlooker(tree, cameras).sight(masks, stands.pose).overlap,
         hull_litres=0.0 if hull is None else hull.volume() * 1e-6,
         evaluations=found.evaluations,
         note=note,
     )
+
+
+def trust(most: float) -> float:
+    """How sure it is that a start pose is right whose most denied limb disagrees by a share of its area.
+
+    Measured on drawn footage (initialised in three frames of each clip, right: mean marker error at most 100 mm): of
+    the choosing half the right ones have at most 0.08, the wrong ones 0.12 and more.
+    """
+    return 1.0 / (1.0 + (most / EVEN_SHARE) ** STEEPNESS)
 
 
 def keep_pose(session: Session, found: InitialPose, replace: bool = False) -> Path:

@@ -109,9 +109,9 @@ class FrameRefiner:
             rng = np.random.Generator(
                 np.random.Philox(np.random.SeedSequence((self._seed, result.frame, 0, 0, REDRAWN)))
             )
-            frame = _Frame(refiner, agreement, silhouettes)
-            found, evaluations = _redrawn(
-                rng, frame.hypothesis(pose, off), result.carried.previous_estimate, frame
+            seen_frame = SeenFrame(refiner, agreement, silhouettes)
+            found, evaluations = redrawn(
+                rng, seen_frame.hypothesis(pose), seen_frame, result.carried.previous_estimate
             )
             pose, off = found.pose, found.off
         weight = float(problem.weigh(pose[None])[0])
@@ -137,7 +137,7 @@ class FrameRefiner:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Hypothesis:
+class Hypothesis:
     """A refined pose (D,), its loss, and where it and the silhouettes disagree."""
 
     pose: Array
@@ -146,29 +146,29 @@ class _Hypothesis:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Frame:
+class SeenFrame:
     """A frame's silhouettes, one a camera, with what compares poses with them."""
 
     refiner: Refiner
     agreement: Agreement
     silhouettes: Sequence[Distances]
 
-    def hypothesis(self, pose: Array, off: Disagreement) -> _Hypothesis:
-        """A pose with its loss."""
-        return _Hypothesis(pose, self.refiner.settled_loss(pose, self.silhouettes), off)
+    def hypothesis(self, pose: Array) -> Hypothesis:
+        """A pose (D,) as it is."""
+        loss = self.refiner.settled_loss(pose, self.silhouettes)
+        return Hypothesis(pose, loss, self.agreement.of(pose, self.silhouettes))
 
-    def better(self, than: _Hypothesis, start: Array) -> _Hypothesis:
+    def better(self, than: Hypothesis, start: Array) -> Hypothesis:
         """Where the descent from a start (D,) ends, if that is clearly better than what there is."""
         pose = self.refiner.refine(start, self.silhouettes).pose
-        loss = self.refiner.settled_loss(pose, self.silhouettes)
-        if loss >= BETTER * than.loss:
+        if self.refiner.settled_loss(pose, self.silhouettes) >= BETTER * than.loss:
             return than
-        return _Hypothesis(pose, loss, self.agreement.of(pose, self.silhouettes))
+        return self.hypothesis(pose)
 
 
-def _redrawn(
-    rng: np.random.Generator, found: _Hypothesis, last: Array | None, frame: _Frame
-) -> tuple[_Hypothesis, int]:
+def redrawn(
+    rng: np.random.Generator, found: Hypothesis, frame: SeenFrame, last: Array | None = None
+) -> tuple[Hypothesis, int]:
     """What is found with the doubtful limbs where the silhouettes agree with them best, and how many places were
     compared. last : (D,) the pose of the last frame, which is tried as well.
     """

@@ -82,7 +82,7 @@ def _without_hidden(view: Distances, camera: Camera, memory: Mapping[str, Array]
     if not hidden.any():
         return view
     cell = cell_size(camera)
-    near = distance_transform_edt(~hidden) * cell <= ROUGH * FAR_MM / mm
+    near = np.asarray(distance_transform_edt(~hidden)) * cell <= ROUGH * FAR_MM / mm
     left, top, signed = _with_room(view, near, cell)
     rows = (top + np.arange(signed.shape[0])) // cell
     columns = (left + np.arange(signed.shape[1])) // cell

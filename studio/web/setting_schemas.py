@@ -97,11 +97,8 @@ class Choice(Answer):
 
 
 class TrackerChoice(Choice):
-    """weighting : what the tracker is weighed with where nobody asks for another. needs_behaviour : whether a run with
-    it has to have a behaviour model.
-    """
+    """needs_behaviour : whether a run with it has to have a behaviour model."""
 
-    weighting: str
     needs_behaviour: bool = False
 
 

@@ -62,7 +62,6 @@ def choices(doors: Door) -> Choices:
             TrackerChoice(
                 name=name,
                 label=_title(entry.settings_type),
-                weighting=DEFAULT_WEIGHTING,
                 needs_behaviour=needs_model(name, None),
             )
             for name, entry in TRACKERS.items()

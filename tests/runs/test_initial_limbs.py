@@ -45,15 +45,15 @@ def test_an_arm_before_the_trunk_is_found_where_it_is(
     hidden[names.index("right_elbow_ry")] = -1.8
     evidence = drawn_evidence(body, stretched, CAMERAS)
     assert off(body, hidden, stretched, "RWrist") > 400.0
-    found = limbs_put_right(body, CAMERAS, evidence, hidden, seed)
+    found = limbs_put_right(body, CAMERAS, evidence, hidden, seed).pose
     assert off(body, found, stretched, "RWrist") < 80.0
     assert off(body, found, stretched, "LWrist") < 80.0
-    assert np.array_equal(found, limbs_put_right(body, CAMERAS, evidence, hidden, seed))
+    assert np.array_equal(found, limbs_put_right(body, CAMERAS, evidence, hidden, seed).pose)
 
 
 def test_a_pose_that_fits_is_not_lost(body: BodyModel, stretched: np.ndarray) -> None:
     evidence = drawn_evidence(body, stretched, CAMERAS)
-    found = limbs_put_right(body, CAMERAS, evidence, stretched, 0)
+    found = limbs_put_right(body, CAMERAS, evidence, stretched, 0).pose
     onlooker = Onlooker(body, CAMERAS)
     assert onlooker.sight(evidence, found).overlap >= onlooker.sight(evidence, stretched).overlap
     for marker in ("RWrist", "LWrist", "LAnkle", "Head"):

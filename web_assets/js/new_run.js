@@ -37,8 +37,6 @@ export async function newRunForm(entry, like = null) {
   // Bodies whose every parameter has limits may begin anywhere between them; the others need a pose.
   const detail = await fetchJson(sessionPath(entry.name));
   const needsPose = !detail.has_start_pose && detail.body.parameters.some((one) => one.lower === null || one.upper === null);
-  const usual = (tracker) => trackers.find((one) => one.name === tracker)?.weighting;
-  let chosen = false;
   const first = { tracker: like?.tracker ?? entry.tracker, weighting: like?.weighting ?? entry.weighting };
   let knobs = await knobsOf(first.tracker, first.weighting);
   const bodyChoices = [{ value: "", label: `the session's (${entry.body})` }, ...bodies.map((body) => ({ value: body.name, label: `${body.name} · ${body.parameters} parameters` }))];
@@ -61,11 +59,8 @@ export async function newRunForm(entry, like = null) {
       [{ name: "live", kind: "check", label: "live: drops frames rather than falls behind", value: false }],
       ...(detail.doubts.length ? [[{ name: "despite", kind: "check", label: "track although the calibration is in doubt", value: false }]] : []),
     ],
-    // A tracker brings its usual weighting along, unless the session or the person wants another.
     changed: async (name, form) => {
       const { tracker, weighting, preset } = form.elements;
-      chosen ||= name === "weighting";
-      if (name === "tracker" && !chosen && usual(entry.tracker) === entry.weighting) weighting.value = usual(tracker.value);
       if (["tracker", "weighting"].includes(name)) {
         knobs = await knobsOf(tracker.value, weighting.value);
         const before = preset.value;

@@ -130,11 +130,9 @@ export function mount(place, way) {
     const plain = state.choices.trackers.filter((one) => !one.needs_behaviour);
     const select = (name, options, value) => element("select", { name }, ...options.map(([key, words]) => new Option(words, key, false, key === value)));
     const submit = element("button", { type: "submit", className: "primary", textContent: newest() ? "Track anew" : "Track" });
-    const usual = (tracker) => (tracker === way.detail.tracker ? way.detail.weighting : plain.find((one) => one.name === tracker)?.weighting);
     const tracker = select("tracker", plain.map((one) => [one.name, one.label]), way.detail.tracker);
-    const weighting = select("weighting", state.choices.weightings.map((one) => [one.name, one.label]), state.weighting ?? usual(tracker.value));
+    const weighting = select("weighting", state.choices.weightings.map((one) => [one.name, one.label]), state.weighting ?? way.detail.weighting);
     weighting.onchange = () => { state.weighting = weighting.value; };
-    tracker.onchange = () => { if (!state.weighting) weighting.value = usual(tracker.value); };
     form.replaceChildren(
       element("label", {}, "Tracker", tracker),
       element("label", {}, "Poses are judged by", weighting),
