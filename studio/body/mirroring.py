@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from studio.body.branches import within_limits
 from studio.body.dragging import root_joint
 from studio.body.forward_kinematics import joint_frames, limb_ends
-from studio.body.inverse_kinematics import MM_PER_RADIAN
+from studio.body.inverse_kinematics import DIFFERENCE, MM_PER_RADIAN
 from studio.body.model import BodyModel
 from studio.errors import BodyError
 from studio.geometry.rotations import vector_from_rotation
@@ -35,15 +35,15 @@ class Mirror:
     def __init__(self, body: BodyModel) -> None:
         self.body = body
         self._twin = _parameter_twins(body)
-        self._limbs = _twins([limb.name for limb in body.drawn])
+        self.limb_twins = name_twins([limb.name for limb in body.drawn])
         sides = np.array([limb.side for limb in body.drawn])
-        if not (self._limbs != np.arange(len(sides))).any() or not (sides == "left").any():
+        if not (self.limb_twins != np.arange(len(sides))).any() or not (sides == "left").any():
             raise BodyError(
                 f"Body '{body.name}' has no left and right to be exchanged.",
                 "Choose a body whose limbs come in left and right.",
             )
         rest = limb_ends(body, body.neutral)[0]
-        across = (rest[sides == "left"] - rest[self._limbs][sides == "left"]).mean(axis=(0, 1))
+        across = (rest[sides == "left"] - rest[self.limb_twins][sides == "left"]).mean(axis=(0, 1))
         self._across = across / np.linalg.norm(across)
         self._joint = root_joint(body)
         self._root = _parameters_of(body, self._joint)
@@ -51,16 +51,37 @@ class Mirror:
 
     def mirrored(self, pose: Array) -> Array:
         """The pose (D,) mirrored where it stands, facing where it faces."""
-        ends, sideways = limb_ends(self.body, pose)[0], self._sideways(pose)
+        ends, sideways = limb_ends(self.body, pose)[0], self.sideways(pose)
         return self._placed(self._exchanged(pose), self._reflected(ends, sideways))
 
     def turned_round(self, pose: Array) -> Array:
         """The pose (D,) facing the other way, left and right exchanged: from front and back it looks the same."""
-        ends, sideways = limb_ends(self.body, pose)[0], self._sideways(pose)
+        ends, sideways = limb_ends(self.body, pose)[0], self.sideways(pose)
         ahead = np.cross(sideways, [0.0, 0.0, 1.0])
         if np.linalg.norm(ahead) < SMALL:
             ahead = np.array([1.0, 0.0, 0.0])
         return self._placed(self._exchanged(pose), self._reflected(ends, ahead / np.linalg.norm(ahead)))
+
+    @property
+    def turns(self) -> bool:
+        """Whether the body's root can turn."""
+        return any(self.body.parameters[at].kind == "angle" for at in self._root.tolist())
+
+    def exchanged(self, pose: Array, own: NDArray[np.int64], limbs: NDArray[np.int64]) -> Array:
+        """The pose (D,) with each of a pair's limbs (indices of drawn ones) where its twin is, as near as the pair's
+        own parameters can bring them; all else stays.
+        """
+        wanted = limb_ends(self.body, pose)[0][self.limb_twins[limbs]]
+        start = pose.copy()
+        start[own] = self._exchanged(pose)[own]
+        return self._fitted(start, wanted, own, limbs)[0]
+
+    def about_face(self, pose: Array) -> Array:
+        """The pose (D,) facing the other way with every limb where its twin is, as near as joint limits allow."""
+        wanted = limb_ends(self.body, pose)[0][self.limb_twins]
+        rest = self.body.neutral
+        rest[self._root] = pose[self._root]
+        return self._placed(rest, wanted, whole=True)
 
     def _exchanged(self, pose: Array) -> Array:
         """The limbs mirrored, the root as it is."""
@@ -71,11 +92,11 @@ class Mirror:
 
     def _reflected(self, ends: Array, normal: Array) -> Array:
         """(L, 2, 3) where the limbs are to be: their twins' ends, mirrored in the plane through the root."""
-        swapped = ends[self._limbs]
+        swapped = ends[self.limb_twins]
         middle = ends.reshape(-1, 3).mean(axis=0)
         return swapped - 2.0 * ((swapped - middle) @ normal)[..., None] * normal
 
-    def _sideways(self, pose: Array) -> Array:
+    def sideways(self, pose: Array) -> Array:
         """(3,) the body's left, level if it can be."""
         if self._joint < 0:
             return self._across
@@ -84,7 +105,7 @@ class Mirror:
         level = own * [1.0, 1.0, 0.0]
         return level / np.linalg.norm(level) if np.linalg.norm(level) > LEVEL else own
 
-    def _placed(self, pose: Array, wanted: Array) -> Array:
+    def _placed(self, pose: Array, wanted: Array, *, whole: bool = False) -> Array:
         """The pose with its root where the limbs are nearest to `wanted`; a body that is not quite even, whole."""
         best, least = pose, math.inf
         for begin in self._beginnings(pose):
@@ -92,13 +113,15 @@ class Mirror:
             if cost < least:
                 best, least = found, cost
         best = within_limits(self.body, best)
-        if math.sqrt(least / len(wanted)) > UNEVEN:
+        if whole or math.sqrt(least / len(wanted)) > UNEVEN:
             best = self._fitted(best, wanted, np.arange(len(best)))[0]
         return best
 
-    def _fitted(self, pose: Array, wanted: Array, free: NDArray[np.int64]) -> tuple[Array, float]:
+    def _fitted(
+        self, pose: Array, wanted: Array, free: NDArray[np.int64], limbs: NDArray[np.int64] | None = None
+    ) -> tuple[Array, float]:
         """The pose with its `free` parameters where the limbs are nearest to `wanted`, limits kept, and half the sum of
-        squares that remains.
+        squares that remains. limbs : which drawn ones, None for all.
         """
         entries = [self.body.parameters[at] for at in free.tolist()]
         scale = np.array([1.0 if entry.kind == "angle" else MM_PER_RADIAN for entry in entries])
@@ -107,19 +130,30 @@ class Mirror:
         inside = np.where(np.isfinite(upper - lower), 1e-9 * (upper - lower), 1e-9)
         begin = np.clip(pose[free] / scale, lower + inside, upper - inside)
 
+        which = slice(None) if limbs is None else limbs
+
         def placed(values: Array) -> Array:
-            moved = pose.copy()
-            moved[free] = values * scale
+            moved = np.repeat(pose[None], len(values), axis=0)
+            moved[:, free] = values * scale
             return moved
 
+        def offsets(values: Array) -> Array:
+            ends = limb_ends(self.body, placed(values))[:, which]
+            return (ends - wanted).reshape(len(values), -1)
+
         def residuals(values: Array) -> Array:
-            offsets = (limb_ends(self.body, placed(values))[0] - wanted).ravel()
-            return np.concatenate([offsets, PULL * (values - begin)])
+            return np.concatenate([offsets(values[None])[0], PULL * (values - begin)])
+
+        def slopes(values: Array) -> Array:
+            steps = DIFFERENCE * np.eye(len(free))
+            ahead, behind = offsets(values + steps), offsets(values - steps)
+            return np.concatenate([(ahead - behind).T / (2.0 * DIFFERENCE), PULL * np.eye(len(free))])
 
         if not len(free):
             return pose.copy(), 0.0
-        answer = least_squares(residuals, begin, bounds=(lower, upper), max_nfev=60)
-        return placed(answer.x), float(answer.cost)
+        limits = (lower, upper)
+        answer = least_squares(residuals, begin, slopes, limits, max_nfev=60)  # pyright: ignore[reportArgumentType]
+        return placed(answer.x[None])[0], float(answer.cost)
 
     def _beginnings(self, pose: Array) -> list[Array]:
         """The pose as it is, and with half a turn about each of the root's axes."""
@@ -149,7 +183,7 @@ class Mirror:
         return np.where(along < -0.01 * SMALL**2, -1.0, 1.0)
 
 
-def _twins(names: list[str]) -> NDArray[np.int64]:
+def name_twins(names: list[str]) -> NDArray[np.int64]:
     """Each name's place, or that of the one that says left where it says right."""
     places = {name: at for at, name in enumerate(names)}
     found = []
@@ -166,7 +200,7 @@ def _parameter_twins(body: BodyModel) -> NDArray[np.int64]:
         groups.setdefault(entry.limb, []).append(at)
     names = list(groups)
     found = np.arange(len(body.parameters))
-    for name, other in zip(names, _twins(names).tolist(), strict=True):
+    for name, other in zip(names, name_twins(names).tolist(), strict=True):
         if len(groups[name]) == len(groups[names[other]]):
             found[groups[name]] = groups[names[other]]
     return found

@@ -9,7 +9,6 @@ from studio.cli.knob_options import given, knob_options
 from studio.cli.output import command, progress
 from studio.knobs import changed, knobs_of
 from studio.runs.refining import REFINED, SMOOTHED, MadeTrack, refine_run, smooth_run
-from studio.runs.tracks import RAW
 from studio.sessions.workspace import Workspace
 from studio.tracking.refinement import RefinementSettings
 from studio.tracking.smoothing import SmoothingSettings
@@ -37,7 +36,9 @@ def _track_options(settings_type: type, source: str, into: str, source_help: str
 
 
 @click.command()
-@_track_options(RefinementSettings, RAW, REFINED, "The track that is refined.")
+@_track_options(
+    RefinementSettings, "", REFINED, "The track that is refined; default: as tracked, sides put right."
+)
 @command
 def refine(
     session: str, run: str, source: str, into: str, replace: bool, **knobs: str | None
@@ -55,8 +56,8 @@ def refine(
         )
     count = len(made.track.frames)
     text = (
-        f"{opened.name} / {run}: track '{into}' made from '{source}', {made.moved} of {count} frames moved; "
-        f"the silhouettes agree by {made.agreement_before:.3f} before, {made.agreement_after:.3f} after."
+        f"{opened.name} / {run}: track '{into}' made from '{made.track.made_by['from']}', {made.moved} of {count} "
+        f"frames moved; the silhouettes agree by {made.agreement_before:.3f} before, {made.agreement_after:.3f} after."
     )
     return {**_told(opened.name, run, made), "moved": made.moved, **_agreement(made), "text": text}
 
@@ -66,7 +67,9 @@ def _agreement(made: MadeTrack) -> dict[str, float]:
 
 
 @click.command(name="smooth")
-@_track_options(SmoothingSettings, "", SMOOTHED, "The track that is smoothed; default: refined, else raw.")
+@_track_options(
+    SmoothingSettings, "", SMOOTHED, "The track that is smoothed; default: refined, else sides, else raw."
+)
 @command
 def smooth_command(
     session: str, run: str, source: str, into: str, replace: bool, **knobs: str | None

@@ -17,6 +17,7 @@ from studio.cli.output import command, note, notes_once, progress
 from studio.errors import RunError
 from studio.progress import Progress
 from studio.runs.new_run import DESPITE, RunRequest, prepare_run
+from studio.runs.sides import exchanged_sides, in_words
 from studio.runs.start_pose_file import frame_of_file, start_pose_from_file
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -185,6 +186,8 @@ def track(
         f"{opened.name} / {run.name}: {run.record.frame_count} frames in {result.seconds:.1f} s, "
         f"seed {run.record.seed}{_how_it_went(run)}"
     )
+    if exchanged := exchanged_sides(run):
+        text += f"\n{in_words(exchanged)}"
     return {**_told(run, result), "text": text}
 
 
@@ -239,6 +242,8 @@ def _told(run: StoredRun, result: BatchResult) -> dict[str, object]:
         "start_pose": record.start_source,
         **_went(run),
     }
+    if exchanged := exchanged_sides(run):
+        told["exchanged"] = list(exchanged)
     if record.behaviour:
         told["behaviour"] = record.behaviour
     if record.tracker == "condensation":

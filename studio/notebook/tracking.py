@@ -16,7 +16,7 @@ from studio.runs.initialising import InitialPose
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.refining import REFINED, SMOOTHED, MadeTrack, refine_run, smooth_run
 from studio.runs.start_pose_file import frame_of_file, start_pose_from_file
-from studio.runs.tracks import RAW, pose_in_track, read_track
+from studio.runs.tracks import pose_in_track, read_track
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.tracking.refinement import RefinementSettings
@@ -116,13 +116,15 @@ def correct(
 def refine(
     run: RunName,
     *,
-    source: str = RAW,
+    source: str = "",
     into: str = REFINED,
     replace: bool = False,
     knobs: Mapping[str, object] | None = None,
     progress: Told = None,
 ) -> MadeTrack:
-    """Refine every frame on its silhouettes and keep that beside what the search found; no weight ever falls."""
+    """Refine every frame on its silhouettes and keep that beside what the search found; no weight ever falls. source :
+    default what was tracked, left and right put right.
+    """
     stored = open_run(run)
     opened = session_of(stored)
     settings = changed(RefinementSettings(), knobs or {})
@@ -140,7 +142,9 @@ def smooth(
     replace: bool = False,
     knobs: Mapping[str, object] | None = None,
 ) -> MadeTrack:
-    """Smooth the poses in time and keep that beside what the search found. source : default the refined, else raw."""
+    """Smooth the poses in time and keep that beside what the search found. source : default the
+    refined, else that with sides put right, else raw.
+    """
     settings = changed(SmoothingSettings(), knobs or {})
     return smooth_run(open_run(run), source=source, into=into, settings=settings, replace=replace)
 

@@ -74,6 +74,25 @@ def _parts(frames: NDArray[np.int64], sure: NDArray[np.bool_]) -> list[NDArray[n
     return sorted(parts, key=lambda part: int(part[0]))
 
 
+class MaskSettings:
+    """The settings that a run's frames were tracked with, with a weighting that reads masks."""
+
+    def __init__(self, run: StoredRun) -> None:
+        self._record = run.record
+        with run.results() as results:
+            self._history = SettingsHistory(tuple(results.settings_history()))
+
+    def of(self, frame: int) -> RunSettings:
+        """Those in use in a frame."""
+        entry = self._history.in_use(frame, 0)
+        values = self._record.settings if entry is None else entry.values
+        settings: RunSettings = settings_from_values(self._record.tracker, self._record.weighting, values)
+        if not WEIGHTINGS[settings.weighting_name].reads_pictures:
+            return settings
+        judge = default_settings(settings.tracker_name, JUDGE)
+        return replace(settings, weighting_name=JUDGE, weighting=judge.weighting)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _SeenFrame:
     """What is kept of a frame while its neighbours are read."""
@@ -95,8 +114,7 @@ class _Work:
         read: Callable[[int], None],
     ) -> None:
         body, self._cameras = run.body(), run.cameras()
-        self._results = run.results()
-        self._history = SettingsHistory(tuple(self._results.settings_history()))
+        self._results, self._settings = run.results(), MaskSettings(run)
         self._record, self._track, self._knobs, self._tell = run.record, track, knobs, read
         self._refiner = Refiner(body, self._cameras, knobs)
         self._onlooker = Onlooker(body, self._cameras)
@@ -123,7 +141,7 @@ class _Work:
     def refine_alone(self, row: int) -> None:
         """One frame by itself."""
         frame, pose = int(self._track.frames[row]), self._track.poses[row]
-        settings = self._settings(frame)
+        settings = self._settings.of(frame)
         evidence = self._problems.evidence(frame, settings)
         refiner = self._refiner_of(tuple(view.camera for view in evidence.views))
         silhouettes = self._silhouettes(refiner, frame, pose, evidence)
@@ -164,7 +182,7 @@ class _Work:
 
     def _seen(self, row: int) -> _SeenFrame:
         frame, pose = int(self._track.frames[row]), self._track.poses[row]
-        evidence = self._problems.evidence(frame, self._settings(frame))
+        evidence = self._problems.evidence(frame, self._settings.of(frame))
         refiner = self._refiner_of(tuple(view.camera for view in evidence.views))
         loss = refiner.frame_loss(pose, self._silhouettes(refiner, frame, pose, evidence))
         self._told()
@@ -193,13 +211,3 @@ class _Work:
             return self._refiner
         cameras = tuple(camera for camera in self._cameras if camera.name in views)
         return Refiner(self._refiner.body, cameras, self._knobs)
-
-    def _settings(self, frame: int) -> RunSettings:
-        """Those in use when the frame was tracked, with a weighting that reads masks."""
-        entry = self._history.in_use(frame, 0)
-        values = self._record.settings if entry is None else entry.values
-        settings: RunSettings = settings_from_values(self._record.tracker, self._record.weighting, values)
-        if not WEIGHTINGS[settings.weighting_name].reads_pictures:
-            return settings
-        judge = default_settings(settings.tracker_name, JUDGE)
-        return replace(settings, weighting_name=JUDGE, weighting=judge.weighting)

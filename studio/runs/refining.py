@@ -3,6 +3,7 @@
 A track says in `made_by` what it was made from and how, so that it can be made again.
 """
 
+from contextlib import closing
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -11,11 +12,14 @@ from numpy.typing import NDArray
 from studio.body.forward_kinematics import marker_points
 from studio.errors import RunError
 from studio.progress import Cancelled, Progress, watched
+from studio.runs.problem_source import ProblemSource
 from studio.runs.refined_frames import refined_frames
 from studio.runs.search_space import search_space
+from studio.runs.sides import put_sides_right
 from studio.runs.tracks import (
     RAW,
     REFINED,
+    SIDES,
     SMOOTHED,
     SOURCE,
     SOURCE_DIGEST,
@@ -59,7 +63,7 @@ def refine_run(
     session: Session,
     run: StoredRun,
     *,
-    source: str = RAW,
+    source: str = "",
     into: str = REFINED,
     settings: RefinementSettings | None = None,
     replace: bool = False,
@@ -68,14 +72,18 @@ def refine_run(
 ) -> MadeTrack:
     """Refine every frame of a track and keep the result as another (`runs.refined_frames` says how).
 
-    progress : told after each frame. cancelled : asked before each; True ends it with WorkCancelledError, nothing is
-    kept. Raises SessionError where `into` is taken, RunError for a run without frames, and what reading the footage
-    raises.
+    source : "" for what was tracked, with its sides put right first (`runs.sides`) where they are not yet. progress :
+    told after each frame. cancelled : asked before each; True ends it with WorkCancelledError, nothing is kept. Raises
+    SessionError where `into` is taken, RunError for a run without frames, and what reading the footage raises.
     """
     knobs = settings or RefinementSettings()
-    track = _begun(run, source, into, replace)
+    track = _begun(run, source or RAW, into, replace)
     tell, step, total = watched(progress, cancelled, "Refining"), f"refining {run.name}", len(track.frames)
     tell(step, 0, total)
+    if not source and into != SIDES:
+        with closing(ProblemSource(session, run.body(), run.cameras())) as problems:
+            put_sides_right(run, problems, lambda _: tell(step, 0, total))
+        track = read_track(run, best_track(run, (SIDES,)).name)
     found = refined_frames(session, run, track, knobs, lambda done: tell(step, done, total))
     moved = int(np.count_nonzero((found.poses != track.poses).any(axis=1)))
     made_by = {"verb": "refine", **_origin(track), **asdict(knobs), "moved": moved}
@@ -99,13 +107,14 @@ def smooth_run(
     settings: SmoothingSettings | None = None,
     replace: bool = False,
 ) -> MadeTrack:
-    """Smooth a track and keep the result as another. source : "" for the refined one, else the raw.
+    """Smooth a track and keep the result as another. source : "" for the refined one, else that with its
+    sides put right, else the raw.
 
     Frames that were filled keep their state ("" where the run has none) and have confidence 0. Raises SessionError,
     RunError, SettingsError where no frame may be believed.
     """
     knobs = settings or SmoothingSettings()
-    chosen = source or best_track(run, () if into == REFINED else (REFINED,)).name
+    chosen = source or best_track(run, (SIDES,) if into == REFINED else (REFINED, SIDES)).name
     track = _begun(run, chosen, into, replace)
     body, record = run.body(), run.record
     angles = np.array([entry.kind == "angle" for entry in body.parameters])

@@ -29,7 +29,7 @@ from studio.runs.initialising import initialise
 from studio.runs.search_space import parameter_names
 from studio.runs.session_settings import session_settings
 from studio.runs.subject_frames import varied_frames
-from studio.runs.tracks import REFINED, best_track, read_track
+from studio.runs.tracks import REFINED, SIDES, best_track, read_track
 from studio.sessions.calibration_changes import stale_runs
 from studio.sessions.names import free_name
 from studio.sessions.session import SUBJECT_NAME, Session
@@ -226,7 +226,7 @@ def _stored_poses(
     for run in runs:
         if run.record.parameters != parameter_names(body):
             continue
-        track = read_track(run, best_track(run, (REFINED,)).name)
+        track = read_track(run, best_track(run, (REFINED, SIDES)).name)
         if len(track.frames):
             return track.frames, track.poses, run.name
     if wanted:

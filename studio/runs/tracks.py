@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 Plain = Any
 """What JSON can hold."""
 
-RAW, REFINED, SMOOTHED = "raw", "refined", "smoothed"
+RAW, SIDES, REFINED, SMOOTHED = "raw", "sides", "refined", "smoothed"
 BEST = "best"
 """Stands for the best track there is (`best_track`) wherever a track is named."""
 SOURCE, SOURCE_DIGEST = "from", "from_digest"
@@ -68,8 +68,8 @@ def track_names(run: StoredRun) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class BestTrack:
-    """The best track of a run. name : "smoothed", else "refined", else "raw". outdated : better ones that were made
-    before the run, or what they were made from, changed.
+    """The best track of a run. name : "smoothed", else "refined", else "sides", else "raw". outdated : better ones
+    that were made before the run, or what they were made from, changed.
     """
 
     name: str
@@ -88,9 +88,10 @@ class BestTrack:
         )
 
 
-def best_track(run: StoredRun, among: Sequence[str] = (SMOOTHED, REFINED)) -> BestTrack:
-    """The first track of `among` that there is, by default the smoothed, else the refined one; else the raw one. A
-    track that was made of poses that have changed since does not count. Raises SessionError where one is damaged.
+def best_track(run: StoredRun, among: Sequence[str] = (SMOOTHED, REFINED, SIDES)) -> BestTrack:
+    """The first track of `among` that there is, by default the smoothed, else the refined one, else that
+    with sides put right; else the raw one. A track that was made of poses that have changed since does not count.
+    Raises SessionError where one is damaged.
     """
     names, outdated = track_names(run), []
     for name in among:
@@ -209,6 +210,11 @@ def write_track(run: StoredRun, track: Track, *, replace: bool = False) -> Path:
     path.parent.mkdir(exist_ok=True)
     write_bytes(path, stream.getvalue())
     return path
+
+
+def drop_track(run: StoredRun, name: str) -> None:
+    """Remove a derived track; where there is none, nothing."""
+    _path(run, name).unlink(missing_ok=True)
 
 
 def stretches(frames: NDArray[np.int64]) -> tuple[slice, ...]:

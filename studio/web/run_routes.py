@@ -12,6 +12,7 @@ from fastapi import APIRouter, Depends
 from studio.errors import RunError
 from studio.runs.new_run import RunRequest as NewRun
 from studio.runs.new_run import prepare_run
+from studio.runs.sides import notes_of
 from studio.sessions.run_log import read_log
 from studio.sessions.stored_run import StoredRun
 from studio.web.doors import Door, Doors, let_go
@@ -94,7 +95,7 @@ def run_detail(session: OpenSession, run: OpenRun) -> RunDetail:
         start_source=record.start_source,
         software=record.software,
         fps=record.fps,
-        notes=list(record.notes),
+        notes=list(notes_of(run)),
         behaviour=record.behaviour,
         live=record.live,
     )

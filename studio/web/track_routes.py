@@ -76,7 +76,7 @@ async def begin_refining(
 ) -> TrackJobState:
     """Refine a track on the silhouettes. Ask for the state, or wait for `track` events."""
     settings = changed(RefinementSettings(), wish.settings)
-    source, into = wish.source or RAW, wish.into or REFINED
+    source, into = wish.source or "", wish.into or REFINED
     check_making(run, source, into, wish.replace)
 
     def work(job: Job) -> dict[str, Any]:

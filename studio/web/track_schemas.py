@@ -38,7 +38,8 @@ class TrackList(Answer):
 
 
 class MakeTrackRequest(Request):
-    """What a track is made from and how. source: null for the usual one (refine: raw; smooth: refined if there is one).
+    """What a track is made from and how. source: null for the usual one (refine: as tracked, with sides put right;
+    smooth: refined if there is one).
 
     into: null for refined or smoothed. replace: write over a derived track of that name.
     """

@@ -41,6 +41,7 @@ def track_to_end(session: Session, run: StoredRun, report: Progress) -> BatchRes
             if stepped is not None and stepped.result is not None:
                 evaluations, beta = stepped.result.evaluations, stepped.record.beta
                 report(f"{session.name} / {run.name}", at_hand.tracking.done, total)
+        at_hand.conclude(lambda _: report("comparing left and right", total, total))
     except BaseException as problem:
         # What went wrong first is what counts, not that a full disk refuses the rest, too.
         with suppress(StudioError):

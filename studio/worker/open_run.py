@@ -12,6 +12,7 @@ from studio.runs.behaviour_models import check_prediction
 from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
 from studio.runs.run_footage import footage_of
+from studio.runs.sides import in_words, put_sides_right
 from studio.runs.tracking_run import Stepped, TrackingRun
 from studio.sessions.run_log import append_to_log
 from studio.sessions.session import Session
@@ -82,6 +83,17 @@ class OpenRun:
     def step_layer(self) -> Stepped | None:
         """Do the next layer of the run; None where a live run has no picture yet."""
         return self.tracking.step_layer()
+
+    def conclude(self, read: Callable[[int], None] = lambda frame: None) -> str:
+        """Look at a finished run as a whole; returns in words what that changed. read : told of each frame looked at.
+
+        What goes wrong is said in these words: the run itself is stored.
+        """
+        try:
+            words = put_sides_right(self.stored, self._problems, read)
+        except StudioError as error:
+            return f"Left and right were not looked at again: {error}"
+        return in_words(words) if words else ""
 
     def rest(self) -> None:
         """Nothing is tracked for now."""

@@ -131,6 +131,8 @@ class TrackingJob:
             self._say.stepped(run, stepped, self._asked_at)
         if run.tracking.finished:
             self._say.log(run, "info", f"Finished: {run.tracking.done} frames.")
+            if words := run.conclude():
+                self._say.log(run, "info", words)
             self._state(FINISHED)
             self._begin_waiting()
         elif (stepped and self._goal == ONE_LAYER) or (self._goal == TO_FRAME_END and result is not None):

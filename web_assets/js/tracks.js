@@ -43,7 +43,7 @@ export async function makeTrackForm(session, run, verb) {
   try { told = await fetchJson(`${path}/tracks`); } catch (error) { return complain(error); }
   const knobs = verb === "refine" ? told.refine_settings : told.smooth_settings;
   const names = told.tracks.map((line) => line.name);
-  const usual = verb === "smooth" && names.includes("refined") ? "refined" : RAW;
+  const usual = verb === "smooth" && names.includes("refined") ? "refined" : names.includes("sides") ? "sides" : RAW;
   const replaces = names.includes(made);
   openForm({
     heading: `${verb === "refine" ? "Refine" : "Smooth"} ${run}`, action: verb === "refine" ? "Refine" : "Smooth",

@@ -126,7 +126,7 @@ export function mount(place, way) {
     return state.tracks.map((line) => {
       const radio = element("input", { type: "radio", name: "way-track", value: line.name, checked: line.name === state.track, ariaLabel: `Look at ${line.name}` });
       radio.onchange = () => choose(line.name).catch(complain);
-      return element("tr", {}, element("td", {}, element("label", { className: "check" }, radio, line.name === "raw" ? "raw (as searched)" : line.name), line.name === usual ? element("span", { className: "badge good", textContent: "for export", title: "Step Export takes this one, unless you choose another." }) : ""),
+      return element("tr", {}, element("td", {}, element("label", { className: "check" }, radio, line.name === "raw" ? "raw (as searched)" : line.name), line.made_by.exchanged ? element("p", { className: "hint", textContent: line.made_by.exchanged.join("; ") }) : "", line.name === usual ? element("span", { className: "badge good", textContent: "for export", title: "Step Export takes this one, unless you choose another." }) : ""),
         element("td", { textContent: line.jitter_mm === null ? "–" : `${line.jitter_mm.toFixed(1)} mm` }), ...(way.detail.has_truth ? [element("td", { textContent: line.mean_mm === null ? "–" : `${line.mean_mm.toFixed(1)} mm` })] : []));
     });
   }
@@ -142,7 +142,7 @@ export function mount(place, way) {
       element("h2", { textContent: "Make it better" }),
       element("table", { className: "figures" }, element("thead", {}, element("tr", {}, ...["track", "jitter", ...(way.detail.has_truth ? ["from truth"] : [])].map((head) => element("th", { textContent: head })))), element("tbody", {}, ...trackRows())),
       element("div", { className: "step-actions" }, act("refine", has("refined") ? "Refine again" : "Refine on the silhouettes", "refined"), act("smooth", has("smoothed") ? "Smooth again" : "Smooth in time", "smoothed")),
-      element("p", { className: "hint", textContent: "Each is kept beside what the search found. The smoothed one is exported where there is one, else the refined one." }),
+      element("p", { className: "hint", textContent: "Each is kept beside what the search found. The smoothed one is exported where there is one, else the refined one, else that with sides put right." }),
       state.failed && element("p", { className: "wrong", role: "alert" }, state.failed.message, element("span", { className: "hint", textContent: ` ${state.failed.hint ?? ""}` })),
     ].filter(Boolean));
   }

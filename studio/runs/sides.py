@@ -1,0 +1,95 @@
+"""A finished run looked at once more as a whole: left and right, front and back put right (`tracking.side_exchange`).
+
+What was tracked stays. Where something was exchanged, the poses with sides put right are a track of their own, which
+says in `made_by` what was exchanged; where nothing was, there is no such track.
+"""
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from studio.evidence.distance_maps import silhouettes_by_camera
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.runs.refined_frames import MaskSettings
+from studio.runs.run_watch import Sightings
+from studio.runs.tracks import (
+    RAW,
+    SIDES,
+    SOURCE,
+    SOURCE_DIGEST,
+    Track,
+    best_track,
+    drop_track,
+    read_track,
+    track_digest,
+    write_track,
+)
+from studio.sessions.stored_run import StoredRun
+from studio.tracking.loss_detection import Onlooker
+from studio.tracking.side_exchange import with_sides_right
+
+BORDER_POINTS = 150
+EXCHANGED = "exchanged"
+"""Entry of `made_by`: what was exchanged, a line each."""
+
+
+def put_sides_right(
+    run: StoredRun, problems: Sightings, read: Callable[[int], None] = lambda frame: None
+) -> tuple[str, ...]:
+    """Look at a run's frames again and keep the track "sides" if that changes anything; returns what was exchanged.
+
+    Live runs and runs to and fro are left alone. A track that was made before and is up to date stays. read : told of
+    each frame that is looked at; what it raises ends the work. Raises what reading the footage raises.
+    """
+    record = run.record
+    if record.live or record.to_and_fro:
+        return ()
+    if known := exchanged_sides(run):
+        return known
+    track = read_track(run, RAW)
+    evidence = partial(_seen, problems, MaskSettings(run), read)
+    found, changes = with_sides_right(
+        problems.body,
+        problems.cameras,
+        track.frames,
+        track.poses,
+        record.fps,
+        lambda frame: silhouettes_by_camera(evidence(frame), BORDER_POINTS),
+    )
+    words = tuple(change.words for change in changes)
+    if not words:
+        drop_track(run, SIDES)
+        return ()
+    changed = np.flatnonzero((found != track.poses).any(axis=1))
+    confidence, onlooker = track.confidence.copy(), Onlooker(problems.body, problems.cameras)
+    for row in changed.tolist():
+        confidence[row] = onlooker.sight(evidence(int(track.frames[row])), found[row]).overlap
+    made_by = {"verb": SIDES, SOURCE: RAW, SOURCE_DIGEST: track_digest(track), EXCHANGED: words}
+    write_track(run, Track(SIDES, track.frames, found, confidence, track.states, made_by), replace=True)
+    return words
+
+
+def exchanged_sides(run: StoredRun) -> tuple[str, ...]:
+    """What was exchanged in the run's track "sides"; nothing where there is none, or the run has changed since."""
+    if best_track(run, (SIDES,)).name != SIDES:
+        return ()
+    return tuple(read_track(run, SIDES).made_by.get(EXCHANGED, ()))
+
+
+def notes_of(run: StoredRun) -> tuple[str, ...]:
+    """The run's notes, with what was made of its sides."""
+    words = exchanged_sides(run)
+    return (*run.record.notes, *([in_words(words)] if words else []))
+
+
+def in_words(words: tuple[str, ...]) -> str:
+    """A sentence on what was exchanged."""
+    return f"Sides were put right in track '{SIDES}': {'; '.join(words)}. What was tracked stays in track '{RAW}'."
+
+
+def _seen(
+    problems: Sightings, settings: MaskSettings, read: Callable[[int], None], frame: int
+) -> FrameEvidence:
+    read(frame)
+    return problems.evidence(frame, settings.of(frame))
