@@ -59,6 +59,8 @@ NEAR_MM = 40.0
 """An exchanged pose that is nearer to the tracked one than to where its limbs were to be is none; by so much."""
 BETTER = 0.02
 """A neighbour whose g is higher by more than this offers its pose."""
+NOTABLY = 0.999
+"""A loss below this share of another is better."""
 MOST_ROUNDS = 10
 KEPT_SILHOUETTES, SETTLED_TOGETHER = 48, 40
 
@@ -90,8 +92,8 @@ class Kind:
 @dataclass(slots=True, eq=False)
 class _Looked:
     """What is known of a kind. losses : (K,) of each row exchanged, NaN where nobody looked, inf where there is no such
-    pose. poses : (K, D) exchanged. wanted : by row, where its limbs (P, 3) were to be. odd : (K,) whether it was
-    exchanged in this way, once or after an exchange back.
+    pose or nothing is seen. poses : (K, D) exchanged. wanted : by row, where its limbs (P, 3) were to be. odd : (K,)
+    whether it was exchanged in this way and not back again.
     """
 
     losses: Array
@@ -231,30 +233,28 @@ class _Work:
             for near in (row - 1, row + 1) if -gain == self._gain(kind, row) else ():
                 if not 0 <= near < len(self.frames):
                     continue
-                known = looked.losses[near]
+                known = self._gain(kind, near)
                 self._look(kind, near)
-                if self._gain(kind, near) < -gain - BETTER:
+                if near in looked.wanted and self._gain(kind, near) < -gain - BETTER:
                     self._offer(kind, near, looked.poses[row], row)
                 reached = self._gain(kind, near)
-                if looked.losses[near] != known and reached + backwards[near] >= -CLEAR:
+                if reached != known and reached + backwards[near] >= -CLEAR:
                     heapq.heappush(waiting, (-reached, near))
 
     def _gain(self, kind: Kind, row: int) -> float:
-        """g of a row, NaN where nobody looked, -inf where there is no such pose; 0 where nothing is seen."""
+        """g of a row, NaN where nobody looked, -inf where there is no such pose."""
         there = self._kinds[kind].losses[row]
-        if not 0.0 < there < np.inf:
-            return -there
-        here = self._tracked(row)[1]
-        return float(np.log(here / there)) if here > 0.0 else 0.0
+        return float(np.log(self._tracked(row)[1] / there)) if there < np.inf else -there
 
     def _look(self, kind: Kind, row: int) -> None:
         looked = self._kinds[kind]
         if not np.isnan(looked.losses[row]):
             return
         looked.losses[row] = np.inf
-        offered = kind.offered(self.poses[row])
-        looked.wanted[row] = self._ends(kind, offered[None])
-        self._offer(kind, row, offered)
+        if self._tracked(row)[1] > 0.0:
+            offered = kind.offered(self.poses[row])
+            looked.wanted[row] = self._ends(kind, offered[None])
+            self._offer(kind, row, offered)
 
     def _offer(self, kind: Kind, row: int, offered: Array, beside: int = -1) -> None:
         """Refine a pose that is offered, and keep it where it is better than what is known and did not slide back.
@@ -263,10 +263,13 @@ class _Work:
         looked, tracked = self._kinds[kind], self._tracked(row)
         if beside >= 0:
             other = self._refined(row, self._tracked(beside)[0])
-            self._here[row] = min(tracked, other, key=lambda found: found[1])
+            self._here[row] = other if other[1] < NOTABLY * tracked[1] else tracked
         pose, loss = self._refined(row, offered)
         before, after = self._ends(kind, np.stack([self.poses[row], pose]))[:, None]
-        if loss < looked.losses[row] and _moved(after, looked.wanted[row]) < _moved(after, before) + NEAR_MM:
+        if (
+            loss < NOTABLY * looked.losses[row]
+            and _moved(after, looked.wanted[row]) < _moved(after, before) + NEAR_MM
+        ):
             looked.losses[row], looked.poses[row] = loss, pose
 
     def _tracked(self, row: int) -> tuple[Array, float]:
