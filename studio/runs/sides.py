@@ -42,8 +42,7 @@ def put_sides_right(
     Live runs and runs to and fro are left alone. A track that was made before and is up to date stays. read : told of
     each frame that is looked at; what it raises ends the work. Raises what reading the footage raises.
     """
-    record = run.record
-    if record.live or record.to_and_fro:
+    if not can_be_looked_at(run):
         return ()
     if known := exchanged_sides(run):
         return known
@@ -54,7 +53,7 @@ def put_sides_right(
         problems.cameras,
         track.frames,
         track.poses,
-        record.fps,
+        run.record.fps,
         lambda frame: silhouettes_by_camera(evidence(frame), BORDER_POINTS),
     )
     words = tuple(change.words for change in changes)
@@ -68,6 +67,11 @@ def put_sides_right(
     made_by = {"verb": SIDES, SOURCE: RAW, SOURCE_DIGEST: track_digest(track), EXCHANGED: words}
     write_track(run, Track(SIDES, track.frames, found, confidence, track.states, made_by), replace=True)
     return words
+
+
+def can_be_looked_at(run: StoredRun) -> bool:
+    """Whether the run's frames are those of its footage, one after the other."""
+    return not (run.record.live or run.record.to_and_fro)
 
 
 def exchanged_sides(run: StoredRun) -> tuple[str, ...]:

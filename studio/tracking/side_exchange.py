@@ -62,7 +62,7 @@ BETTER = 0.02
 NOTABLY = 0.999
 """A loss below this share of another is better."""
 MOST_ROUNDS = 10
-KEPT_SILHOUETTES, SETTLED_TOGETHER = 48, 40
+KEPT_SILHOUETTES, SETTLED_TOGETHER = 96, 80
 
 
 @dataclass(frozen=True, slots=True)

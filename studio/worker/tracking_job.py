@@ -19,6 +19,7 @@ from studio.worker.open_live_run import opened
 from studio.worker.open_run import FINISHED, PAUSED, OpenRun
 from studio.worker.reporter import IDLE, Reporter, names_of, unforeseen
 from studio.worker.search_pace import SearchPace
+from studio.worker.side_looking import SideLooking
 from studio.worker.waiting_runs import WaitingRuns
 
 COMPILING, TRACKING, REANNEALING = "compiling", "tracking", "reannealing"
@@ -34,6 +35,7 @@ class TrackingJob:
         self._pace = SearchPace(clock)
         self._waiting = WaitingRuns()
         self._say = Reporter(post, self._pace, self._waiting)
+        self._sides = SideLooking(self._say.log)
         self._run: OpenRun | None = None
         self._goal = RUN_ON
         self._asked_at = math.nan
@@ -104,7 +106,11 @@ class TrackingJob:
             self._fail(run, unforeseen(error), "See the log; 'start' tries the frame again.")
 
     def close(self) -> None:
-        """Save and close the open run."""
+        """Save and close the open run, and give up what is done beside it."""
+        self._sides.close()
+        self._close_run()
+
+    def _close_run(self) -> None:
         run, self._run = self._run, None
         if run is not None:
             run.close()
@@ -131,8 +137,7 @@ class TrackingJob:
             self._say.stepped(run, stepped, self._asked_at)
         if run.tracking.finished:
             self._say.log(run, "info", f"Finished: {run.tracking.done} frames.")
-            if words := run.conclude():
-                self._say.log(run, "info", words)
+            self._sides.add(run)
             self._state(FINISHED)
             self._begin_waiting()
         elif (stepped and self._goal == ONE_LAYER) or (self._goal == TO_FRAME_END and result is not None):
@@ -170,7 +175,7 @@ class TrackingJob:
             return
         # The new one is opened before the old one is let go, so that a refusal changes nothing.
         following = opened(session, run_folder)
-        self.close()
+        self._close_run()
         self._run = following
         version, settings = following.mailbox.latest()
         entry = following.tracking.history.entries[-1]
@@ -254,7 +259,7 @@ class TrackingJob:
     def _let_go(self, _: commands.Close) -> None:
         if self._tracking:
             raise RunError(f"Run '{self._opened().run_name}' is being tracked.", "Cancel it first.")
-        self.close()
+        self._close_run()
         self._state(IDLE)
 
     def _stop(self, _: commands.Stop) -> None:

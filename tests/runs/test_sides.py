@@ -1,29 +1,26 @@
 """The bundled walk with its legs exchanged for a while: put right in a track of its own, and said."""
 
-import dataclasses
 from collections.abc import Iterator
 from contextlib import closing
 
 import numpy as np
 import pytest
+from planted_sides import EXCHANGED, LAST, planted, stored, true_poses
 from sample_walk import copy_of_walk
-from store_records import layer_of, result_of
 
 from studio.body.forward_kinematics import marker_points
-from studio.body.inverse_kinematics import pose_from_markers
-from studio.capture.trc import read_trc
-from studio.evaluation.errors import rows_of_frames
-from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.problem_source import ProblemSource
 from studio.runs.refining import smooth_run
 from studio.runs.sides import notes_of, put_sides_right
 from studio.runs.tracks import best_track, read_track, track_names
-from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.tracking.side_exchange import kinds_of
+from studio.worker.batch import track_to_end
+from studio.worker.open_live_run import opened
+from studio.worker.open_run import OpenRun
+from studio.worker.side_looking import SideLooking
 
-LAST, EXCHANGED = 36, range(12, 28)
+WORDS = ("frames 12 to 27: left and right leg exchanged",)
 
 
 @pytest.fixture(scope="module")
@@ -33,40 +30,12 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Session:
 
 @pytest.fixture(scope="module")
 def truth(session: Session) -> np.ndarray:
-    """(36, D) the true poses."""
-    assert session.truth_path is not None
-    motion, body = read_trc(session.truth_path), session.body()
-    rows, names = rows_of_frames(motion, session.manifest.fps), tuple(marker.name for marker in body.markers)
-    columns = [motion.names.index(name) for name in names]
-    poses, pose = [], session.start_pose(body)
-    for frame in range(LAST):
-        assert pose is not None
-        pose, _ = pose_from_markers(body, names, motion.positions[rows[frame]][columns], pose)
-        poses.append(pose)
-    return np.array(poses)
-
-
-def stored(session: Session, poses: np.ndarray, run: StoredRun | None = None) -> StoredRun:
-    """A finished run that found these poses."""
-    run = run or prepare_run(session, RunRequest(last=LAST, fit_shape=False))
-    writer = ResultsWriter(run.folder)
-    for frame, pose in enumerate(poses):
-        result = result_of(frame, size=len(pose))
-        estimate = dataclasses.replace(result.estimate, pose=pose)
-        writer.write_frame(
-            dataclasses.replace(result, estimate=estimate), [layer_of(frame, 0, size=len(pose))], False
-        )
-    writer.close()
-    return run
+    return true_poses(session)
 
 
 @pytest.fixture(scope="module")
 def run(session: Session, truth: np.ndarray) -> StoredRun:
-    poses = truth.copy()
-    legs = next(kind for kind in kinds_of(session.body()) if "leg" in kind.what)
-    for frame in EXCHANGED:
-        poses[frame] = legs.offered(truth[frame])
-    return stored(session, poses)
+    return planted(session, truth)
 
 
 @pytest.fixture
@@ -76,12 +45,12 @@ def problems(session: Session, run: StoredRun) -> Iterator[ProblemSource]:
 
 
 def test_legs_are_put_right_once_and_what_was_tracked_stays(
-    session: Session, run: StoredRun, truth: np.ndarray, problems: ProblemSource
+    run: StoredRun, truth: np.ndarray, problems: ProblemSource
 ) -> None:
     raw, read = read_track(run), list[int]()
     assert notes_of(run) == run.record.notes
     words = put_sides_right(run, problems, read.append)
-    assert words == ("frames 12 to 27: left and right leg exchanged",)
+    assert words == WORDS
     assert np.array_equal(read_track(run).poses, raw.poses)
     track, body = read_track(run, "best"), run.body()
     assert track.name == "sides"
@@ -112,3 +81,25 @@ def test_a_run_that_is_sound_has_no_such_track(
     assert notes_of(again) == again.record.notes
     assert put_sides_right(again, problems) == ()
     assert "sides" not in track_names(again)
+
+
+def test_a_run_that_is_tracked_to_its_end_is_looked_at(session: Session, truth: np.ndarray) -> None:
+    batch, job = planted(session, truth), planted(session, truth)
+    told: list[str] = []
+    track_to_end(session, batch, lambda step, _done, _total: told.append(step))
+    assert "comparing left and right" in told
+    assert read_track(batch, "sides").made_by["exchanged"] == list(WORDS)
+
+    said: list[tuple[str, str]] = []
+
+    def say(_run: OpenRun, level: str, text: str) -> None:
+        said.append((level, text))
+
+    looking, open_run = SideLooking(say), opened(str(session.path), str(job.folder))
+    looking.add(open_run)
+    looking._thread.submit(lambda: None).result()
+    looking.close()
+    open_run.close()
+    assert [level for level, _ in said] == ["info"]
+    assert WORDS[0] in said[0][1]
+    assert notes_of(job)[-1] == said[0][1]
