@@ -26,7 +26,9 @@ from studio.runs.tracks import (
     write_track,
 )
 from studio.sessions.stored_run import StoredRun
+from studio.tracking.hidden_areas import without_hidden
 from studio.tracking.loss_detection import Onlooker
+from studio.tracking.refinement import Distances, mm_at
 from studio.tracking.side_exchange import with_sides_right
 
 BORDER_POINTS = 150
@@ -48,20 +50,26 @@ def put_sides_right(
         return known
     track = read_track(run, RAW)
     evidence = partial(_seen, problems, MaskSettings(run), read)
-    found, changes = with_sides_right(
-        problems.body,
-        problems.cameras,
-        track.frames,
-        track.poses,
-        run.record.fps,
-        lambda frame: silhouettes_by_camera(evidence(frame), BORDER_POINTS),
-    )
+    body, cameras, poses = problems.body, problems.cameras, dict(zip(track.frames, track.poses, strict=True))
+    with run.results() as results:
+
+        def silhouettes_of(frame: int) -> dict[str, Distances]:
+            """The frame's, without what the run knew to be hidden there."""
+            seen = silhouettes_by_camera(evidence(frame), BORDER_POINTS)
+            own = [camera for camera in cameras if camera.name in seen]
+            hidden, mm = results.result(frame).carried.memory, mm_at(body, own, poses[frame])
+            shown = without_hidden([seen[camera.name] for camera in own], own, mm, hidden)
+            return {camera.name: view for camera, view in zip(own, shown, strict=True)}
+
+        found, changes = with_sides_right(
+            body, cameras, track.frames, track.poses, run.record.fps, silhouettes_of
+        )
     words = tuple(change.words for change in changes)
     if not words:
         drop_track(run, SIDES)
         return ()
     changed = np.flatnonzero((found != track.poses).any(axis=1))
-    confidence, onlooker = track.confidence.copy(), Onlooker(problems.body, problems.cameras)
+    confidence, onlooker = track.confidence.copy(), Onlooker(body, cameras)
     for row in changed.tolist():
         confidence[row] = onlooker.sight(evidence(int(track.frames[row])), found[row]).overlap
     made_by = {"verb": SIDES, SOURCE: RAW, SOURCE_DIGEST: track_digest(track), EXCHANGED: words}
