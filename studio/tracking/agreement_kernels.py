@@ -27,6 +27,17 @@ def distance_to(x, y, quad, turn):
 
 
 @njit(**OPTIONS)
+def is_inside(x, y, quad, turn):
+    """Whether a point lies in a quadrilateral (4, 2) that runs round as `turn` says."""
+    for corner in range(4):
+        following = (corner + 1) & 3
+        ex, ey = quad[following, 0] - quad[corner, 0], quad[following, 1] - quad[corner, 1]
+        if turn * (ex * (y - quad[corner, 1]) - ey * (x - quad[corner, 0])) < 0.0:
+            return False
+    return True
+
+
+@njit(**OPTIONS)
 def count_limbs(quads, turns, signed, corner, size, step, far, counts):
     """Fill the first two columns of counts (L, 3) of one view: see `agreement.Disagreement`."""
     left, top = corner
@@ -43,7 +54,7 @@ def count_limbs(quads, turns, signed, corner, size, step, far, counts):
             y = row * step
             for column in range(first_x, last_x + 1):
                 x = column * step
-                if distance_to(x, y, quad, turns[limb]) > 0.0:
+                if not is_inside(x, y, quad, turns[limb]):
                     continue
                 counts[limb, 0] += 1.0
                 mapped = 0 <= x - left < width and 0 <= y - top < height
@@ -100,7 +111,18 @@ def far_points(quads, signed, corner, step, far):
 def is_near(x, y, quads, turns, far):
     """Whether a point is within `far` pixels of one of the quadrilaterals."""
     for limb in range(quads.shape[0]):
-        if np.isfinite(quads[limb, 0, 0]) and distance_to(x, y, quads[limb], turns[limb]) <= far:
+        quad = quads[limb]
+        if not np.isfinite(quad[0, 0]):
+            continue
+        if x < min(quad[0, 0], quad[1, 0], quad[2, 0], quad[3, 0]) - far:
+            continue
+        if x > max(quad[0, 0], quad[1, 0], quad[2, 0], quad[3, 0]) + far:
+            continue
+        if y < min(quad[0, 1], quad[1, 1], quad[2, 1], quad[3, 1]) - far:
+            continue
+        if y > max(quad[0, 1], quad[1, 1], quad[2, 1], quad[3, 1]) + far:
+            continue
+        if distance_to(x, y, quad, turns[limb]) <= far:
             return True
     return False
 
@@ -153,7 +175,7 @@ def count_cells(quads, signed, corner, cell, far, counts):
         for row in range(max(0, int(quad[:, 1].min() // cell)), int(last_row) + 1):
             for column in range(max(0, int(quad[:, 0].min() // cell)), int(last_column) + 1):
                 x, y = column * cell + cell // 2, row * cell + cell // 2
-                covered[row, column] |= distance_to(x, y, quad, turn) == 0.0
+                covered[row, column] |= is_inside(x, y, quad, turn)
     for row in range(counts.shape[0]):
         for column in range(counts.shape[1]):
             x, y = column * cell + cell // 2 - left, row * cell + cell // 2 - top
