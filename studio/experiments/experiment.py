@@ -7,13 +7,17 @@ paper's claim. Running, keeping and showing them is the same for all.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 from studio.experiments.charts import Chart
 from studio.experiments.footage_shelf import FootageShelf
 
 # Numbers, words, lists and dictionaries: what JSON can hold.
 Plain = Any
+Measure = Callable[[Mapping[str, Plain], FootageShelf], dict[str, Plain]]
+M = TypeVar("M", bound=Callable[..., Any])
+
+NAMED_BELOW = "studio.experiments"
 
 VERDICTS = ("reproduced", "better", "not reproduced", "answered")
 # What stands in a verdict's place where a trial failed or the conclusion could not be drawn.
@@ -110,7 +114,26 @@ class Experiment:
     source: str
     claim: str
     trials: Callable[[Scale], tuple[Trial, ...]]
-    measure: Callable[[Mapping[str, Plain], FootageShelf], dict[str, Plain]]
+    measure: Measure
     conclude: Callable[[Sequence[Outcome]], Findings]
     footage: tuple[str, ...] = ()
     alone: bool = False
+
+
+def kept_as(name: str) -> Callable[[M], M]:
+    """Give a measure the name that its outcomes are kept under, wherever its code moves to.
+
+    The names are those of the modules in which outcomes were first measured, below NAMED_BELOW: another name is
+    another trial, and everything is measured again.
+    """
+
+    def named(measure: M) -> M:
+        measure.kept_as = f"{NAMED_BELOW}.{name}"  # pyright: ignore[reportFunctionMemberAccess]
+        return measure
+
+    return named
+
+
+def measure_name(measure: Measure) -> str:
+    """The name that a measure's outcomes are kept under: that of `kept_as`, else where it stands."""
+    return getattr(measure, "kept_as", f"{measure.__module__}.{measure.__qualname__}")

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import studio
-from studio.experiments.experiment import Experiment, Plain, Trial
+from studio.experiments.experiment import Experiment, Plain, Trial, measure_name
 from studio.runs.new_run import software_version
 from studio.sessions.atomic_files import write_text
 
@@ -64,9 +64,8 @@ class KeptTrials:
 
 def trial_key(experiment: Experiment, trial: Trial, recipes: Mapping[str, str]) -> str:
     """The name under which a trial's outcome is kept. recipes : digests of the experiment's footage, by name."""
-    measure = experiment.measure
     made_by = {
-        "measure": f"{measure.__module__}.{measure.__qualname__}",
+        "measure": measure_name(experiment.measure),
         "alone": experiment.alone,
         "arguments": plain(trial.arguments),
         "footage": {name: recipes[name] for name in footage_of(experiment, trial)},

@@ -1,21 +1,18 @@
 """What a command has to run: the trials of all asked experiments, each once, and the footage that they need."""
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from studio.errors import StudioError
-from studio.experiments.experiment import Experiment, Plain, Scale, Trial
-from studio.experiments.footage_shelf import FootageShelf
+from studio.experiments.experiment import Experiment, Measure, Plain, Scale, Trial
 from studio.experiments.kept_trials import footage_of, plain, trial_key
 from studio.sessions.manifest import read_manifest
 from studio.synthesis.recipe_file import find_recipe, read_recipe
 from studio.synthesis.recipes import RECIPE_COPY
 
 FULL_SEEDS, QUICK_SEEDS = 10, 3
-
-Measure = Callable[[Mapping[str, Plain], FootageShelf], dict[str, Plain]]
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.experiments.charts import Chart, Series
-from studio.experiments.experiment import Number, Outcome, Table, Trial
+from studio.experiments.experiment import Number, Outcome, Table, Trial, kept_as
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import number, ratio_interval, sign_test
 from studio.experiments.tracked import Attempt, Tracked, track
@@ -42,6 +42,7 @@ def tracking_trial(group: str, attempt: Attempt) -> Trial:
     return Trial(f"{group}, seed {attempt.seed}", attempt.plain())
 
 
+@kept_as("tracking_trials.measure_tracking")
 def measure_tracking(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
     """Track; the fields of `Tracked`."""
     return asdict(track(Attempt.of_plain(arguments), shelf))

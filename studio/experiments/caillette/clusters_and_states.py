@@ -27,7 +27,7 @@ from studio.experiments.caillette.setting import (
 from studio.experiments.caillette.training_set import Training, learnt, recorded
 from studio.experiments.charts import Chart, Heat, Series
 from studio.experiments.deutscher_reid.setting import share_number
-from studio.experiments.experiment import Experiment, Findings, Number, Outcome, Scale, Table, Trial
+from studio.experiments.experiment import Experiment, Findings, Number, Outcome, Scale, Table, Trial, kept_as
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import number, overall
 
@@ -60,6 +60,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
     return tuple(found)
 
 
+@kept_as("caillette.clusters_and_states.measure")
 def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
     """Clusters; of the dance states and entropies (nats a frame) for every memory and ε."""
     wanted = Training.of_plain(arguments["training"])

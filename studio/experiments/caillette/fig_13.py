@@ -34,7 +34,7 @@ from studio.experiments.caillette.setting import (
 )
 from studio.experiments.caillette.training_set import Training, learnt, recorded
 from studio.experiments.charts import Chart, Series
-from studio.experiments.experiment import Experiment, Findings, Number, Outcome, Scale, Trial
+from studio.experiments.experiment import Experiment, Findings, Number, Outcome, Scale, Trial, kept_as
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import number, overall
 
@@ -63,6 +63,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
     return tuple(found)
 
 
+@kept_as("caillette.fig_13.measure")
 def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
     """Track, or (where the arguments are a training set) ask the automaton."""
     if "entropy_of" not in arguments:

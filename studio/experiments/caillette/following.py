@@ -14,7 +14,7 @@ from studio.behaviour.model import BehaviourModel
 from studio.experiments.caillette.problems import known_problems, problems
 from studio.experiments.caillette.training_set import Training, learnt
 from studio.experiments.caillette.true_motion import TrueMotion, joint_errors, true_motion
-from studio.experiments.experiment import Trial
+from studio.experiments.experiment import Trial, kept_as
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.tracking_trials import Contender
 from studio.runs.behaviour_models import fitting
@@ -124,6 +124,7 @@ def follow_trial(
     return Trial(f"{group}, seed {seed}", follow.plain())
 
 
+@kept_as("caillette.following.measure")
 def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
     """Track and compare; the fields of `Followed`."""
     wanted = Follow.of_plain(arguments)

@@ -34,7 +34,7 @@ from studio.experiments.caillette.setting import (
 )
 from studio.experiments.caillette.training_set import learnt
 from studio.experiments.caillette.true_motion import true_motion
-from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Trial
+from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Trial, kept_as
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import number
 
@@ -62,6 +62,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
     )
 
 
+@kept_as("caillette.online_learning.measure")
 def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
     """The passes, each the fields of `Followed`; clusters and states before and after."""
     wanted = Follow.of_plain(arguments)

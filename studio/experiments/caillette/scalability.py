@@ -15,7 +15,7 @@ from studio.experiments.caillette.setting import EXERCISE, EXERCISE_2, SOURCE
 from studio.experiments.caillette.training_set import Training, lesson_of
 from studio.experiments.charts import Chart, Series
 from studio.experiments.deutscher_reid.setting import share_number
-from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Table, Trial
+from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Table, Trial, kept_as
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import number, overall
 
@@ -42,6 +42,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
     return tuple(found)
 
 
+@kept_as("caillette.scalability.measure")
 def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
     """Sizes of the model, seconds to learn clusters and automaton, milliseconds to predict 1000 particles."""
     training = Training.of_plain(arguments["training"])

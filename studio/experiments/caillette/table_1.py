@@ -16,7 +16,7 @@ from studio.experiments.caillette.training_set import Training, learnt
 from studio.experiments.caillette.true_motion import true_motion
 from studio.experiments.charts import Chart, Series
 from studio.experiments.deutscher_reid.setting import share_number
-from studio.experiments.experiment import Experiment, Findings, Number, Outcome, Scale, Table, Trial
+from studio.experiments.experiment import Experiment, Findings, Number, Outcome, Scale, Table, Trial, kept_as
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.hull_benchmark import TABLE_1
 from studio.experiments.statistics import number, overall
@@ -62,6 +62,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
     )
 
 
+@kept_as("caillette.table_1.measure")
 def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
     """Milliseconds by part, as in LABELS; voxels by depth with five views."""
     session, last = shelf.session(arguments["footage"]), int(arguments["last"])

@@ -17,7 +17,7 @@ from studio.body.forward_kinematics import marker_points
 from studio.experiments.deutscher_reid.arms import TemplateArm, template_arm
 from studio.experiments.deutscher_reid.fewest_particles import fewest, sizes
 from studio.experiments.deutscher_reid.setting import annealing_as_ten
-from studio.experiments.experiment import Scale, Trial
+from studio.experiments.experiment import Scale, Trial, kept_as
 from studio.experiments.footage_shelf import FootageShelf
 from studio.runs.search_space import default_sigma, search_space
 from studio.synthesis.arm_footage import arm_motion
@@ -117,6 +117,7 @@ def group(name: str, body: str, rate: float) -> str:
     return f"{name}, {BODY_WORDS[body]}, {rate:g} pictures/s"
 
 
+@kept_as("deutscher_reid.arm_sequences.measure")
 def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
     """The fewest particles for one seed; the motion is the seed's, and every run has random numbers of its own."""
     del shelf

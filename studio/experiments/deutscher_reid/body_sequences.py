@@ -10,7 +10,7 @@ from typing import Any
 
 from studio.experiments.deutscher_reid.fewest_particles import fewest, sizes
 from studio.experiments.deutscher_reid.setting import CIRCLE, WEIGHTING, succeeded
-from studio.experiments.experiment import Scale, Trial
+from studio.experiments.experiment import Scale, Trial, kept_as
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.tracked import Attempt, track
 
@@ -49,6 +49,7 @@ def trials(
     )
 
 
+@kept_as("deutscher_reid.body_sequences.measure")
 def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
     """The fewest particles for one seed."""
 

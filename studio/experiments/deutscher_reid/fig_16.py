@@ -14,7 +14,7 @@ from studio.experiments.charts import Chart, Series
 from studio.experiments.deutscher_reid.arms import localise
 from studio.experiments.deutscher_reid.setting import EQ18_WORDS, SOURCE
 from studio.experiments.deutscher_reid.variance_reduction import scene
-from studio.experiments.experiment import Experiment, Findings, Number, Outcome, Scale, Table, Trial
+from studio.experiments.experiment import Experiment, Findings, Number, Outcome, Scale, Table, Trial, kept_as
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import bootstrap_interval, ratio_number, sign_test
 
@@ -56,6 +56,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
     )
 
 
+@kept_as("deutscher_reid.fig_16.measure")
 def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
     """The mean SSD of the reported poses, per share."""
     del shelf

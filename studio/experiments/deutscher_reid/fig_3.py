@@ -11,7 +11,7 @@ from studio.errors import TruthError
 from studio.evaluation.errors import rows_of_frames
 from studio.experiments.charts import Chart, Series
 from studio.experiments.deutscher_reid.setting import BODY, CIRCLE, PLAIN, SOURCE, WEIGHTING, share_number
-from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Table, Trial
+from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Table, Trial, kept_as
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import number, overall
 from studio.experiments.tracked import Attempt, track
@@ -41,6 +41,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
     )
 
 
+@kept_as("deutscher_reid.fig_3.measure")
 def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
     """The spread per layer (mm, of x and y together), whether the first cloud covers the true movement, how far the
     last one's middle is from the true place, means over the frames but the first; and the clouds of the middle frame.

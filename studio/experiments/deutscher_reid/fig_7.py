@@ -23,7 +23,7 @@ from studio.experiments.deutscher_reid.setting import (
     times_in_words,
 )
 from studio.experiments.deutscher_reid.true_poses import true_poses
-from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Table, Trial
+from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Table, Trial, kept_as
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import number, overall
 from studio.settings import changed_settings, default_settings
@@ -56,6 +56,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
     )
 
 
+@kept_as("deutscher_reid.fig_7.measure")
 def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
     """Angles (degrees), the true one, and log w of each of TERMS at every angle."""
     session, frame = shelf.session(arguments["footage"]), int(arguments["frame"])

@@ -20,7 +20,7 @@ from studio.experiments.deutscher_reid.variance_reduction import (
     reduction_chart,
     reductions,
 )
-from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Table, Trial
+from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Table, Trial, kept_as
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import number, overall
 
@@ -86,6 +86,7 @@ def trials_fig_18(scale: Scale) -> tuple[Trial, ...]:
     )
 
 
+@kept_as("deutscher_reid.figs_17_and_18.measure_fig_18")
 def measure_fig_18(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
     """Per layer, how widely the ends of the links are scattered (mm), and of one seed where some of them lie."""
     del shelf

@@ -23,7 +23,7 @@ from studio.experiments.deutscher_reid.setting import (
     share_number,
     times_in_words,
 )
-from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Table, Trial
+from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Table, Trial, kept_as
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import number
 from studio.experiments.tracked import Attempt, track
@@ -69,6 +69,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
     )
 
 
+@kept_as("deutscher_reid.figs_19_and_20.measure")
 def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
     """Shares of the first cloud's variance per layer and parameter, and the scatter of PARTS (mm) per layer, means
     over the frames but the first, which is searched several times.

@@ -14,7 +14,7 @@ import numpy as np
 
 from studio.experiments.charts import Chart, Series
 from studio.experiments.deutscher_reid.setting import CIRCLE, PLAIN, SOURCE, WEIGHTING
-from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Table, Trial
+from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Table, Trial, kept_as
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import number
 from studio.numba_in_threads import numba
@@ -39,6 +39,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
     )
 
 
+@kept_as("deutscher_reid.processors.measure")
 def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
     """Fewest milliseconds of a frame's search and of weighing one layer, for 1, 2, … threads in turn."""
     session = shelf.session(arguments["footage"])

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from studio.experiments.charts import Chart, Series
 from studio.experiments.deutscher_reid.arms import TemplateArm, localise, template_arm
-from studio.experiments.experiment import Outcome, Scale, Table, Trial
+from studio.experiments.experiment import Outcome, Scale, Table, Trial, kept_as
 from studio.experiments.footage_shelf import FootageShelf
 
 Array = NDArray[np.float64]
@@ -74,6 +74,7 @@ def trials(
     )
 
 
+@kept_as("deutscher_reid.variance_reduction.measure")
 def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
     """Variances per layer and parameter of one search, over those of the first cloud."""
     del shelf

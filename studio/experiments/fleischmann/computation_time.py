@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.experiments.charts import Chart, Series
-from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Table, Trial
+from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Table, Trial, kept_as
 from studio.experiments.fleischmann.setting import EVALUATIONS, SOURCE, SWARM, TWIN
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import number
@@ -75,6 +75,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
     return tuple(Trial(f"frame times, seed {seed}", {"seed": seed, "frames": frames}) for seed in scale.seeds)
 
 
+@kept_as("fleischmann.computation_time.measure")
 def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
     """Milliseconds a frame of every part, means over some frames after the kernels are warm."""
     session = shelf.session(TWIN)

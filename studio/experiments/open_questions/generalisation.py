@@ -12,7 +12,7 @@ import numpy as np
 
 from studio.experiments.caillette.training_set import Training, model_file
 from studio.experiments.charts import Chart, Heat
-from studio.experiments.experiment import Experiment, Findings, Number, Outcome, Scale, Table, Trial
+from studio.experiments.experiment import Experiment, Findings, Number, Outcome, Scale, Table, Trial, kept_as
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import number
 from studio.experiments.tracked import Attempt, Tracked, track
@@ -145,6 +145,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
     return tuple(found)
 
 
+@kept_as("open_questions.generalisation.measure")
 def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
     """Track a clip; the fields of `Tracked`."""
     plain = dict(arguments["attempt"])

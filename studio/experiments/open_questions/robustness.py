@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from studio.experiments.charts import Chart, Heat
-from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Table, Trial
+from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Table, Trial, kept_as
 from studio.experiments.fleischmann.setting import EQ13, EVALUATIONS, IMPROVED, SWARM, TWIN
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.open_questions.damage import DAMAGES
@@ -143,6 +143,7 @@ def trials_of(question: Question, scale: Scale) -> tuple[Trial, ...]:
     return tuple(found)
 
 
+@kept_as("open_questions.robustness.measure")
 def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
     """Track the damaged footage; the fields of `Tracked`."""
     attempt = Attempt.of_plain(arguments["attempt"])
