@@ -20,8 +20,8 @@ from studio.sessions.atomic_files import write_text
 
 # What decides on an outcome; pages, commands and reports do not.
 SCIENCE = (
-    *("geometry", "body", "capture", "evidence", "volume", "weighting", "behaviour", "tracking", "runs"),
-    *("evaluation", "training"),
+    *("geometry", "motion_files", "body", "capture", "evidence", "volume", "weighting", "behaviour"),
+    *("tracking", "runs", "evaluation", "training"),
 )
 
 

@@ -15,13 +15,13 @@ from studio.behaviour.model_file import read_model
 from studio.body.inverse_kinematics import known_markers, pose_from_markers
 from studio.body.model import BodyModel
 from studio.body.subject import read_subject
-from studio.capture.trc import read_trc
 from studio.errors import NotFoundError, TruthError
 from studio.evaluation.errors import evaluate, rows_of_frames
 from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.experiments.footage_shelf import FootageShelf
 from studio.geometry.camera import Camera
+from studio.motion_files.trc import read_trc
 from studio.runs.behaviour_models import check_prediction, fitting, model_folders, model_path
 from studio.runs.run_behaviour import learner_of
 from studio.runs.search_space import search_space, session_sigma

@@ -11,7 +11,6 @@ import pytest
 from studio.behaviour.feature_space import feature_space
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
-from studio.capture.trc import read_trc, write_trc
 from studio.errors import SettingsError, TruthError
 from studio.experiments.caillette import learnt_files
 from studio.experiments.caillette.following import Follow, Followed, measure
@@ -21,6 +20,7 @@ from studio.experiments.caillette.problems import Known, known_problems, problem
 from studio.experiments.caillette.training_set import Training, learnt, recorded
 from studio.experiments.caillette.true_motion import joint_errors, true_motion
 from studio.experiments.footage_shelf import FootageShelf
+from studio.motion_files.trc import read_trc, write_trc
 from studio.sessions.process_lock import ProcessLock
 from studio.settings import changed_settings, default_settings
 from studio.weighting.problem import Expectant

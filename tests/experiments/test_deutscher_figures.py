@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from studio.body.forward_kinematics import marker_points
-from studio.capture.trc import read_trc
 from studio.experiments.catalogue import EXPERIMENTS
 from studio.experiments.deutscher_reid import body_sequences, fig_3, fig_7, fig_16, figs_19_and_20, processors
 from studio.experiments.deutscher_reid.fewest_particles import Fewest
@@ -22,6 +21,7 @@ from studio.experiments.kept_trials import plain
 from studio.experiments.reproduction_plan import frames_of
 from studio.experiments.tracked import Tracked
 from studio.experiments.tracking_trials import group_of
+from studio.motion_files.trc import read_trc
 
 SAMPLES = Path(__file__).parents[2] / "sample_sessions"
 OURS = tuple(name for name in EXPERIMENTS if name.startswith("deutscher-"))

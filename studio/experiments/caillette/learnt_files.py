@@ -19,7 +19,7 @@ from studio.sessions.process_lock import ProcessLock
 
 LEARNT = "learnt"
 # Code that decides on what is learnt or fitted.
-ROOMS = ("geometry", "body", "behaviour", "synthesis", "training")
+ROOMS = ("geometry", "motion_files", "body", "behaviour", "synthesis", "training")
 WAIT_SECONDS = 0.2
 
 

@@ -23,13 +23,12 @@ from studio.behaviour.model_file import read_model, write_model
 from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
+from studio.body.person import first_frames, sampled
 from studio.experiments.caillette.learnt_files import made_once
 from studio.experiments.caillette.pointing import POINTING, pointing_poses
 from studio.experiments.footage_shelf import FootageShelf
-from studio.synthesis.person import first_frames
 from studio.synthesis.recipe_file import JOINED, find_recipe, read_recipe
 from studio.synthesis.recipes import recipe_motion
-from studio.synthesis.recorded_clip import sampled
 from studio.training.learning import learn
 from studio.training.oversampling import OversamplingSettings, performed
 from studio.training.resampling import frame_times

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from studio.array_archives import read_archive
 from studio.body.forward_kinematics import limb_frames, marker_points
 from studio.body.model import BodyModel
-from studio.capture.trc import MarkerMotion, read_trc
+from studio.body.person import first_frames, marker_motion
 from studio.errors import TruthError
 from studio.experiments.caillette.learnt_files import made_once
 from studio.experiments.footage_shelf import FootageShelf
+from studio.motion_files.trc import MarkerMotion, read_trc
 from studio.sessions.session import Session
-from studio.synthesis.person import first_frames, marker_motion
 from studio.synthesis.recipe_file import read_recipe
 from studio.synthesis.recipes import RECIPE_COPY, recipe_motion, recipe_person
 from studio.training.sources import fitted_person

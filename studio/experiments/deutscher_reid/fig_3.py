@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.capture.trc import read_trc
 from studio.errors import TruthError
 from studio.evaluation.errors import rows_of_frames
 from studio.experiments.charts import Chart, Series
@@ -15,6 +14,7 @@ from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, 
 from studio.experiments.footage_shelf import FootageShelf
 from studio.experiments.statistics import number, overall
 from studio.experiments.tracked import Attempt, track
+from studio.motion_files.trc import read_trc
 from studio.sessions.session import Session
 from studio.tracking.tracker import LayerRecord
 

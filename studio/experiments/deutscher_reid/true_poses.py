@@ -5,9 +5,9 @@ from numpy.typing import NDArray
 
 from studio.body.inverse_kinematics import known_markers, pose_from_markers
 from studio.body.model import BodyModel
-from studio.capture.trc import read_trc
 from studio.errors import TruthError
 from studio.evaluation.errors import rows_of_frames
+from studio.motion_files.trc import read_trc
 from studio.sessions.session import Session
 
 Array = NDArray[np.float64]

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 from scipy.spatial.transform import Rotation
 
+from studio.body.person import SIDES, PersonMotion, joint_points
+from studio.body.retargeting import FLOOR_SHARE, above_floor
 from studio.geometry.rotations import axis_turn
-from studio.synthesis.person import SIDES, PersonMotion, joint_points
-from studio.synthesis.retargeting import FLOOR_SHARE, above_floor
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from studio.errors import StudioError
-from studio.synthesis.acclaim import read_acclaim
+from studio.motion_files.acclaim import read_acclaim
 
 CMU_UNIT = 0.0254 / 0.45 * 1000.0
 SKELETON = """# a leg of two bones

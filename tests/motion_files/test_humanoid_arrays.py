@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from studio.errors import StudioError
-from studio.synthesis.humanoid_arrays import read_humanoid_arrays
+from studio.motion_files.humanoid_arrays import read_humanoid_arrays
 
 FRAMES = 9
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from studio.errors import StudioError
-from studio.synthesis.recorded_motion import RecordedMotion, moved_skeleton
+from studio.motion_files.recorded_motion import RecordedMotion, moved_skeleton
 
 Array = NDArray[np.float64]
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
+from studio.body.person import SIDES, PersonMotion, Skeleton, joint_points
 from studio.errors import StudioError
-from studio.synthesis.person import SIDES, PersonMotion, Skeleton, joint_points
-from studio.synthesis.recorded_motion import RecordedMotion
+from studio.motion_files.recorded_motion import RecordedMotion
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from studio.errors import StudioError
 from studio.geometry.rotations import axis_turn
-from studio.synthesis.recorded_motion import (
+from studio.motion_files.recorded_motion import (
     UP_FROM_Y_UP,
     RecordedMotion,
     at_line,

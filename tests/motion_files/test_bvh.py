@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from studio.errors import StudioError
-from studio.synthesis.bvh import read_bvh
+from studio.motion_files.bvh import read_bvh
 
 TEXT = """HIERARCHY
 ROOT Hips

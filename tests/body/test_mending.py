@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from studio.geometry.rotations import axis_turn
-from studio.synthesis.mending import (
+from studio.body.mending import (
     ankle_bend,
     feet_lost,
     mended,
@@ -13,9 +12,11 @@ from studio.synthesis.mending import (
     with_hands_above_floor,
     with_knees_forward,
 )
+from studio.body.person import PersonMotion, joint_points
+from studio.body.retargeting import lowest_of_sole
+from studio.geometry.rotations import axis_turn
 from studio.synthesis.motions import make_motion
-from studio.synthesis.person import PersonMotion, joint_points, skeleton_of_height
-from studio.synthesis.retargeting import lowest_of_sole
+from studio.synthesis.person import skeleton_of_height
 
 BONES = skeleton_of_height(1760.0, np.random.default_rng(1))
 WALK = make_motion("walk", BONES, 240, 120.0, {})

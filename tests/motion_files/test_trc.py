@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studio.capture.trc import MarkerMotion, read_trc, write_trc
 from studio.errors import TruthError
+from studio.motion_files.trc import MarkerMotion, read_trc, write_trc
 
 HEADER = (
     "PathFileType\t4\t(X/Y/Z)\twalk.trc\n"
