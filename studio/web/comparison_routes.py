@@ -9,17 +9,17 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Response
 
-from studio.errors import NotFoundError, StudioError
-from studio.experiments.comparison import Plan, plan_comparison
-from studio.experiments.comparison_folders import (
+from studio.comparison.entrants import LINEUPS, VARIANTS, WEIGHTING, Lineup
+from studio.comparison.folders import (
     kept_comparison,
     kept_comparisons,
     new_comparison,
     place_of,
     throw_away,
 )
-from studio.experiments.entrants import LINEUPS, VARIANTS, WEIGHTING, Lineup
-from studio.experiments.kept_comparison import FRAMES_NAME, RESULT_NAME, KeptComparison
+from studio.comparison.kept_comparison import FRAMES_NAME, RESULT_NAME, KeptComparison
+from studio.comparison.plan import Plan, plan_comparison
+from studio.errors import NotFoundError, StudioError
 from studio.sessions.session import Session
 from studio.tracking.catalogue import TRACKERS
 from studio.web.comparison_schemas import (

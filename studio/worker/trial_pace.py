@@ -2,8 +2,8 @@
 
 from collections.abc import Callable, Iterable, Mapping
 
-from studio.experiments.kept_trials import KeptOutcome
-from studio.experiments.reproduction_plan import TrialJob
+from studio.comparison.kept_trials import KeptOutcome
+from studio.comparison.trials import TrialJob
 
 # Called with a step in words, what is done of it, how much it is, and the seconds that are left (None: unknown).
 Report = Callable[[str, int, int, float | None], None]

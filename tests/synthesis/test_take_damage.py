@@ -11,9 +11,9 @@ import pytest
 import tomli_w
 
 from studio.body.person import PersonMotion, joint_points
+from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.tracked import Attempt, track
 from studio.errors import StudioError
-from studio.experiments.footage_shelf import FootageShelf
-from studio.experiments.tracked import Attempt, track
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.sessions.session import Session

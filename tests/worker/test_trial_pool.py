@@ -2,8 +2,8 @@
 
 from toy_experiments import measure
 
-from studio.experiments.kept_trials import KeptOutcome
-from studio.experiments.reproduction_plan import TrialJob
+from studio.comparison.kept_trials import KeptOutcome
+from studio.comparison.trials import TrialJob
 from studio.worker.trial_pace import TrialPace
 from studio.worker.trial_pool import next_job
 
