@@ -17,6 +17,7 @@ from studio.reproduction.caillette import (
 from studio.reproduction.deutscher_reid import (
     adaptive_diffusion,
     crossover,
+    fig_3,
     fig_7,
     fig_8,
     fig_16,
@@ -28,23 +29,13 @@ from studio.reproduction.deutscher_reid import (
     processors,
     three_cameras,
 )
-from studio.reproduction.deutscher_reid import fig_3 as deutscher_fig_3
 from studio.reproduction.experiment import Experiment
-from studio.reproduction.fleischmann import (
-    best_figure,
-    computation_time,
-    constraints,
-    fig_3,
-    fig_6,
-    figs_4_5,
-    partitions,
-    table_2,
-)
+from studio.reproduction.fleischmann import computation_time, figures
 from studio.reproduction.open_questions import generalisation, robustness
 
 # One line each: the module's EXPERIMENT, or its EXPERIMENTS. A new module is imported above and named here.
 MODULES: tuple[ModuleType, ...] = (
-    deutscher_fig_3,
+    fig_3,
     fig_7,
     fig_8,
     three_cameras,
@@ -57,13 +48,7 @@ MODULES: tuple[ModuleType, ...] = (
     figs_19_and_20,
     full_body_saving,
     processors,
-    table_2,
-    fig_3,
-    figs_4_5,
-    fig_6,
-    partitions,
-    constraints,
-    best_figure,
+    figures,
     computation_time,
     clusters_and_states,
     table_1,

@@ -4,22 +4,26 @@ Trials of the same attempt are the same trial whichever experiment asks for it, 
 runs from several sides share them.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.comparison.findings import Chart, Number, Series, Table
-from studio.comparison.statistics import number, ratio_interval, sign_test
+from studio.comparison.findings import Chart, Findings, Number, Series, Table
+from studio.comparison.statistics import number, overall, ratio_interval, sign_test
 from studio.comparison.tracked import Attempt, Tracked
-from studio.comparison.tracking_trials import group_of
-from studio.comparison.trials import Outcome
+from studio.comparison.tracking_trials import group_of, measure_tracking, tracking_trial
+from studio.comparison.trials import Outcome, Trial
+from studio.reproduction.drawing import seeds_and_mean
+from studio.reproduction.experiment import Experiment
 from studio.tracking.evaluations import knobs_for_evaluations
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
+Groups = Mapping[str, Sequence[Tracked]]
+Claim = Callable[[Groups], Number | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,9 +36,102 @@ class Contender:
     changes: Mapping[str, Any] = field(default_factory=dict)
 
     def attempt(self, footage: str, seed: int, evaluations: int, **wanted: Any) -> Attempt:  # noqa: ANN401
-        """A run of so many evaluations a frame. wanted : other fields of `Attempt`."""
-        knobs = knobs_for_evaluations(self.tracker, evaluations)
+        """A run of so many evaluations a frame, 0 where the knobs say it. wanted : other fields of `Attempt`."""
+        knobs = knobs_for_evaluations(self.tracker, evaluations) if evaluations else {}
         return Attempt(footage, self.tracker, self.weighting, seed, {**knobs, **self.changes}, **wanted)
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line of an experiment's table of settings: what is tracked with every seed.
+
+    evaluations : a frame, 0 where the contender's knobs say it. wanted : other fields of `Attempt`.
+    """
+
+    name: str
+    contender: Contender
+    footage: str
+    evaluations: int = 0
+    wanted: Mapping[str, Any] = field(default_factory=dict)
+
+    def trial(self, seed: int) -> Trial:
+        """The trial of a seed."""
+        attempt = self.contender.attempt(self.footage, seed, self.evaluations, **self.wanted)
+        return tracking_trial(self.name, attempt)
+
+
+def tracked_experiment(
+    name: str,
+    title: str,
+    source: str,
+    claim: str,
+    *,
+    lines: Callable[[bool], Iterable[Line]],
+    claims: Iterable[Claim],
+    words: Callable[[Groups, Sequence[Number]], str],
+    tables: Iterable[Callable[[Groups], Table]],
+    charts: Iterable[Callable[[Groups], Chart]],
+    settings: Mapping[str, Any] | Callable[[Groups], Mapping[str, Any]],
+    judged: Callable[[Number], bool] = lambda number: True,
+) -> Experiment:
+    """An experiment that is a table of settings and one of claims.
+
+    lines : the settings, for a quick look or in full. claims : what is made a number of the runs by line; None where
+    they do not say it. judged : the numbers that the verdict is on, among those with a verdict of their own.
+    """
+
+    def conclude(outcomes: Sequence[Outcome]) -> Findings:
+        groups = by_group(outcomes)
+        numbers = tuple(number for claimed in claims if (number := claimed(groups)) is not None)
+        return Findings(
+            overall(entry.verdict for entry in numbers if judged(entry)),
+            words(groups, numbers),
+            numbers,
+            tuple(made(groups) for made in tables),
+            tuple(made(groups) for made in charts),
+            settings(groups) if callable(settings) else settings,
+        )
+
+    return Experiment(
+        name,
+        title,
+        source,
+        claim,
+        lambda scale: tuple(line.trial(seed) for line in lines(scale.quick) for seed in scale.seeds),
+        measure_tracking,
+        conclude,
+        tuple(dict.fromkeys(line.footage for line in lines(False))),
+    )
+
+
+def mean_of(name: str, group: str, paper: float | None = None) -> Claim:
+    """The mean over seeds of a line's mean error, beside the paper's."""
+    return lambda groups: mean_number(name, groups[group], paper)
+
+
+def worst_of(name: str, group: str, paper: float | None = None) -> Claim:
+    """The mean over seeds of a line's worst frame, beside the paper's."""
+    return lambda groups: mean_number(name, groups[group], paper, of=lambda run: run.worst_mm)
+
+
+def ratio_of(name: str, ours: str, theirs: str, claim: str) -> Claim:
+    """The ratio of two lines' mean errors; claim : "equal" or "lower"."""
+    return lambda groups: error_ratio(name, groups[ours], groups[theirs], claim)
+
+
+def summary(title: str) -> Callable[[Groups], Table]:
+    """`summary_table` of all lines."""
+    return lambda groups: summary_table(title, groups)
+
+
+def curves_of(title: str, names: Mapping[str, str], fps: float = 60.0) -> Callable[[Groups], Chart]:
+    """`curves` of some lines. names : in the chart, to the lines'."""
+    return lambda groups: curves(title, {name: groups[line] for name, line in names.items()}, fps)
+
+
+def mean_errors(runs: Sequence[Tracked]) -> list[float]:
+    """The mean error of every seed, mm."""
+    return [run.mean_mm for run in runs]
 
 
 def grouped(outcomes: Sequence[Outcome], made: Callable[..., T]) -> dict[str, list[T]]:
@@ -62,12 +159,7 @@ def curves(
     series: list[Series] = []
     for group, runs in groups.items():
         frames = tuple(frame * 60.0 / fps for frame in runs[0].frames)
-        for index, run in enumerate(runs):
-            series.append(
-                Series(f"{group}, seed {index}", frames, tuple(run.per_frame_mm), group=group, thin=True)
-            )
-        mean = tuple(float(value) for value in error_rows(runs).mean(axis=0))
-        series.append(Series(group, frames, mean, group=group))
+        series += seeds_and_mean(group, frames, error_rows(runs))
     return Chart(title, "lines", "frame (at 60 Hz)", "mean error (mm)", tuple(series), bands=bands)
 
 
