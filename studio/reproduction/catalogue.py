@@ -1,7 +1,8 @@
 """All experiments that `studio reproduce` knows, in the order of the report."""
 
 import difflib
-from types import MappingProxyType, ModuleType
+from collections.abc import Iterable
+from types import MappingProxyType
 
 from studio.errors import NotFoundError
 from studio.reproduction.caillette import (
@@ -15,51 +16,49 @@ from studio.reproduction.caillette import (
     table_1,
 )
 from studio.reproduction.deutscher_reid import (
-    adaptive_diffusion,
-    crossover,
     fig_3,
     fig_7,
-    fig_8,
     fig_16,
     figs_12_to_14,
     figs_17_and_18,
     figs_19_and_20,
-    full_body_saving,
-    layers_and_particles,
+    particles_on_arms,
+    particles_on_bodies,
     processors,
-    three_cameras,
+    tracked_people,
 )
 from studio.reproduction.experiment import Experiment
 from studio.reproduction.fleischmann import computation_time, figures
 from studio.reproduction.open_questions import generalisation, robustness
 
-# One line each: the module's EXPERIMENT, or its EXPERIMENTS. A new module is imported above and named here.
-MODULES: tuple[ModuleType, ...] = (
-    fig_3,
-    fig_7,
-    fig_8,
-    three_cameras,
-    layers_and_particles,
-    figs_12_to_14,
-    adaptive_diffusion,
-    fig_16,
-    figs_17_and_18,
-    crossover,
-    figs_19_and_20,
-    full_body_saving,
-    processors,
-    figures,
-    computation_time,
-    clusters_and_states,
-    table_1,
-    fig_11,
-    fig_12,
-    fig_13,
-    scalability,
-    online_learning,
-    best_tracker,
-    robustness,
-    generalisation,
+# A new experiment is named here.
+LISTED: tuple[Experiment, ...] = (
+    fig_3.EXPERIMENT,
+    fig_7.EXPERIMENT,
+    tracked_people.FIG_8,
+    *tracked_people.THREE_CAMERAS,
+    particles_on_bodies.MORE_LAYERS,
+    tracked_people.ENOUGH_PARTICLES,
+    *figs_12_to_14.EXPERIMENTS,
+    particles_on_arms.DIFFUSION,
+    fig_16.EXPERIMENT,
+    *figs_17_and_18.EXPERIMENTS,
+    particles_on_arms.CROSSOVER,
+    *figs_19_and_20.EXPERIMENTS,
+    particles_on_bodies.BOTH_IMPROVEMENTS,
+    processors.EXPERIMENT,
+    *figures.EXPERIMENTS,
+    computation_time.EXPERIMENT,
+    clusters_and_states.EXPERIMENT,
+    table_1.EXPERIMENT,
+    fig_11.EXPERIMENT,
+    *fig_12.EXPERIMENTS,
+    fig_13.EXPERIMENT,
+    scalability.EXPERIMENT,
+    online_learning.EXPERIMENT,
+    best_tracker.EXPERIMENT,
+    *robustness.EXPERIMENTS,
+    generalisation.EXPERIMENT,
 )
 
 ALL = "all"
@@ -67,19 +66,17 @@ ALL = "all"
 RESERVED = (ALL, "list", "footage", "trials")
 
 
-def gathered(modules: tuple[ModuleType, ...]) -> dict[str, Experiment]:
-    """The experiments of some modules by name. Raises ValueError where two share a name."""
+def by_name(experiments: Iterable[Experiment]) -> dict[str, Experiment]:
+    """Experiments by name. Raises ValueError where two share one, or it means something else."""
     found: dict[str, Experiment] = {}
-    for module in modules:
-        own: tuple[Experiment, ...] = getattr(module, "EXPERIMENTS", None) or (module.EXPERIMENT,)
-        for experiment in own:
-            if experiment.name in (*found, *RESERVED):
-                raise ValueError(f"The name '{experiment.name}' of {module.__name__} is taken.")
-            found[experiment.name] = experiment
+    for experiment in experiments:
+        if experiment.name in (*found, *RESERVED):
+            raise ValueError(f"The name '{experiment.name}' is taken.")
+        found[experiment.name] = experiment
     return found
 
 
-EXPERIMENTS = MappingProxyType(gathered(MODULES))
+EXPERIMENTS = MappingProxyType(by_name(LISTED))
 
 
 def find_experiments(

@@ -24,13 +24,13 @@ def floats(values: ArrayLike) -> tuple[float, ...]:
 
 def line(name: str, x: Iterable[float], y: ArrayLike, *, dashed: bool = False) -> Series:
     """A line in a colour of its own."""
-    return Series(name, tuple(x), floats(y), group=name, dashed=dashed)
+    return Series(name, tuple(map(float, x)), floats(y), group=name, dashed=dashed)
 
 
 def seeds_and_mean(name: str, x: Sequence[float], rows: Array, mean: ArrayLike | None = None) -> list[Series]:
     """Every seed's row of (S, X) thin, the mean over the seeds (or another one) thick."""
     thin = [
-        Series(f"{name}, seed {seed}", tuple(x), floats(row), group=name, thin=True)
+        Series(f"{name}, seed {seed}", floats(x), floats(row), group=name, thin=True)
         for seed, row in enumerate(rows)
     ]
     return [*thin, line(name, x, rows.mean(axis=0) if mean is None else mean)]

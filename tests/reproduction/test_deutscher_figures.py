@@ -17,17 +17,22 @@ from studio.comparison.trials import Outcome, Scale, Trial
 from studio.motion_files.trc import read_trc
 from studio.reproduction.catalogue import EXPERIMENTS
 from studio.reproduction.deutscher_reid import (
-    body_sequences,
     fig_3,
     fig_7,
     fig_16,
     figs_19_and_20,
+    particles_on_bodies,
     processors,
 )
 from studio.reproduction.deutscher_reid.fewest_particles import Fewest
-from studio.reproduction.deutscher_reid.fig_8 import CONDENSATION, LARGE, ONE_LAYER, terminal_failure
 from studio.reproduction.deutscher_reid.setting import share_number, succeeded
-from studio.reproduction.deutscher_reid.three_cameras import longest_loss
+from studio.reproduction.deutscher_reid.tracked_people import (
+    CONDENSATION,
+    LARGE,
+    ONE_LAYER,
+    longest_loss,
+    terminal_failure,
+)
 from studio.reproduction.deutscher_reid.true_poses import true_poses
 from studio.reproduction.plan import frames_of
 
@@ -187,10 +192,10 @@ def test_200_particles_are_judged_with_eq_13() -> None:
 
 
 def test_the_fewest_particles_of_a_body_are_sought_on_footage(shelf) -> None:
-    trial = body_sequences.trials(Scale((1,), quick=True), {"Eq. 13": {"survival": 0.5, "layers": 2}})[0]
+    trial = particles_on_bodies.trials(Scale((1,), quick=True), {"Eq. 13": {"survival": 0.5, "layers": 2}})[0]
     arguments = {**json.loads(json.dumps(trial.arguments)), "footage": "walk", "last": 8, "sizes": [1, 60]}
-    found = json.loads(json.dumps(body_sequences.measure(arguments, shelf)))
-    assert found == body_sequences.measure(arguments, shelf)
+    found = json.loads(json.dumps(particles_on_bodies.measure(arguments, shelf)))
+    assert found == particles_on_bodies.measure(arguments, shelf)
     assert Fewest(**found).particles in (1, 60, 3600)
     assert {row[0] for row in found["tried"]} <= {1, 60}
 

@@ -8,7 +8,7 @@ from toy_experiments import toy
 
 from studio.comparison.kept_trials import plain
 from studio.errors import NotFoundError
-from studio.reproduction.catalogue import EXPERIMENTS, find_experiments, gathered
+from studio.reproduction.catalogue import EXPERIMENTS, by_name, find_experiments
 from studio.reproduction.plan import each_once, footage_needed, frames_of, plan, scale_of
 from studio.synthesis.recipe_file import recipe_names
 
@@ -28,13 +28,12 @@ def test_names_are_found(tmp_path) -> None:
 
 
 def test_names_are_taken_once(tmp_path) -> None:
-    first = SimpleNamespace(__name__="first", EXPERIMENT=toy("one", tmp_path))
-    many = SimpleNamespace(__name__="many", EXPERIMENTS=(toy("two", tmp_path), toy("three", tmp_path)))
-    assert list(gathered((first, many))) == ["one", "two", "three"]
-    with pytest.raises(ValueError, match="'one' of first is taken"):
-        gathered((first, first))
+    first, second = toy("one", tmp_path), toy("two", tmp_path)
+    assert list(by_name((first, second))) == ["one", "two"]
+    with pytest.raises(ValueError, match="'one' is taken"):
+        by_name((first, first))
     with pytest.raises(ValueError, match="taken"):
-        gathered((SimpleNamespace(__name__="bad", EXPERIMENT=toy("trials", tmp_path)),))
+        by_name((toy("trials", tmp_path),))
 
 
 @pytest.mark.parametrize("name", EXPERIMENTS)

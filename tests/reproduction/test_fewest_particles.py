@@ -10,14 +10,7 @@ from studio.comparison.findings import Findings
 from studio.comparison.footage_shelf import FootageShelf
 from studio.comparison.tracking_trials import group_of
 from studio.comparison.trials import Outcome, Scale
-from studio.reproduction.deutscher_reid import (
-    adaptive_diffusion,
-    arm_sequences,
-    crossover,
-    full_body_saving,
-    layers_and_particles,
-)
-from studio.reproduction.deutscher_reid.arm_sequences import RATE, arm_sequence, group, is_tracked
+from studio.reproduction.deutscher_reid import particles_on_arms, particles_on_bodies
 from studio.reproduction.deutscher_reid.fewest_particles import (
     ABOVE,
     BELOW,
@@ -30,6 +23,7 @@ from studio.reproduction.deutscher_reid.fewest_particles import (
     sizes,
     successes,
 )
+from studio.reproduction.deutscher_reid.particles_on_arms import RATE, arm_sequence, group, is_tracked
 from studio.reproduction.deutscher_reid.setting import annealing_as_ten
 from studio.reproduction.experiment import Experiment
 from studio.tracking.settings import AnnealedSettings
@@ -125,12 +119,12 @@ def test_an_arm_in_motion_is_tracked_with_many_particles_and_not_with_few() -> N
 
 
 def test_a_trial_is_measured_the_same_again_and_survives_json(tmp_path) -> None:
-    filters = adaptive_diffusion.filters(0.5)
-    trial = arm_sequences.trials(Scale((2,), quick=True), filters, "planar_arm4", 20.0)[0]
+    filters = particles_on_arms.diffusion_filters(0.5)
+    trial = particles_on_arms.trials(Scale((2,), quick=True), filters, "planar_arm4", 20.0)[0]
     arguments = json.loads(json.dumps({**trial.arguments, "frames": 5, "sizes": [8, 32, 128]}))
     shelf = FootageShelf(tmp_path)
-    first = json.loads(json.dumps(arm_sequences.measure(arguments, shelf)))
-    assert first == arm_sequences.measure(arguments, shelf)
+    first = json.loads(json.dumps(particles_on_arms.measure(arguments, shelf)))
+    assert first == particles_on_arms.measure(arguments, shelf)
     assert Fewest(**first).particles in (8, 32, 128, 512)
 
 
@@ -148,7 +142,7 @@ def concluded(experiment: Experiment, needed: dict[str, float]) -> Findings:
     ("slow", "verdict"), [(200.0, "reproduced"), (800.0, "better"), (100.0, "not reproduced")]
 )
 def test_adaptive_diffusion_saves_two_more_or_nothing(slow: float, verdict: str) -> None:
-    experiment = adaptive_diffusion.EXPERIMENT
+    experiment = particles_on_arms.DIFFUSION
     names = {group_of(trial) for trial in experiment.trials(SEEDS)}
     needed = {name: 100.0 for name in names}
     # The verdict is on the first case alone.
@@ -170,9 +164,9 @@ def test_adaptive_diffusion_saves_two_more_or_nothing(slow: float, verdict: str)
     ],
 )
 def test_crossover_saves_on_branches_and_not_on_a_chain(branched: float, chain: float, verdict: str) -> None:
-    experiment = crossover.EXPERIMENT
+    experiment = particles_on_arms.CROSSOVER
     needed = {group_of(trial): 100.0 for trial in experiment.trials(SEEDS)}
-    first = crossover.WITH[0]
+    first = particles_on_arms.ADDED_TO[0]
     assert (first.base, first.survival) == ("adaptive", 0.5)
     needed[group(first.name("parameters"), "branched_arms6", RATE)] = branched
     needed[group(first.name("parameters"), "planar_arm4", RATE)] = chain
@@ -185,11 +179,11 @@ def test_crossover_saves_on_branches_and_not_on_a_chain(branched: float, chain: 
 
 
 def test_every_particle_is_crossed_and_the_chain_is_shared_with_adaptive_diffusion() -> None:
-    trials = crossover.EXPERIMENT.trials(SEEDS)
+    trials = particles_on_arms.CROSSOVER.trials(SEEDS)
     assert {trial.arguments["knobs"]["crossover"] for trial in trials} == {0.0, 1.0}
     keys = [
         {json.dumps(trial.arguments, sort_keys=True) for trial in experiment.trials(SEEDS)}
-        for experiment in (adaptive_diffusion.EXPERIMENT, crossover.EXPERIMENT)
+        for experiment in (particles_on_arms.DIFFUSION, particles_on_arms.CROSSOVER)
     ]
     assert len(keys[0] & keys[1]) == 4 * len(SEEDS.seeds)
 
@@ -197,15 +191,15 @@ def test_every_particle_is_crossed_and_the_chain_is_shared_with_adaptive_diffusi
 def test_six_layers_may_anneal_as_much_as_ten() -> None:
     assert annealing_as_ten(10) == 0.5
     assert annealing_as_ten(6) ** 6 == pytest.approx(0.5**10)
-    assert arm_sequences.SURVIVALS == (0.5, 0.315)
+    assert particles_on_arms.SURVIVALS == (0.5, 0.315)
 
 
 @pytest.mark.parametrize(
     ("both", "verdict"), [(100.0, "reproduced"), (20.0, "better"), (300.0, "not reproduced")]
 )
 def test_both_together_save_four_on_a_whole_body(both: float, verdict: str) -> None:
-    needed = dict(zip(full_body_saving.FILTERS, (400.0, 200.0, both, 100.0), strict=True))
-    found = concluded(full_body_saving.EXPERIMENT, needed)
+    needed = dict(zip(particles_on_bodies.FILTERS, (400.0, 200.0, both, 100.0), strict=True))
+    found = concluded(particles_on_bodies.BOTH_IMPROVEMENTS, needed)
     assert found.verdict == verdict
     assert found.numbers[0].ours == pytest.approx(400.0 / both)
     assert [entry.paper for entry in found.numbers[:2]] == [4.0, 4.0]
@@ -213,16 +207,16 @@ def test_both_together_save_four_on_a_whole_body(both: float, verdict: str) -> N
 
 @pytest.mark.parametrize(("ten", "verdict"), [(100.0, "reproduced"), (300.0, "not reproduced")])
 def test_doubling_the_layers_more_than_halves_the_particles(ten: float, verdict: str) -> None:
-    layers, _ = layers_and_particles.EXPERIMENTS
+    layers = particles_on_bodies.MORE_LAYERS
     found = concluded(layers, {"5 layers": 400.0, "10 layers": ten, "20 layers": 60.0})
     assert found.verdict == verdict
     assert f"{400.0 / ten:.1f} times" in found.words
 
 
 def test_ten_layers_and_eq_13_are_the_same_trial() -> None:
-    layers, _ = layers_and_particles.EXPERIMENTS
+    layers = particles_on_bodies.MORE_LAYERS
     keys = [
         {json.dumps(trial.arguments, sort_keys=True) for trial in experiment.trials(SEEDS)}
-        for experiment in (layers, full_body_saving.EXPERIMENT)
+        for experiment in (layers, particles_on_bodies.BOTH_IMPROVEMENTS)
     ]
     assert len(keys[0] & keys[1]) == len(SEEDS.seeds)

@@ -10,18 +10,18 @@ succeed, these (an upper bound). Pairs in which both ends fail say nothing and a
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-import numpy as np
-
-from studio.comparison.findings import Chart, Number, Series, Table
-from studio.comparison.statistics import bootstrap_interval, number
+from studio.comparison.findings import Chart, Findings, Number, Table
+from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome
 from studio.reproduction.deutscher_reid.setting import geometric_mean
+from studio.reproduction.drawing import bar_chart, intervals, line, places
 from studio.reproduction.tracking import grouped
 
+Groups = Mapping[str, Sequence["Fewest"]]
 ABOVE, BELOW = "above", "below"
 
 
@@ -86,7 +86,7 @@ def needed(name: str, found: Sequence[Fewest]) -> Number:
     return number(name, [entry.particles for entry in found], "particles", statistic=geometric_mean)
 
 
-def censored_in_words(groups: Mapping[str, Sequence[Fewest]]) -> str:
+def censored_in_words(groups: Groups) -> str:
     """Which searches met an end of the grid; empty where none did."""
     told = []
     for name, found in groups.items():
@@ -103,29 +103,36 @@ def censored_in_words(groups: Mapping[str, Sequence[Fewest]]) -> str:
     return ("; ".join(told) + ".") if told else ""
 
 
-def bars(title: str, groups: Mapping[str, Sequence[Fewest]]) -> Chart:
+def times(found: Number, digits: int = 1) -> str:
+    """ "2.1 times (1.9 to 2.3)"."""
+    return f"{found.ours:.{digits}f} times ({found.low:.{digits}f} to {found.high:.{digits}f})"
+
+
+def concluded(
+    groups: Groups,
+    verdict: str,
+    words: str,
+    savings: Iterable[Number],
+    title: str,
+    settings: Mapping[str, Any],
+) -> Findings:
+    """What all experiments on the particles needed show: savings, needs, shares of success, each seed's. title : of
+    the chart of needs.
+    """
+    numbers = (*savings, *(needed(f"particles needed: {name}", found) for name, found in groups.items()))
+    charts = (bars(title, groups), successes("Runs that succeed, by particles", groups))
+    table = per_seed("Fewest particles with which most runs succeed", groups)
+    return Findings(verdict, words, numbers, (table,), charts, settings)
+
+
+def bars(title: str, groups: Groups) -> Chart:
     """The particles that each filter needs, with intervals over the seeds."""
-    values = [[entry.particles for entry in found] for found in groups.values()]
-    ends = [bootstrap_interval(row, geometric_mean) for row in values]
-    series = Series(
-        "particles needed",
-        tuple(float(index) for index in range(len(values))),
-        tuple(float(geometric_mean(np.array(row))) for row in values),
-        low=tuple(low for low, _ in ends),
-        high=tuple(high for _, high in ends),
-    )
-    return Chart(
-        title,
-        "bars",
-        "filter",
-        "particles needed for success",
-        (series,),
-        categories=tuple(groups),
-        log_y=False,
-    )
+    rows = ([entry.particles for entry in found] for found in groups.values())
+    series = intervals("particles needed", places(len(groups)), rows, geometric_mean)
+    return bar_chart(title, "filter", "particles needed for success", (series,), groups)
 
 
-def successes(title: str, groups: Mapping[str, Sequence[Fewest]]) -> Chart:
+def successes(title: str, groups: Groups) -> Chart:
     """Share of the runs that succeeded with so many particles, over all seeds' bisections (which try a size only
     where it matters, so neighbouring sizes rest on different seeds).
     """
@@ -137,11 +144,11 @@ def successes(title: str, groups: Mapping[str, Sequence[Fewest]]) -> Chart:
             total[0], total[1] = total[0] + good, total[1] + runs
         order = sorted(won)
         shares = tuple(won[size][0] / won[size][1] for size in order)
-        series.append(Series(name, tuple(float(size) for size in order), shares, group=name))
+        series.append(line(name, order, shares))
     return Chart(title, "lines", "particles", "runs that succeed (share)", tuple(series), log_x=True)
 
 
-def per_seed(title: str, groups: Mapping[str, Sequence[Fewest]]) -> Table:
+def per_seed(title: str, groups: Groups) -> Table:
     """A line a filter, a column a seed."""
     mark = {ABOVE: "> ", BELOW: "≤ ", "": ""}
     count = max(len(found) for found in groups.values())
