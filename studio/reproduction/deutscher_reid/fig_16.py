@@ -10,16 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from studio.comparison.findings import Chart, Findings, Number, Series, Table
+from studio.comparison.findings import Chart, Findings, Number, Table
 from studio.comparison.footage_shelf import FootageShelf
-from studio.comparison.statistics import bootstrap_interval, ratio_number, sign_test
+from studio.comparison.statistics import ratio_number, sign_test
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.reproduction.deutscher_reid.arms import localise
+from studio.reproduction.deutscher_reid.localisation import BRANCHED, CHAIN, scene
 from studio.reproduction.deutscher_reid.setting import EQ18_WORDS, SOURCE
-from studio.reproduction.deutscher_reid.variance_reduction import scene
+from studio.reproduction.drawing import intervals, line_chart
 from studio.reproduction.experiment import Experiment
 
-CHAIN, BRANCHED = "planar_arm4", "branched_arms6"
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 # Eight layers as in Fig. 18.
 SETTINGS: Mapping[str, Any] = {"layers": 8, "particles": 100, "survival": 0.3}
@@ -123,24 +123,14 @@ def _ratio(key: tuple[str, str], rows: np.ndarray) -> Number:
 
 def _chart(body: str, groups: Groups) -> Chart:
     """The paper's graph: SSD over the share of crossover."""
-    series = []
     percent = tuple(100.0 * share for share in SHARES)
-    for (owner, cut), rows in groups.items():
-        if owner != body:
-            continue
-        ends = [bootstrap_interval(column.tolist()) for column in rows.T]
-        series.append(
-            Series(
-                cut,
-                percent,
-                tuple(rows.mean(axis=0).tolist()),
-                low=tuple(low for low, _ in ends),
-                high=tuple(high for _, high in ends),
-                group=cut,
-            )
-        )
+    series = [
+        intervals(cut, percent, rows.T.tolist(), group=cut)
+        for (owner, cut), rows in groups.items()
+        if owner == body
+    ]
     panel = "a: no branches" if body == CHAIN else "b: branched"
-    return Chart(f"Match over crossover ({panel})", "lines", "crossover (%)", "SSD", tuple(series))
+    return line_chart(f"Match over crossover ({panel})", "crossover (%)", "SSD", series)
 
 
 def _table(groups: Groups) -> Table:

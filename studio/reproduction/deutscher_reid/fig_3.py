@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.comparison.findings import Chart, Findings, Series, Table
+from studio.comparison.findings import Chart, Findings
 from studio.comparison.footage_shelf import FootageShelf
 from studio.comparison.statistics import number, overall
 from studio.comparison.tracked import Attempt, track
@@ -15,6 +15,7 @@ from studio.errors import TruthError
 from studio.evaluation.errors import rows_of_frames
 from studio.motion_files.trc import read_trc
 from studio.reproduction.deutscher_reid.setting import BODY, CIRCLE, PLAIN, SOURCE, WEIGHTING, share_number
+from studio.reproduction.drawing import layer_table, line, line_chart, places, seeds_and_mean
 from studio.reproduction.experiment import Experiment
 from studio.sessions.session import Session
 from studio.tracking.tracker import LayerRecord
@@ -118,31 +119,16 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
         "from the true place: "
         "the person who was rendered is not made of cones, and a layer of Eq. 13 first spreads more than it selects."
     )
-    drawn = outcomes[0].measured["clouds"]
     clouds = tuple(
-        Series(
-            f"layer {layer + 1}",
-            tuple(np.array(cloud)[:, 0]),
-            tuple(np.array(cloud)[:, 1]),
-            group=f"layer {layer + 1}",
-        )
-        for layer, cloud in zip(DRAWN_LAYERS, drawn, strict=True)
+        line(f"layer {layer + 1}", *np.array(cloud).T)
+        for layer, cloud in zip(DRAWN_LAYERS, outcomes[0].measured["clouds"], strict=True)
     )
-    axis = tuple(float(layer) for layer in range(1, layers + 1))
-    thin = tuple(
-        Series(f"spread, seed {seed}", axis, tuple(row), group="spread", thin=True)
-        for seed, row in enumerate(spreads)
-    )
-    mean = Series("spread", axis, tuple(spreads.mean(axis=0)), group="spread")
+    fall = seeds_and_mean("spread", places(layers, first=1), spreads)
     charts = (
         Chart("Particles of one frame around the true place", "points", "x (mm)", "y (mm)", clouds),
-        Chart("Spread over the layers", "lines", "layer", "spread (mm)", (*thin, mean), log_y=True),
+        line_chart("Spread over the layers", "layer", "spread (mm)", fall, log_y=True),
     )
-    table = Table(
-        "Mean spread",
-        ("layer", "mm"),
-        tuple((int(layer), round(float(v), 2)) for layer, v in zip(axis, spreads.mean(axis=0), strict=True)),
-    )
+    table = layer_table("Mean spread", ("mm",), spreads.mean(axis=0)[:, None], digits=2)
     settings = {"footage": CIRCLE, "body": BODY, "weighting": WEIGHTING, **KNOBS}
     return Findings(overall(entry.verdict for entry in numbers), words, numbers, (table,), charts, settings)
 

@@ -26,6 +26,7 @@ from studio.reproduction.deutscher_reid.setting import (
     times_in_words,
 )
 from studio.reproduction.deutscher_reid.true_poses import true_poses
+from studio.reproduction.drawing import line, line_chart
 from studio.reproduction.experiment import Experiment
 from studio.settings import changed_settings, default_settings
 from studio.weighting.catalogue import WEIGHTINGS
@@ -185,10 +186,8 @@ def _charts(outcomes: Sequence[Outcome]) -> tuple[Chart, ...]:
     charts = []
     for outcome in outcomes[:2]:
         angles, truth = tuple(outcome.measured["angles"]), outcome.measured["truth"]
-        series = tuple(
-            Series(name, angles, tuple(np.exp(np.array(values)).tolist()), group=name)
-            for name, values in outcome.measured["log_weights"].items()
-        )
+        weights = outcome.measured["log_weights"].items()
+        series = tuple(line(name, angles, np.exp(values)) for name, values in weights)
         title = f"Weight against the right knee's angle, frame {outcome.trial.arguments['frame']}"
         bands = ((truth - 1.0, truth + 1.0, "true angle"),)
         charts.append(Chart(title, "lines", "right knee (°)", "weight", series, bands=bands))
@@ -202,15 +201,8 @@ def _charts(outcomes: Sequence[Outcome]) -> tuple[Chart, ...]:
         )
         for index, outcome in enumerate(outcomes)
     )
-    charts.append(
-        Chart(
-            "Edges and region together, every frame",
-            "lines",
-            "knee from its true angle (°)",
-            "weight",
-            shifted,
-        )
-    )
+    title, axis = "Edges and region together, every frame", "knee from its true angle (°)"
+    charts.append(line_chart(title, axis, "weight", shifted))
     return tuple(charts)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import marker_points
-from studio.comparison.findings import Chart, Findings, Series, Table
+from studio.comparison.findings import Chart, Findings, Table
 from studio.comparison.footage_shelf import FootageShelf
 from studio.comparison.statistics import number
 from studio.comparison.tracked import Attempt, track
@@ -27,6 +27,7 @@ from studio.reproduction.deutscher_reid.setting import (
     share_number,
     times_in_words,
 )
+from studio.reproduction.drawing import layer_table, line, line_chart, places, seeds_and_mean
 from studio.reproduction.experiment import Experiment
 from studio.runs.hierarchy import hierarchy_of
 from studio.tracking.tracker import LayerRecord
@@ -37,6 +38,7 @@ FRAMES, QUICK_FRAMES = 20, 8
 # From one seed's first frame to the next one's.
 STRIDE, QUICK_STRIDE, FOOTAGE_FRAMES = 37, 20, 240
 KNOBS: Mapping[str, Any] = {**IMPROVED, "layers": 10, "particles": 200}
+SHARE = "variance over the first cloud's"
 # Ranks in the tree: the root; what hangs on the trunk; what lies beyond elbow and knee.
 RANKS = ("torso", "hips, shoulders and head", "elbows, knees and beyond")
 # Markers of both sides that tell how far out a part is.
@@ -168,44 +170,29 @@ def conclude_fig_20(outcomes: Sequence[Outcome]) -> Findings:
         f"layers, is in order hips, knees, ankles in {times_in_words(legs)} and shoulders, elbows, wrists in "
         f"{times_in_words(arms)}; Fig. 20 shows the order from the torso to the limbs' joints. {EQ18_WORDS}"
     )
-    layers = tuple(float(layer) for layer in range(1, scatter.shape[1] + 1))
-    series = tuple(
-        Series(name, layers, tuple(scatter[:, :, index].mean(axis=0)), group=name)
-        for index, name in enumerate(names)
-    )
-    chart = Chart(
-        "Scatter of the particles' joints over the layers", "lines", "layer", "mm", series, log_y=True
-    )
-    rows = tuple(
-        (int(layer), *(round(float(value), 1) for value in row))
-        for layer, row in zip(layers, scatter.mean(axis=0), strict=True)
-    )
-    table = Table("Mean scatter (mm)", ("layer", *names), rows)
+    mean = scatter.mean(axis=0)
+    fall = (line(name, places(len(mean), first=1), mean[:, index]) for index, name in enumerate(names))
+    chart = line_chart("Scatter of the particles' joints over the layers", "layer", "mm", fall, log_y=True)
+    table = layer_table("Mean scatter (mm)", names, mean)
     return Findings(order.verdict, words, numbers, (table,), (chart,), _settings())
 
 
 def _rank_chart(shares: Array, rank: NDArray[np.int64]) -> Chart:
-    layers = tuple(float(layer) for layer in range(1, shares.shape[1] + 1))
-    series: list[Series] = []
-    for index, name in enumerate(RANKS):
-        rows = shares[:, :, rank == index].mean(axis=2)
-        series += [
-            Series(f"{name}, seed {seed}", layers, tuple(row), group=name, thin=True)
-            for seed, row in enumerate(rows)
-        ]
-        series.append(Series(name, layers, tuple(rows.mean(axis=0)), group=name))
-    title = "Variance over the layers, by rank in the tree"
-    return Chart(title, "lines", "layer", "variance over the first cloud's", tuple(series), log_y=True)
+    layers = places(shares.shape[1], first=1)
+    series = [
+        entry
+        for index, name in enumerate(RANKS)
+        for entry in seeds_and_mean(name, layers, shares[:, :, rank == index].mean(axis=2))
+    ]
+    return line_chart("Variance over the layers, by rank in the tree", "layer", SHARE, series, log_y=True)
 
 
 def _parameter_chart(outcomes: Sequence[Outcome], shares: Array) -> Chart:
-    layers = tuple(float(layer) for layer in range(1, shares.shape[1] + 1))
-    series = tuple(
-        Series(label, layers, tuple(shares[:, :, index].mean(axis=0)), group=label)
-        for index, label in enumerate(outcomes[0].measured["parameters"])
+    layers, mean = places(shares.shape[1], first=1), shares.mean(axis=0)
+    series = (
+        line(label, layers, mean[:, index]) for index, label in enumerate(outcomes[0].measured["parameters"])
     )
-    title = "Variance over the layers, every parameter"
-    return Chart(title, "lines", "layer", "variance over the first cloud's", series, log_y=True)
+    return line_chart("Variance over the layers, every parameter", "layer", SHARE, series, log_y=True)
 
 
 def _small(value: float) -> str:

@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from studio.comparison.findings import Chart, Findings, Series, Table
+from studio.comparison.findings import Findings, Series, Table
 from studio.comparison.footage_shelf import FootageShelf
 from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.numba_in_threads import numba
 from studio.reproduction.deutscher_reid.setting import CIRCLE, PLAIN, SOURCE, WEIGHTING
+from studio.reproduction.drawing import line, line_chart
 from studio.reproduction.experiment import Experiment
 from studio.runs.search_space import default_sigma, search_space
 from studio.settings import changed_settings, default_settings
@@ -131,12 +132,12 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
         "rounds; other programs on the machine lower the figures."
     )
     axis = tuple(float(count) for count in counts)
-    series = tuple(
-        Series(label, axis, tuple(speed[what].mean(axis=0)), group=label)
+    series = (
+        line(label, axis, speed[what].mean(axis=0))
         for what, label in (("frame", "a whole frame"), ("weighing", "weighing alone"))
     )
     claimed = Series("paper: 0.8 each", axis, tuple(max(1.0, PAPER * count) for count in counts), dashed=True)
-    chart = Chart("Speed-up over processors", "lines", "processors", "times as fast", (*series, claimed))
+    chart = line_chart("Speed-up over processors", "processors", "times as fast", (*series, claimed))
     rows = tuple(
         (
             count,

@@ -8,8 +8,8 @@ import pytest
 from studio.comparison.findings import Findings
 from studio.comparison.footage_shelf import FootageShelf
 from studio.comparison.trials import Outcome, Scale
-from studio.reproduction.deutscher_reid import figs_12_to_14, figs_17_and_18
-from studio.reproduction.deutscher_reid.variance_reduction import (
+from studio.reproduction.deutscher_reid import localisation
+from studio.reproduction.deutscher_reid.localisation import (
     SETTINGS,
     crossing_layers,
     measure,
@@ -19,7 +19,7 @@ from studio.reproduction.deutscher_reid.variance_reduction import (
 from studio.reproduction.experiment import Experiment
 
 SEEDS = Scale(tuple(range(6)))
-FIGURES = {entry.name: entry for entry in (*figs_12_to_14.EXPERIMENTS, *figs_17_and_18.EXPERIMENTS)}
+FIGURES = {entry.name: entry for entry in (*localisation.EXPERIMENTS, *localisation.EXPERIMENTS_ON_BRANCHES)}
 
 
 def falling(shares: list[list[float]], noisy: float = 1.0) -> dict:
@@ -57,7 +57,7 @@ def test_seeds_are_counted_as_the_claim_says() -> None:
     assert found.crossings.tolist() == [[1, 2, 3], [2, 2, 3], [1, 2, 4], [3, 2, 1]]
     assert found.strictly_rising.tolist() == [True, False, False, False]
     assert found.even.tolist() == [False, True, False, False]
-    assert found.mean_shares[0].tolist() == [1.0, 1.0, 1.0]
+    assert found.mean_layers == "2.8, 2.8, 3.8"
 
 
 @pytest.fixture(scope="module")
@@ -117,10 +117,10 @@ def test_the_plain_filter_is_even_or_the_words_say_why(measured: dict[str, Outco
         # The reason given, measured: noise delays the first joint more than the last one, and noise that hides
         # selection loses the arm.
         groups = reductions([measured[key] for key in measured if "planar_arm4" in key])
-        planned, adaptive = groups[figs_12_to_14.WITHOUT], groups[figs_12_to_14.WITH]
+        planned, adaptive = groups[localisation.WITHOUT], groups[localisation.WITH]
         delay = (planned.crossings - adaptive.crossings).mean(axis=0)
         assert delay[0] > delay[-1] + 0.5
-        assert groups[figs_12_to_14.WITH_LOUD].errors.mean() > 0.5
+        assert groups[localisation.WITH_LOUD].errors.mean() > 0.5
 
 
 def test_both_branched_arms_are_localised_from_the_hinge(measured: dict[str, Outcome]) -> None:
@@ -163,8 +163,8 @@ def test_verdicts_follow_what_was_measured() -> None:
 def test_trials_of_figures_12_to_14_are_shared() -> None:
     searches = [
         json.dumps(trial.arguments, sort_keys=True)
-        for experiment in figs_12_to_14.EXPERIMENTS
+        for experiment in localisation.EXPERIMENTS
         for trial in experiment.trials(SEEDS)
     ]
     assert len(set(searches)) == 3 * len(SEEDS.seeds)
-    assert {experiment.measure for experiment in figs_12_to_14.EXPERIMENTS} == {measure}
+    assert {experiment.measure for experiment in localisation.EXPERIMENTS} == {measure}
