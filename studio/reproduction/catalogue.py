@@ -6,10 +6,8 @@ from types import MappingProxyType
 
 from studio.errors import NotFoundError
 from studio.reproduction.caillette import (
-    best_tracker,
     clusters_and_states,
-    fig_11,
-    fig_12,
+    dynamics,
     fig_13,
     online_learning,
     scalability,
@@ -50,12 +48,12 @@ LISTED: tuple[Experiment, ...] = (
     computation_time.EXPERIMENT,
     clusters_and_states.EXPERIMENT,
     table_1.EXPERIMENT,
-    fig_11.EXPERIMENT,
-    *fig_12.EXPERIMENTS,
+    dynamics.FIG_11_EXPERIMENT,
+    *dynamics.FIG_12_EXPERIMENTS,
     fig_13.EXPERIMENT,
     scalability.EXPERIMENT,
     online_learning.EXPERIMENT,
-    best_tracker.EXPERIMENT,
+    dynamics.BEST_TRACKER,
     *robustness.EXPERIMENTS,
     generalisation.EXPERIMENT,
 )

@@ -5,11 +5,15 @@ found again after the program was killed), how one trial is measured, and what a
 paper's claim. Running, keeping and showing them is the same for all.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
-from studio.comparison.findings import Findings, Heading
+from studio.comparison.findings import Chart, Findings, Heading, Number, Table
+from studio.comparison.statistics import overall
 from studio.comparison.trials import Measure, Outcome, Scale, Trial
+
+G = TypeVar("G")
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,3 +32,34 @@ class Experiment(Heading):
     conclude: Callable[[Sequence[Outcome]], Findings]
     footage: tuple[str, ...] = ()
     alone: bool = False
+
+
+def concluding(
+    read: Callable[[Sequence[Outcome]], G],
+    *,
+    claims: Iterable[Callable[[G], Number | None]],
+    words: Callable[[G, Sequence[Number]], str],
+    tables: Iterable[Callable[[G], Table]],
+    charts: Iterable[Callable[[G], Chart]],
+    settings: Mapping[str, Any] | Callable[[Sequence[Outcome]], Mapping[str, Any]],
+    judged: Callable[[Number], bool] = lambda number: True,
+) -> Callable[[Sequence[Outcome]], Findings]:
+    """A conclusion that is a table of claims.
+
+    read : what all outcomes say together. claims : each makes a number of that, None where it does not say it.
+    judged : the numbers that the verdict is on, among those with a verdict of their own.
+    """
+
+    def conclude(outcomes: Sequence[Outcome]) -> Findings:
+        found = read(outcomes)
+        numbers = tuple(number for claim in claims if (number := claim(found)) is not None)
+        return Findings(
+            overall(number.verdict for number in numbers if judged(number)),
+            words(found, numbers),
+            numbers,
+            tuple(made(found) for made in tables),
+            tuple(made(found) for made in charts),
+            settings(outcomes) if callable(settings) else settings,
+        )
+
+    return conclude

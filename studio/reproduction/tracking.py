@@ -11,13 +11,13 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.comparison.findings import Chart, Findings, Number, Series, Table
-from studio.comparison.statistics import number, overall, ratio_interval, sign_test
+from studio.comparison.findings import Chart, Number, Series, Table
+from studio.comparison.statistics import number, ratio_interval, sign_test
 from studio.comparison.tracked import Attempt, Tracked
 from studio.comparison.tracking_trials import group_of, measure_tracking, tracking_trial
 from studio.comparison.trials import Outcome, Trial
 from studio.reproduction.drawing import seeds_and_mean
-from studio.reproduction.experiment import Experiment
+from studio.reproduction.experiment import Experiment, concluding
 from studio.tracking.evaluations import knobs_for_evaluations
 
 Array = NDArray[np.float64]
@@ -71,27 +71,13 @@ def tracked_experiment(
     words: Callable[[Groups, Sequence[Number]], str],
     tables: Iterable[Callable[[Groups], Table]],
     charts: Iterable[Callable[[Groups], Chart]],
-    settings: Mapping[str, Any] | Callable[[Groups], Mapping[str, Any]],
+    settings: Mapping[str, Any] | Callable[[Sequence[Outcome]], Mapping[str, Any]],
     judged: Callable[[Number], bool] = lambda number: True,
 ) -> Experiment:
     """An experiment that is a table of settings and one of claims.
 
-    lines : the settings, for a quick look or in full. claims : what is made a number of the runs by line; None where
-    they do not say it. judged : the numbers that the verdict is on, among those with a verdict of their own.
+    lines : the settings, for a quick look or in full. claims and the rest : of `concluding`, from the runs by line.
     """
-
-    def conclude(outcomes: Sequence[Outcome]) -> Findings:
-        groups = by_group(outcomes)
-        numbers = tuple(number for claimed in claims if (number := claimed(groups)) is not None)
-        return Findings(
-            overall(entry.verdict for entry in numbers if judged(entry)),
-            words(groups, numbers),
-            numbers,
-            tuple(made(groups) for made in tables),
-            tuple(made(groups) for made in charts),
-            settings(groups) if callable(settings) else settings,
-        )
-
     return Experiment(
         name,
         title,
@@ -99,7 +85,15 @@ def tracked_experiment(
         claim,
         lambda scale: tuple(line.trial(seed) for line in lines(scale.quick) for seed in scale.seeds),
         measure_tracking,
-        conclude,
+        concluding(
+            by_group,
+            claims=claims,
+            words=words,
+            tables=tables,
+            charts=charts,
+            settings=settings,
+            judged=judged,
+        ),
         tuple(dict.fromkeys(line.footage for line in lines(False))),
     )
 

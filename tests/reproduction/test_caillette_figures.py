@@ -9,7 +9,7 @@ import pytest
 
 from studio.comparison.findings import VERDICTS, Findings
 from studio.comparison.trials import Outcome, Scale, Trial
-from studio.reproduction.caillette import clusters_and_states, comparing, fig_12, fig_13, scalability
+from studio.reproduction.caillette import clusters_and_states, comparing, dynamics, fig_13, scalability
 from studio.reproduction.caillette.following import Follow, Followed
 from studio.reproduction.catalogue import EXPERIMENTS
 from studio.synthesis.recipe_file import find_recipe
@@ -288,7 +288,7 @@ def test_ratios_and_root_mean_squares() -> None:
     assert halves.ours == pytest.approx(0.5, rel=0.01)
     assert halves.verdict == "reproduced"
     assert comparing.ratio("none", [run], [run], "").verdict == "answered"
-    assert fig_12.FEW.changes["model_free_share"] == 0.0
+    assert dynamics.FEW.changes["model_free_share"] == 0.0
 
 
 def test_every_column_of_a_summary_is_its_own_measure() -> None:

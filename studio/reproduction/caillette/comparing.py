@@ -17,6 +17,7 @@ from studio.comparison.statistics import number, ratio_interval
 from studio.comparison.trials import Outcome
 from studio.reproduction.caillette.following import Followed
 from studio.reproduction.caillette.setting import FPS
+from studio.reproduction.drawing import places, seeds_and_mean
 from studio.reproduction.tracking import claimed_verdict, grouped
 
 Array = NDArray[np.float64]
@@ -107,13 +108,7 @@ def curves(title: str, groups: Groups, measure: str = LIMB) -> Chart:
     series: list[Series] = []
     for group, runs in groups.items():
         rows = np.array([getattr(run, field) for run in runs])
-        frames = tuple(float(frame) for frame in range(rows.shape[1]))
-        series += [
-            Series(f"{group}, seed {index}", frames, tuple(row.tolist()), group=group, thin=True)
-            for index, row in enumerate(rows)
-        ]
-        whole = np.sqrt((rows**2).mean(axis=0))
-        series.append(Series(group, frames, tuple(whole.tolist()), group=group))
+        series += seeds_and_mean(group, places(rows.shape[1]), rows, np.sqrt((rows**2).mean(axis=0)))
     return Chart(title, "lines", f"frame (at {FPS} Hz)", axis, tuple(series))
 
 

@@ -5,6 +5,7 @@ Footage: two exercises of real modern dance, performed anew by a rendered person
 (`dance-unseen`). Training: the exercises as recorded and two more performances of each, each smoothed five times.
 """
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
@@ -60,6 +61,11 @@ def last_frame(footage: str, quick: bool, most: int | None = None) -> int:
 def training(quick: bool) -> Training:
     """What models are learnt from: both exercises; the first alone for a quick look."""
     return QUICK_TRAINING if quick else BOTH
+
+
+def taught_with(memory: int, quick: bool) -> Training:
+    """That, for an automaton with a memory."""
+    return dataclasses.replace(training(quick), memory=memory)
 
 
 def training_words(quick: bool) -> str:

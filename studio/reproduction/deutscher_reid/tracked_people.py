@@ -18,6 +18,7 @@ import numpy as np
 from studio.comparison.findings import Chart, Number, Series
 from studio.comparison.statistics import number
 from studio.comparison.tracked import Tracked
+from studio.comparison.trials import Outcome
 from studio.reproduction.deutscher_reid.particles_on_bodies import FRAMES as FEW_FRAMES
 from studio.reproduction.deutscher_reid.particles_on_bodies import first_frame
 from studio.reproduction.deutscher_reid.setting import (
@@ -82,8 +83,8 @@ def _successes(groups: Groups, name: str) -> str:
     return times_in_words([succeeded(run) for run in groups[name]])
 
 
-def _frames(groups: Groups) -> int:
-    return len(next(iter(groups.values()))[0].frames)
+def _frames(outcomes: Sequence[Outcome]) -> int:
+    return len(outcomes[0].measured["frames"])
 
 
 def _all_curves(groups: Groups) -> Chart:
@@ -198,9 +199,9 @@ FIG_8 = tracked_experiment(
     words=_fig_8_words,
     tables=(summary("Trackers of Fig. 8"),),
     charts=(_all_curves, _kept_chart),
-    settings=lambda groups: {
+    settings=lambda outcomes: {
         "footage": CIRCLE,
-        "frames": _frames(groups),
+        "frames": _frames(outcomes),
         "body": BODY,
         "weighting": WEIGHTING,
         **{f"{one.name}: {knob}": value for one in CONTENDERS for knob, value in one.changes.items()},
@@ -301,9 +302,9 @@ def _figure(figure: Figure) -> Experiment:
         words=lambda groups, numbers: _figure_words(figure, groups),
         tables=(summary(f"Fig. {figure.number}: {figure.what}"),),
         charts=(_all_curves,),
-        settings=lambda groups: {
+        settings=lambda outcomes: {
             "footage": figure.footage,
-            "frames": _frames(groups),
+            "frames": _frames(outcomes),
             "body": figure.body,
             **{f"{one.name}: {knob}": value for one in FILTERS for knob, value in one.changes.items()},
             **{f"{one.name}: weighting": one.weighting for one in FILTERS},
