@@ -6,13 +6,13 @@ making of the masks. The best of the repeats counts, on as many threads as Numba
 """
 
 import dataclasses
-import time
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.benchmarks.kernels import filled
+from studio.benchmarks.made_scene import camera_towards, filled
+from studio.benchmarks.timing import quickest
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_frames
 from studio.body.model import BodyModel
@@ -33,7 +33,6 @@ Bytes = NDArray[np.uint8]
 WIDTH, HEIGHT, FOCAL = 320, 240, 300.0
 DISTANCE, LOW, HIGH = 3300.0, 1500.0, 2500.0
 """mm: the ring's radius, and the cameras' heights in turn."""
-DISTORTION = (-0.32, 0.14, 0.0, 0.0, 0.0)
 VIEWS, DEPTHS = (3, 4, 5), (6, 7, 8)
 TABLE_1 = {3: (11.0, 24.1, 73.5), 4: (11.1, 22.8, 66.0), 5: (12.8, 28.1, 78.6)}
 """Milliseconds by number of views, at depths 6, 7 and 8."""
@@ -59,16 +58,11 @@ def run_hull_benchmark(
             reconstructor = Reconstructor(cameras, box_of(cameras), HullSettings(hull_depth=depth))
             for kind, evidence in seen.items():
                 contests[views, depth, kind] = _carving(reconstructor, evidence)
-    best = dict.fromkeys(contests, np.inf)
-    for repeat in range(repeats + 1):
-        for key, run in contests.items():
-            start = time.perf_counter()
-            run()
-            # The first round compiles and warms up.
-            if repeat:
-                best[key] = min(best[key], time.perf_counter() - start)
-        if progress is not None:
-            progress("Carving hulls", repeat, repeats)
+    best = quickest(
+        contests,
+        repeats,
+        on_round=lambda done: progress("Carving hulls", done, repeats) if progress else None,
+    )
     rows = [
         {
             "views": views,
@@ -91,23 +85,13 @@ def run_hull_benchmark(
 
 def ring_of_small_cameras(count: int) -> tuple[Camera, ...]:
     """Cameras around the world's origin, looking at a person's middle, in turn lower and higher."""
-    matrix = np.array([[FOCAL, 0.0, WIDTH / 2], [0.0, FOCAL, HEIGHT / 2], [0.0, 0.0, 1.0]])
     cameras: list[Camera] = []
     for number in range(count):
         bearing = 2.0 * np.pi * number / count + 0.3
-        centre = np.array(
-            [DISTANCE * np.cos(bearing), DISTANCE * np.sin(bearing), HIGH if number % 2 else LOW]
-        )
-        forward = np.array([0.0, 0.0, 950.0]) - centre
-        forward /= np.linalg.norm(forward)
-        right = np.cross(forward, [0.0, 0.0, 1.0])
-        right /= np.linalg.norm(right)
-        rotation = np.stack([right, np.cross(forward, right), forward])
-        cameras.append(
-            Camera(
-                f"ring{number + 1}", WIDTH, HEIGHT, matrix, np.array(DISTORTION), rotation, -rotation @ centre
-            )
-        )
+        height = HIGH if number % 2 else LOW
+        centre = np.array([DISTANCE * np.cos(bearing), DISTANCE * np.sin(bearing), height])
+        middle = np.array([0.0, 0.0, 950.0])
+        cameras.append(camera_towards(f"ring{number + 1}", (WIDTH, HEIGHT), FOCAL, centre, middle))
     return tuple(cameras)
 
 

@@ -8,13 +8,14 @@ memory as a whole the loads alone would take half as long again, and flatter the
 repeated in turns and the best of each counted, so that another process taking a core for a moment changes
 little."""
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.benchmarks.made_scene import camera_towards, filled
+from studio.benchmarks.timing import quickest
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
@@ -38,7 +39,6 @@ Array = NDArray[np.float64]
 WIDTH, HEIGHT = 640, 480
 FOCAL, DISTANCE, ABOVE = 560.0, 3300.0, 1700.0
 """Pixels and mm: a person about 200 pixels tall, seen from above as by the Lee walk's cameras."""
-DISTORTION = (-0.32, 0.14, 0.0, 0.0, 0.0)
 FRAMES_PER_SECOND = 60.0
 POSES = 1008
 LIMIT_BLOCKS, LIMIT_PASSES = 4, 20
@@ -97,19 +97,11 @@ def run_benchmark(
 def ring_of_cameras(body: BodyModel) -> tuple[Camera, ...]:
     """Four cameras around a body in its neutral pose, looking at its middle."""
     middle = limb_ends(body, body.neutral[None]).reshape(-1, 3).mean(axis=0)
-    matrix = np.array([[FOCAL, 0.0, WIDTH / 2], [0.0, FOCAL, HEIGHT / 2], [0.0, 0.0, 1.0]])
     cameras: list[Camera] = []
     for number in range(4):
         bearing = np.deg2rad(45.0 + 90.0 * number)
         centre = middle + np.array([DISTANCE * np.cos(bearing), DISTANCE * np.sin(bearing), ABOVE])
-        forward = (middle - centre) / np.linalg.norm(middle - centre)
-        right = np.cross(forward, [0.0, 0.0, 1.0])
-        right /= np.linalg.norm(right)
-        rotation = np.stack([right, np.cross(forward, right), forward])
-        distortion = np.array(DISTORTION)
-        cameras.append(
-            Camera(f"made{number + 1}", WIDTH, HEIGHT, matrix, distortion, rotation, -rotation @ centre)
-        )
+        cameras.append(camera_towards(f"made{number + 1}", (WIDTH, HEIGHT), FOCAL, centre, middle))
     return tuple(cameras)
 
 
@@ -129,17 +121,6 @@ def made_evidence(
         frames["proximity"].append(ViewEvidence(camera.name, picture, mask, proximity))
         frames["bodytrack"].append(ViewEvidence(camera.name, picture, mask, bodytrack_edges(picture)))
     return {kind: FrameEvidence(0, tuple(views)) for kind, views in frames.items()}
-
-
-def filled(outlines: Array, width: int, height: int) -> NDArray[np.uint8]:
-    """(H, W) 255 where a pixel's centre lies in any of the convex outlines (L, 4, 2)."""
-    x, y = np.meshgrid(np.arange(width, dtype=np.float64), np.arange(height, dtype=np.float64))
-    mask = np.zeros((height, width), dtype=np.bool_)
-    for outline in outlines[np.isfinite(outlines).all(axis=(1, 2))]:
-        edges = zip(outline, np.roll(outline, -1, axis=0), strict=True)
-        sides = np.array([(q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]) for p, q in edges])
-        mask |= (sides >= 0.0).all(axis=0) | (sides <= 0.0).all(axis=0)
-    return np.where(mask, np.uint8(255), np.uint8(0))
 
 
 def weighing_contests(
@@ -202,23 +183,12 @@ def limit_contest(problem: EdgeRegionProblem, poses: Array) -> Contest:
 
 def timed(contests: list[Contest], repeats: int, progress: Progress | None) -> dict[str, float]:
     """The best time of each, seconds, all run in turns."""
-    threads = numba.get_num_threads()
-    best: dict[str, float] = {}
-    try:
-        for repeat in range(repeats + 1):
-            for contest in contests:
-                numba.set_num_threads(contest.threads)
-                start = time.perf_counter()
-                contest.run()
-                elapsed = time.perf_counter() - start
-                # The first round compiles and warms up.
-                if repeat:
-                    best[contest.name] = min(best.get(contest.name, np.inf), elapsed)
-            if progress is not None:
-                progress("Weighing", repeat, repeats)
-    finally:
-        numba.set_num_threads(threads)
-    return best
+    return quickest(
+        {contest.name: contest.run for contest in contests},
+        repeats,
+        {contest.name: contest.threads for contest in contests},
+        lambda done: progress("Weighing", done, repeats) if progress else None,
+    )
 
 
 def _weighing(problem: FrameFunction, poses: Array) -> Callable[[], object]:

@@ -5,25 +5,52 @@ the number of views hardly, particles count in proportion, and all together keep
 """
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from studio.behaviour.model import BehaviourModel
 from studio.benchmarks.hulls import TABLE_1
+from studio.benchmarks.timing import quickest
 from studio.comparison.findings import Chart, Findings, Number, Series, Table
 from studio.comparison.footage_shelf import FootageShelf
 from studio.comparison.statistics import number, overall
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.numba_in_threads import numba
-from studio.reproduction.caillette.setting import MEMORY, SOURCE, TEST, TEST_640, training
-from studio.reproduction.caillette.table_1_timing import blob_fitting, carving, searching
+from studio.reproduction.caillette.problems import Known
+from studio.reproduction.caillette.setting import (
+    BLOBS,
+    GUIDED,
+    MEMORY,
+    SOURCE,
+    TEST,
+    TEST_640,
+    guided,
+    training,
+)
 from studio.reproduction.caillette.training_set import Training, learnt
 from studio.reproduction.caillette.true_motion import true_motion
 from studio.reproduction.deutscher_reid.setting import share_number
 from studio.reproduction.experiment import Experiment
+from studio.runs.behaviour_models import fitting
+from studio.runs.search_space import search_space, session_sigma
+from studio.sessions.session import Session
+from studio.settings import changed_settings, default_settings
+from studio.tracking.catalogue import TRACKERS
+from studio.tracking.frame_loop import search_frame
+from studio.tracking.tracker import Carried, FrameResult, start_of
+from studio.volume.blob_fitting import fit_blobs
 from studio.volume.hull import Hull
+from studio.volume.reconstruction import Reconstructor
+from studio.volume.tracking_space import box_of
+from studio.weighting.blobs import BlobProblem, BlobWeigher
+from studio.weighting.catalogue import WEIGHTINGS
 
+Array = NDArray[np.float64]
+
+ROUNDS = 3
 DEPTHS, VIEWS, PARTICLES = (6, 7, 8), (3, 4, 5), (500, 1000)
 PAPER = {
     **{
@@ -81,6 +108,86 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
                 spent = searching(session, hulls, truth, count, model, int(arguments["seed"]))
                 found[f"particles {count}"] = spent
     return found
+
+
+def carving(
+    shelf: FootageShelf, session: Session, last: int, depth: int, views: int
+) -> tuple[float, list[Hull]]:
+    """Milliseconds of a hull, and the hulls of the first frames. Pictures are read and decoded before."""
+    settings = changed_settings(default_settings(GUIDED, BLOBS), {"hull_depth": depth})
+    weighting, cameras = WEIGHTINGS[BLOBS], session.cameras()
+    reconstructor = Reconstructor(cameras[:views], box_of(cameras), settings.weighting)
+    fewer = []
+    for frame in range(last):
+        seen = shelf.evidence(
+            session, cameras, frame, settings.evidence, weighting.edge_kind, weighting.reads_pictures
+        )
+        fewer.append(dataclasses.replace(seen, views=seen.views[:views]))
+    hulls = [reconstructor.hull(frame) for frame in fewer]
+    return _milliseconds([lambda frame=frame: reconstructor.hull(frame) for frame in fewer]), hulls
+
+
+def blob_fitting(session: Session, hulls: Sequence[Hull], truth: Array) -> float:
+    """Milliseconds of a fit from one prediction, the true pose (F, D) of the frame before, with blobs learnt from the
+    frames themselves.
+    """
+    weigher, body = _weigher(session), session.body()
+    memory: Mapping[str, Array] = {}
+    for hull, pose in zip(hulls, truth, strict=True):
+        memory = BlobProblem(weigher, hull).expecting(pose[None], memory).remembered(pose)
+    model = weigher.model(memory)
+    starts = truth[[max(0, frame - 1) for frame in range(len(hulls))]]
+    return _milliseconds(
+        [
+            lambda hull=hull, start=start: fit_blobs(hull, model, body, start[None])
+            for hull, start in zip(hulls, starts, strict=True)
+        ]
+    )
+
+
+def searching(
+    session: Session,
+    hulls: Sequence[Hull],
+    truth: Array,
+    particles: int,
+    model: BehaviourModel,
+    seed: int,
+) -> float:
+    """Milliseconds of a frame of the guided tracker whose blobs are fitted already: prediction, evaluation, drawing."""
+    body, fps = session.body(), session.manifest.fps
+    space = search_space(body, session_sigma(session, body, fps), fitting(model, body, fps))
+    contender = guided(particles)
+    settings = changed_settings(default_settings(contender.tracker, BLOBS), contender.changes).tracker
+    weigher = _weigher(session)
+
+    def search(told: Known, before: Carried, frame: int) -> FrameResult:
+        return search_frame(
+            TRACKERS[contender.tracker],
+            told,
+            before,
+            space,
+            seed=seed,
+            frame=frame,
+            settings_source=lambda: (1, settings),
+        )
+
+    carried, frames = start_of(tuple(float(value) for value in truth[0])), []
+    for frame, (hull, pose) in enumerate(zip(hulls, truth, strict=True)):
+        told = Known(BlobProblem(weigher, hull).expecting(pose[None], {}))
+        if frame:
+            frames.append(lambda told=told, before=carried, frame=frame: search(told, before, frame))
+        carried = search(told, carried, frame).carried
+    return _milliseconds(frames)
+
+
+def _milliseconds(works: Sequence[Callable[[], Any]]) -> float:
+    """The mean over several works of the quickest of some rounds each."""
+    return 1000.0 * float(np.mean(list(quickest(dict(enumerate(works)), ROUNDS).values())))
+
+
+def _weigher(session: Session) -> BlobWeigher:
+    settings = default_settings(GUIDED, BLOBS)
+    return BlobWeigher(session.body(), session.cameras(), settings.weighting)
 
 
 def conclude(outcomes: Sequence[Outcome]) -> Findings:

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.benchmarks.made_scene import filled
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends, limb_frames
 from studio.body.model import BodyModel
@@ -112,16 +113,7 @@ def silhouette(body: BodyModel, camera: Camera, pose: Array) -> NDArray[np.uint8
     """(H, W) 255 where a pixel's centre lies inside the outline of a limb, else 0; pose (D,)."""
     shapes = kinematic_tables(body).limb_shape
     corners, _ = project(camera, limb_outlines(shapes, limb_frames(body, pose[None]), camera)[0])
-    x, y = np.meshgrid(np.arange(camera.width, dtype=float), np.arange(camera.height, dtype=float))
-    inside = np.zeros(x.shape, dtype=bool)
-    for outline in corners:
-        following = np.roll(outline, -1, axis=0)
-        turns = [
-            (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0])
-            for a, b in zip(outline, following, strict=True)
-        ]
-        inside |= np.all(np.array(turns) >= 0, axis=0) | np.all(np.array(turns) <= 0, axis=0)
-    return np.where(inside, np.uint8(255), np.uint8(0))
+    return filled(corners, camera.width, camera.height)
 
 
 def true_pose(space: SearchSpace, seed: int) -> Array:

@@ -6,12 +6,12 @@ The paper's filter takes 60 s a frame, all of it in the weighting; here a frame 
 shared (drawing, noise, a lock) is a larger part of it, so the weighting alone is measured beside the whole frame.
 """
 
-import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from studio.benchmarks.timing import quickest
 from studio.comparison.findings import Findings, Series, Table
 from studio.comparison.footage_shelf import FootageShelf
 from studio.comparison.statistics import number
@@ -68,29 +68,19 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
             settings_source=lambda: (1, settings.tracker),
         )
 
-    before = numba.get_num_threads()
     # A process that runs alone begins with one thread a core.
-    threads = list(range(1, before + 1))
-    try:
-        return {
-            "threads": threads,
-            "frame": _fewest(frame, threads, arguments["rounds"]),
-            "weighing": _fewest(lambda: problem.weigh(poses), threads, arguments["rounds"]),
-        }
-    finally:
-        numba.set_num_threads(before)
+    threads = list(range(1, numba.get_num_threads() + 1))
 
+    def milliseconds(work: Callable[[], object]) -> list[float]:
+        every = dict.fromkeys(threads, work)
+        found = quickest(every, arguments["rounds"], {count: count for count in threads})
+        return [1000.0 * found[count] for count in threads]
 
-def _fewest(work: Any, threads: Sequence[int], rounds: int) -> list[float]:  # noqa: ANN401 - any callable
-    """Milliseconds of the quickest of some rounds, for each number of threads; they take turns."""
-    found = np.full(len(threads), np.inf)
-    for _ in range(rounds + 1):
-        for place, count in enumerate(threads):
-            numba.set_num_threads(count)
-            began = time.perf_counter()
-            work()
-            found[place] = min(found[place], 1000.0 * (time.perf_counter() - began))
-    return found.tolist()
+    return {
+        "threads": threads,
+        "frame": milliseconds(frame),
+        "weighing": milliseconds(lambda: problem.weigh(poses)),
+    }
 
 
 def conclude(outcomes: Sequence[Outcome]) -> Findings:
