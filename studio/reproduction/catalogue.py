@@ -8,8 +8,7 @@ from studio.errors import NotFoundError
 from studio.reproduction.caillette import (
     clusters_and_states,
     dynamics,
-    fig_13,
-    online_learning,
+    models,
     scalability,
     table_1,
 )
@@ -50,9 +49,9 @@ LISTED: tuple[Experiment, ...] = (
     table_1.EXPERIMENT,
     dynamics.FIG_11_EXPERIMENT,
     *dynamics.FIG_12_EXPERIMENTS,
-    fig_13.EXPERIMENT,
+    models.FIG_13,
     scalability.EXPERIMENT,
-    online_learning.EXPERIMENT,
+    models.ONLINE_LEARNING,
     dynamics.BEST_TRACKER,
     *robustness.EXPERIMENTS,
     generalisation.EXPERIMENT,

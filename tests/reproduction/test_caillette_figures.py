@@ -9,7 +9,7 @@ import pytest
 
 from studio.comparison.findings import VERDICTS, Findings
 from studio.comparison.trials import Outcome, Scale, Trial
-from studio.reproduction.caillette import clusters_and_states, comparing, dynamics, fig_13, scalability
+from studio.reproduction.caillette import clusters_and_states, comparing, dynamics, models, scalability
 from studio.reproduction.caillette.following import Follow, Followed
 from studio.reproduction.catalogue import EXPERIMENTS
 from studio.synthesis.recipe_file import find_recipe
@@ -227,7 +227,7 @@ def test_fig_13_asks_that_longer_memories_are_better() -> None:
     assert bad.verdict == "not reproduced"
     assert "does not help" in bad.words
     assert f"{0.5:.2f}" in bad.words
-    assert len(EXPERIMENTS["caillette-fig-13"].trials(SCALE)) == len(fig_13.MEMORIES) * 4
+    assert len(EXPERIMENTS["caillette-fig-13"].trials(SCALE)) == len(models.MEMORIES) * 4
 
 
 def test_clusters_stand_beside_the_papers() -> None:

@@ -23,6 +23,7 @@ from studio.reproduction.tracking import claimed_verdict, grouped
 Array = NDArray[np.float64]
 Runs = Sequence[Followed]
 Groups = Mapping[str, Runs]
+Error = Callable[[Followed], float]
 
 OFF_MM = 150.0
 """RMS over the markers: the body is no longer on the person."""
@@ -79,7 +80,7 @@ def loses_track(run: Followed) -> bool:
     return longest_loss(run) >= 1.0
 
 
-def ratio(name: str, ours: Runs, theirs: Runs, claim: str, of: Callable[[Followed], float] = limb) -> Number:
+def ratio(name: str, ours: Runs, theirs: Runs, claim: str, of: Error = limb) -> Number:
     """The ratio of two contenders' errors, paired by seed. claim : "equal" or "lower" (`claimed_verdict`), "" where
     there is none.
     """
@@ -92,12 +93,12 @@ def ratio(name: str, ours: Runs, theirs: Runs, claim: str, of: Callable[[Followe
     )
 
 
-def error_number(name: str, runs: Runs, of: Callable[[Followed], float] = limb, unit: str = "°") -> Number:
+def error_number(name: str, runs: Runs, of: Error = limb, unit: str = "°") -> Number:
     """The mean over seeds of a run's error; the paper prints curves and no figures."""
     return number(name, [of(run) for run in runs], unit)
 
 
-def mean_of(runs: Runs, of: Callable[[Followed], float] = limb) -> float:
+def mean_of(runs: Runs, of: Error = limb) -> float:
     """The mean over seeds."""
     return float(np.mean([of(run) for run in runs]))
 

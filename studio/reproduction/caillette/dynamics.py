@@ -26,6 +26,7 @@ from studio.reproduction.caillette.comparing import (
     MEASURES,
     OFF_MM,
     POSITION,
+    Error,
     Groups,
     Runs,
     angle,
@@ -65,7 +66,6 @@ from studio.reproduction.tracking import Contender
 from studio.tracking.evaluations import knobs_for_evaluations
 
 Claim = Callable[[Groups], Number | None]
-Error = Callable[[Followed], float]
 
 BLIND = (CONDENSATION, ANNEALED, IMPROVED)
 PREDICTION = {"prediction": "behaviour"}
