@@ -1,7 +1,8 @@
 """Motion files in Biovision's BVH: a hierarchy of joints with offsets and channels, then a row of numbers a frame.
 
-Read strictly: whatever is not understood is refused with its line. The rest pose is that of all angles zero, y up
-and facing z, as in the CMU clips. BVH names no unit; the CMU clips' is 25.4 / 0.45 mm.
+Read strictly: whatever is not understood is refused with its line. `read_bvh_file` gives what the file says, in its own
+unit and axes. As a recording (`read_bvh`) the rest pose is that of all angles zero, y up and facing z, as in the CMU
+clips, and only the root may move. BVH names no unit; the CMU clips' is 25.4 / 0.45 mm.
 """
 
 from dataclasses import dataclass, field
@@ -28,27 +29,81 @@ CHANNELS = {f"{axis}{kind}": (kind, "XYZ".index(axis)) for axis in "XYZ" for kin
 REMEDY = "Correct the line, or export the file again."
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class BvhFile:
+    """What a file says, in its unit and axes.
+
+    names, parents : joints in the file's order, end sites named after their parent with `_end`; is_end : (J,) which
+    those are. offsets : (J, 3). moves : (F, J, 3) position channels, 0 where there is none; moved : (J, 3) where there
+    is one. turns : (F, J, 3, 3) in the parent's frame.
+    """
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    is_end: NDArray[np.bool_]
+    offsets: Array
+    moves: Array
+    moved: NDArray[np.bool_]
+    turns: Array
+    fps: float
+
+    def followed(self) -> tuple[Array, Array]:
+        """Places (F, J, 3) and turns (F, J, 3, 3) of the joints in the file's world, without end sites. A position
+        channel stands in the offset's place, as Blender reads it.
+        """
+        places, turned = np.where(self.moved, self.moves, self.offsets), self.turns.copy()
+        for joint, parent in enumerate(self.parents):
+            if parent >= 0:
+                turned[:, joint] = turned[:, parent] @ self.turns[:, joint]
+                step = (turned[:, parent] @ places[:, joint][..., None])[..., 0]
+                places[:, joint] = places[:, parent] + step
+        return places[:, ~self.is_end], turned[:, ~self.is_end]
+
+
 @dataclass(slots=True)
 class _Hierarchy:
     """What the upper half of the file says. channels : of each joint the words after their number."""
 
     names: list[str] = field(default_factory=list)
     parents: list[int] = field(default_factory=list)
+    is_end: list[bool] = field(default_factory=list)
     offsets: list[list[float]] = field(default_factory=list)
     channels: list[list[str]] = field(default_factory=list)
 
 
 def read_bvh(path: Path, unit_mm: float = CMU_UNIT) -> RecordedMotion:
-    """The motion in a BVH file; end sites become joints named after their parent with `_end`.
+    """The motion in a BVH file; end sites become joints. A position channel of the root adds to its offset.
 
     Raises StudioError naming file, line and remedy.
     """
+    found = read_bvh_file(path)
+    if found.moved[1:].any():
+        joint = found.names[1 + int(found.moved[1:].any(axis=1).argmax())]
+        raise StudioError(
+            f"'{path.name}': joint '{joint}' has position channels, which only the root may have.",
+            "Export with fixed bone lengths.",
+        )
+    return moved_skeleton(
+        found.names,
+        found.parents,
+        found.offsets,
+        found.turns,
+        found.offsets[0] + found.moves[:, 0],
+        fps=found.fps,
+        source=path.name,
+        axes=UP_FROM_Y_UP,
+        scale=unit_mm,
+    )
+
+
+def read_bvh_file(path: Path) -> BvhFile:
+    """The joints and their motion as they are written. Raises StudioError naming file, line and remedy."""
     lines = text_lines(path)
     hierarchy, at = _read_hierarchy(path, lines)
     fps, rows = _read_rows(path, lines, at, sum(map(len, hierarchy.channels)))
     count = len(hierarchy.names)
-    local = np.tile(np.eye(3), (len(rows), count, 1, 1))
-    root = np.tile(np.array(hierarchy.offsets[0]), (len(rows), 1))
+    turns = np.tile(np.eye(3), (len(rows), count, 1, 1))
+    moves, moved = np.zeros((len(rows), count, 3)), np.zeros((count, 3), dtype=np.bool_)
     column = 0
     for joint, channels in enumerate(hierarchy.channels):
         for channel in channels:
@@ -56,25 +111,25 @@ def read_bvh(path: Path, unit_mm: float = CMU_UNIT) -> RecordedMotion:
             values = rows[:, column]
             column += 1
             if kind == "rotation":
-                local[:, joint] = local[:, joint] @ axis_turn(axis, np.radians(values))
-            elif joint == 0:
-                root[:, axis] += values
-    return moved_skeleton(
+                turns[:, joint] = turns[:, joint] @ axis_turn(axis, np.radians(values))
+            else:
+                moves[:, joint, axis] += values
+                moved[joint, axis] = True
+    return BvhFile(
         tuple(hierarchy.names),
         tuple(hierarchy.parents),
+        np.array(hierarchy.is_end),
         np.array(hierarchy.offsets),
-        local,
-        root,
-        fps=fps,
-        source=path.name,
-        axes=UP_FROM_Y_UP,
-        scale=unit_mm,
+        moves,
+        moved,
+        turns,
+        fps,
     )
 
 
 def _read_hierarchy(path: Path, lines: list[str]) -> tuple[_Hierarchy, int]:
     """The joints, and the number of the line "MOTION" (from 0)."""
-    found, open_joints, pending = _Hierarchy(), [], ""
+    found, open_joints, pending, is_end = _Hierarchy(), [], "", False
     for index, text in enumerate(lines):
         words = text.split()
         head, line = (words[0] if words else ""), index + 1
@@ -85,13 +140,15 @@ def _read_hierarchy(path: Path, lines: list[str]) -> tuple[_Hierarchy, int]:
         if head in ("ROOT", "JOINT", "End"):
             if (head == "ROOT") != (not found.names) or len(words) < 2:
                 raise at_line(path, line, f"'{text.strip()}' does not belong here", REMEDY)
-            pending = f"{found.names[open_joints[-1]]}_end" if head == "End" else words[1]
+            is_end = head == "End"
+            pending = f"{found.names[open_joints[-1]]}_end" if is_end else words[1]
         elif head == "{" and pending:
             if pending in found.names:
                 raise at_line(path, line, f"there is a second joint '{pending}'", "Rename one of them.")
             found.parents.append(open_joints[-1] if open_joints else -1)
             open_joints.append(len(found.names))
             found.names.append(pending)
+            found.is_end.append(is_end)
             found.offsets.append([])
             found.channels.append([])
             pending = ""
@@ -102,20 +159,16 @@ def _read_hierarchy(path: Path, lines: list[str]) -> tuple[_Hierarchy, int]:
         elif head == "OFFSET" and open_joints and len(words) == 4:
             found.offsets[open_joints[-1]] = numbers(path, line, words[1:])
         elif head == "CHANNELS" and open_joints:
-            found.channels[open_joints[-1]] = _channels(path, line, words, is_root=len(open_joints) == 1)
+            found.channels[open_joints[-1]] = _channels(path, line, words)
         elif head not in ("HIERARCHY", ""):
             raise at_line(path, line, f"'{text.strip()[:40]}' is not understood", REMEDY)
     raise StudioError(f"'{path.name}' has no MOTION.", "Give a BVH file with its frames.")
 
 
-def _channels(path: Path, line: int, words: list[str], *, is_root: bool) -> list[str]:
+def _channels(path: Path, line: int, words: list[str]) -> list[str]:
     names = words[2:]
     if len(words) < 2 or words[1] != str(len(names)) or not set(names) <= set(CHANNELS):
         raise at_line(path, line, "the channels do not match their number, or one is unknown", REMEDY)
-    if not is_root and any(CHANNELS[name][0] == "position" for name in names):
-        raise at_line(
-            path, line, "only the root may have position channels", "Export with fixed bone lengths."
-        )
     return names
 
 

@@ -1,5 +1,6 @@
 """Motion as it was recorded from a person: a tree of joints moving over time, whatever file it came from."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -110,7 +111,7 @@ def numbers(path: Path, line: int, words: list[str]) -> list[float]:
             value = float(word)
         except ValueError:
             value = float("nan")
-        if not np.isfinite(value):
+        if not math.isfinite(value):
             raise at_line(
                 path, line, f"'{word}' is not a number", "Correct the line, or fetch the file anew."
             )

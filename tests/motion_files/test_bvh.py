@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from studio.errors import StudioError
-from studio.motion_files.bvh import read_bvh
+from studio.motion_files.bvh import read_bvh, read_bvh_file
 
 TEXT = """HIERARCHY
 ROOT Hips
@@ -59,7 +59,11 @@ def test_a_small_tree_stands_where_scipy_puts_it(tmp_path: Path) -> None:
         ("OFFSET 1 0 0", "OFFSET 1 0 x", "line 8: 'x' is not a number"),
         ("    OFFSET 1 0 0\n", "", "joint 'Leg' has no OFFSET"),
         ("CHANNELS 3 Yrotation", "CHANNELS 3 Wrotation", "line 9"),
-        ("CHANNELS 3 Yrotation Zrotation", "CHANNELS 3 Yposition Zrotation", "only the root"),
+        (
+            "CHANNELS 3 Yrotation Zrotation",
+            "CHANNELS 3 Yposition Zrotation",
+            "joint 'Leg' has position channels",
+        ),
         ("JOINT Leg", "JOINT Hips", "second joint 'Hips'"),
         ("Frames: 2", "Frames: 3", "3 frames are announced, 2 follow"),
         ("Frame Time: .0083333", "Frame Time: 0", "line 18"),
@@ -75,6 +79,23 @@ def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, old: str, new: str
     assert words in told.value.message
     assert "'tiny.bvh'" in told.value.message
     assert told.value.hint
+
+
+def test_a_file_says_which_joints_move_and_keeps_its_own_axes(tmp_path: Path) -> None:
+    text = TEXT.replace(
+        "CHANNELS 3 Yrotation Zrotation Xrotation", "CHANNELS 3 Xposition Yposition Zposition"
+    )
+    found = read_bvh_file(written(tmp_path, text))
+    assert found.names == ("Hips", "Leg", "Leg_end")
+    assert found.is_end.tolist() == [False, False, True]
+    assert found.moved.all(axis=1).tolist() == [True, True, False]
+    places, turns = found.followed()
+    assert places.shape == (2, 2, 3)
+    hips = Rotation.from_euler("ZYX", [30, 20, 10], degrees=True)
+    # Where there are position channels, they stand in the offset's place.
+    np.testing.assert_allclose(places[0, 0], [1.0, 2.0, 3.0])
+    np.testing.assert_allclose(places[0, 1], places[0, 0] + hips.apply([50.0, 60.0, 70.0]), atol=1e-9)
+    np.testing.assert_allclose(turns[0, 1], hips.as_matrix(), atol=1e-12)
 
 
 @pytest.mark.real_data
