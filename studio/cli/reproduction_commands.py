@@ -19,8 +19,8 @@ from studio.reproduction.experiment import Experiment
 from studio.reproduction.findings_files import number_in_words, read_findings
 from studio.reproduction.plan import FULL_SEEDS, QUICK_SEEDS, scale_of
 from studio.reproduction.runner import Reproduction, reproduce
+from studio.reproduction.trial_pace import Report
 from studio.sessions.workspace import workspace_root
-from studio.worker.trial_pace import Report
 
 NOT_CONCLUDED = 1
 SECONDS_BETWEEN_LINES = 10.0

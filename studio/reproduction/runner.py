@@ -16,12 +16,12 @@ from studio.reproduction.conclusion import conclude
 from studio.reproduction.experiment import Experiment
 from studio.reproduction.findings_files import FOOTAGE, TRIALS, write_findings, write_overview
 from studio.reproduction.plan import PlannedExperiment, each_once, footage_needed, is_rendered, plan
+from studio.reproduction.trial_pace import Report, TrialPace
 from studio.sessions.atomic_files import PARTIAL_PREFIX, discard, move_into_place, new_folder_beside
 from studio.sessions.manifest import FILE_NAME as MANIFEST
 from studio.sessions.manifest import now
 from studio.sessions.process_lock import ProcessLock
 from studio.synthesis.recipes import synthesize
-from studio.worker.trial_pace import Report, TrialPace
 from studio.worker.trial_pool import cores, run_jobs
 from studio.worker.trial_process import TrialResult
 

@@ -7,15 +7,16 @@ that each row begins with what the tracker reaches undamaged.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from studio.comparison.findings import Chart, Findings, Heat, Table
+from studio.comparison.findings import Chart, Heat, Table
 from studio.comparison.footage_shelf import FootageShelf
 from studio.comparison.tracked import Attempt, Tracked, track
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
-from studio.reproduction.experiment import Experiment
+from studio.reproduction.experiment import Experiment, concluding
 from studio.reproduction.fleischmann.setting import EQ13, EVALUATIONS, IMPROVED, SWARM, TWIN
 from studio.reproduction.open_questions.damage import DAMAGES
 from studio.reproduction.tracking import Contender, by_group
@@ -42,7 +43,7 @@ CONTENDERS = (
 @dataclass(frozen=True, slots=True)
 class Question:
     """One heat map. degrees : from none to much. damage : of DAMAGES. fields : a degree as fields of an attempt,
-    where no evidence is damaged but less of it is given.
+    where no evidence is damaged but less of it is given. shown : a degree on the axis.
     """
 
     name: str
@@ -53,30 +54,13 @@ class Question:
     footage: str = TWIN
     damage: str = "none"
     fields: Callable[[float], dict[str, Any]] = lambda degree: {}
-
-    def shown(self, degree: float) -> str:
-        """The degree on the axis."""
-        return f"{degree:g}"
+    shown: Callable[[float], str] = "{:g}".format
 
 
 def fewer_cameras(count: float) -> dict[str, Any]:
     """So many of the eight, spread as evenly as can be (two neighbours would see the same side)."""
     order = (1, 5, 3, 7, 2, 6, 4, 8)
     return {"cameras": tuple(sorted(f"cam{number}" for number in order[: int(count)]))}
-
-
-def slower(step: float) -> dict[str, Any]:
-    """Only every so many frames are seen."""
-    return {"every": int(step)}
-
-
-@dataclass(frozen=True, slots=True)
-class Rates(Question):
-    """Degrees are steps between the frames seen; shown as frames a second."""
-
-    def shown(self, degree: float) -> str:
-        """Frames a second."""
-        return f"{60.0 / degree:g}"
 
 
 QUESTIONS = (
@@ -113,13 +97,15 @@ QUESTIONS = (
         footage=EIGHT,
         fields=fewer_cameras,
     ),
-    Rates(
+    Question(
         "fewer-frames",
         "Few frames a second",
         "frames a second",
         "How few frames a second are enough?",
         (1.0, 2.0, 3.0, 4.0, 6.0, 10.0),
-        fields=slower,
+        # Only every so many frames are seen.
+        fields=lambda step: {"every": int(step)},
+        shown=lambda step: f"{60.0 / step:g}",
     ),
 )
 
@@ -129,16 +115,17 @@ def group(contender: Contender, question: Question, degree: float) -> str:
     return f"{contender.name}, {question.shown(degree)}"
 
 
-def trials_of(question: Question, scale: Scale) -> tuple[Trial, ...]:
+def _trials(question: Question, scale: Scale) -> tuple[Trial, ...]:
     """Every contender at every degree with every seed."""
     found: list[Trial] = []
+    last = QUICK_FRAMES if scale.quick else FRAMES
     for contender in CONTENDERS:
         for degree in question.degrees:
+            damage = {"damage": question.damage, "degree": degree if question.damage != "none" else 0.0}
             for seed in scale.seeds[:MOST_SEEDS]:
-                fields = question.fields(degree)
-                last = QUICK_FRAMES if scale.quick else FRAMES
-                attempt = contender.attempt(question.footage, seed, EVALUATIONS, last=last, **fields)
-                damage = {"damage": question.damage, "degree": degree if question.damage != "none" else 0.0}
+                attempt = contender.attempt(
+                    question.footage, seed, EVALUATIONS, last=last, **question.fields(degree)
+                )
                 label = f"{group(contender, question, degree)}, seed {seed}"
                 found.append(Trial(label, {"attempt": attempt.plain(), **damage}))
     return tuple(found)
@@ -152,92 +139,89 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
     return asdict(track(attempt, shelf, spoilt=spoilt))
 
 
-def conclude_of(question: Question, outcomes: Sequence[Outcome]) -> Findings:
-    """The heat maps of error and of losses, and up to which degree each contender stands."""
-    cells = by_group(outcomes)
-    errors = {
-        entry.name: [_mean_error(cells[group(entry, question, degree)]) for degree in question.degrees]
-        for entry in CONTENDERS
-    }
-    losses = {
-        entry.name: [_lost_share(cells[group(entry, question, degree)]) for degree in question.degrees]
-        for entry in CONTENDERS
-    }
-    columns = tuple(question.shown(degree) for degree in question.degrees)
-    rows = tuple(entry.name for entry in CONTENDERS)
-    charts = (
-        _heat(f"{question.title}: mean error (mm)", question, columns, rows, errors),
-        _heat(f"{question.title}: frames with a limb lost (%)", question, columns, rows, losses),
-    )
-    best = min(rows, key=lambda name: errors[name][-1])
-    words = (
-        " ".join(f"{name} stands {_standing(question, errors[name], losses[name])}." for name in rows)
-        + f" At the last degree ({columns[-1]} {question.axis}) {best} is the nearest: "
-        f"{errors[best][-1]:.0f} mm. To stand: a mean below {STANDS_MM:.0f} mm and a limb lost in fewer "
+@dataclass(frozen=True, slots=True)
+class Cells:
+    """What every contender (a row) reached at every degree (a column): mean error, mm, and frames with a loss, %."""
+
+    errors: Mapping[str, list[float]]
+    losses: Mapping[str, list[float]]
+
+
+def _cells(question: Question, outcomes: Sequence[Outcome]) -> Cells:
+    runs = by_group(outcomes)
+
+    def means(of: Callable[[Tracked], float], factor: float = 1.0) -> dict[str, list[float]]:
+        return {
+            entry.name: [
+                factor * float(np.mean([of(run) for run in runs[group(entry, question, degree)]]))
+                for degree in question.degrees
+            ]
+            for entry in CONTENDERS
+        }
+
+    return Cells(means(lambda run: run.mean_mm), means(lambda run: run.lost_frames / len(run.frames), 100.0))
+
+
+def _words(question: Question, cells: Cells) -> str:
+    last = question.shown(question.degrees[-1])
+    best = min(cells.errors, key=lambda name: cells.errors[name][-1])
+    stood = " ".join(f"{name} stands {_standing(question, cells, name)}." for name in cells.errors)
+    return (
+        f"{stood} At the last degree ({last} {question.axis}) {best} is the nearest: "
+        f"{cells.errors[best][-1]:.0f} mm. To stand: a mean below {STANDS_MM:.0f} mm and a limb lost in fewer "
         f"than {100 * STANDS_LOST:.0f} % of the frames."
     )
-    table = Table(
-        "Mean error over seeds (mm), frames with a limb lost (%)",
-        ("tracker", *(f"{column} {question.axis}" for column in columns)),
-        tuple(
-            (
-                name,
-                *(
-                    f"{error:.1f} / {loss:.0f}"
-                    for error, loss in zip(errors[name], losses[name], strict=True)
-                ),
-            )
-            for name in rows
-        ),
-    )
-    settings = {"footage": question.footage, "frames": outcomes[0].trial.arguments["attempt"]["last"]}
-    return Findings("answered", words, (), (table,), charts, {**settings, "evaluations": EVALUATIONS})
 
 
-def _mean_error(runs: Sequence[Tracked]) -> float:
-    return float(np.mean([run.mean_mm for run in runs]))
-
-
-def _lost_share(runs: Sequence[Tracked]) -> float:
-    return 100.0 * float(np.mean([run.lost_frames / len(run.frames) for run in runs]))
-
-
-def _standing(question: Question, errors: list[float], losses: list[float]) -> str:
+def _standing(question: Question, cells: Cells, name: str) -> str:
     """Up to which degree errors and losses stay small, in words."""
     stood = ""
-    for degree, error, loss in zip(question.degrees, errors, losses, strict=True):
+    for degree, error, loss in zip(question.degrees, cells.errors[name], cells.losses[name], strict=True):
         if error > STANDS_MM or loss > 100.0 * STANDS_LOST:
             break
         stood = question.shown(degree)
     return f"up to {stood} {question.axis}" if stood else "none of it"
 
 
-def _heat(
-    title: str,
-    question: Question,
-    columns: tuple[str, ...],
-    rows: tuple[str, ...],
-    values: dict[str, list[float]],
-) -> Chart:
-    cells = tuple(tuple(round(value, 2) for value in values[name]) for name in rows)
-    return Chart(title, "heat", question.axis, "tracker", heat=Heat(columns, rows, cells))
+def _table(question: Question, cells: Cells) -> Table:
+    rows = tuple(
+        (name, *(f"{error:.1f} / {loss:.0f}" for error, loss in zip(errors, cells.losses[name], strict=True)))
+        for name, errors in cells.errors.items()
+    )
+    heads = (f"{question.shown(degree)} {question.axis}" for degree in question.degrees)
+    return Table("Mean error over seeds (mm), frames with a limb lost (%)", ("tracker", *heads), rows)
+
+
+def _heat(title: str, question: Question, values: Mapping[str, list[float]]) -> Chart:
+    columns = tuple(question.shown(degree) for degree in question.degrees)
+    cells = tuple(tuple(round(value, 2) for value in row) for row in values.values())
+    heat = Heat(columns, tuple(values), cells)
+    return Chart(f"{question.title}: {title}", "heat", question.axis, "tracker", heat=heat)
 
 
 def _experiment(question: Question) -> Experiment:
-    def trials(scale: Scale) -> tuple[Trial, ...]:
-        return trials_of(question, scale)
-
-    def conclude(outcomes: Sequence[Outcome]) -> Findings:
-        return conclude_of(question, outcomes)
-
     return Experiment(
         name=f"robustness-{question.name}",
         title=question.title,
         source="an open question",
         claim=question.claim,
-        trials=trials,
+        trials=partial(_trials, question),
         measure=measure,
-        conclude=conclude,
+        conclude=concluding(
+            partial(_cells, question),
+            claims=(),
+            words=lambda cells, numbers: _words(question, cells),
+            tables=(partial(_table, question),),
+            charts=(
+                lambda cells: _heat("mean error (mm)", question, cells.errors),
+                lambda cells: _heat("frames with a limb lost (%)", question, cells.losses),
+            ),
+            settings=lambda outcomes: {
+                "footage": question.footage,
+                "frames": outcomes[0].trial.arguments["attempt"]["last"],
+                "evaluations": EVALUATIONS,
+            },
+        ),
         footage=(question.footage,),
     )
 
