@@ -7,8 +7,8 @@ import click
 
 from studio.cli.arguments import frame_range
 from studio.cli.output import command, note, progress
+from studio.comparison.candidates import DEFAULT_LAYERS, LINEUPS, VARIANTS, Lineup, read_assignments
 from studio.comparison.comparison_findings import document, table_text
-from studio.comparison.entrants import DEFAULT_LAYERS, LINEUPS, VARIANTS, Lineup, read_assignments
 from studio.comparison.folders import differences, new_comparison, place_of, unfinished_like
 from studio.comparison.kept_comparison import RECORD_NAME, KeptComparison
 from studio.comparison.plan import Plan, plan_comparison

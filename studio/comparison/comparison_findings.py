@@ -82,8 +82,8 @@ def document(comparison: Comparison) -> dict[str, Any]:
         "seeds": list(plan.seeds),
         "trackers": [_plain_tracker(result) for result in comparison.trackers],
         "settings": {
-            entrant.name: {"weighting": entrant.weighting, **dict(entrant.changes)}
-            for entrant in plan.entrants
+            candidate.name: {"weighting": candidate.weighting, **dict(candidate.changes)}
+            for candidate in plan.entrants
         },
         "sign_tests": [
             {
@@ -215,10 +215,10 @@ def _settings(comparison: Comparison) -> dict[str, Any]:
         "body": plan.body or "the session's",
         "seeds": ", ".join(str(seed) for seed in plan.seeds),
     }
-    for entrant in plan.entrants:
-        defaults = values(entrant.settings())
-        told[entrant.name] = ", ".join(
-            [entrant.weighting, *(f"{knob} {defaults[knob]}" for knob in entrant.changes)]
+    for candidate in plan.entrants:
+        defaults = values(candidate.settings())
+        told[candidate.name] = ", ".join(
+            [candidate.weighting, *(f"{knob} {defaults[knob]}" for knob in candidate.changes)]
         )
     return told
 

@@ -144,7 +144,7 @@ def result_of(comparison: Comparison) -> dict[str, Any]:
 def _findings_document(comparison: Comparison) -> dict[str, Any]:
     """The comparison as an experiment's document, to be drawn as those are."""
     plan = comparison.plan
-    names = ", ".join(entrant.name for entrant in plan.entrants)
+    names = ", ".join(candidate.name for candidate in plan.entrants)
     heading = Heading(
         "comparison", f"{names} on {plan.session}", f"{plan.evaluations} evaluations a frame", claim=""
     )

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from studio.body.model import BodyModel
-from studio.comparison.entrants import Entrant, Lineup, entrants
+from studio.comparison.candidates import Candidate, Lineup, candidates
 from studio.comparison.statistics import SignTest, sign_test
 from studio.comparison.tracked import Attempt
 from studio.comparison.tracking_trials import tracking_trial
@@ -38,7 +38,7 @@ class Plan:
 
     footage: str
     session: str
-    entrants: tuple[Entrant, ...]
+    entrants: tuple[Candidate, ...]
     evaluations: int
     seeds: tuple[int, ...]
     first: int
@@ -149,7 +149,9 @@ def plan_comparison(
     begin, end = checked_frames(session, first, last)
     model = session.body(body or None)
     start_pose(session, model, None)
-    taking_part = entrants(Lineup(lineup.names, weighting, lineup.evaluations, lineup.layers, lineup.changes))
+    taking_part = candidates(
+        Lineup(lineup.names, weighting, lineup.evaluations, lineup.layers, lineup.changes)
+    )
     chosen = _chosen_model(session, model, taking_part, behaviour)
     return Plan(
         footage=str(session.path.absolute()),
@@ -170,22 +172,22 @@ def plan_comparison(
 def trials(plan: Plan) -> tuple[Trial, ...]:
     """One a tracker and seed; every tracker's first seed first, so that an early look compares them all."""
     return tuple(
-        tracking_trial(entrant.name, _attempt(plan, entrant, seed))
+        tracking_trial(candidate.name, _attempt(plan, candidate, seed))
         for seed in plan.seeds
-        for entrant in plan.entrants
+        for candidate in plan.entrants
     )
 
 
 def conclude(plan: Plan, outcomes: Sequence[Outcome]) -> Comparison:
     """The comparison from the outcomes of all trials, in the order of `trials`."""
     measured = iter(outcome.measured for outcome in outcomes)
-    found: dict[str, list[SeedResult]] = {entrant.name: [] for entrant in plan.entrants}
+    found: dict[str, list[SeedResult]] = {candidate.name: [] for candidate in plan.entrants}
     frames: tuple[int, ...] = ()
     for seed in plan.seeds:
-        for entrant in plan.entrants:
+        for candidate in plan.entrants:
             values = next(measured)
             frames = tuple(values["frames"])
-            found[entrant.name].append(_seed_result(entrant.name, seed, values))
+            found[candidate.name].append(_seed_result(candidate.name, seed, values))
     trackers = tuple(_tracker_result(name, tuple(seeds)) for name, seeds in found.items())
     pairs = tuple(_pair(first, second) for at, first in enumerate(trackers) for second in trackers[at + 1 :])
     return Comparison(plan, frames, trackers, pairs)
@@ -198,32 +200,32 @@ def mean_curve(result: TrackerResult) -> tuple[float, ...]:
 
 
 def _chosen_model(
-    session: Session, body: BodyModel, taking_part: Sequence[Entrant], asked: str
+    session: Session, body: BodyModel, taking_part: Sequence[Candidate], asked: str
 ) -> ChosenModel | None:
     """The model of all who need one; None where nobody does. Raises BehaviourError, NotFoundError."""
-    for entrant in taking_part:
-        if needs_model(entrant.tracker, entrant.settings().tracker):
-            return chosen_model(session, body, entrant.settings(), asked)
+    for candidate in taking_part:
+        if needs_model(candidate.tracker, candidate.settings().tracker):
+            return chosen_model(session, body, candidate.settings(), asked)
     return None
 
 
-def _attempt(plan: Plan, entrant: Entrant, seed: int) -> Attempt:
+def _attempt(plan: Plan, candidate: Candidate, seed: int) -> Attempt:
     return Attempt(
         plan.footage,
-        entrant.tracker,
-        entrant.weighting,
+        candidate.tracker,
+        candidate.weighting,
         seed,
-        {"refine_frames": FrameRefinementSettings().refine_frames, **entrant.changes},
+        {"refine_frames": FrameRefinementSettings().refine_frames, **candidate.changes},
         plan.first,
         plan.last,
         body=plan.body,
-        behaviour=_behaviour_of(plan, entrant),
+        behaviour=_behaviour_of(plan, candidate),
     )
 
 
-def _behaviour_of(plan: Plan, entrant: Entrant) -> str:
-    """The file of the model that an entrant is guided by, "" for one that is not."""
-    guided = plan.behaviour_path and needs_model(entrant.tracker, entrant.settings().tracker)
+def _behaviour_of(plan: Plan, candidate: Candidate) -> str:
+    """The file of the model that an candidate is guided by, "" for one that is not."""
+    guided = plan.behaviour_path and needs_model(candidate.tracker, candidate.settings().tracker)
     return plan.behaviour_path if guided else ""
 
 

@@ -9,7 +9,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Response
 
-from studio.comparison.entrants import LINEUPS, VARIANTS, WEIGHTING, Lineup
+from studio.comparison.candidates import LINEUPS, VARIANTS, WEIGHTING, Lineup
 from studio.comparison.folders import (
     kept_comparison,
     kept_comparisons,
@@ -103,7 +103,8 @@ def detail(session: OpenSession, kept: Kept, doors: Door) -> ComparisonDetail:
         behaviour=plan.behaviour,
         fps=plan.fps,
         settings={
-            entrant.name: {WEIGHTING: entrant.weighting, **entrant.changes} for entrant in plan.entrants
+            candidate.name: {WEIGHTING: candidate.weighting, **candidate.changes}
+            for candidate in plan.entrants
         },
         result=kept.result(),
     )
@@ -147,11 +148,11 @@ def frames_as_csv(session: OpenSession, kept: Kept) -> Response:
 def _plan(session: Session, wish: ComparisonRequest) -> Plan:
     """The wish, checked. Raises StudioError for what cannot be compared."""
     changes: dict[str, dict] = {"": dict(wish.settings)} if wish.settings else {}
-    for entrant in wish.trackers:
-        own = dict(entrant.settings) | ({WEIGHTING: entrant.weighting} if entrant.weighting else {})
+    for candidate in wish.trackers:
+        own = dict(candidate.settings) | ({WEIGHTING: candidate.weighting} if candidate.weighting else {})
         if own:
-            changes[entrant.name] = own
-    names = tuple(entrant.name for entrant in wish.trackers)
+            changes[candidate.name] = own
+    names = tuple(candidate.name for candidate in wish.trackers)
     lineup = Lineup(names, wish.weighting or "", wish.evaluations, wish.layers, changes)
     return plan_comparison(
         session,
@@ -198,7 +199,7 @@ def _line(doors: Doors, session: Session, kept: KeptComparison) -> ComparisonLin
         name=kept.name,
         created=record.created,
         status=status,  # pyright: ignore[reportArgumentType]
-        trackers=[entrant.name for entrant in plan.entrants],
+        trackers=[candidate.name for candidate in plan.entrants],
         evaluations=plan.evaluations,
         seeds=len(plan.seeds),
         first=plan.first,

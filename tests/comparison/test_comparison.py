@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from studio.comparison.candidates import Lineup, read_assignments
 from studio.comparison.comparison_findings import document, findings, frames_csv, table_text
-from studio.comparison.entrants import Lineup, read_assignments
 from studio.comparison.footage_shelf import FootageShelf
 from studio.comparison.plan import (
     Comparison,
@@ -144,7 +144,9 @@ def test_wrong_seeds_and_frames_are_refused(wrong: dict) -> None:
 
 
 def test_the_weighting_is_one_for_all_and_the_sessions_unless_said() -> None:
-    assert {entrant.weighting for entrant in plan("annealed", "condensation").entrants} == {DEFAULT_WEIGHTING}
+    assert {candidate.weighting for candidate in plan("annealed", "condensation").entrants} == {
+        DEFAULT_WEIGHTING
+    }
     with pytest.raises(StudioError, match="no weighting 'x'"):
         plan_comparison(Session(WALK), Lineup(("annealed",), "x", 200), (0,))
 

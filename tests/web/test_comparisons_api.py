@@ -9,7 +9,7 @@ import pytest
 from sample_walk import copy_of_walk
 from web_doubles import Studio
 
-from studio.comparison.entrants import Lineup
+from studio.comparison.candidates import Lineup
 from studio.comparison.folders import new_comparison, place_of
 from studio.comparison.plan import plan_comparison
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from sample_walk import copy_of_walk
 
-from studio.comparison.entrants import Lineup
+from studio.comparison.candidates import Lineup
 from studio.comparison.folders import new_comparison, place_of
 from studio.comparison.kept_comparison import KeptComparison
 from studio.comparison.plan import Plan, plan_comparison

@@ -2,7 +2,7 @@
 
 import pytest
 
-from studio.comparison.entrants import LINEUPS, VARIANTS, Entrant, Lineup, entrants, read_assignments
+from studio.comparison.candidates import LINEUPS, VARIANTS, Candidate, Lineup, candidates, read_assignments
 from studio.errors import SettingsError, StudioError
 from studio.settings import changed_settings, default_settings
 from studio.tracking.evaluations import evaluations_of
@@ -10,17 +10,19 @@ from studio.tracking.evaluations import evaluations_of
 
 def made(
     *names: str, changes: tuple[str, ...] = (), evaluations: int = 1000, layers: int = 10
-) -> dict[str, Entrant]:
-    """The entrants by name."""
+) -> dict[str, Candidate]:
+    """The candidates by name."""
     lineup = Lineup(names, "edge-region", evaluations, layers, read_assignments(changes))
-    return {entrant.name: entrant for entrant in entrants(lineup)}
+    return {candidate.name: candidate for candidate in candidates(lineup)}
 
 
 def test_everyone_weighs_as_many_poses() -> None:
     found = made("annealed", "annealed:eq13", "condensation")
     assert list(found) == ["annealed", "annealed:eq13", "condensation"]
-    for entrant in found.values():
-        assert evaluations_of(entrant.tracker, entrant.settings().tracker) == entrant.evaluations == 1000
+    for candidate in found.values():
+        assert (
+            evaluations_of(candidate.tracker, candidate.settings().tracker) == candidate.evaluations == 1000
+        )
     assert (found["annealed"].settings().tracker.layers, found["annealed"].settings().tracker.particles) == (
         10,
         100,
@@ -50,9 +52,9 @@ def test_lineups_stand_for_their_members() -> None:
 
 @pytest.mark.parametrize("evaluations", [1000, 2000, 4000])
 def test_every_partition_of_the_swarm_weighs_as_many_poses(evaluations: int) -> None:
-    for entrant in made("partitions", evaluations=evaluations).values():
-        assert entrant.evaluations == pytest.approx(evaluations, rel=0.01)
-        assert entrant.settings().tracker.partition in entrant.name or entrant.name == "swarm"
+    for candidate in made("partitions", evaluations=evaluations).values():
+        assert candidate.evaluations == pytest.approx(evaluations, rel=0.01)
+        assert candidate.settings().tracker.partition in candidate.name or candidate.name == "swarm"
 
 
 def test_changes_go_to_whom_they_name() -> None:
@@ -66,14 +68,14 @@ def test_changes_go_to_whom_they_name() -> None:
     assert found["annealed"].settings().tracker.survival == 0.5
     assert found["annealed:b"].settings().tracker.survival != 0.5
     assert found["annealed:b"].weighting == "bodytrack"
-    assert {entrant.settings().tracker.diffusion_scale for entrant in found.values()} == {2.0}
+    assert {candidate.settings().tracker.diffusion_scale for candidate in found.values()} == {2.0}
     assert found["annealed"].weighting == found["condensation"].weighting == "edge-region"
 
 
 def test_recorded_changes_make_the_same_settings_again() -> None:
-    entrant = made("annealed:eq13", changes=("annealed:eq13.survival=0.4",))["annealed:eq13"]
-    again = changed_settings(default_settings(entrant.tracker, entrant.weighting), entrant.changes)
-    assert again == entrant.settings()
+    candidate = made("annealed:eq13", changes=("annealed:eq13.survival=0.4",))["annealed:eq13"]
+    again = changed_settings(default_settings(candidate.tracker, candidate.weighting), candidate.changes)
+    assert again == candidate.settings()
     assert again.tracker.survival == 0.4
 
 

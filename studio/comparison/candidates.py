@@ -80,7 +80,7 @@ LINEUPS: dict[str, tuple[str, ...]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Entrant:
+class Candidate:
     """A tracker that takes part. name : unique in its comparison. changes : knobs by flat name, the evaluations'
     included. evaluations : poses weighed in a frame.
     """
@@ -112,7 +112,7 @@ class Lineup:
     changes: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
 
 
-def entrants(lineup: Lineup) -> tuple[Entrant, ...]:
+def candidates(lineup: Lineup) -> tuple[Candidate, ...]:
     """Everyone with the same number of evaluations. Raises SettingsError naming what is wrong with whom."""
     names = expanded(lineup.names)
     if not names:
@@ -128,7 +128,7 @@ def entrants(lineup: Lineup) -> tuple[Entrant, ...]:
             hint = f"Name it as it stands in the list: {', '.join(names)}."
             raise SettingsError(f"A change is for '{name}', which does not take part.", hint)
     _check_shared(lineup.changes.get("", {}), names, lineup.weighting)
-    return tuple(_entrant(name, lineup) for name in names)
+    return tuple(_candidate(name, lineup) for name in names)
 
 
 def expanded(names: Sequence[str]) -> tuple[str, ...]:
@@ -161,7 +161,7 @@ def read_assignments(assignments: Sequence[str]) -> dict[str, dict[str, Value]]:
     return changes
 
 
-def _entrant(name: str, lineup: Lineup) -> Entrant:
+def _candidate(name: str, lineup: Lineup) -> Candidate:
     tracker = name.partition(":")[0]
     own = dict(lineup.changes.get(name, {}))
     weighting = str(own.pop(WEIGHTING, lineup.weighting))
@@ -192,7 +192,7 @@ def _entrant(name: str, lineup: Lineup) -> Entrant:
             f"Leave {', '.join(equal)} as they follow from the evaluations, or change them together.",
         )
     chosen = values(changed)
-    return Entrant(name, tracker, weighting, total, {knob: chosen[knob] for knob in {**equal, **wanted}})
+    return Candidate(name, tracker, weighting, total, {knob: chosen[knob] for knob in {**equal, **wanted}})
 
 
 def _check_shared(shared: Mapping[str, Value], names: Sequence[str], weighting: str) -> None:
