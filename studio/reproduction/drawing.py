@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from studio.comparison.findings import Chart, Series, Table
+from studio.comparison.findings import Chart, Heat, Series, Table
 from studio.comparison.statistics import Statistic, bootstrap_interval
 
 Array = NDArray[np.float64]
@@ -77,6 +77,12 @@ def bar_chart(title: str, x: str, y: str, series: Sequence[Series], names: Itera
 def line_chart(title: str, x: str, y: str, series: Iterable[Series], *, log_y: bool = False) -> Chart:
     """Lines over an axis."""
     return Chart(title, "lines", x, y, tuple(series), log_y=log_y)
+
+
+def heat_chart(title: str, x: str, y: str, columns: Iterable[str], rows: Values, digits: int = 2) -> Chart:
+    """A heat map: a row of cells by name."""
+    cells = tuple(tuple(round(value, digits) for value in row) for row in rows.values())
+    return Chart(title, "heat", x, y, heat=Heat(tuple(columns), tuple(rows), cells))
 
 
 def layer_table(title: str, names: Sequence[str], rows: Array, digits: int = 1) -> Table:

@@ -15,7 +15,7 @@ from scipy.stats import chi2
 
 from studio.behaviour.model import BehaviourModel
 from studio.body.catalogue import load_body
-from studio.comparison.findings import Chart, Findings, Heat, Number, Series, Table
+from studio.comparison.findings import Chart, Findings, Number, Series, Table
 from studio.comparison.footage_shelf import FootageShelf
 from studio.comparison.statistics import number, overall
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
@@ -30,9 +30,12 @@ from studio.reproduction.caillette.setting import (
 )
 from studio.reproduction.caillette.training_set import Training, learnt, recorded
 from studio.reproduction.deutscher_reid.setting import share_number
+from studio.reproduction.drawing import heat_chart, line_chart
 from studio.reproduction.experiment import Experiment
 
 Array = NDArray[np.float64]
+# What was measured of the dance with every seed.
+Dance = Sequence[Mapping[str, Any]]
 
 PAPER_CLUSTERS, PAPER_POINTING = 122.0, 5.0
 PAPER_STATES: Mapping[int, float] = {10: 948.0, 30: 2890.0}
@@ -143,7 +146,7 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
         _words(claims, dance, oversampled),
         (*claims, *others),
         (_table(dance),),
-        (*_charts(dance), *_heats(dance)),
+        _charts(dance),
         {
             "training": training_words(quick),
             "ε": SHOWN_EPSILON,
@@ -152,12 +155,11 @@ def conclude(outcomes: Sequence[Outcome]) -> Findings:
     )
 
 
-def _words(claims: Sequence[Number], dance: Sequence[Mapping[str, Any]], oversampled: Number) -> str:
+def _words(claims: Sequence[Number], dance: Dance, oversampled: Number) -> str:
     clusters, pointing, ten, thirty = (entry.ours for entry in claims[:4])
     kept = 100.0 * float(np.mean([entry["kept"] for entry in dance]))
     gaps = {
-        memory: float(np.mean(_cells(dance, memory, SHOWN_EPSILON, TEST_SET)))
-        / float(np.mean(_cells(dance, memory, SHOWN_EPSILON, TRAIN)))
+        memory: _mean(dance, memory, SHOWN_EPSILON, TEST_SET) / _mean(dance, memory, SHOWN_EPSILON, TRAIN)
         for memory in (1, 30)
     }
     inside = {
@@ -176,7 +178,7 @@ def _words(claims: Sequence[Number], dance: Sequence[Mapping[str, Any]], oversam
     )
 
 
-def _cells(dance: Sequence[Mapping[str, Any]], memory: int, epsilon: float, name: str) -> list[float]:
+def _cells(dance: Dance, memory: int, epsilon: float, name: str) -> list[float]:
     """A cell's value in every seed."""
     return [
         float(cell[name])
@@ -191,7 +193,7 @@ def _grows(entry: Mapping[str, Any], name: str) -> bool:
     return bool(np.all(np.diff(values) > 0))
 
 
-def _entropy_numbers(dance: Sequence[Mapping[str, Any]]) -> tuple[Number, ...]:
+def _entropy_numbers(dance: Dance) -> tuple[Number, ...]:
     return tuple(
         number(
             f"entropy, {name}, memory {memory}", _cells(dance, memory, SHOWN_EPSILON, name), "nats a frame"
@@ -201,56 +203,55 @@ def _entropy_numbers(dance: Sequence[Mapping[str, Any]]) -> tuple[Number, ...]:
     )
 
 
-def _table(dance: Sequence[Mapping[str, Any]]) -> Table:
+def _table(dance: Dance) -> Table:
     names = ("states", TRAIN, TEST_SET, NEVER)
     rows = tuple(
-        (memory, epsilon, *(round(float(np.mean(_cells(dance, memory, epsilon, name))), 3) for name in names))
+        (memory, epsilon, *(round(_mean(dance, memory, epsilon, name), 3) for name in names))
         for epsilon in EPSILONS
         for memory in MEMORIES
     )
     return Table("States and entropies (nats a frame)", ("memory", "ε", *names), rows)
 
 
-def _charts(dance: Sequence[Mapping[str, Any]]) -> tuple[Chart, ...]:
-    memories = tuple(float(memory) for memory in MEMORIES)
+def _mean(dance: Dance, memory: int, epsilon: float, name: str) -> float:
+    return float(np.mean(_cells(dance, memory, epsilon, name)))
 
-    def means(name: str) -> tuple[float, ...]:
-        return tuple(float(np.mean(_cells(dance, memory, SHOWN_EPSILON, name))) for memory in MEMORIES)
 
-    entropies = tuple(Series(name, memories, means(name)) for name in (TRAIN, TEST_SET, NEVER))
+def _charts(dance: Dance) -> tuple[Chart, ...]:
+    memories, axis = tuple(float(memory) for memory in MEMORIES), "memory (frames)"
+
+    def over_memory(name: str, shown: str = "") -> Series:
+        return Series(
+            shown or name,
+            memories,
+            tuple(_mean(dance, memory, SHOWN_EPSILON, name) for memory in MEMORIES),
+        )
+
     paper = tuple(float(memory) for memory in PAPER_STATES)
     states = (
-        Series("ours", memories, means("states")),
+        over_memory("states", "ours"),
         Series("paper", paper, tuple(PAPER_STATES.values()), dashed=True),
+    )
+    entropies = map(over_memory, (TRAIN, TEST_SET, NEVER))
+    heats = (
+        heat_chart(
+            f"Entropy, {name} (nats a frame)",
+            axis,
+            "ε",
+            map(str, MEMORIES),
+            {
+                f"ε {epsilon:g}": [_mean(dance, memory, epsilon, name) for memory in MEMORIES]
+                for epsilon in EPSILONS
+            },
+            digits=3,
+        )
+        for name in (TRAIN, TEST_SET)
     )
     title = f"Entropy over memory, ε = {SHOWN_EPSILON:g}"
     return (
-        Chart(title, "lines", "memory (frames)", "entropy (nats a frame)", entropies),
-        Chart("States over memory", "lines", "memory (frames)", "states", states),
-    )
-
-
-def _heats(dance: Sequence[Mapping[str, Any]]) -> tuple[Chart, ...]:
-    columns = tuple(str(memory) for memory in MEMORIES)
-    rows = tuple(f"ε {epsilon:g}" for epsilon in EPSILONS)
-    return tuple(
-        Chart(
-            f"Entropy, {name} (nats a frame)",
-            "heat",
-            "memory (frames)",
-            "ε",
-            heat=Heat(
-                columns,
-                rows,
-                tuple(
-                    tuple(
-                        round(float(np.mean(_cells(dance, memory, epsilon, name))), 3) for memory in MEMORIES
-                    )
-                    for epsilon in EPSILONS
-                ),
-            ),
-        )
-        for name in (TRAIN, TEST_SET)
+        line_chart(title, axis, "entropy (nats a frame)", entropies),
+        line_chart("States over memory", axis, "states", states),
+        *heats,
     )
 
 

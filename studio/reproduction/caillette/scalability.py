@@ -18,6 +18,7 @@ from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.reproduction.caillette.setting import EXERCISE, EXERCISE_2, SOURCE
 from studio.reproduction.caillette.training_set import Training, lesson_of
 from studio.reproduction.deutscher_reid.setting import share_number
+from studio.reproduction.drawing import line_chart, places
 from studio.reproduction.experiment import Experiment
 
 CLASSES = (EXERCISE, EXERCISE_2, "walk-with-turns", "run", "jumps", "handstand")
@@ -133,30 +134,20 @@ def _ends(means: Mapping[str, Sequence[float]], name: str, digits: int = 0) -> s
 
 
 def _table(names: Sequence[str], means: Mapping[str, Sequence[float]]) -> Table:
-    heads = (
-        "classes",
-        "the last one",
-        "frames",
-        "clusters",
-        "states",
-        "learning (s)",
-        "automaton (s)",
-        "prediction (ms)",
-    )
+    heads = ("frames", "clusters", "states", "learning (s)", "automaton (s)", "prediction (ms)")
     rows = tuple(
         (place + 1, name, *(round(means[key][place], 2) for key in LABELS))
         for place, name in enumerate(names)
     )
-    return Table("Means over the seeds", heads, rows)
+    return Table("Means over the seeds", ("classes", "the last one", *heads), rows)
 
 
 def _charts(means: Mapping[str, Sequence[float]]) -> tuple[Chart, ...]:
     def chart(title: str, axis: str, keys: Mapping[str, str]) -> Chart:
-        series = tuple(
-            Series(label, tuple(float(place + 1) for place in range(len(means[key]))), tuple(means[key]))
-            for key, label in keys.items()
+        series = (
+            Series(label, places(len(means[key]), first=1), tuple(means[key])) for key, label in keys.items()
         )
-        return Chart(title, "lines", "classes of motion", axis, series)
+        return line_chart(title, "classes of motion", axis, series)
 
     return (
         chart("Clusters", "clusters", {"clusters": "clusters"}),

@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from studio.comparison.findings import Chart, Heat, Table
+from studio.comparison.findings import Chart, Table
 from studio.comparison.footage_shelf import FootageShelf
 from studio.comparison.tracked import Attempt, Tracked, track
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
+from studio.reproduction.drawing import heat_chart
 from studio.reproduction.experiment import Experiment, concluding
 from studio.reproduction.fleischmann.setting import EQ13, EVALUATIONS, IMPROVED, SWARM, TWIN
 from studio.reproduction.open_questions.damage import DAMAGES
@@ -193,10 +194,8 @@ def _table(question: Question, cells: Cells) -> Table:
 
 
 def _heat(title: str, question: Question, values: Mapping[str, list[float]]) -> Chart:
-    columns = tuple(question.shown(degree) for degree in question.degrees)
-    cells = tuple(tuple(round(value, 2) for value in row) for row in values.values())
-    heat = Heat(columns, tuple(values), cells)
-    return Chart(f"{question.title}: {title}", "heat", question.axis, "tracker", heat=heat)
+    columns = map(question.shown, question.degrees)
+    return heat_chart(f"{question.title}: {title}", question.axis, "tracker", columns, values)
 
 
 def _experiment(question: Question) -> Experiment:
