@@ -4,10 +4,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.body.person import SIDES, PersonMotion, Skeleton, joint_points
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.geometry.rotations import axis_turn
-from studio.synthesis.person import SIDES, PersonMotion, Skeleton, joint_points
 from studio.synthesis.posture import add_arm, trunk
 
 Array = NDArray[np.float64]

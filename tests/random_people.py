@@ -6,21 +6,15 @@ from pathlib import Path
 
 import numpy as np
 
+from studio.body.person import SIDES, PersonMotion, Skeleton, joint_points, marker_motion
 from studio.body.subject import Subject, write_subject
 from studio.capture.calibration_files import write_calibration
-from studio.capture.trc import write_trc
 from studio.geometry.camera import Camera
 from studio.geometry.rotations import axis_turn
+from studio.motion_files.trc import write_trc
 from studio.sessions.importers.catalogue import import_source
 from studio.sessions.session import Session
-from studio.synthesis.person import (
-    SIDES,
-    PersonMotion,
-    Skeleton,
-    joint_points,
-    marker_motion,
-    yaw_pitch_roll,
-)
+from studio.synthesis.person import yaw_pitch_roll
 from studio.synthesis.person_footage import render_person
 from studio.synthesis.posture import add_arm, trunk
 from studio.synthesis.recipe_file import Recipe

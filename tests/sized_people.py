@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 from studio.body.catalogue import load_body
 from studio.body.inverse_kinematics import pose_from_markers
 from studio.body.model import BodyModel
+from studio.body.person import PersonMotion, Skeleton, marker_motion
 from studio.body.subject import Subject, fit_subject
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
 from studio.synthesis.cameras import RIGS
 from studio.synthesis.motions import make_motion
-from studio.synthesis.person import PersonMotion, Skeleton, marker_lengths, marker_motion, skeleton_of_height
+from studio.synthesis.person import marker_lengths, skeleton_of_height
 from studio.synthesis.renderer import Renderer
 from studio.synthesis.rooms import ROOMS
 from studio.synthesis.wardrobes import WARDROBES

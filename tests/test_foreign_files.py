@@ -140,7 +140,7 @@ from studio.capture.calibration_files import find_calibrations, read_calibration
 from studio.capture.cut_recordings import mend_recording
 from studio.capture.pictures import check_picture, read_picture
 from studio.capture.timestamps import read_timestamps
-from studio.capture.trc import read_trc
+from studio.motion_files.trc import read_trc
 from studio.capture.video import measure_video
 from studio.capture.video_probe import probe_video
 from studio.errors import StudioError

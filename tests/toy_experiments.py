@@ -13,11 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from studio.comparison.findings import Chart, Findings, Heat, Series, Table
+from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.statistics import number, overall
+from studio.comparison.trials import Outcome, Scale, Trial
 from studio.errors import StudioError
-from studio.experiments.charts import Chart, Heat, Series
-from studio.experiments.experiment import Experiment, Findings, Outcome, Scale, Table, Trial
-from studio.experiments.footage_shelf import FootageShelf
-from studio.experiments.statistics import number, overall
+from studio.reproduction.experiment import Experiment
 
 SETTINGS = ("plain", "clever")
 

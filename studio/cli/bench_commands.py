@@ -7,13 +7,13 @@ from pathlib import Path
 
 import click
 
+from studio.benchmarks.hulls import run_hull_benchmark
+from studio.benchmarks.kernels import run_benchmark
+from studio.benchmarks.live import run_live_benchmark
+from studio.benchmarks.live_stages import in_words
 from studio.cli.output import command, progress
-from studio.experiments.benchmark import run_benchmark
-from studio.experiments.hull_benchmark import run_hull_benchmark
-from studio.experiments.live_benchmark import in_words
 from studio.progress import Progress
 from studio.runs.new_run import RunRequest, prepare_run
-from studio.scene.live_benchmarking import run_live_benchmark
 from studio.sessions.workspace import Workspace
 from studio.web.samples import install_sample
 from studio.worker.control import StudioControl

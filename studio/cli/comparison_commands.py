@@ -7,12 +7,12 @@ import click
 
 from studio.cli.arguments import frame_range
 from studio.cli.output import command, note, progress
+from studio.comparison.candidates import DEFAULT_LAYERS, LINEUPS, VARIANTS, Lineup, read_assignments
+from studio.comparison.comparison_findings import document, table_text
+from studio.comparison.folders import differences, new_comparison, place_of, unfinished_like
+from studio.comparison.kept_comparison import RECORD_NAME, KeptComparison
+from studio.comparison.plan import Plan, plan_comparison
 from studio.errors import RunError, SessionError
-from studio.experiments.comparison import Plan, plan_comparison
-from studio.experiments.comparison_findings import document, table_text
-from studio.experiments.comparison_folders import differences, new_comparison, place_of, unfinished_like
-from studio.experiments.entrants import DEFAULT_LAYERS, LINEUPS, VARIANTS, Lineup, read_assignments
-from studio.experiments.kept_comparison import RECORD_NAME, KeptComparison
 from studio.runs.behaviour_models import needs_model
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace

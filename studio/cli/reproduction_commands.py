@@ -11,20 +11,22 @@ import click
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from studio.cli.output import errors_in_words, messages, note, tell
-from studio.experiments.catalogue import EXPERIMENTS, find_experiments
-from studio.experiments.experiment import FAILED, Experiment, Scale
-from studio.experiments.findings_document import Document
-from studio.experiments.findings_files import FOLDER, REPORT, SUMMARY, number_in_words, read_findings
-from studio.experiments.reproduction_plan import FULL_SEEDS, QUICK_SEEDS, scale_of
+from studio.comparison.findings import FAILED
+from studio.comparison.findings_document import REPORT, REPRODUCTIONS, SUMMARY, Document
+from studio.comparison.trials import Scale
+from studio.reproduction.catalogue import EXPERIMENTS, find_experiments
+from studio.reproduction.experiment import Experiment
+from studio.reproduction.findings_files import number_in_words, read_findings
+from studio.reproduction.plan import FULL_SEEDS, QUICK_SEEDS, scale_of
+from studio.reproduction.runner import Reproduction, reproduce
+from studio.reproduction.trial_pace import Report
 from studio.sessions.workspace import workspace_root
-from studio.worker.reproduction import Reproduction, reproduce
-from studio.worker.trial_pace import Report
 
 NOT_CONCLUDED = 1
 SECONDS_BETWEEN_LINES = 10.0
 NOT_RUN = "not run yet"
 
-OUT_HELP = f"Folder of everything that is kept; default: '{FOLDER}' in the workspace."
+OUT_HELP = f"Folder of everything that is kept; default: '{REPRODUCTIONS}' in the workspace."
 SEEDS_HELP = f"Seeds of every setting; default {FULL_SEEDS}, with --quick {QUICK_SEEDS}."
 QUICK_HELP = "A look in minutes: fewer seeds, frames and settings."
 PROCESSES_HELP = "How many at once; default: one a core."
@@ -48,7 +50,7 @@ def reproduce_command(
     says that an experiment could not be concluded; a claim that is not reproduced is a result like any other.
     """
     with errors_in_words():
-        folder = (out or workspace_root() / FOLDER).expanduser().absolute()
+        folder = (out or workspace_root() / REPRODUCTIONS).expanduser().absolute()
         if name == "list":
             tell(_listed(folder), as_json)
             return

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
-from studio.capture.trc import MarkerMotion
 from studio.errors import TruthError
 from studio.evaluation.alignment import FEWEST_POINTS, moved_to_root, similarity_aligned
+from studio.motion_files.trc import MarkerMotion
 from studio.runs.marker_lines import marker_links, marker_sides
 
 Array = NDArray[np.float64]

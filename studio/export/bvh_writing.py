@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from studio.export.axes import Axes
-from studio.export.bvh_reading import read_bvh
 from studio.export.naming import joint_names
 from studio.export.skeleton import Skeleton, follow, skeleton_of
 from studio.export.task import ExportTask, Written, agreed, apart, turned_apart
+from studio.motion_files.bvh import read_bvh_file
 
 Array = NDArray[np.float64]
 
@@ -134,7 +134,7 @@ def _row(ordered: list[int], still: list[bool], places: Array, angles: Array, de
 
 def _read_back(task: ExportTask, skeleton: Skeleton, wanted: tuple[Array, Array]) -> str:
     """Compare the file's joints with those that were meant."""
-    read = read_bvh(task.place)
+    read = read_bvh_file(task.place)
     order = [_depth_first(skeleton.tree.parents).index(joint) for joint in range(len(skeleton.names))]
     places, turns = read.followed()
     points = task.axes.points_back(places[:, order])

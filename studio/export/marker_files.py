@@ -1,21 +1,16 @@
 """Points over time as TRC and C3D, gaps as gaps."""
 
-from pathlib import Path
-
-import ezc3d
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.capture.trc import TRC_FROM_WORLD, MarkerMotion, read_trc, write_trc
 from studio.errors import ExportError
-from studio.export.axes import Axes
 from studio.export.naming import Points, points_of
 from studio.export.task import ExportTask, Written, agreed, apart
+from studio.motion_files.c3d import MOST_FRAMES as MOST_C3D_FRAMES
+from studio.motion_files.c3d import read_c3d_points, write_c3d
+from studio.motion_files.trc import TRC_FROM_WORLD, MarkerMotion, read_trc, write_trc
 
 Array = NDArray[np.float64]
-
-MOST_C3D_FRAMES = 65_535
-RESIDUAL_SEEN, RESIDUAL_MISSING = 0.0, -1.0
 
 
 def marked_points(task: ExportTask) -> tuple[Points, Array]:
@@ -62,42 +57,17 @@ def write_c3d_file(task: ExportTask) -> Written:
         if count > MOST_C3D_FRAMES:
             place = place.with_name(f"{place.stem}-{part + 1}{place.suffix}")
         task.step("writing", first, count)
-        _write_c3d(place, points.names, task.axes.points(places[first:last]), task)
-        worst = max(worst, apart(read_c3d_points(place, task.axes), places[first:last]))
+        part_of_it = MarkerMotion(
+            points.names,
+            task.motion.times[first:last],
+            task.axes.points(places[first:last]),
+            task.options.unit,
+            task.motion.fps,
+        )
+        write_c3d(place, part_of_it, up=task.options.up, source=task.source)
+        worst = max(worst, apart(task.axes.points_back(read_c3d_points(place)), places[first:last]))
         files.append(place)
     return Written(tuple(files), agreed(files[0], worst), _notes(points, task, "residual -1"))
-
-
-def read_c3d_points(path: Path, axes: Axes) -> Array:
-    """(K, M, 3) mm in the world, NaN where the residual says that a point is missing."""
-    content = ezc3d.c3d(str(path))
-    points = np.array(content["data"]["points"], dtype=np.float64)[:3].transpose(2, 1, 0)
-    residuals = np.array(content["data"]["meta_points"]["residuals"])[0].T
-    points[residuals < 0.0] = np.nan
-    return axes.points_back(points)
-
-
-def _write_c3d(place: Path, names: tuple[str, ...], points: Array, task: ExportTask) -> None:
-    """points : (K, M, 3) in the file's unit and axes."""
-    content = ezc3d.c3d()
-    # A file that states no frame rate for analogue data is refused by some readers: there is none, at one sample.
-    content["parameters"]["POINT"]["RATE"]["value"] = [task.motion.fps]
-    content["parameters"]["POINT"]["UNITS"]["value"] = [task.options.unit]
-    content["parameters"]["POINT"]["LABELS"]["value"] = list(names)
-    content["parameters"]["POINT"]["DESCRIPTIONS"]["value"] = list(names)
-    up = {"y": ("+Z", "+Y"), "z": ("+X", "+Z")}[task.options.up]
-    content.add_parameter("POINT", "X_SCREEN", [up[0]])
-    content.add_parameter("POINT", "Y_SCREEN", [up[1]])
-    content.add_parameter("MANUFACTURER", "SOFTWARE", ["capture studio"])
-    for name, value in task.source.items():
-        content.add_parameter("STUDIO", name.upper(), [value])
-    missing = np.isnan(points).any(axis=2)
-    stored = np.ones((4, len(names), len(points)))
-    stored[:3] = points.transpose(2, 1, 0)
-    content["data"]["points"] = stored
-    residuals = np.where(missing, RESIDUAL_MISSING, RESIDUAL_SEEN)
-    content["data"]["meta_points"]["residuals"] = residuals.T[None]
-    content.write(str(place))
 
 
 def _notes(points: Points, task: ExportTask, how: str) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from studio.body.model import BodyModel
 from studio.body.subject import Subject
 from studio.capture.exclusions import painted_picture, png_of
+from studio.footage_recipes import synthesize as synthesize_recipe
 from studio.notebook.opening import SessionName, open_session
 from studio.notebook.progress import Told, told
 from studio.runs.background_setup import BackgroundSetup, set_up_background
@@ -21,7 +22,6 @@ from studio.sessions.background_files import polygon_exclusion, set_backgrounds,
 from studio.sessions.importers.catalogue import import_source
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
-from studio.synthesis.recipes import synthesize as synthesize_recipe
 
 USUAL = FitRequest()
 

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 
 from studio.body.forward_kinematics import marker_points
-from studio.capture.trc import MarkerMotion, read_trc
 from studio.errors import TruthError
 from studio.evaluation.errors import Evaluation
 from studio.evaluation.errors import evaluate as evaluate_poses
+from studio.motion_files.trc import MarkerMotion, read_trc
 from studio.notebook.opening import RunName, open_run, session_of
 from studio.runs.tracks import BEST, Track, track_names
 from studio.runs.tracks import read_track as read_stored_track

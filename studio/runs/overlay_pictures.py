@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.capture.footage import Footage
-from studio.capture.trc import MarkerMotion, read_trc
 from studio.errors import NotFoundError, StudioError
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.frame_evidence import ViewEvidence
 from studio.evidence.pipeline import EvidenceMaker
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
+from studio.motion_files.trc import MarkerMotion, read_trc
 from studio.runs.colour_tokens import colour_tokens
 from studio.runs.marker_lines import marker_links
 from studio.runs.overlay_drawing import NO_MARKS, OVERLAYS, ViewMarks, draw_view, upright

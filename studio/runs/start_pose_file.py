@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from studio.body.inverse_kinematics import known_markers, pose_from_markers
 from studio.body.model import BodyModel
-from studio.capture.trc import read_trc
 from studio.errors import RunError, TruthError
+from studio.motion_files.trc import read_trc
 from studio.runs.search_space import parameter_names
 from studio.sessions.made_from import note
 from studio.sessions.named_rows import pose_frame, read_pose, write_pose

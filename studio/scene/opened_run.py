@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.model import BodyModel
-from studio.capture.trc import MarkerMotion, read_trc
 from studio.errors import NotFoundError, SessionError, StudioError
 from studio.geometry.camera import Camera
+from studio.motion_files.trc import MarkerMotion, read_trc
 from studio.runs.tracks import RAW, Track, read_track, track_names, track_stamp
 from studio.sessions.results_store import ResultsReader
 from studio.sessions.session import Session

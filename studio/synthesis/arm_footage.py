@@ -16,10 +16,10 @@ from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_frames, marker_points
 from studio.body.model import BodyModel
 from studio.body.tables import kinematic_tables
-from studio.capture.trc import MarkerMotion
 from studio.geometry.camera import Camera
 from studio.geometry.cones import limb_outlines
 from studio.geometry.projection import project
+from studio.motion_files.trc import MarkerMotion
 from studio.progress import Progress
 from studio.sessions.atomic_files import write_text
 from studio.sessions.named_rows import poses_csv

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
+from studio.body.person import SIDES, PersonMotion, Skeleton
 from studio.errors import StudioError
 from studio.synthesis.footfalls import ROLL_UP, Footfalls, planned_track
 from studio.synthesis.gait import FootTrack, Gait, Path, eased, leg_to_ankle
-from studio.synthesis.person import SIDES, PersonMotion, Skeleton
 from studio.synthesis.posture import add_arm, allowed_height, frame_rate, trunk
 
 Array = NDArray[np.float64]

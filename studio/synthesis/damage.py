@@ -8,10 +8,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.body.person import PersonMotion, joint_points
 from studio.errors import StudioError
 from studio.geometry.camera import Camera
 from studio.geometry.rotations import rotation_from_vector
-from studio.synthesis.person import PersonMotion, joint_points
 from studio.synthesis.room import CHECKS, GRAIN, PLAIN, Block
 
 Array = NDArray[np.float64]

@@ -14,11 +14,12 @@ import numpy as np
 import tomli_w
 from numpy.typing import NDArray
 
+from studio.body.person import PersonMotion, joint_points
 from studio.geometry.projection import project
 from studio.synthesis.damage import Damage
 from studio.synthesis.drawn_room import DRAWN, FLOOR_AND_WALLS
 from studio.synthesis.joined_clips import Clip
-from studio.synthesis.person import PersonMotion, Proportions, joint_points
+from studio.synthesis.person import Proportions
 from studio.synthesis.recipe_file import (
     JOINED,
     RECIPES,

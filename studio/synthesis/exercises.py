@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.body.person import SIDES, PersonMotion, Skeleton
 from studio.geometry.rotations import axis_turn
 from studio.synthesis.gait import eased, leg_to_ankle
-from studio.synthesis.person import SIDES, PersonMotion, Skeleton
 from studio.synthesis.posture import add_arm, frame_rate, trunk
 from studio.synthesis.room import GRAIN, Block
 

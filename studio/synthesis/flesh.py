@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.synthesis.person import SIDES, PersonMotion, Skeleton, joint_points
+from studio.body.person import SIDES, PersonMotion, Skeleton, joint_points
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.body.person import Skeleton
 from studio.geometry.rotations import axis_turn
 from studio.synthesis.gait import FootTrack, Gait, Path, eased, swung
-from studio.synthesis.person import Skeleton
 
 Array = NDArray[np.float64]
 

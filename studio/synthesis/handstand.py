@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
+from studio.body.person import SIDES, PersonMotion, Skeleton, joint_points
 from studio.geometry.rotations import axis_turn
-from studio.synthesis.person import SIDES, PersonMotion, Skeleton, joint_points
 
 Array = NDArray[np.float64]
 

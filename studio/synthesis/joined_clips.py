@@ -8,15 +8,15 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
+from studio.body.mending import mended, with_hands_above_floor
+from studio.body.person import PersonMotion, Skeleton, sampled
+from studio.body.retargeting import above_floor, on_skeleton
 from studio.errors import StudioError
 from studio.geometry.rotations import axis_turn
+from studio.motion_files.recorded_motion import RecordedMotion
 from studio.synthesis.gait import eased
-from studio.synthesis.mending import mended, with_hands_above_floor
 from studio.synthesis.performances import Variation, from_local, performance, to_local
-from studio.synthesis.person import PersonMotion, Skeleton
-from studio.synthesis.recorded_clip import placed, sampled
-from studio.synthesis.recorded_motion import RecordedMotion
-from studio.synthesis.retargeting import above_floor, on_skeleton
+from studio.synthesis.recorded_clip import placed
 
 Array = NDArray[np.float64]
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
+from studio.body.person import SIDES, PersonMotion, Skeleton
 from studio.errors import StudioError
 from studio.geometry.rotations import axis_turn
 from studio.synthesis.circuit import circuit
@@ -26,7 +27,6 @@ from studio.synthesis.gait import (
 )
 from studio.synthesis.handstand import handstand
 from studio.synthesis.journeys import Journey, Stretch
-from studio.synthesis.person import SIDES, PersonMotion, Skeleton
 from studio.synthesis.posture import add_arm, allowed_height, frame_rate, trunk
 
 Array = NDArray[np.float64]

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from studio.body.person import SIDES, PersonMotion, joint_points, sampled
+from studio.body.retargeting import above_floor, lowest_of_sole
 from studio.geometry.rotations import axis_turn
-from studio.synthesis.person import SIDES, PersonMotion, joint_points
-from studio.synthesis.recorded_clip import sampled
-from studio.synthesis.retargeting import above_floor, lowest_of_sole
-from studio.synthesis.smooth_noise import smooth_noise, warped_times
+from studio.training.smooth_noise import smooth_noise, warped_times
 
 Array = NDArray[np.float64]
 

@@ -3,9 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.body.person import Skeleton
 from studio.geometry.rotations import axis_turn
 from studio.synthesis.gait import FootTrack
-from studio.synthesis.person import Skeleton, yaw_pitch_roll
+from studio.synthesis.person import yaw_pitch_roll
 
 Array = NDArray[np.float64]
 NEARLY_STRAIGHT = 0.994

@@ -1,6 +1,7 @@
 """From a recipe to a session: footage rendered, truth beside it, imported like anybody's footage."""
 
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 import msgspec
@@ -8,11 +9,14 @@ import numpy as np
 
 from studio.body.catalogue import load_body
 from studio.body.inverse_kinematics import known_markers, pose_from_markers
+from studio.body.person import PersonMotion, Skeleton, first_frames, marker_motion
 from studio.body.subject import Subject, fit_subject, write_subject
 from studio.capture.calibration_files import read_calibration, write_calibration
-from studio.capture.trc import MarkerMotion, write_trc
-from studio.errors import BodyError, SessionError
+from studio.errors import BodyError, SessionError, StudioError
 from studio.geometry.camera import Camera
+from studio.motion_files.reading import read_recording
+from studio.motion_files.recorded_motion import RecordedMotion
+from studio.motion_files.trc import MarkerMotion, write_trc
 from studio.progress import Progress
 from studio.sessions.importers.bodytrack import RATE, read_numbers
 from studio.sessions.importers.catalogue import import_source
@@ -22,20 +26,11 @@ from studio.synthesis.arm_footage import render_arm
 from studio.synthesis.damage import misplaced
 from studio.synthesis.joined_clips import joined_person
 from studio.synthesis.motions import make_motion
-from studio.synthesis.person import (
-    PersonMotion,
-    Skeleton,
-    first_frames,
-    marker_lengths,
-    marker_motion,
-    proportioned,
-    skeleton_of_height,
-)
+from studio.synthesis.person import marker_lengths, proportioned, skeleton_of_height
 from studio.synthesis.person_footage import render_person
 from studio.synthesis.real_data import located
 from studio.synthesis.recipe_file import JOINED, RECORDED, Recipe, find_recipe, read_recipe, recipe_cameras
-from studio.synthesis.recorded_clip import read_recording, recorded_person
-from studio.synthesis.recorded_motion import RecordedMotion
+from studio.synthesis.recorded_clip import recorded_person
 from studio.synthesis.shape import skeleton_of_subject, subject_of_file, with_hands_and_feet
 
 ARM = "arm"
@@ -72,6 +67,23 @@ def synthesize(
     write_manifest(into, changed)
     (into / RECIPE_COPY).write_bytes(path.read_bytes())
     return into
+
+
+def person_of_recipe(
+    recipe: Path | str, skeleton: Skeleton, options: Mapping[str, float] | None, frames: int | None
+) -> PersonMotion:
+    """The motion of a recipe on a skeleton, nothing rendered. options, frames : in place of the recipe's own.
+
+    Raises StudioError, for a recipe without a person too.
+    """
+    path = find_recipe(recipe)
+    wanted = read_recipe(path)
+    if wanted.motion == ARM:
+        raise StudioError(f"Recipe '{path.name}' moves no person.", "Choose a recipe of a person.")
+    changed = msgspec.structs.replace(
+        wanted, options={**wanted.options, **(options or {})}, frames=frames or wanted.frames
+    )
+    return recipe_motion(changed, path.parent, skeleton)
 
 
 def render_source(

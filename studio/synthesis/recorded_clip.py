@@ -2,22 +2,16 @@
 where in the room.
 """
 
-from pathlib import Path
-
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
-from scipy.spatial.transform import Rotation, RotationSpline
+from scipy.spatial.transform import Rotation
 
+from studio.body.person import PersonMotion, Skeleton, sampled
+from studio.body.retargeting import above_floor, on_skeleton
 from studio.errors import StudioError
 from studio.geometry.rotations import axis_turn
-from studio.synthesis.acclaim import read_acclaim
-from studio.synthesis.bvh import read_bvh
+from studio.motion_files.recorded_motion import RecordedMotion
 from studio.synthesis.gait import eased
-from studio.synthesis.humanoid_arrays import read_humanoid_arrays
-from studio.synthesis.person import PersonMotion, Skeleton
-from studio.synthesis.recorded_motion import RecordedMotion
-from studio.synthesis.retargeting import above_floor, on_skeleton
 
 Array = NDArray[np.float64]
 
@@ -32,19 +26,6 @@ CLIP_OPTIONS = {
     "bank": 0.0,  # 0...1: how far the person leans into the bend, as a share of what their speed demands
 }
 GRAVITY = 9810.0
-MARGIN_FRAMES = 12
-
-
-def read_recording(path: Path, skeleton: Path | None = None) -> RecordedMotion:
-    """The motion in a file, by its ending: .amc, .bvh or .npz. Raises StudioError naming the endings there are."""
-    if path.suffix == ".amc":
-        return read_acclaim(path, skeleton)
-    readers = {".bvh": read_bvh, ".npz": read_humanoid_arrays}
-    if path.suffix not in readers:
-        raise StudioError(
-            f"'{path.name}' is no motion file that can be read.", "Give an .amc, .bvh or .npz file."
-        )
-    return readers[path.suffix](path)
 
 
 def recorded_person(
@@ -65,23 +46,6 @@ def recorded_person(
     if wanted["radius_mm"] != 0.0:
         motion = bent(motion, wanted["radius_mm"], wanted["bank"])
     return placed(motion, np.radians(wanted["turn_degrees"]), (wanted["at_x_mm"], wanted["at_y_mm"]))
-
-
-def sampled(motion: PersonMotion, times: Array, fps: float) -> PersonMotion:
-    """The motion at times (F,) in seconds from its first frame, on smooth curves through its frames (cubic splines of
-    places and of turns; times of frames give these frames). fps : of the result.
-    """
-    last = motion.frame_count - 1
-    inside = np.clip(times * motion.fps, 0.0, last)
-    low = int(np.clip(np.floor(inside.min()) - MARGIN_FRAMES, 0, last - 1))
-    high = int(np.clip(np.ceil(inside.max()) + MARGIN_FRAMES, low + 1, last))
-    known = np.arange(low, high + 1, dtype=np.float64)
-    turns = {
-        name: RotationSpline(known, Rotation.from_matrix(turn[low : high + 1]))(inside).as_matrix()
-        for name, turn in motion.turns.items()
-    }
-    root: Array = CubicSpline(known, motion.root[low : high + 1])(inside)
-    return PersonMotion(motion.skeleton, fps, root, turns)
 
 
 def bent(motion: PersonMotion, radius: float, bank: float) -> PersonMotion:

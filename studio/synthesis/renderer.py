@@ -12,13 +12,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.body.person import PersonMotion, sampled
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.synthesis.cameras import pixel_rays
 from studio.synthesis.flesh import BOUND, BOUND_RADIUS, clothed_pieces, piece_tables
 from studio.synthesis.noise_kernels import add_sensor_noise
-from studio.synthesis.person import PersonMotion
-from studio.synthesis.recorded_clip import sampled
 from studio.synthesis.room import Room, block_tables
 from studio.synthesis.room_kernels import trace_room
 from studio.synthesis.tracing_kernels import floor_shadow, trace_person

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from studio.body.catalogue import load_body
+from studio.body.person import SIDES, Skeleton
 from studio.body.subject import Subject, subject_from_shape
 from studio.errors import BodyError
 from studio.sessions.importers.bodytrack import read_numbers
-from studio.synthesis.person import HAND, SIDES, Skeleton
+from studio.synthesis.person import HAND
 
 # How far in front of and above the neck's base the shoulders are, mm: rounded means of both sides in the Lee walk's
 # start pose. Sideways they are as far as the clavicle's length then leaves.

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.body.person import MARKERS
 from studio.errors import StudioError
-from studio.synthesis.person import MARKERS
 
 Array = NDArray[np.float64]
 

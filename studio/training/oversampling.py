@@ -13,8 +13,8 @@ from scipy.ndimage import gaussian_filter1d
 
 from studio.body.model import BodyModel
 from studio.knobs import knob
-from studio.synthesis.smooth_noise import smooth_noise, warped_times
 from studio.training.resampling import poses_at
+from studio.training.smooth_noise import smooth_noise, warped_times
 
 Array = NDArray[np.float64]
 

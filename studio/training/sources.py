@@ -9,28 +9,26 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import marker_points
+from studio.body.mending import mended
 from studio.body.model import BodyModel
+from studio.body.person import PersonMotion, sampled
+from studio.body.retargeting import family_of, on_skeleton
 from studio.body.subject import Subject, fit_subject
-from studio.capture.trc import MarkerMotion, read_trc
 from studio.errors import StudioError
+from studio.footage_recipes import person_of_recipe, recipe_names
+from studio.motion_files.c3d import read_c3d
+from studio.motion_files.reading import read_recording
+from studio.motion_files.recorded_motion import RecordedMotion
+from studio.motion_files.trc import MarkerMotion, read_trc
 from studio.progress import Progress
 from studio.sessions.manifest import FILE_NAME as SESSION_FILE
 from studio.sessions.run_record import FILE_NAME as RUN_FILE
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
-from studio.synthesis.mending import mended
-from studio.synthesis.person import PersonMotion
-from studio.synthesis.recipe_file import find_recipe, read_recipe, recipe_names
-from studio.synthesis.recipes import recipe_motion
-from studio.synthesis.recorded_clip import read_recording, sampled
-from studio.synthesis.recorded_motion import RecordedMotion
-from studio.synthesis.retargeting import family_of, on_skeleton
-from studio.training.c3d_file import read_c3d
 from studio.training.marker_labels import person_markers
 from studio.training.pose_fitting import bad_frames, fit_poses
 from studio.training.resampling import frame_times, points_at, poses_at
@@ -42,7 +40,6 @@ FPS = 30.0
 FEWEST_FRAMES = 10
 SKELETON_FILES, POINT_FILES, RECIPE = (".amc", ".bvh", ".npz"), (".c3d", ".trc"), ".toml"
 MOTION_FILES = (*SKELETON_FILES, *POINT_FILES)
-ARM = "arm"
 # Pairs of markers whose distances say how large the person is.
 MEASURED = (
     *(("Hip", "Neck"), ("Neck", "Head")),
@@ -146,16 +143,9 @@ def recipe_recording(
     options : of the motion, in place of the recipe's ({"performance": 2} is the second performance of joined clips).
     frames : instead of the recipe's, at its rate. Raises StudioError, for a recipe without a person too.
     """
-    path = find_recipe(recipe)
-    wanted = read_recipe(path)
-    if wanted.motion == ARM:
-        raise StudioError(f"Recipe '{path.name}' moves no person.", "Choose a recipe of a person.")
-    changed = msgspec.structs.replace(
-        wanted, options={**wanted.options, **(options or {})}, frames=frames or wanted.frames
-    )
-    motion = recipe_motion(changed, path.parent, skeleton_of_body(body))
+    motion = person_of_recipe(recipe, skeleton_of_body(body), options=options, frames=frames)
     times = frame_times((motion.frame_count - 1) / motion.fps, fps)
-    return fitted_person(sampled(motion, times, fps), body, path.stem, progress)
+    return fitted_person(sampled(motion, times, fps), body, Path(recipe).stem, progress)
 
 
 def _fitted(targets: Targets, body: BodyModel, name: str, fps: float, progress: Progress | None) -> Recording:

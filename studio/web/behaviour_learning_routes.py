@@ -10,12 +10,12 @@ from fastapi import APIRouter
 from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import list_bodies, load_body
 from studio.errors import BehaviourError, NotFoundError
+from studio.footage_recipes import recipe_names
 from studio.knobs import knobs_of
 from studio.runs.behaviour_models import SUFFIX, models_folder
 from studio.sessions.archives import ENDINGS, unpacked
 from studio.sessions.names import checked_name
 from studio.sessions.session import BODIES_NAME
-from studio.synthesis.recipe_file import recipe_names
 from studio.training.oversampling import OversamplingSettings
 from studio.training.sources import FPS, MOTION_FILES
 from studio.web.behaviour_learning_schemas import LearningChoices, LearningProgress, LearningRequest

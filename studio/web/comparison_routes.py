@@ -9,17 +9,17 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Response
 
-from studio.errors import NotFoundError, StudioError
-from studio.experiments.comparison import Plan, plan_comparison
-from studio.experiments.comparison_folders import (
+from studio.comparison.candidates import LINEUPS, VARIANTS, WEIGHTING, Lineup
+from studio.comparison.folders import (
     kept_comparison,
     kept_comparisons,
     new_comparison,
     place_of,
     throw_away,
 )
-from studio.experiments.entrants import LINEUPS, VARIANTS, WEIGHTING, Lineup
-from studio.experiments.kept_comparison import FRAMES_NAME, RESULT_NAME, KeptComparison
+from studio.comparison.kept_comparison import FRAMES_NAME, RESULT_NAME, KeptComparison
+from studio.comparison.plan import Plan, plan_comparison
+from studio.errors import NotFoundError, StudioError
 from studio.sessions.session import Session
 from studio.tracking.catalogue import TRACKERS
 from studio.web.comparison_schemas import (
@@ -103,7 +103,8 @@ def detail(session: OpenSession, kept: Kept, doors: Door) -> ComparisonDetail:
         behaviour=plan.behaviour,
         fps=plan.fps,
         settings={
-            entrant.name: {WEIGHTING: entrant.weighting, **entrant.changes} for entrant in plan.entrants
+            candidate.name: {WEIGHTING: candidate.weighting, **candidate.changes}
+            for candidate in plan.entrants
         },
         result=kept.result(),
     )
@@ -147,11 +148,11 @@ def frames_as_csv(session: OpenSession, kept: Kept) -> Response:
 def _plan(session: Session, wish: ComparisonRequest) -> Plan:
     """The wish, checked. Raises StudioError for what cannot be compared."""
     changes: dict[str, dict] = {"": dict(wish.settings)} if wish.settings else {}
-    for entrant in wish.trackers:
-        own = dict(entrant.settings) | ({WEIGHTING: entrant.weighting} if entrant.weighting else {})
+    for candidate in wish.trackers:
+        own = dict(candidate.settings) | ({WEIGHTING: candidate.weighting} if candidate.weighting else {})
         if own:
-            changes[entrant.name] = own
-    names = tuple(entrant.name for entrant in wish.trackers)
+            changes[candidate.name] = own
+    names = tuple(candidate.name for candidate in wish.trackers)
     lineup = Lineup(names, wish.weighting or "", wish.evaluations, wish.layers, changes)
     return plan_comparison(
         session,
@@ -198,7 +199,7 @@ def _line(doors: Doors, session: Session, kept: KeptComparison) -> ComparisonLin
         name=kept.name,
         created=record.created,
         status=status,  # pyright: ignore[reportArgumentType]
-        trackers=[entrant.name for entrant in plan.entrants],
+        trackers=[candidate.name for candidate in plan.entrants],
         evaluations=plan.evaluations,
         seeds=len(plan.seeds),
         first=plan.first,

@@ -8,15 +8,14 @@ from fastapi import APIRouter
 from pydantic import Field
 from starlette.responses import FileResponse, Response
 
+from studio.comparison.findings_document import REPORT, REPRODUCTIONS, RESULTS, SUMMARY
 from studio.errors import NotFoundError, SessionError
-from studio.experiments.findings_files import REPORT, RESULTS, SUMMARY
 from studio.typed_decoding import decode_json
 from studio.web.doors import Door, Doors
 from studio.web.schemas import Answer
 
 router = APIRouter(tags=["reports"])
 
-REPRODUCTION_FOLDER = "reproduction"
 DOWNLOADS = {RESULTS: "application/json", SUMMARY: "text/markdown; charset=utf-8", REPORT: "text/html"}
 
 
@@ -61,4 +60,4 @@ class _Results(msgspec.Struct, frozen=True):
 
 
 def _folder(doors: Doors) -> Path:
-    return doors.workspace.root / REPRODUCTION_FOLDER
+    return doors.workspace.root / REPRODUCTIONS

@@ -5,8 +5,8 @@ from collections import OrderedDict
 from functools import lru_cache
 from pathlib import Path
 
-from studio.capture.trc import MarkerMotion, read_trc
 from studio.evaluation.errors import Evaluation, evaluate
+from studio.motion_files.trc import MarkerMotion, read_trc
 from studio.runs.tracks import RAW, read_track, track_stamp
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun

@@ -5,10 +5,10 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Response
 
+from studio.comparison.folders import bring_back
+from studio.comparison.kept_comparison import RECORD_NAME as COMPARISON_FILE_NAME
+from studio.comparison.kept_comparison import KeptComparison
 from studio.errors import NotFoundError, StudioError
-from studio.experiments.comparison_folders import bring_back
-from studio.experiments.kept_comparison import RECORD_NAME as COMPARISON_FILE_NAME
-from studio.experiments.kept_comparison import KeptComparison
 from studio.sessions.manifest import FILE_NAME, read_manifest
 from studio.sessions.names import inside
 from studio.sessions.run_record import FILE_NAME as RUN_FILE_NAME

@@ -4,8 +4,8 @@ import math
 
 from studio.body.model import BodyModel, Parameter
 from studio.capture.footage_source import CameraSource
+from studio.comparison.folders import comparison_count
 from studio.errors import StudioError
-from studio.experiments.comparison_folders import comparison_count
 from studio.geometry.camera import Camera
 from studio.runs.silhouette_doubts import standing_doubts
 from studio.sessions.beginning import next_step

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from fastapi import APIRouter, Response
 
-from studio.capture.trc import read_trc
 from studio.errors import SettingsError
 from studio.evaluation.errors import evaluate
 from studio.knobs import changed, knobs_of
+from studio.motion_files.trc import read_trc
 from studio.runs.correcting import prepare_correction, track_backwards
 from studio.runs.refining import (
     REFINED,

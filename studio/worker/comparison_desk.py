@@ -5,8 +5,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from studio.comparison.kept_comparison import KeptComparison
 from studio.errors import RunError, StudioError
-from studio.experiments.kept_comparison import KeptComparison
 from studio.sessions.session import Session
 from studio.worker.comparison_run import run_comparison
 from studio.worker.trial_pool import cores

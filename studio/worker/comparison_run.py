@@ -6,13 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from studio.comparison.kept_comparison import KeptComparison, trial_key
+from studio.comparison.kept_trials import KeptOutcome, measured_by, plain
+from studio.comparison.plan import Comparison, Plan, conclude, trials
+from studio.comparison.tracking_trials import measure_tracking
+from studio.comparison.trials import Outcome, Trial, TrialJob
 from studio.errors import RunError
-from studio.experiments.comparison import Comparison, Plan, conclude, trials
-from studio.experiments.experiment import Outcome, Trial
-from studio.experiments.kept_comparison import KeptComparison, trial_key
-from studio.experiments.kept_trials import KeptOutcome, measured_by, plain
-from studio.experiments.reproduction_plan import TrialJob
-from studio.experiments.tracking_trials import measure_tracking
 from studio.progress import Progress
 from studio.sessions.manifest import now
 from studio.sessions.session import Session

@@ -13,8 +13,8 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-from studio.experiments.footage_shelf import MOST_BYTES
-from studio.experiments.reproduction_plan import TrialJob
+from studio.comparison.footage_shelf import MOST_BYTES
+from studio.comparison.trials import TrialJob
 from studio.worker.owned_process import ending
 from studio.worker.trial_process import TrialResult, run_trials
 

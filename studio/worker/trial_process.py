@@ -11,11 +11,9 @@ from multiprocessing import parent_process
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 
-from studio.experiments.conclusion import failure_in_words
-from studio.experiments.experiment import Plain
-from studio.experiments.footage_shelf import FootageShelf
-from studio.experiments.kept_trials import plain
-from studio.experiments.reproduction_plan import TrialJob
+from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.kept_trials import plain
+from studio.comparison.trials import Plain, TrialJob, failure_in_words
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,9 +10,10 @@ from scene_wire import until
 from studio_page import StudioPage
 from studio_server import StudioServer
 
-from studio.experiments.charts import Chart, Series
-from studio.experiments.experiment import Experiment, Findings, Number, Scale, Table
-from studio.experiments.findings_document import Making, as_document
+from studio.comparison.findings import Chart, Findings, Number, Series, Table
+from studio.comparison.findings_document import Making, as_document
+from studio.comparison.trials import Scale
+from studio.reproduction.experiment import Experiment
 
 pytestmark = pytest.mark.browser
 

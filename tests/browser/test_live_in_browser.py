@@ -12,8 +12,8 @@ from studio_page import StudioPage
 from studio_server import StudioServer
 from toy_session import make_session
 
-from studio.experiments.live_benchmark import CHANGES, TRACKER, WEIGHTING, live_figures
-from studio.experiments.live_footage import learn_walk, make_footage
+from studio.benchmarks.live_footage import learn_walk, make_footage
+from studio.benchmarks.live_stages import CHANGES, TRACKER, WEIGHTING, live_figures
 from studio.runs.live_summary import summary_of
 from studio.sessions.workspace import Workspace
 

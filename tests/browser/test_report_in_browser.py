@@ -6,10 +6,10 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 from toy_experiments import conclude, measure, toy
 
-from studio.experiments.experiment import Outcome, Scale
-from studio.experiments.findings_document import Making, as_document, failed_document
-from studio.experiments.kept_trials import plain
-from studio.experiments.report_document import report_html
+from studio.comparison.findings_document import Making, as_document, failed_document
+from studio.comparison.kept_trials import plain
+from studio.comparison.trials import Outcome, Scale
+from studio.reproduction.report_document import report_html
 
 pytestmark = pytest.mark.browser
 SEEDS = tuple(range(12))

@@ -10,9 +10,9 @@ from click.testing import CliRunner, Result
 from toy_session import FRAMES, true_poses
 
 from studio.body.forward_kinematics import marker_points
-from studio.capture.trc import MarkerMotion, write_trc
 from studio.cli.main import main
-from studio.experiments.kept_comparison import BEHAVIOUR_NAME
+from studio.comparison.kept_comparison import BEHAVIOUR_NAME
+from studio.motion_files.trc import MarkerMotion, write_trc
 from studio.sessions.made_from import note
 from studio.sessions.named_rows import write_pose
 from studio.sessions.session import Session

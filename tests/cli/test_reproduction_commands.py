@@ -10,9 +10,9 @@ from toy_experiments import toy
 
 from studio.cli import reproduction_commands
 from studio.cli.main import main
-from studio.experiments import catalogue
+from studio.reproduction import catalogue
+from studio.reproduction import runner as reproduction
 from studio.sessions.workspace import workspace_root
-from studio.worker import reproduction
 
 
 @pytest.fixture(autouse=True)

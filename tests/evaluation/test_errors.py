@@ -5,10 +5,10 @@ import pytest
 
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
-from studio.capture.trc import MarkerMotion
 from studio.errors import TruthError
 from studio.evaluation.errors import evaluate, limb_of_markers, rows_of_frames
 from studio.evaluation.report import in_words
+from studio.motion_files.trc import MarkerMotion
 
 FRAMES = 6
 

@@ -16,7 +16,7 @@ from studio.export.bvh_writing import smooth_angles
 from studio.export.exporting import export_run
 from studio.export.formats import FORMATS
 from studio.export.skeleton import Skeleton, follow, skeleton_of
-from studio.synthesis.bvh import read_bvh
+from studio.motion_files.bvh import read_bvh
 
 BVH = FORMATS["bvh"]
 LEAST_MM, LEAST_DEGREES = 0.1, 0.01

@@ -8,7 +8,7 @@ import pytest
 from board_takes import PLACES, render_takes, two_cameras
 
 import studio
-from studio.export.bvh_reading import read_bvh
+from studio.motion_files.bvh import read_bvh_file
 from studio.notebook.opening import Tracked
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -39,7 +39,7 @@ def test_the_page_runs_from_top_to_bottom(
     assert studio.evaluate("walk/first", track="refined").mean_mm < 60.0
     assert studio.list_tracks("walk/first") == ("raw", "refined", "smoothed")
     assert [entry.name for entry in studio.list_runs("walk")] == ["first", "fixed"]
-    assert len(read_bvh(tmp_path / "walk.bvh").turns) == 8
+    assert len(read_bvh_file(tmp_path / "walk.bvh").turns) == 8
     told = capsys.readouterr().out
     assert "There is no session 'run'" in told
     assert "Traceback" not in told

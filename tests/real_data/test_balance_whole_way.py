@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 import studio
 from studio.body.forward_kinematics import marker_points
-from studio.capture.trc import read_trc
 from studio.geometry.projection import project
+from studio.motion_files.trc import read_trc
 from studio.notebook.aligning import Alignment
 from studio.runs.checking import RunCheck, check_run
 from studio.runs.mask_quality import MaskQuality

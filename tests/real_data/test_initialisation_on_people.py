@@ -9,19 +9,19 @@ from random_people import people_session, random_moments
 from scipy import ndimage
 
 from studio.body.forward_kinematics import marker_points
+from studio.body.person import PersonMotion
+from studio.body.retargeting import on_skeleton
 from studio.capture.calibration_files import read_calibration
-from studio.capture.trc import read_trc
 from studio.evidence.frame_evidence import FrameEvidence
+from studio.motion_files.reading import read_recording
+from studio.motion_files.trc import read_trc
 from studio.runs.initialising import WEIGHTING, initialise
 from studio.runs.problem_source import ProblemSource
 from studio.sessions.importers.catalogue import import_source
 from studio.sessions.session import Session
 from studio.settings import default_settings
-from studio.synthesis.person import PersonMotion
 from studio.synthesis.recipe_file import Recipe, find_recipe, read_recipe
 from studio.synthesis.recipes import recipe_motion, recipe_person
-from studio.synthesis.recorded_clip import read_recording
-from studio.synthesis.retargeting import on_skeleton
 from studio.synthesis.shape import with_hands_and_feet
 from studio.weighting.outlines import OutlineProjector
 from studio.weighting.silhouette_areas import Silhouettes

@@ -9,6 +9,7 @@ import pytest
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import joint_frames, marker_points
 from studio.body.inverse_kinematics import pose_from_markers
+from studio.body.person import MARKERS, PersonMotion, Skeleton, marker_motion
 from studio.body.subject import fit_subject, subject_from_shape
 from studio.capture.calibration_files import read_calibration
 from studio.evidence.background import gaussian_from_frames
@@ -20,7 +21,7 @@ from studio.geometry.rotations import axis_turn
 from studio.synthesis.flesh import BOUND, BOUND_RADIUS, clothed_pieces, piece_tables
 from studio.synthesis.gait import leg_to_ankle
 from studio.synthesis.office import office
-from studio.synthesis.person import MARKERS, PersonMotion, Skeleton, marker_lengths, marker_motion
+from studio.synthesis.person import marker_lengths
 from studio.synthesis.person_footage import recipe_renderer
 from studio.synthesis.recipe_file import Recipe, find_recipe, read_recipe
 from studio.synthesis.recipes import recipe_motion, recipe_person

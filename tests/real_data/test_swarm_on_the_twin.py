@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studio.experiments.fleischmann.best_figure import FILTER_3, SWARM_3
-from studio.experiments.fleischmann.setting import EQ13, EVALUATIONS, SWARM, TWIN, TWIN_20
-from studio.experiments.footage_shelf import FootageShelf
-from studio.experiments.statistics import sign_test
-from studio.experiments.tracked import Attempt, Tracked, track
-from studio.experiments.tracking_trials import Contender
+from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.statistics import sign_test
+from studio.comparison.tracked import Attempt, Tracked, track
+from studio.reproduction.fleischmann.figures import FILTER_3, SWARM_3
+from studio.reproduction.fleischmann.setting import EQ13, EVALUATIONS, SWARM, TWIN, TWIN_20
+from studio.reproduction.tracking import Contender
 from studio.settings import DEFAULT_WEIGHTING
 from studio.synthesis.recipes import synthesize
 from studio.tracking.evaluations import knobs_for_evaluations

@@ -13,10 +13,10 @@ from tracked_runs import opened, poses_of
 from studio.behaviour.model_file import read_model, write_model
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
-from studio.capture.trc import MarkerMotion, write_trc
+from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.tracked import Attempt, track
 from studio.errors import BehaviourError, NotFoundError, SettingsError, StudioError
-from studio.experiments.footage_shelf import FootageShelf
-from studio.experiments.tracked import Attempt, track
+from studio.motion_files.trc import MarkerMotion, write_trc
 from studio.runs.behaviour_models import check_prediction, fitting, models_folder, models_in
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.problem_source import ProblemSource

@@ -7,10 +7,10 @@ from arm_behaviour import keep_arm_model
 from toy_session import true_poses
 from tracked_runs import finish
 
+from studio.benchmarks.kernels import made_evidence, ring_of_cameras
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.experiments.benchmark import made_evidence, ring_of_cameras
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.search_space import default_sigma, search_space
 from studio.sessions.session import Session

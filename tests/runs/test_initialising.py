@@ -11,8 +11,8 @@ from random_people import people_session, random_moments
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.body.subject import Subject
-from studio.capture.trc import read_trc
 from studio.errors import NotFoundError, RunError, WorkCancelledError
+from studio.motion_files.trc import read_trc
 from studio.runs.initialising import (
     InitialPose,
     hull_of,

@@ -5,8 +5,8 @@ import pytest
 
 from studio.body.inverse_kinematics import pose_from_markers
 from studio.body.model import BodyModel
-from studio.capture.trc import MarkerMotion, read_trc
 from studio.evaluation.errors import evaluate, rows_of_frames
+from studio.motion_files.trc import MarkerMotion, read_trc
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.refining import refine_run, smooth_run
 from studio.runs.tracks import Track, read_track, write_track

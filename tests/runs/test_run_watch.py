@@ -12,7 +12,7 @@ from studio.behaviour.model_file import write_model
 from studio.behaviour.model_learning import learn_model
 from studio.behaviour.settings import LearningSettings
 from studio.body.forward_kinematics import marker_points
-from studio.capture.trc import read_trc
+from studio.motion_files.trc import read_trc
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.reannealing import Reannealing
 from studio.sessions.session import Session

@@ -9,8 +9,8 @@ from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
 from studio.capture.calibration_files import write_calibration
 from studio.capture.footage_source import CameraSource, FootageSource
-from studio.capture.trc import MarkerMotion, write_trc
 from studio.geometry.camera import Camera
+from studio.motion_files.trc import MarkerMotion, write_trc
 from studio.sessions.manifest import SessionManifest, now, write_manifest
 from studio.sessions.session import Session
 from studio.tracking.tracker import Carried, Estimate, FrameResult, LayerRecord, ParticleSet

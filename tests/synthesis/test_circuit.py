@@ -3,16 +3,11 @@
 import numpy as np
 import pytest
 
+from studio.body.person import PersonMotion, Skeleton, joint_points, marker_motion
 from studio.errors import StudioError
 from studio.synthesis.circuit import Halt as CircuitHalt
 from studio.synthesis.circuit import circuit, walked
-from studio.synthesis.person import (
-    PersonMotion,
-    Skeleton,
-    joint_points,
-    marker_motion,
-    skeleton_of_height,
-)
+from studio.synthesis.person import skeleton_of_height
 
 FRAMES = 450
 OPTIONS = {

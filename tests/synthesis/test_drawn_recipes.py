@@ -7,9 +7,9 @@ import msgspec
 import numpy as np
 import pytest
 
+from studio.body.person import joint_points
 from studio.geometry.projection import project
 from studio.synthesis.drawn_recipes import CHOOSING, HALVES, KINDS, REPORTING, clip_names, recipe_text
-from studio.synthesis.person import joint_points
 from studio.synthesis.recipe_file import (
     RECIPES,
     RECORDED,

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from studio.capture.trc import read_trc
+from studio.motion_files.trc import read_trc
 from studio.sessions.session import Session
 from studio.synthesis.recipes import synthesize
 

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from studio.body.person import PersonMotion, joint_points, marker_motion
 from studio.errors import StudioError
 from studio.synthesis.motions import MOTIONS, make_motion
-from studio.synthesis.person import PersonMotion, joint_points, marker_motion, skeleton_of_height
+from studio.synthesis.person import skeleton_of_height
 
 BONES = skeleton_of_height(1760.0, np.random.default_rng(1))
 FPS = 60.0

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from studio.body.person import joint_points, marker_motion
+from studio.body.retargeting import lowest_of_sole
 from studio.synthesis.motions import make_motion
 from studio.synthesis.performances import CARRIERS, Variation, from_local, performance, to_local
-from studio.synthesis.person import joint_points, marker_motion, skeleton_of_height
-from studio.synthesis.retargeting import lowest_of_sole
-from studio.synthesis.smooth_noise import smooth_noise, warped_times
+from studio.synthesis.person import skeleton_of_height
+from studio.training.smooth_noise import smooth_noise, warped_times
 
 BONES = skeleton_of_height(1760.0, np.random.default_rng(1))
 WALK = make_motion("walk", BONES, 240, 60.0, {})

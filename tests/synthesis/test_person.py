@@ -5,9 +5,10 @@ import pytest
 
 from studio.body.catalogue import load_body
 from studio.body.inverse_kinematics import pose_from_markers
+from studio.body.person import MARKERS, joint_points, marker_motion
 from studio.body.subject import Subject, fit_subject
 from studio.synthesis.motions import make_motion
-from studio.synthesis.person import MARKERS, joint_points, marker_lengths, marker_motion, skeleton_of_height
+from studio.synthesis.person import marker_lengths, skeleton_of_height
 
 
 def test_marker_names_are_those_of_the_tracker_bodies() -> None:

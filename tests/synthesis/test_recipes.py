@@ -9,10 +9,10 @@ import tomli_w
 
 from studio.body.forward_kinematics import marker_points
 from studio.capture.calibration_files import read_calibration, write_calibration
-from studio.capture.trc import read_trc
 from studio.errors import SessionError
 from studio.evaluation.errors import evaluate
 from studio.geometry.projection import project
+from studio.motion_files.trc import read_trc
 from studio.sessions.session import Session
 from studio.synthesis.recipe_file import find_recipe, read_recipe, recipe_cameras
 from studio.synthesis.recipes import synthesize

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from test_retargeting import humanoid
 
+from studio.body.person import PersonMotion, joint_points, sampled
+from studio.body.retargeting import on_skeleton
 from studio.errors import StudioError
 from studio.geometry.rotations import axis_turn
-from studio.synthesis.person import PersonMotion, joint_points, skeleton_of_height
-from studio.synthesis.recorded_clip import bent, read_recording, recorded_person, sampled
-from studio.synthesis.recorded_motion import RecordedMotion
-from studio.synthesis.retargeting import on_skeleton
+from studio.motion_files.reading import read_recording
+from studio.motion_files.recorded_motion import RecordedMotion
+from studio.synthesis.person import skeleton_of_height
+from studio.synthesis.recorded_clip import bent, recorded_person
 
 BONES = skeleton_of_height(1760.0, np.random.default_rng(1))
 FPS = 60.0

@@ -4,10 +4,11 @@ import numba
 import numpy as np
 import pytest
 
+from studio.body.person import joint_points
 from studio.geometry.projection import project
 from studio.synthesis.cameras import corner_rig
 from studio.synthesis.motions import make_motion
-from studio.synthesis.person import joint_points, skeleton_of_height
+from studio.synthesis.person import skeleton_of_height
 from studio.synthesis.renderer import Renderer
 from studio.synthesis.room import furnished_room
 

@@ -5,16 +5,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studio.capture.trc import read_trc
+from studio.body.person import marker_motion
 from studio.capture.video import VideoReader
 from studio.evaluation.errors import evaluate
 from studio.evidence.background import gaussian_from_frames
 from studio.evidence.masks import cleaned
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.projection import project
+from studio.motion_files.trc import read_trc
 from studio.sessions.session import Session
 from studio.synthesis.motions import make_motion
-from studio.synthesis.person import marker_motion, skeleton_of_height
+from studio.synthesis.person import skeleton_of_height
 from studio.synthesis.recipe_file import find_recipe, read_recipe, recipe_cameras
 from studio.synthesis.renderer import Renderer
 from studio.synthesis.room import furnished_room

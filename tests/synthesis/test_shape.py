@@ -11,12 +11,13 @@ from studio.body.dimensions import with_dimensions
 from studio.body.forward_kinematics import limb_ends
 from studio.body.inverse_kinematics import pose_from_markers
 from studio.body.model import BodyModel
+from studio.body.person import joint_points, marker_motion
 from studio.body.subject import fit_subject, read_subject
-from studio.capture.trc import read_trc
 from studio.errors import BodyError, StudioError
+from studio.motion_files.trc import read_trc
 from studio.sessions.session import Session
 from studio.synthesis.circuit import circuit
-from studio.synthesis.person import joint_points, marker_lengths, marker_motion
+from studio.synthesis.person import marker_lengths
 from studio.synthesis.recipe_file import read_recipe
 from studio.synthesis.recipes import synthesize
 from studio.synthesis.shape import skeleton_of_subject, subject_of_file, with_hands_and_feet

@@ -10,21 +10,16 @@ import numpy as np
 import pytest
 import tomli_w
 
+from studio.body.person import PersonMotion, joint_points
+from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.tracked import Attempt, track
 from studio.errors import StudioError
-from studio.experiments.footage_shelf import FootageShelf
-from studio.experiments.tracked import Attempt, track
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.sessions.session import Session
 from studio.synthesis.damage import clutter_in_front
 from studio.synthesis.motions import make_motion
-from studio.synthesis.person import (
-    PersonMotion,
-    Proportions,
-    joint_points,
-    proportioned,
-    skeleton_of_height,
-)
+from studio.synthesis.person import Proportions, proportioned, skeleton_of_height
 from studio.synthesis.recipe_file import read_recipe, recipe_cameras
 from studio.synthesis.recipes import synthesize
 from studio.synthesis.renderer import Renderer

@@ -9,16 +9,17 @@ import pytest
 import tomli_w
 
 from studio.body.catalogue import load_body
-from studio.capture.trc import read_trc
+from studio.body.person import SIDES, PersonMotion, joint_points, marker_motion
+from studio.body.retargeting import lowest_of_sole
 from studio.errors import StudioError
 from studio.evaluation.errors import evaluate
 from studio.geometry.projection import project
+from studio.motion_files.trc import read_trc
 from studio.runs.search_space import default_sigma
 from studio.sessions.session import Session
-from studio.synthesis.person import SIDES, PersonMotion, joint_points, marker_motion, skeleton_of_height
+from studio.synthesis.person import skeleton_of_height
 from studio.synthesis.recipe_file import find_recipe, read_recipe, recipe_cameras
 from studio.synthesis.recipes import recipe_motion, synthesize
-from studio.synthesis.retargeting import lowest_of_sole
 
 FIGURES = {
     "circle-three-cameras": 4.0,  # seconds that the paper names (Figs. 9 and 10), or ours

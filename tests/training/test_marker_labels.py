@@ -5,8 +5,8 @@ import pytest
 
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
+from studio.body.person import MARKERS
 from studio.errors import StudioError
-from studio.synthesis.person import MARKERS
 from studio.training.marker_labels import person_markers
 
 BODY = load_body("human25")

@@ -13,8 +13,8 @@ from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
-from studio.capture.trc import MarkerMotion, write_trc
 from studio.errors import BodyError, StudioError
+from studio.motion_files.trc import MarkerMotion, write_trc
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace

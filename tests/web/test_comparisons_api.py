@@ -9,9 +9,9 @@ import pytest
 from sample_walk import copy_of_walk
 from web_doubles import Studio
 
-from studio.experiments.comparison import plan_comparison
-from studio.experiments.comparison_folders import new_comparison, place_of
-from studio.experiments.entrants import Lineup
+from studio.comparison.candidates import Lineup
+from studio.comparison.folders import new_comparison, place_of
+from studio.comparison.plan import plan_comparison
 
 WISH = {
     "session": "walk", "trackers": [{"name": "annealed"}, {"name": "annealed:eq13", "settings": {"survival": 0.5}}],

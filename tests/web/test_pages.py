@@ -5,10 +5,10 @@ import re
 import pytest
 from web_doubles import TOKEN, Studio
 
+from studio.comparison.findings import VERDICTS
 from studio.evidence.settings import EvidenceSettings
-from studio.experiments.catalogue import EXPERIMENTS
-from studio.experiments.experiment import VERDICTS
 from studio.knobs import knobs_of
+from studio.reproduction.catalogue import EXPERIMENTS
 from studio.scene.view_options import Shown
 from studio.sessions.stored_run import StoredRun
 from studio.settings import RecordingSettings

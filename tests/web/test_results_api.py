@@ -9,7 +9,7 @@ import pytest
 from web_doubles import Studio
 
 from studio.body.forward_kinematics import marker_points
-from studio.capture.trc import MarkerMotion, write_trc
+from studio.motion_files.trc import MarkerMotion, write_trc
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 

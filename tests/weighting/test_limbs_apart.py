@@ -11,9 +11,10 @@ from scipy.optimize import lsq_linear
 from studio.body.catalogue import list_bodies, load_body
 from studio.body.forward_kinematics import limb_ends, limb_frames
 from studio.body.model import BodyModel, Limb
+from studio.body.person import PersonMotion
 from studio.body.subject import Subject, fit_subject
 from studio.errors import BodyError
-from studio.synthesis.person import PersonMotion, marker_lengths
+from studio.synthesis.person import marker_lengths
 from studio.weighting.hard_prior_kernels import closest
 from studio.weighting.hard_priors import LIMB_SHARE, TRUNK_SHARE, HardPriors, limb_pairs
 

@@ -11,13 +11,14 @@ from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import marker_points
 from studio.body.inverse_kinematics import pose_from_markers
 from studio.body.model import BodyModel
+from studio.body.person import PersonMotion, marker_motion
+from studio.body.retargeting import on_skeleton
 from studio.body.subject import Subject, fit_subject
-from studio.capture.trc import read_trc
+from studio.motion_files.reading import read_recording
+from studio.motion_files.trc import read_trc
 from studio.sessions.session import Session
 from studio.synthesis.motions import make_motion
-from studio.synthesis.person import PersonMotion, marker_lengths, marker_motion, skeleton_of_height
-from studio.synthesis.recorded_clip import read_recording
-from studio.synthesis.retargeting import on_skeleton
+from studio.synthesis.person import marker_lengths, skeleton_of_height
 from studio.weighting.hard_priors import HardPriors
 
 HEIGHT = 1760.0

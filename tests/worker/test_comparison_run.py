@@ -7,11 +7,11 @@ from dataclasses import replace
 import pytest
 from sample_walk import copy_of_walk
 
+from studio.comparison.candidates import Lineup
+from studio.comparison.folders import new_comparison, place_of
+from studio.comparison.kept_comparison import KeptComparison
+from studio.comparison.plan import Plan, plan_comparison
 from studio.errors import RunError
-from studio.experiments.comparison import Plan, plan_comparison
-from studio.experiments.comparison_folders import new_comparison, place_of
-from studio.experiments.entrants import Lineup
-from studio.experiments.kept_comparison import KeptComparison
 from studio.sessions.session import Session
 from studio.worker.comparison_desk import ComparisonDesk, ComparisonState
 from studio.worker.comparison_run import done_before, run_comparison

@@ -2,9 +2,9 @@
 
 from toy_experiments import measure
 
-from studio.experiments.kept_trials import KeptOutcome
-from studio.experiments.reproduction_plan import TrialJob
-from studio.worker.trial_pace import TrialPace
+from studio.comparison.kept_trials import KeptOutcome
+from studio.comparison.trials import TrialJob
+from studio.reproduction.trial_pace import TrialPace
 from studio.worker.trial_pool import next_job
 
 

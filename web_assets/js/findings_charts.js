@@ -1,4 +1,4 @@
-// Charts given as plain values (studio/experiments/charts.py), drawn alike in the report and in the studio's pages.
+// Charts given as plain values (studio/comparison/findings.py), drawn alike in the report and in the studio's pages.
 
 import { figure, figures, heatOption, legendEntries, seriesOption } from "./findings_options.js";
 

@@ -10,8 +10,8 @@ from studio.capture.calibration_files import Calibration, write_calibration
 from studio.capture.calibration_toml import is_canonical
 from studio.capture.footage_source import CameraSource, FootageSource
 from studio.capture.pictures import list_pictures
-from studio.capture.trc import read_trc
 from studio.errors import SessionError
+from studio.motion_files.trc import read_trc
 from studio.progress import Progress
 from studio.sessions.importers.measuring import MeasuredSource
 from studio.sessions.importers.plan import SourcePlan

@@ -1,0 +1,195 @@
+"""How fast poses are weighed, against the fastest that memory allows.
+
+The scene is made here: four 640 × 480 cameras like those of the Lee walk around the default body, a
+silhouette and a noisy picture. The limit is the edge and region weighting's own loads and nothing else: the
+map reads of the index stream that it really produced for some of the same poses, in the same run. The stream
+is replayed sixteen poses at a time, so that it comes from the cache as it does in the weighting: read from
+memory as a whole the loads alone would take half as long again, and flatter the weighting. Everything is
+repeated in turns and the best of each counted, so that another process taking a core for a moment changes
+little."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.benchmarks.made_scene import camera_towards, filled
+from studio.benchmarks.timing import quickest
+from studio.body.catalogue import load_body
+from studio.body.forward_kinematics import limb_ends
+from studio.body.model import BodyModel
+from studio.evidence.edges import bodytrack_edges, proximity_edges
+from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
+from studio.geometry.camera import Camera
+from studio.numba_in_threads import numba
+from studio.progress import Progress
+from studio.weighting.bodytrack import BodytrackSettings, BodytrackWeigher
+from studio.weighting.edge_region import EdgeRegionProblem, EdgeRegionSettings, EdgeRegionWeigher
+from studio.weighting.edge_region_kernels import LANES, loads_only
+from studio.weighting.edge_region_silhouette import EdgeRegionSilhouetteSettings, EdgeRegionSilhouetteWeigher
+from studio.weighting.edge_silhouette import EdgeSilhouetteSettings, EdgeSilhouetteWeigher
+from studio.weighting.outlines import OutlineProjector
+from studio.weighting.problem import FrameFunction
+from studio.weighting.silhouette_areas import FULL, HALF
+from studio.weighting.template import TemplateSettings, TemplateWeigher
+
+Array = NDArray[np.float64]
+
+WIDTH, HEIGHT = 640, 480
+FOCAL, DISTANCE, ABOVE = 560.0, 3300.0, 1700.0
+"""Pixels and mm: a person about 200 pixels tall, seen from above as by the Lee walk's cameras."""
+FRAMES_PER_SECOND = 60.0
+POSES = 1008
+LIMIT_BLOCKS, LIMIT_PASSES = 4, 20
+"""The limit takes about as long as weighing all poses, so that a busy machine disturbs both alike."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contest:
+    """One thing that is timed. run : does it once. evaluations : in one go."""
+
+    name: str
+    run: Callable[[], object]
+    evaluations: int
+    threads: int = 1
+
+
+def run_benchmark(
+    body_name: str = "human31", repeats: int = 80, progress: Progress | None = None
+) -> dict[str, object]:
+    """Evaluations a second of every weighting, one thread unless it says otherwise, and the limit of
+    edge-region's.
+
+    repeats : of every measurement. progress : told (step, done, total). Changes the number of Numba's threads
+    while it runs, and sets it back."""
+    body = load_body(body_name)
+    cameras = ring_of_cameras(body)
+    rng = np.random.default_rng(0)
+    sigma = np.array([entry.max_step for entry in body.parameters]) / (2.0 * FRAMES_PER_SECOND)
+    poses = body.neutral + sigma * rng.normal(size=(POSES, len(sigma)))
+    evidence = made_evidence(body, cameras, rng)
+    weigher = EdgeRegionWeigher(body, cameras, EdgeRegionSettings())
+    problem = weigher.problem(evidence["proximity"])
+    limit = limit_contest(problem, poses)
+    contests = [*weighing_contests(body, cameras, evidence, problem, poses), limit]
+    best = timed(contests, repeats, progress)
+    rates = {contest.name: contest.evaluations / best[contest.name] for contest in contests}
+    most = rates.pop(limit.name)
+    rate = rates["edge_region"]
+    return {
+        "edge_region": {
+            "evaluations_per_second": round(rate),
+            "samples": weigher.samples_per_evaluation,
+            "load_limit_per_second": round(most),
+            "fraction_of_load_limit": round(rate / most, 3),
+        },
+        "others_evaluations_per_second": {
+            name: round(found) for name, found in rates.items() if name != "edge_region"
+        },
+        "body": body.name,
+        "cameras": len(cameras),
+        "poses": POSES,
+        "repeats": repeats,
+    }
+
+
+def ring_of_cameras(body: BodyModel) -> tuple[Camera, ...]:
+    """Four cameras around a body in its neutral pose, looking at its middle."""
+    middle = limb_ends(body, body.neutral[None]).reshape(-1, 3).mean(axis=0)
+    cameras: list[Camera] = []
+    for number in range(4):
+        bearing = np.deg2rad(45.0 + 90.0 * number)
+        centre = middle + np.array([DISTANCE * np.cos(bearing), DISTANCE * np.sin(bearing), ABOVE])
+        cameras.append(camera_towards(f"made{number + 1}", (WIDTH, HEIGHT), FOCAL, centre, middle))
+    return tuple(cameras)
+
+
+def made_evidence(
+    body: BodyModel, cameras: tuple[Camera, ...], rng: np.random.Generator
+) -> dict[str, FrameEvidence]:
+    """A frame of the body in its neutral pose as its cones, brighter than a noisy ground, by kind of edge
+    map.
+    """
+    corners, _ = OutlineProjector.of_body(body, cameras).corners(body.neutral[None])
+    frames: dict[str, list[ViewEvidence]] = {"proximity": [], "bodytrack": []}
+    for camera, outlines in zip(cameras, corners[0], strict=True):
+        mask = filled(outlines, camera.width, camera.height)
+        grey = np.clip(60.0 + 90.0 * (mask > 0) + rng.normal(0.0, 4.0, mask.shape), 0, 255).astype(np.uint8)
+        picture = np.repeat(grey[:, :, None], 3, axis=2)
+        proximity = proximity_edges(picture, 12.0, 2.0)
+        frames["proximity"].append(ViewEvidence(camera.name, picture, mask, proximity))
+        frames["bodytrack"].append(ViewEvidence(camera.name, picture, mask, bodytrack_edges(picture)))
+    return {kind: FrameEvidence(0, tuple(views)) for kind, views in frames.items()}
+
+
+def weighing_contests(
+    body: BodyModel,
+    cameras: tuple[Camera, ...],
+    evidence: dict[str, FrameEvidence],
+    problem: EdgeRegionProblem,
+    poses: Array,
+) -> list[Contest]:
+    """Every weighting on one thread, edge-region on two as well."""
+    aware = EdgeRegionWeigher(body, cameras, EdgeRegionSettings(occlusion_aware=True))
+    problems: dict[str, FrameFunction] = {
+        "edge_region": problem,
+        "edge_region_occlusion_aware": aware.problem(evidence["proximity"]),
+        "bodytrack": BodytrackWeigher(body, cameras, BodytrackSettings()).problem(evidence["bodytrack"]),
+        "template": TemplateWeigher(body, cameras, TemplateSettings()).problem(evidence["proximity"]),
+        **silhouette_problems(body, cameras, evidence["proximity"]),
+    }
+    found = [Contest(name, _weighing(entry, poses), len(poses)) for name, entry in problems.items()]
+    if numba.get_num_threads() > 1:
+        many = np.concatenate([poses] * 4)
+        found.append(Contest("edge_region_two_threads", _weighing(problem, many), len(many), threads=2))
+    return found
+
+
+def silhouette_problems(
+    body: BodyModel, cameras: tuple[Camera, ...], evidence: FrameEvidence
+) -> dict[str, FrameFunction]:
+    """The weightings that look at the bidirectional silhouette, at half and at full resolution."""
+    found: dict[str, FrameFunction] = {}
+    for resolution in (HALF, FULL):
+        edges = EdgeSilhouetteSettings(silhouette_resolution=resolution)
+        three = EdgeRegionSilhouetteSettings(silhouette_resolution=resolution)
+        found[f"edge_silhouette_{resolution}"] = EdgeSilhouetteWeigher(body, cameras, edges).problem(evidence)
+        found[f"edge_region_silhouette_{resolution}"] = EdgeRegionSilhouetteWeigher(
+            body, cameras, three
+        ).problem(evidence)
+    return found
+
+
+def limit_contest(problem: EdgeRegionProblem, poses: Array) -> Contest:
+    """The loads alone, of up to LIMIT_BLOCKS blocks of sixteen poses spread over all."""
+    outlines, maps = problem.weigher.projector.blocks(poses), problem.maps
+    outlines = np.ascontiguousarray(outlines[:: max(1, len(outlines) // LIMIT_BLOCKS)][:LIMIT_BLOCKS])
+    blocks, views = outlines.shape[:2]
+    edge_pairs, region_pairs = (
+        stream.reshape(blocks, views, LANES, -1, LANES).view(np.uint64)
+        for stream in problem.recorded_indices(outlines)
+    )
+    sums = np.zeros((blocks, views, LANES, 2), dtype=np.int64)
+
+    def load() -> NDArray[np.int64]:
+        for block in range(blocks):
+            one = slice(block, block + 1)
+            loads_only(maps.values, maps.views, edge_pairs[one], region_pairs[one], LIMIT_PASSES, sums[one])
+        return sums
+
+    return Contest("limit", load, blocks * LANES * LIMIT_PASSES)
+
+
+def timed(contests: list[Contest], repeats: int, progress: Progress | None) -> dict[str, float]:
+    """The best time of each, seconds, all run in turns."""
+    return quickest(
+        {contest.name: contest.run for contest in contests},
+        repeats,
+        {contest.name: contest.threads for contest in contests},
+        lambda done: progress("Weighing", done, repeats) if progress else None,
+    )
+
+
+def _weighing(problem: FrameFunction, poses: Array) -> Callable[[], object]:
+    return lambda: problem.weigh(poses)

@@ -1,0 +1,139 @@
+"""The comparisons of a session: where a new one goes, finding them, throwing them away and bringing them back."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from studio.comparison.kept_comparison import (
+    BEHAVIOUR_NAME,
+    RECORD_NAME,
+    ComparisonRecord,
+    KeptComparison,
+)
+from studio.comparison.kept_trials import plain
+from studio.comparison.plan import Plan
+from studio.errors import NotFoundError, SessionError
+from studio.runs.new_run import software_version
+from studio.sessions import atomic_files
+from studio.sessions.manifest import now
+from studio.sessions.names import checked_name, free_name, inside, is_name
+from studio.sessions.record_files import write_record
+from studio.sessions.session import Session
+from studio.sessions.workspace import TRASH_NAME, Workspace
+
+FOLDER_NAME = "comparisons"
+
+
+def new_comparison(folder: Path, plan: Plan) -> KeptComparison:
+    """Make a comparison's folder, whole or not at all. Raises SessionError if something is there."""
+    record = ComparisonRecord(name=folder.name, created=now(), software=software_version(), plan=plan)
+    made = atomic_files.new_folder_beside(folder)
+    try:
+        if plan.behaviour_path:
+            atomic_files.copy_file(Path(plan.behaviour_path), made / BEHAVIOUR_NAME)
+        write_record(made / RECORD_NAME, record)
+        atomic_files.move_into_place(made, folder)
+    except FileExistsError:
+        raise SessionError(
+            f"There is something at '{folder}' already.", "Choose another name or folder."
+        ) from None
+    finally:
+        atomic_files.discard(made)
+    return KeptComparison(folder)
+
+
+def place_of(session: Session, name: str = "") -> Path:
+    """Where a comparison of a session goes; without a name to comparison-1, comparison-2, …"""
+    folder = session.path / FOLDER_NAME
+    taken = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+    return folder / (
+        checked_name(name, "comparison") if name else free_name(f"comparison-{len(taken) + 1}", taken)
+    )
+
+
+def kept_comparisons(session: Session) -> tuple[KeptComparison, ...]:
+    """A session's comparisons, newest first."""
+    return tuple(KeptComparison(path) for path in sorted(_folders(session), key=_made, reverse=True))
+
+
+def comparison_count(session: Session) -> int:
+    """How many comparisons a session has."""
+    return len(_folders(session))
+
+
+def kept_comparison(session: Session, name: str) -> KeptComparison:
+    """A session's comparison by name. Raises NotFoundError, NameRefused."""
+    path = inside(session.path / FOLDER_NAME, name, "comparison")
+    if not _is_comparison(path):
+        raise NotFoundError(
+            f"Session '{session.name}' has no comparison '{name}'.",
+            "List them, or start one with 'studio compare'.",
+        )
+    return KeptComparison(path)
+
+
+def unfinished_like(session: Session, plan: Plan) -> KeptComparison | None:
+    """The newest comparison of a session that asked for the same and can go on, None without one."""
+    for kept in kept_comparisons(session):
+        try:
+            same = not differences(plan, kept.plan(session))
+        except SessionError:
+            continue
+        if same and kept.status() in ("interrupted", "cancelled", "failed"):
+            return kept
+    return None
+
+
+def throw_away(workspace: Workspace, session: Session, kept: KeptComparison) -> Path:
+    """Move a comparison to the workspace's trash. Raises SessionError while a process works at it."""
+    if kept.is_running():
+        raise SessionError(f"Comparison '{kept.name}' is running.", "Cancel it first.")
+    return workspace.to_trash(kept.folder, f"{session.name}--{kept.name}")
+
+
+def bring_back(workspace: Workspace, trashed_name: str) -> tuple[Session, KeptComparison]:
+    """Bring a comparison back from the trash into its session. Raises NotFoundError."""
+    thrown = KeptComparison(inside(workspace.root / TRASH_NAME, trashed_name))
+    record = thrown.record()
+    for owner in (trashed_name.partition("--")[0], record.plan.session):
+        if is_name(owner) and (workspace.root / owner).is_dir():
+            session = workspace.session(owner)
+            folder = session.path / FOLDER_NAME
+            folder.mkdir(exist_ok=True)
+            place = folder / free_name(record.name, {path.name for path in folder.iterdir()})
+            os.rename(thrown.folder, place)
+            return session, KeptComparison(place)
+    raise NotFoundError(
+        f"Session '{record.plan.session}' of this comparison is gone.", "Restore the session first."
+    )
+
+
+def differences(asked: Plan, kept: Plan) -> tuple[str, ...]:
+    """The names of what two plans differ in; where the session lies does not count."""
+    first, second = _comparable(asked), _comparable(kept)
+    return tuple(name for name in first if first[name] != second[name])
+
+
+def _comparable(plan: Plan) -> Mapping[str, Any]:
+    places = ("footage", "session", "behaviour_path")
+    return plain({name: value for name, value in asdict(plan).items() if name not in places})
+
+
+def _folders(session: Session) -> list[Path]:
+    folder = session.path / FOLDER_NAME
+    return [path for path in folder.iterdir() if _is_comparison(path)] if folder.is_dir() else []
+
+
+def _is_comparison(path: Path) -> bool:
+    return not path.name.startswith(".") and (path / RECORD_NAME).is_file()
+
+
+def _made(path: Path) -> tuple[str, int, str]:
+    """What orders folders by age; one that cannot be read counts as oldest."""
+    try:
+        created = KeptComparison(path).record().created
+    except SessionError:
+        created = ""
+    return created, len(path.name), path.name

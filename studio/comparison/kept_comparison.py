@@ -1,0 +1,154 @@
+"""Comparisons on disk: a folder each, in the session they belong to, so that none is lost and all can go on.
+
+`comparisons/<name>/`: `comparison.json` (what was asked), `behaviour.model` (a copy of the model of those that need
+one), `trials/` (one file an outcome, as soon as it is there),
+and once all are done `result.json` (numbers, findings, every frame) and `frames.csv`.
+"""
+
+import hashlib
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from studio.comparison.comparison_findings import document, findings, frames_csv
+from studio.comparison.findings import Heading
+from studio.comparison.findings_document import Making, as_document
+from studio.comparison.kept_trials import KeptTrials, measured_by, plain
+from studio.comparison.plan import Comparison, Plan
+from studio.comparison.trials import Scale, Trial
+from studio.sessions import atomic_files
+from studio.sessions.manifest import now
+from studio.sessions.process_lock import ProcessLock
+from studio.sessions.record_files import read_record, write_record
+from studio.sessions.session import Session
+from studio.typed_decoding import decode_json
+
+RECORD_NAME, RESULT_NAME, FRAMES_NAME = "comparison.json", "result.json", "frames.csv"
+BEHAVIOUR_NAME = "behaviour.model"
+LOCK_NAME, TRIALS_NAME = "comparison.lock", "trials"
+SCHEMA_VERSION = 1
+
+
+class ComparisonRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What was asked. name : of the folder when it was made. created : UTC, ISO 8601. software : the studio's version.
+
+    ended : "cancelled" or "failed" where it was broken off so, "" else; problem : why, in words.
+    """
+
+    schema: int = SCHEMA_VERSION
+    name: str
+    created: str
+    software: str
+    plan: Plan
+    ended: str = ""
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class KeptComparison:
+    """A comparison's folder, whatever became of it."""
+
+    folder: Path
+
+    @property
+    def name(self) -> str:
+        """The folder's name."""
+        return self.folder.name
+
+    @property
+    def kept_trials(self) -> KeptTrials:
+        """The outcomes that are there."""
+        return KeptTrials(self.folder / TRIALS_NAME)
+
+    def record(self) -> ComparisonRecord:
+        """What was asked. Raises NotFoundError where there is nothing, SessionError where it cannot be read."""
+        return read_record(
+            self.folder / RECORD_NAME,
+            ComparisonRecord,
+            SCHEMA_VERSION,
+            missing=(f"There is no comparison '{self.name}'.", "Start one with 'studio compare'."),
+            what="a comparison's record",
+            remedy="Start a new one.",
+        )
+
+    def plan(self, session: Session | None = None) -> Plan:
+        """What was asked; of the session where it lies now, if one is given."""
+        asked = self.record().plan
+        if asked.behaviour:
+            asked = replace(asked, behaviour_path=str((self.folder / BEHAVIOUR_NAME).absolute()))
+        if session is None:
+            return asked
+        return replace(asked, footage=str(session.path.absolute()), session=session.name)
+
+    def status(self) -> str:
+        """running, finished, cancelled, failed, or interrupted (its process is gone; it can go on)."""
+        if (self.folder / RESULT_NAME).is_file():
+            return "finished"
+        if self.is_running():
+            return "running"
+        return self.record().ended or "interrupted"
+
+    def is_running(self) -> bool:
+        """Whether a living process works at it."""
+        return ProcessLock.is_held(self.folder / LOCK_NAME)
+
+    def lock(self) -> ProcessLock | None:
+        """The right to work at it, None while another process does."""
+        return ProcessLock.take(self.folder / LOCK_NAME)
+
+    def end(self, how: str, problem: str = "") -> None:
+        """Write down that it was broken off ("cancelled", "failed") or goes on ("")."""
+        ended = msgspec.structs.replace(self.record(), ended=how, problem=problem)
+        write_record(self.folder / RECORD_NAME, ended)
+
+    def finish(self, comparison: Comparison) -> None:
+        """Write the result, the frames first, so that whoever sees a result finds both."""
+        atomic_files.write_text(self.folder / FRAMES_NAME, frames_csv(comparison))
+        atomic_files.write_bytes(
+            self.folder / RESULT_NAME, msgspec.json.encode(result_of(comparison)) + b"\n"
+        )
+
+    def result(self) -> dict[str, Any] | None:
+        """Numbers (`document`), `findings` and `per_frame`, None while it is not finished."""
+        path = self.folder / RESULT_NAME
+        return decode_json(path.read_bytes(), dict[str, Any]) if path.is_file() else None
+
+
+def trial_key(trial: Trial) -> str:
+    """The name of a trial's outcome: made from its arguments, but not from where the session and the comparison's one
+    behaviour model lie.
+    """
+    elsewhere = ("footage", "behaviour")
+    arguments = {name: value for name, value in plain(trial.arguments).items() if name not in elsewhere}
+    return hashlib.sha256(json.dumps(arguments, sort_keys=True).encode()).hexdigest()[:24]
+
+
+def result_of(comparison: Comparison) -> dict[str, Any]:
+    """All that is kept of a comparison, plain; NaN is written as null."""
+    return {
+        **document(comparison),
+        "per_frame": {
+            "frames": list(comparison.frames),
+            "error_mm": {
+                result.tracker: [list(seed.per_frame_mm) for seed in result.seeds]
+                for result in comparison.trackers
+            },
+        },
+        "findings": _findings_document(comparison),
+    }
+
+
+def _findings_document(comparison: Comparison) -> dict[str, Any]:
+    """The comparison as an experiment's document, to be drawn as those are."""
+    plan = comparison.plan
+    names = ", ".join(candidate.name for candidate in plan.entrants)
+    heading = Heading(
+        "comparison", f"{names} on {plan.session}", f"{plan.evaluations} evaluations a frame", claim=""
+    )
+    seconds = sum(result.seconds for result in comparison.trackers)
+    count = len(plan.seeds) * len(plan.entrants)
+    making = Making(Scale(plan.seeds), count, seconds, measured_by(), (), now())
+    return as_document(heading, findings(comparison), making)

@@ -1,0 +1,94 @@
+"""Outcomes on disk, one file each, so that nothing that was measured is measured twice.
+
+A file's name is made from all that an outcome depends on: the function that measures, its arguments, and the
+recipes of the footage that these name. Experiments that ask for the same trial share it; a program that was killed
+goes on where it was. A file is whole or not there.
+"""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import studio
+from studio.comparison.trials import Plain
+from studio.runs.new_run import software_version
+from studio.sessions.atomic_files import write_text
+
+# What decides on an outcome; pages, commands and reports do not.
+SCIENCE = (
+    *("geometry", "motion_files", "body", "capture", "evidence", "volume", "weighting", "behaviour"),
+    *("tracking", "runs", "evaluation", "training"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class KeptOutcome:
+    """What became of a trial.
+
+    measured : plain values, None where it failed. failure : why, "" where it did not. seconds : it took.
+    software : what measured it. finished : UTC, ISO 8601. label, arguments : of the trial, for people who read the
+    file.
+    """
+
+    measured: Mapping[str, Plain] | None
+    failure: str
+    seconds: float
+    software: str
+    finished: str
+    label: str
+    arguments: Mapping[str, Plain]
+
+
+class KeptTrials:
+    """The folder of kept outcomes; one process writes."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def read(self, key: str) -> KeptOutcome | None:
+        """The outcome of that key; None where there is none, or a file that cannot be read as one."""
+        try:
+            return KeptOutcome(**json.loads((self.folder / f"{key}.json").read_text(encoding="utf-8")))
+        except (OSError, ValueError, TypeError):
+            return None
+
+    def write(self, key: str, outcome: KeptOutcome) -> None:
+        """Keep an outcome, in the place of an older one. Raises OSError."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        write_text(self.folder / f"{key}.json", json.dumps(plain(asdict(outcome)), indent=1) + "\n")
+
+
+def measured_by() -> str:
+    """The studio's version and a digest of the code that decides on outcomes: "0.1.0+1a2b3c4d"."""
+    return f"{software_version()}+{code_digest(SCIENCE)}"
+
+
+@cache
+def code_digest(rooms: tuple[str, ...]) -> str:
+    """A digest of the code of some rooms, read once in a process."""
+    package = Path(studio.__file__).parent
+    digest = hashlib.sha256()
+    for room in rooms:
+        for path in sorted((package / room).rglob("*")):
+            if path.suffix in (".py", ".toml"):
+                digest.update(path.read_bytes())
+    return digest.hexdigest()[:8]
+
+
+def plain(value: Plain) -> Any:  # noqa: ANN401
+    """The value as it comes back from JSON (tuples as lists, keys as words, NumPy's numbers as numbers)."""
+    return json.loads(json.dumps(value, default=_plain_value))
+
+
+def _plain_value(value: Any) -> Any:  # noqa: ANN401
+    """NumPy's arrays and numbers, mappings and sets. Raises TypeError for what has no plain form."""
+    as_list = getattr(value, "tolist", None)
+    if callable(as_list):
+        return as_list()
+    if isinstance(value, Mapping):
+        return dict(value)
+    raise TypeError(f"A {type(value).__name__} is no plain value.")

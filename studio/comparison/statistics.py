@@ -1,0 +1,181 @@
+"""Intervals, tests and verdicts of the experiments: what several seeds say about one number.
+
+The verdict's rule: the bootstrap 95 % interval over the seeds contains the paper's value (reproduced), lies
+wholly on the better side of it (better), or does not (not reproduced). It is firm with FIRM_SEEDS seeds or more.
+"""
+
+import math
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+
+from studio.comparison.findings import FIRM_SEEDS, Number
+
+Array = NDArray[np.float64]
+# Of a sample; one that takes `axis`, like NumPy's, is many times as fast.
+Statistic = Callable[..., ArrayLike]
+
+RESAMPLES = 9999
+SEED = 20050213
+
+
+class SignTest(NamedTuple):
+    """better, worse, ties : pairs in which ours is smaller, larger, equal. p : two-sided, ties left out."""
+
+    better: int
+    worse: int
+    ties: int
+    p: float
+
+
+def bootstrap_interval(
+    values: Sequence[float], statistic: Statistic = np.mean, level: float = 0.95
+) -> tuple[float, float]:
+    """Low and high end of a statistic's bootstrap interval (bias-corrected and accelerated; percentiles where
+    that is not defined), always the same for the same values. One value, or equal ones: that value twice; none:
+    NaN twice.
+    """
+    sample = np.asarray(values, dtype=np.float64)
+    return _interval((sample,), statistic, level)
+
+
+def ratio_interval(
+    ours: Sequence[float], theirs: Sequence[float], statistic: Statistic = np.mean, level: float = 0.95
+) -> tuple[float, float]:
+    """The interval of statistic(ours) / statistic(theirs), both of the same seeds in the same order.
+
+    Raises ValueError where they are not equally many.
+    """
+    first, second = _pairs(ours, theirs)
+    return _interval((first, second), _ratio_of(statistic), level)
+
+
+def sign_test(ours: Sequence[float], theirs: Sequence[float]) -> SignTest:
+    """Whether ours is smaller than theirs, pair by pair (two-sided sign test).
+
+    Raises ValueError where they are not equally many.
+    """
+    first, second = _pairs(ours, theirs)
+    better, worse = int((first < second).sum()), int((first > second).sum())
+    p = float(stats.binomtest(better, better + worse).pvalue) if better + worse else 1.0
+    return SignTest(better, worse, len(first) - better - worse, p)
+
+
+def number(
+    name: str,
+    values: Sequence[float],
+    unit: str = "",
+    paper: float | None = None,
+    better: str = "",
+    statistic: Statistic = np.mean,
+) -> Number:
+    """A number over seeds with its interval and verdict; values : one a seed, those that are not finite are left
+    out (and not counted).
+    """
+    kept = [float(value) for value in values if math.isfinite(value)]
+    ours = float(np.asarray(statistic(np.array(kept)))) if kept else math.nan
+    low, high = bootstrap_interval(kept, statistic)
+    verdict = verdict_of(low, high, paper, better)
+    return Number(name, ours, low, high, unit, paper, better, len(kept), verdict)
+
+
+def ratio_number(
+    name: str,
+    ours: Sequence[float],
+    theirs: Sequence[float],
+    unit: str = "",
+    paper: float | None = None,
+    better: str = "",
+    statistic: Statistic = np.mean,
+) -> Number:
+    """statistic(ours) / statistic(theirs) with its interval and verdict, paired by seed; pairs that are not finite
+    are left out. Raises ValueError where they are not equally many.
+    """
+    first, second = _pairs(ours, theirs)
+    finite = np.isfinite(first) & np.isfinite(second)
+    first, second = first[finite], second[finite]
+    value = float(_ratio_of(statistic)(first, second)) if len(first) else math.nan
+    low, high = ratio_interval(first.tolist(), second.tolist(), statistic)
+    verdict = verdict_of(low, high, paper, better)
+    return Number(name, value, low, high, unit, paper, better, len(first), verdict)
+
+
+def verdict_of(low: float, high: float, paper: float | None, better: str = "") -> str:
+    """The verdict on an interval: "answered" without a paper's value, else as the rule above says."""
+    if better not in ("", "lower", "higher"):
+        raise ValueError(f"better is '{better}', not 'lower', 'higher' or ''.")
+    if paper is None:
+        return "answered"
+    if low <= paper <= high:
+        return "reproduced"
+    on_better_side = (better == "lower" and high < paper) or (better == "higher" and low > paper)
+    return "better" if on_better_side else "not reproduced"
+
+
+def overall(verdicts: Iterable[str]) -> str:
+    """The verdict of the whole: "not reproduced" as soon as one is, "better" only where all that can be compared
+    are, "answered" where none can.
+    """
+    compared = [verdict for verdict in verdicts if verdict != "answered"]
+    if not compared:
+        return "answered"
+    if "not reproduced" in compared:
+        return "not reproduced"
+    return "reproduced" if "reproduced" in compared else "better"
+
+
+def firmness(seeds: int) -> str:
+    """Words to set behind a verdict: empty with seeds enough, else that it is not firm yet."""
+    if seeds >= FIRM_SEEDS:
+        return ""
+    return f"not firm: {seeds} {'seed' if seeds == 1 else 'seeds'} of at least {FIRM_SEEDS}"
+
+
+def _interval(samples: tuple[Array, ...], statistic: Statistic, level: float) -> tuple[float, float]:
+    count = len(samples[0])
+    if count == 0:
+        return math.nan, math.nan
+    if count == 1 or all(np.all(sample == sample[0]) for sample in samples):
+        value = float(np.asarray(statistic(*samples)))
+        return value, value
+    for method in ("BCa", "percentile"):
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            # Samples whose resamples hardly differ (a median, a maximum) have no acceleration: percentiles then.
+            warnings.simplefilter("ignore")
+            found = stats.bootstrap(
+                samples,
+                statistic,
+                n_resamples=RESAMPLES,
+                confidence_level=level,
+                method=method,
+                paired=len(samples) > 1,
+                rng=np.random.default_rng(SEED),
+            ).confidence_interval
+        if math.isfinite(found.low) and math.isfinite(found.high):
+            return float(found.low), float(found.high)
+    return math.nan, math.nan
+
+
+def _ratio_of(statistic: Statistic) -> Callable[..., Array]:
+    """statistic(first) / statistic(second) along an axis."""
+
+    def along(sample: Array, axis: int) -> Array:
+        if statistic in (np.mean, np.median):
+            return np.asarray(statistic(sample, axis=axis))
+        return np.apply_along_axis(statistic, axis, sample)
+
+    def ratio(first: Array, second: Array, axis: int = -1) -> Array:
+        return along(first, axis) / along(second, axis)
+
+    return ratio
+
+
+def _pairs(ours: Sequence[float], theirs: Sequence[float]) -> tuple[Array, Array]:
+    first, second = np.asarray(ours, dtype=np.float64), np.asarray(theirs, dtype=np.float64)
+    if first.shape != second.shape:
+        raise ValueError(f"{len(first)} values cannot be paired with {len(second)}.")
+    return first, second

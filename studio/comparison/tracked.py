@@ -1,0 +1,309 @@
+"""A tracker on a footage, kept in memory only: the trial that most experiments are made of."""
+
+import dataclasses
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.behaviour.model import BehaviourModel
+from studio.behaviour.model_file import read_model
+from studio.body.inverse_kinematics import known_markers, pose_from_markers
+from studio.body.model import BodyModel
+from studio.body.subject import read_subject
+from studio.comparison.footage_shelf import FootageShelf
+from studio.errors import NotFoundError, TruthError
+from studio.evaluation.errors import evaluate, rows_of_frames
+from studio.evidence.distance_maps import silhouettes_by_camera
+from studio.evidence.frame_evidence import FrameEvidence
+from studio.geometry.camera import Camera
+from studio.motion_files.trc import read_trc
+from studio.runs.behaviour_models import check_prediction, fitting, model_folders, model_path
+from studio.runs.run_behaviour import learner_of
+from studio.runs.search_space import search_space, session_sigma
+from studio.runs.shape_on_the_way import WEIGHTING, FittedShape, shaped_body
+from studio.sessions.session import Session
+from studio.settings import RunSettings, changed_settings, default_settings
+from studio.tracking.catalogue import TRACKERS
+from studio.tracking.frame_loop import search_frame
+from studio.tracking.frame_refinement import FrameRefiner, space_after
+from studio.tracking.tracker import LayerRecord, start_of
+from studio.weighting.catalogue import WEIGHTINGS
+
+Array = NDArray[np.float64]
+
+
+AS_PUBLISHED: Mapping[str, Any] = {"refine_frames": False}
+"""The papers' trackers end where their search does; an attempt that refines says so."""
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """One run: all that its poses depend on, plain values.
+
+    footage : a recipe's name, or the path of a session. changes : knobs by flat name. first, last : frames, half
+    open; last None means all. every : only each so many frames are seen (fps is divided, σ0 multiplied). cameras :
+    names, empty for all. body : a body's name or file, "" for the session's own. subject : a subject file beside the
+    session's own, such as "subject_shape.toml" of the Lee-walk twin (no hands and feet), "" for its own. sigma_scale :
+    multiplies σ0. behaviour : a behaviour model, by its name in the workspace's models or by path. shape_frames : that
+    many frames are tracked first, and the shape that is fitted to them (`runs.shape_on_the_way`) has the run.
+    """
+
+    footage: str
+    tracker: str
+    weighting: str
+    seed: int
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    first: int = 0
+    last: int | None = None
+    every: int = 1
+    cameras: tuple[str, ...] = ()
+    body: str = ""
+    sigma_scale: float = 1.0
+    subject: str = ""
+    behaviour: str = ""
+    shape_frames: int = 0
+
+    def plain(self) -> dict[str, Any]:
+        """As a trial's arguments; without a model as they were before there were any, so that outcomes stay known."""
+        return {
+            name: value
+            for name, value in asdict(self).items()
+            if value or name not in ("behaviour", "shape_frames")
+        }
+
+    @classmethod
+    def of_plain(cls, arguments: Mapping[str, Any]) -> "Attempt":
+        """From a trial's arguments, as they come back from JSON."""
+        return cls(**{**arguments, "cameras": tuple(arguments.get("cameras", ()))})
+
+
+@dataclass(frozen=True, slots=True)
+class Tracked:
+    """What an attempt reached, mm without alignment.
+
+    frames : numbers in the footage. per_frame_mm : mean over markers. lost : per frame the names of limbs that are
+    lost (a marker more than 150 mm off). evaluations : poses weighed in a frame after the first. seconds : of the
+    search (weighting and tracker), without reading and preparing pictures.
+    """
+
+    frames: list[int]
+    per_frame_mm: list[float]
+    lost: list[list[str]]
+    mean_mm: float
+    worst_mm: float
+    lost_frames: int
+    lost_limbs: list[str]
+    evaluations: int
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Changed:
+    """How an experiment may spoil what a tracker is given. cameras : of all views. evidence : of each frame."""
+
+    cameras: Callable[[tuple[Camera, ...]], tuple[Camera, ...]] = lambda cameras: cameras
+    evidence: Callable[[FrameEvidence], FrameEvidence] = lambda evidence: evidence
+
+
+UNCHANGED = Changed()
+
+
+def track(
+    attempt: Attempt,
+    shelf: FootageShelf,
+    *,
+    on_layer: Callable[[LayerRecord], None] | None = None,
+    on_frame: Callable[[int, int], None] | None = None,
+    spoilt: Changed = UNCHANGED,
+) -> Tracked:
+    """Track and measure. on_layer : is given every layer. on_frame : frames done, frames in all; may raise to stop.
+
+    Raises TruthError for a footage without truth and what tracking raises.
+    """
+    session = shelf.session(attempt.footage)
+    if session.truth_path is None:
+        raise TruthError(f"Session '{session.name}' has no truth.", "Take one made by 'studio synthesize'.")
+    subject = read_subject(session.path / attempt.subject) if attempt.subject else None
+    body = session.body(attempt.body or None, subject)
+    changes = {**AS_PUBLISHED, **attempt.changes}
+    settings = changed_settings(default_settings(attempt.tracker, attempt.weighting), changes)
+    follow = _Following(attempt, session, shelf, settings, spoilt)
+    start = _start_pose(session, body, attempt.first, session.manifest.fps)
+    frames = range(attempt.first, attempt.last or session.manifest.frame_count, attempt.every)
+    if attempt.shape_frames and start is not None:
+        shaped = follow.shaped(body, start, frames[: attempt.shape_frames])
+        body, start = shaped.body, tuple(float(value) for value in shaped.start)
+    found = follow(body, start, frames, on_layer=on_layer, on_frame=on_frame)
+    return measured(session, body, found.poses, np.array(frames), found.evaluations, found.seconds)
+
+
+@dataclass(slots=True, eq=False)
+class _Followed:
+    """poses (F, D) and log_weights (F,) of frames; evaluations of one after the first; seconds of the search."""
+
+    poses: Array
+    log_weights: Array
+    evaluations: int = 0
+    seconds: float = 0.0
+
+
+class _Following:
+    """A session's frames followed with one tracker and its settings, by any body."""
+
+    def __init__(
+        self, attempt: Attempt, session: Session, shelf: FootageShelf, settings: RunSettings, spoilt: Changed
+    ) -> None:
+        self.attempt, self.session, self.shelf, self.settings = attempt, session, shelf, settings
+        self.spoilt, self.cameras = spoilt, _cameras(session, attempt.cameras)
+        self.seen_with = spoilt.cameras(self.cameras)
+
+    def evidence(self, frame: int, weighting: str = "") -> FrameEvidence:
+        """What is seen in a frame, as a weighting wants it ("": the attempt's)."""
+        reader = WEIGHTINGS[weighting or self.attempt.weighting]
+        return self.spoilt.evidence(
+            self.shelf.evidence(
+                self.session,
+                self.cameras,
+                frame,
+                self.settings.evidence,
+                reader.edge_kind,
+                reader.reads_pictures,
+            )
+        )
+
+    def shaped(self, body: BodyModel, start: tuple[float, ...], frames: range) -> FittedShape:
+        """The body in the shape that the first frames show, and its pose in the first."""
+        sigma = session_sigma(self.session, body, self.session.manifest.fps / self.attempt.every)
+        return shaped_body(
+            body,
+            self.seen_with,
+            lambda frame: self.evidence(frame, WEIGHTING),
+            frames,
+            np.array(start),
+            sigma,
+        )
+
+    def __call__(
+        self,
+        body: BodyModel,
+        start: tuple[float, ...] | None,
+        frames: range,
+        on_layer: Callable[[LayerRecord], None] | None = None,
+        on_frame: Callable[[int, int], None] | None = None,
+    ) -> _Followed:
+        """The frames followed from a start pose."""
+        attempt, settings = self.attempt, self.settings
+        fps = self.session.manifest.fps
+        behaviour = _behaviour(self.session, body, settings, attempt)
+        sigma = session_sigma(self.session, body, fps / attempt.every) * attempt.sigma_scale
+        space = search_space(body, sigma, behaviour)
+        learner = learner_of(behaviour, settings, attempt.seed)
+        weigher = WEIGHTINGS[attempt.weighting].prepare(body, self.seen_with, settings.weighting)
+        refiner = FrameRefiner(body, self.seen_with, attempt.seed)
+        carried = start_of(start)
+        found = _Followed(np.zeros((len(frames), len(body.parameters))), np.zeros(len(frames)))
+
+        def tracked(count: int) -> tuple[Array, Array]:
+            return found.poses[:count], found.log_weights[:count]
+
+        for number, frame in enumerate(frames):
+            seen = self.evidence(frame)
+            began = time.perf_counter()
+            if learner is not None:
+                space = dataclasses.replace(space, behaviour=learner.model_in(number, tracked))
+                carried = learner.carried_into(number, carried, tracked)
+            problem = weigher.problem(seen)
+            result = search_frame(
+                TRACKERS[attempt.tracker],
+                problem,
+                carried,
+                space_after(space, carried, settings.refinement),
+                seed=attempt.seed,
+                frame=frame,
+                settings_source=lambda: (1, settings.tracker),
+                repeats=settings.tracker.start_repeats if number == 0 else 1,
+                on_layer=on_layer,
+            )
+            result = refiner.refined(
+                result, partial(silhouettes_by_camera, seen), problem, settings.refinement
+            )
+            if number:
+                found.seconds += time.perf_counter() - began
+            carried, found.evaluations = result.carried, result.evaluations
+            found.poses[number], found.log_weights[number] = result.estimate.pose, result.estimate.log_weight
+            if on_frame is not None:
+                on_frame(number + 1, len(frames))
+        return found
+
+
+def measured(
+    session: Session,
+    body: BodyModel,
+    poses: Array,
+    frames: NDArray[np.int64],
+    evaluations: int,
+    seconds: float,
+) -> Tracked:
+    """The errors of poses (K, D) of frames (K,) of a session with truth."""
+    assert session.truth_path is not None
+    truth = read_trc(session.truth_path)
+    found = evaluate(poses, frames, body, truth, session.manifest.fps)
+    return Tracked(
+        frames=[int(frame) for frame in found.frames],
+        per_frame_mm=[round(value, 3) for value in found.per_frame_mm],
+        lost=[list(limbs) for limbs in found.lost_by_frame],
+        mean_mm=round(found.mean_mm, 4),
+        worst_mm=round(found.worst_mm, 3),
+        lost_frames=found.lost_frames,
+        lost_limbs=list(found.lost_limbs),
+        evaluations=evaluations,
+        seconds=round(seconds, 4),
+    )
+
+
+def _behaviour(
+    session: Session, body: BodyModel, settings: RunSettings, attempt: Attempt
+) -> BehaviourModel | None:
+    """The attempt's model at the rate of its frames. Raises SettingsError where one is needed and none given."""
+    if not attempt.behaviour:
+        check_prediction(settings, has_model=False)
+        return None
+    path = model_path(model_folders(session), attempt.behaviour)
+    return fitting(read_model(path), body, session.manifest.fps / attempt.every)
+
+
+def _cameras(session: Session, names: tuple[str, ...]) -> tuple[Camera, ...]:
+    """The session's cameras, or those of them that are named, in the session's order."""
+    known = session.cameras()
+    unknown = set(names) - {camera.name for camera in known}
+    if unknown:
+        words = ", ".join(camera.name for camera in known)
+        raise NotFoundError(f"'{session.name}' has no camera '{min(unknown)}'.", f"It has {words}.")
+    return tuple(camera for camera in known if not names or camera.name in names)
+
+
+def _start_pose(session: Session, body: BodyModel, first: int, fps: float) -> tuple[float, ...] | None:
+    """The session's start pose; for a later first frame, and for a body that the session's pose is not of, the body
+    laid on the true markers of that frame.
+    """
+    is_own = body.name == session.manifest.body
+    own = session.start_pose(body) if is_own else None
+    pose = own if first == 0 and is_own else _pose_on_truth(session, body, first, fps, own)
+    return None if pose is None else tuple(float(value) for value in pose)
+
+
+def _pose_on_truth(session: Session, body: BodyModel, frame: int, fps: float, near: Array | None) -> Array:
+    """(D,) the pose whose markers come closest to the true ones of a frame, angles near `near` where given."""
+    assert session.truth_path is not None
+    truth = read_trc(session.truth_path)
+    rows = rows_of_frames(truth, fps)
+    if frame not in rows:
+        raise TruthError(f"The truth has no row for frame {frame}.", "Start at a frame that it has.")
+    kept, names = known_markers(body, truth.names)
+    points = truth.positions[rows[frame], kept]
+    return pose_from_markers(body, names, points, body.neutral if near is None else near)[0]

@@ -1,0 +1,87 @@
+"""A trial: one piece of work whose outcome depends on its arguments alone, run in any process, kept and found again."""
+
+import traceback
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+from studio.comparison.footage_shelf import FootageShelf
+from studio.errors import StudioError
+
+# Numbers, words, lists and dictionaries: what JSON can hold.
+Plain = Any
+Measure = Callable[[Mapping[str, Plain], FootageShelf], dict[str, Plain]]
+M = TypeVar("M", bound=Callable[..., Any])
+NAMED_BELOW = "studio.experiments"
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """How much is run. seeds : of the trials. quick : a look in minutes."""
+
+    seeds: tuple[int, ...]
+    quick: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """One piece of work. label : words for the progress. arguments : all that its outcome depends on, plain;
+    the same arguments always give the same outcome, so a kept outcome is used again.
+    """
+
+    label: str
+    arguments: Mapping[str, Plain]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """A trial and what was measured: plain values."""
+
+    trial: Trial
+    measured: Mapping[str, Plain]
+
+
+@dataclass(frozen=True, slots=True)
+class TrialJob:
+    """A trial, ready to be run in any process.
+
+    key : under which its outcome is kept. experiment : the first that asks for it. footage : recipes that it looks
+    at. frames : how many of them from the first, None for all. alone : nothing else may run then.
+    """
+
+    key: str
+    experiment: str
+    label: str
+    arguments: Mapping[str, Plain]
+    measure: Measure
+    footage: tuple[str, ...]
+    frames: int | None
+    alone: bool
+
+
+def kept_as(name: str) -> Callable[[M], M]:
+    """Give a measure the name that its outcomes are kept under, wherever its code moves to.
+
+    The names are those of the modules in which outcomes were first measured, below NAMED_BELOW: another name is
+    another trial, and everything is measured again.
+    """
+
+    def named(measure: M) -> M:
+        measure.kept_as = f"{NAMED_BELOW}.{name}"  # pyright: ignore[reportFunctionMemberAccess]
+        return measure
+
+    return named
+
+
+def measure_name(measure: Measure) -> str:
+    """The name that a measure's outcomes are kept under: that of `kept_as`, else where it stands."""
+    return getattr(measure, "kept_as", f"{measure.__module__}.{measure.__qualname__}")
+
+
+def failure_in_words(error: Exception) -> str:
+    """What went wrong: a StudioError's own words, else the kind of error and where it was raised."""
+    if isinstance(error, StudioError):
+        return str(error)
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {error} ({Path(place.filename).name}, line {place.lineno})"

@@ -1,0 +1,46 @@
+"""Recipes of footage by name: the three things that the studio asks of the room `synthesis`.
+
+Making footage is a leaf: no room of the product imports it. Whoever wants a recipe asks here, and the room is loaded
+then, as a command's module is.
+"""
+
+import importlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from studio.body.person import PersonMotion, Skeleton
+from studio.progress import Progress
+
+
+def recipe_names() -> tuple[str, ...]:
+    """The recipes that come with the studio."""
+    return _synthesis("recipe_file").recipe_names()
+
+
+def person_of_recipe(
+    recipe: str | Path,
+    skeleton: Skeleton,
+    *,
+    options: Mapping[str, float] | None = None,
+    frames: int | None = None,
+) -> PersonMotion:
+    """The motion of a recipe (a file or a bundled name) on a skeleton; nothing is rendered.
+
+    options, frames : in place of the recipe's own. Raises StudioError, for a recipe without a person too.
+    """
+    return _synthesis("recipes").person_of_recipe(recipe, skeleton, options, frames)
+
+
+def synthesize(
+    recipe: str | Path, into: Path, progress: Progress | None = None, frames: int | None = None
+) -> Path:
+    """Render a recipe's footage and make a session of it in the folder `into`, which is not there yet; returns it.
+
+    frames : only the first so many. Raises StudioError.
+    """
+    return _synthesis("recipes").synthesize(recipe, into, progress, frames)
+
+
+def _synthesis(module: str) -> Any:  # noqa: ANN401 - a module
+    return importlib.import_module(f"studio.synthesis.{module}")

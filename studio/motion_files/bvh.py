@@ -1,0 +1,202 @@
+"""Motion files in Biovision's BVH: a hierarchy of joints with offsets and channels, then a row of numbers a frame.
+
+Read strictly: whatever is not understood is refused with its line. `read_bvh_file` gives what the file says, in its own
+unit and axes. As a recording (`read_bvh`) the rest pose is that of all angles zero, y up and facing z, as in the CMU
+clips, and only the root may move. BVH names no unit; the CMU clips' is 25.4 / 0.45 mm.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.errors import StudioError
+from studio.geometry.rotations import axis_turn
+from studio.motion_files.recorded_motion import (
+    UP_FROM_Y_UP,
+    RecordedMotion,
+    at_line,
+    moved_skeleton,
+    numbers,
+    text_lines,
+)
+
+Array = NDArray[np.float64]
+
+CMU_UNIT = 25.4 / 0.45
+CHANNELS = {f"{axis}{kind}": (kind, "XYZ".index(axis)) for axis in "XYZ" for kind in ("position", "rotation")}
+REMEDY = "Correct the line, or export the file again."
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BvhFile:
+    """What a file says, in its unit and axes.
+
+    names, parents : joints in the file's order, end sites named after their parent with `_end`; is_end : (J,) which
+    those are. offsets : (J, 3). moves : (F, J, 3) position channels, 0 where there is none; moved : (J, 3) where there
+    is one. turns : (F, J, 3, 3) in the parent's frame.
+    """
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    is_end: NDArray[np.bool_]
+    offsets: Array
+    moves: Array
+    moved: NDArray[np.bool_]
+    turns: Array
+    fps: float
+
+    def followed(self) -> tuple[Array, Array]:
+        """Places (F, J, 3) and turns (F, J, 3, 3) of the joints in the file's world, without end sites. A position
+        channel stands in the offset's place, as Blender reads it.
+        """
+        places, turned = np.where(self.moved, self.moves, self.offsets), self.turns.copy()
+        for joint, parent in enumerate(self.parents):
+            if parent >= 0:
+                turned[:, joint] = turned[:, parent] @ self.turns[:, joint]
+                step = (turned[:, parent] @ places[:, joint][..., None])[..., 0]
+                places[:, joint] = places[:, parent] + step
+        return places[:, ~self.is_end], turned[:, ~self.is_end]
+
+
+@dataclass(slots=True)
+class _Hierarchy:
+    """What the upper half of the file says. channels : of each joint the words after their number."""
+
+    names: list[str] = field(default_factory=list)
+    parents: list[int] = field(default_factory=list)
+    is_end: list[bool] = field(default_factory=list)
+    offsets: list[list[float]] = field(default_factory=list)
+    channels: list[list[str]] = field(default_factory=list)
+
+
+def read_bvh(path: Path, unit_mm: float = CMU_UNIT) -> RecordedMotion:
+    """The motion in a BVH file; end sites become joints. A position channel of the root adds to its offset.
+
+    Raises StudioError naming file, line and remedy.
+    """
+    found = read_bvh_file(path)
+    if found.moved[1:].any():
+        joint = found.names[1 + int(found.moved[1:].any(axis=1).argmax())]
+        raise StudioError(
+            f"'{path.name}': joint '{joint}' has position channels, which only the root may have.",
+            "Export with fixed bone lengths.",
+        )
+    return moved_skeleton(
+        found.names,
+        found.parents,
+        found.offsets,
+        found.turns,
+        found.offsets[0] + found.moves[:, 0],
+        fps=found.fps,
+        source=path.name,
+        axes=UP_FROM_Y_UP,
+        scale=unit_mm,
+    )
+
+
+def read_bvh_file(path: Path) -> BvhFile:
+    """The joints and their motion as they are written. Raises StudioError naming file, line and remedy."""
+    lines = text_lines(path)
+    hierarchy, at = _read_hierarchy(path, lines)
+    fps, rows = _read_rows(path, lines, at, sum(map(len, hierarchy.channels)))
+    count = len(hierarchy.names)
+    turns = np.tile(np.eye(3), (len(rows), count, 1, 1))
+    moves, moved = np.zeros((len(rows), count, 3)), np.zeros((count, 3), dtype=np.bool_)
+    column = 0
+    for joint, channels in enumerate(hierarchy.channels):
+        for channel in channels:
+            kind, axis = CHANNELS[channel]
+            values = rows[:, column]
+            column += 1
+            if kind == "rotation":
+                turns[:, joint] = turns[:, joint] @ axis_turn(axis, np.radians(values))
+            else:
+                moves[:, joint, axis] += values
+                moved[joint, axis] = True
+    return BvhFile(
+        tuple(hierarchy.names),
+        tuple(hierarchy.parents),
+        np.array(hierarchy.is_end),
+        np.array(hierarchy.offsets),
+        moves,
+        moved,
+        turns,
+        fps,
+    )
+
+
+def _read_hierarchy(path: Path, lines: list[str]) -> tuple[_Hierarchy, int]:
+    """The joints, and the number of the line "MOTION" (from 0)."""
+    found, open_joints, pending, is_end = _Hierarchy(), [], "", False
+    for index, text in enumerate(lines):
+        words = text.split()
+        head, line = (words[0] if words else ""), index + 1
+        if head == "MOTION":
+            if open_joints or not found.names:
+                raise at_line(path, line, "the hierarchy is not complete before MOTION", REMEDY)
+            return found, index
+        if head in ("ROOT", "JOINT", "End"):
+            if (head == "ROOT") != (not found.names) or len(words) < 2:
+                raise at_line(path, line, f"'{text.strip()}' does not belong here", REMEDY)
+            is_end = head == "End"
+            pending = f"{found.names[open_joints[-1]]}_end" if is_end else words[1]
+        elif head == "{" and pending:
+            if pending in found.names:
+                raise at_line(path, line, f"there is a second joint '{pending}'", "Rename one of them.")
+            found.parents.append(open_joints[-1] if open_joints else -1)
+            open_joints.append(len(found.names))
+            found.names.append(pending)
+            found.is_end.append(is_end)
+            found.offsets.append([])
+            found.channels.append([])
+            pending = ""
+        elif head == "}" and open_joints:
+            if not found.offsets[open_joints[-1]]:
+                raise at_line(path, line, f"joint '{found.names[open_joints[-1]]}' has no OFFSET", REMEDY)
+            open_joints.pop()
+        elif head == "OFFSET" and open_joints and len(words) == 4:
+            found.offsets[open_joints[-1]] = numbers(path, line, words[1:])
+        elif head == "CHANNELS" and open_joints:
+            found.channels[open_joints[-1]] = _channels(path, line, words)
+        elif head not in ("HIERARCHY", ""):
+            raise at_line(path, line, f"'{text.strip()[:40]}' is not understood", REMEDY)
+    raise StudioError(f"'{path.name}' has no MOTION.", "Give a BVH file with its frames.")
+
+
+def _channels(path: Path, line: int, words: list[str]) -> list[str]:
+    names = words[2:]
+    if len(words) < 2 or words[1] != str(len(names)) or not set(names) <= set(CHANNELS):
+        raise at_line(path, line, "the channels do not match their number, or one is unknown", REMEDY)
+    return names
+
+
+def _read_rows(path: Path, lines: list[str], at: int, width: int) -> tuple[float, Array]:
+    """Frames a second and (F, width) channel values."""
+    counted, timed = (lines[at + step].split() if at + step < len(lines) else [] for step in (1, 2))
+    if len(counted) != 2 or counted[0] != "Frames:" or not counted[1].isdigit():
+        raise at_line(path, at + 2, "'Frames:' and their number must follow MOTION", REMEDY)
+    if len(timed) != 3 or timed[:2] != ["Frame", "Time:"]:
+        raise at_line(path, at + 3, "'Frame Time:' and the seconds must follow", REMEDY)
+    (step,) = numbers(path, at + 3, timed[2:])
+    if not 1e-4 <= step <= 1.0:
+        raise at_line(path, at + 3, f"a frame time of {step:g} s is not 0.0001 to 1", REMEDY)
+    rows = []
+    for index in range(at + 3, len(lines)):
+        words = lines[index].split()
+        if words and len(words) != width:
+            what = f"a frame has {len(words)} numbers, the hierarchy {width} channels"
+            raise at_line(path, index + 1, what, REMEDY)
+        if words:
+            rows.append(numbers(path, index + 1, words))
+    if len(rows) != int(counted[1]) or not rows:
+        raise at_line(
+            path, at + 2, f"{counted[1]} frames are announced, {len(rows)} follow", "Fetch the file anew."
+        )
+    return _rate(1.0 / step), np.array(rows)
+
+
+def _rate(fps: float) -> float:
+    """A rate whose frame time was rounded to seven digits: .0083333 s is 120 frames a second."""
+    return float(round(fps)) if abs(fps - round(fps)) < 1e-3 * fps / 10.0 else fps

@@ -1,0 +1,207 @@
+"""A tracker on the dance, with or without a behaviour model: the trial that most of these experiments are made of."""
+
+import dataclasses
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.behaviour.feature_space import feature_space
+from studio.behaviour.model import BehaviourModel
+from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.trials import Trial, kept_as
+from studio.reproduction.caillette.problems import known_problems, problems
+from studio.reproduction.caillette.training_set import Training, learnt
+from studio.reproduction.caillette.true_motion import TrueMotion, joint_errors, true_motion
+from studio.reproduction.tracking import Contender
+from studio.runs.behaviour_models import fitting
+from studio.runs.run_behaviour import learner_of
+from studio.runs.search_space import search_space, session_sigma
+from studio.sessions.session import Session
+from studio.settings import RunSettings, changed_settings, default_settings
+from studio.tracking.catalogue import TRACKERS
+from studio.tracking.frame_loop import search_frame
+from studio.tracking.tracker import LayerRecord, SearchSpace, start_of
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Follow:
+    """One run: all that its poses depend on, plain values.
+
+    footage : a recipe's name. last : frames from the first, which begins at the true pose. changes : knobs by flat
+    name. from_truth : blobs are fitted from the true pose in every frame. training : what the behaviour model is
+    learnt from, None for none.
+    """
+
+    footage: str
+    tracker: str
+    weighting: str
+    seed: int
+    last: int
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    from_truth: bool = False
+    training: Training | None = None
+
+    def plain(self) -> dict[str, Any]:
+        """As a trial's arguments."""
+        return asdict(self)
+
+    @classmethod
+    def of_plain(cls, arguments: Mapping[str, Any]) -> "Follow":
+        """From a trial's arguments, as they come back from JSON."""
+        training = arguments.get("training")
+        return cls(**{**arguments, "training": Training.of_plain(training) if training else None})
+
+    def settings(self) -> RunSettings:
+        """All knobs of the run. Raises SettingsError."""
+        return changed_settings(default_settings(self.tracker, self.weighting), self.changes)
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """What a run reached. Of each frame: angle_deg, limb_deg, position_mm : RMS over joint angles, limbs' directions
+    and markers; lost : a marker is off by more than 150 mm; free : share of the particles that no model moved, empty
+    where none guides them. mean_mm : mean marker error. evaluations : of a frame. milliseconds : of a frame's search.
+    """
+
+    angle_deg: list[float]
+    limb_deg: list[float]
+    position_mm: list[float]
+    lost: list[bool]
+    free: list[float]
+    mean_mm: float
+    evaluations: int
+    milliseconds: float
+
+    @property
+    def angle_rms(self) -> float:
+        """RMS over frames and joint angles, degrees."""
+        return float(np.sqrt(np.mean(np.square(self.angle_deg))))
+
+    @property
+    def limb_rms(self) -> float:
+        """RMS over frames and limbs of the angle between found and true axis, degrees."""
+        return float(np.sqrt(np.mean(np.square(self.limb_deg))))
+
+    @property
+    def position_rms(self) -> float:
+        """RMS over frames and markers, mm."""
+        return float(np.sqrt(np.mean(np.square(self.position_mm))))
+
+    @property
+    def lost_share(self) -> float:
+        """Share of the frames with a limb lost."""
+        return float(np.mean(self.lost))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Way:
+    """The poses (F, D) of a run, and what the frames told. model : what it knew at its end, if anything."""
+
+    poses: Array
+    free: list[float]
+    evaluations: int
+    seconds: float
+    model: BehaviourModel | None
+
+
+def follow_trial(
+    contender: Contender,
+    group: str,
+    footage: str,
+    seed: int,
+    last: int,
+    **wanted: Any,  # noqa: ANN401
+) -> Trial:
+    """The trial of a contender. group : contender and setting in words. wanted : other fields of `Follow`."""
+    changes = {**contender.changes, **wanted.pop("changes", {})}
+    follow = Follow(footage, contender.tracker, contender.weighting, seed, last, changes, **wanted)
+    return Trial(f"{group}, seed {seed}", follow.plain())
+
+
+@kept_as("caillette.following.measure")
+def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
+    """Track and compare; the fields of `Followed`."""
+    wanted = Follow.of_plain(arguments)
+    model = learnt(shelf, wanted.training).model if wanted.training else None
+    session = shelf.session(wanted.footage)
+    truth = true_motion(shelf, session, wanted.last)
+    return asdict(followed(session, truth, way_of(shelf, session, truth, wanted, model)))
+
+
+def way_of(
+    shelf: FootageShelf, session: Session, truth: TrueMotion, wanted: Follow, model: BehaviourModel | None
+) -> Way:
+    """Track the footage from the true pose of its first frame."""
+    settings, space = wanted.settings(), _space(session, model)
+    if wanted.from_truth:
+        problem_of = known_problems(shelf, session, settings, truth.poses)
+    else:
+        problem_of = problems(shelf, session, settings, wanted.last)
+    learner = learner_of(space.behaviour, settings, wanted.seed)
+    carried = start_of(tuple(float(value) for value in truth.poses[0]))
+    poses, log_weights = np.zeros((wanted.last, len(space.names))), np.zeros(wanted.last)
+    free: list[float] = []
+    seconds, evaluations = 0.0, 0
+
+    def tracked(count: int) -> tuple[Array, Array]:
+        return poses[:count], log_weights[:count]
+
+    def note(record: LayerRecord) -> None:
+        if np.isfinite(record.model_free_share):
+            free.append(float(record.model_free_share))
+
+    for frame in range(wanted.last):
+        problem = problem_of(frame)
+        began = time.perf_counter()
+        if learner is not None:
+            space = dataclasses.replace(space, behaviour=learner.model_in(frame, tracked))
+            carried = learner.carried_into(frame, carried, tracked)
+        result = search_frame(
+            TRACKERS[wanted.tracker],
+            problem,
+            carried,
+            space,
+            seed=wanted.seed,
+            frame=frame,
+            settings_source=lambda: (1, settings.tracker),
+            repeats=settings.tracker.start_repeats if frame == 0 else 1,
+            on_layer=note,
+        )
+        if frame:
+            seconds += time.perf_counter() - began
+        carried, evaluations = result.carried, result.evaluations
+        poses[frame], log_weights[frame] = result.estimate.pose, result.estimate.log_weight
+    known = learner.model_in(wanted.last, tracked) if learner is not None else space.behaviour
+    return Way(poses, free, evaluations, seconds, known)
+
+
+def followed(session: Session, truth: TrueMotion, way: Way) -> Followed:
+    """The errors of a way."""
+    body = session.body()
+    found = joint_errors(body, feature_space(body, session.manifest.fps).columns, way.poses, truth)
+    return Followed(
+        _rounded(found.angle_deg),
+        _rounded(found.limb_deg),
+        _rounded(found.position_mm),
+        [bool(value) for value in found.lost],
+        [round(value, 4) for value in way.free],
+        round(float(found.mean_mm.mean()), 4),
+        way.evaluations,
+        round(1000.0 * way.seconds / max(1, len(way.poses) - 1), 3),
+    )
+
+
+def _space(session: Session, model: BehaviourModel | None) -> SearchSpace:
+    body, fps = session.body(), session.manifest.fps
+    fitted = None if model is None else fitting(model, body, fps)
+    return search_space(body, session_sigma(session, body, fps), fitted)
+
+
+def _rounded(values: Sequence[float] | Array) -> list[float]:
+    return [round(float(value), 3) for value in values]

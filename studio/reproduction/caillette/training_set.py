@@ -1,0 +1,199 @@
+"""What behaviour models are learnt from, and the models, learnt once and kept beside the footage.
+
+Three performances of each exercise as the paper has them: the recording itself and two more, made as the test is (the
+recipe's option `performance`: tempo and joints change slowly by a little); each is smoothed by several amounts (section
+7.1), which makes about 13 000 frames of two exercises. Everything is on the body in its own proportions: a model fits
+the body in any size.
+"""
+
+import dataclasses
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.behaviour.model import BehaviourModel
+from studio.behaviour.model_file import read_model, write_model
+from studio.behaviour.settings import LearningSettings
+from studio.body.catalogue import load_body
+from studio.body.model import BodyModel
+from studio.body.person import first_frames, sampled
+from studio.comparison.footage_shelf import FootageShelf
+from studio.reproduction.caillette.learnt_files import made_once
+from studio.reproduction.caillette.pointing import POINTING, pointing_poses
+from studio.synthesis.recipe_file import JOINED, find_recipe, read_recipe
+from studio.synthesis.recipes import recipe_motion
+from studio.training.learning import learn
+from studio.training.oversampling import OversamplingSettings, performed
+from studio.training.resampling import frame_times
+from studio.training.sources import FPS, Recording, fitted_person
+from studio.training.targets import skeleton_of_body
+
+Array = NDArray[np.float64]
+
+USUAL_MEMORY, USUAL_EPSILON = 10, 0.05
+MODEL, NUMBERS, POSES = "model.behaviour", "learnt.json", "poses.npy"
+
+
+@dataclass(frozen=True, slots=True)
+class Training:
+    """What a model is learnt from and how; plain values.
+
+    sources : recipes of people's motion, or "pointing". frames : of each at 30 Hz, 0 for all. performances : of each,
+    the first as recorded.
+    smoothings : of each performance. memory, epsilon : of the automaton. clusters : further learning knobs. seed : of
+    performances and clustering. tested : recipes on whose motion the entropy is measured.
+    """
+
+    sources: tuple[str, ...]
+    frames: int = 0
+    performances: int = 3
+    smoothings: int = 5
+    memory: int = USUAL_MEMORY
+    epsilon: float = USUAL_EPSILON
+    seed: int = 0
+    body: str = "human25"
+    tested: tuple[str, ...] = ()
+    clusters: Mapping[str, Any] = field(default_factory=dict)
+
+    def plain(self) -> dict[str, Any]:
+        """As a trial's arguments."""
+        return asdict(self)
+
+    @classmethod
+    def of_plain(cls, arguments: Mapping[str, Any]) -> "Training":
+        """From a trial's arguments, as they come back from JSON."""
+        words = {name: tuple(arguments[name]) for name in ("sources", "tested")}
+        return cls(**{**arguments, **words})
+
+    def settings(self) -> LearningSettings:
+        """The knobs of learning."""
+        return LearningSettings(memory=self.memory, epsilon=self.epsilon, **self.clusters)
+
+    def material(self) -> OversamplingSettings:
+        """The knobs of what is made of a performance."""
+        return OversamplingSettings(smoothings=self.smoothings)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lesson:
+    """A model with what learning it told. seconds : of clusters and automaton, without reading the sources."""
+
+    model: BehaviourModel
+    frames: int
+    seconds: float
+
+
+def recorded(
+    shelf: FootageShelf, source: str, body: BodyModel, frames: int = 0, performance: int = 0
+) -> Recording:
+    """A source's motion on the body, fitted once. frames : at 30 Hz from the first, 0 for all. performance : which, 0
+    for the source as it is.
+
+    Raises StudioError for an unknown recipe and for recorded motion that is not there.
+    """
+    if source == POINTING:
+        return _performed(Recording(source, FPS, pointing_poses(body, FPS)), body, performance)
+    path = find_recipe(source)
+    recipe = read_recipe(path)
+    own = performance > 0 and recipe.motion == JOINED
+    if own:
+        recipe = msgspec.structs.replace(
+            recipe, options={**recipe.options, "performance": float(performance)}
+        )
+
+    def make(folder: Path) -> None:
+        motion = recipe_motion(recipe, path.parent, skeleton_of_body(body))
+        times = frame_times((motion.frame_count - 1) / motion.fps, FPS)
+        shown = first_frames(sampled(motion, times, FPS), frames or None)
+        np.save(folder / POSES, fitted_person(shown, body, source).poses)
+
+    making = {"recipe": msgspec.to_builtins(recipe), "body": body.name, "frames": frames, "fps": FPS}
+    found = Recording(source, FPS, np.load(made_once(shelf, "motion", making, make) / POSES))
+    return found if own else _performed(found, body, performance)
+
+
+def _performed(recording: Recording, body: BodyModel, performance: int) -> Recording:
+    """Another performance of what no recipe can perform anew: tempo and angles change slowly by a little."""
+    if performance == 0:
+        return recording
+    rng = np.random.default_rng(performance)
+    poses = performed(body, recording.poses, recording.fps, OversamplingSettings(), rng)
+    return dataclasses.replace(recording, poses=poses)
+
+
+def learnt(shelf: FootageShelf, training: Training) -> Lesson:
+    """The model of a training set, learnt once for all who ask. Models that differ in memory or ε alone have the same
+    clusters.
+    """
+    return _read(_learnt_folder(shelf, training))
+
+
+def model_file(shelf: FootageShelf, training: Training) -> Path:
+    """The file of that model."""
+    return _learnt_folder(shelf, training) / MODEL
+
+
+def _learnt_folder(shelf: FootageShelf, training: Training) -> Path:
+    clusters = dataclasses.replace(training, memory=USUAL_MEMORY, epsilon=USUAL_EPSILON)
+    first = made_once(shelf, "model", _making(clusters), lambda folder: _learn(shelf, clusters, folder))
+    if clusters == training:
+        return first
+
+    def make(folder: Path) -> None:
+        began = time.perf_counter()
+        base = _read(first)
+        model = base.model.with_automaton(training.settings())
+        _write(folder, Lesson(model, base.frames, time.perf_counter() - began))
+
+    return made_once(shelf, "model", _making(training), make)
+
+
+def lesson_of(shelf: FootageShelf, training: Training) -> Lesson:
+    """The model of a training set, learnt now: to measure how long it takes."""
+    body = load_body(training.body)
+    recordings = [
+        recorded(shelf, source, body, training.frames, _number(training, performance))
+        for source in training.sources
+        for performance in range(training.performances)
+    ]
+    tested = [recorded(shelf, source, body, training.frames) for source in training.tested]
+    began = time.perf_counter()
+    model, told = learn(
+        recordings, body, training.settings(), training.material(), tested, seed=training.seed
+    )
+    return Lesson(model, told.frames, time.perf_counter() - began)
+
+
+def _number(training: Training, performance: int) -> int:
+    """The number of a performance: other ones with every seed, the first always as recorded."""
+    return performance + training.performances * training.seed if performance else 0
+
+
+def _learn(shelf: FootageShelf, training: Training, folder: Path) -> None:
+    _write(folder, lesson_of(shelf, training))
+
+
+def _making(training: Training) -> dict[str, Any]:
+    named = [name for name in (*training.sources, *training.tested) if name != POINTING]
+    return {
+        **training.plain(),
+        "recipes": [msgspec.to_builtins(read_recipe(find_recipe(name))) for name in named],
+    }
+
+
+def _write(folder: Path, lesson: Lesson) -> None:
+    write_model(lesson.model, folder / MODEL)
+    numbers = {"frames": lesson.frames, "seconds": round(lesson.seconds, 3)}
+    (folder / NUMBERS).write_text(json.dumps(numbers), encoding="utf-8")
+
+
+def _read(folder: Path) -> Lesson:
+    numbers = json.loads((folder / NUMBERS).read_text(encoding="utf-8"))
+    return Lesson(read_model(folder / MODEL), int(numbers["frames"]), float(numbers["seconds"]))

@@ -1,0 +1,147 @@
+"""The planar arms of Deutscher & Reid (2005), section 6: one camera facing the plane, a silhouette of a known
+pose.
+
+Nothing is known before the search but the range of the joints (Fig. 12a: the first cloud is uniform over it),
+so the largest movement that can be expected is the whole range and σ0 of Eq. 13 is half of it.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.benchmarks.made_scene import filled
+from studio.body.catalogue import load_body
+from studio.body.forward_kinematics import limb_ends, limb_frames
+from studio.body.model import BodyModel
+from studio.body.tables import kinematic_tables
+from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
+from studio.geometry.camera import Camera
+from studio.geometry.cones import limb_outlines
+from studio.geometry.projection import project
+from studio.runs.search_space import search_space
+from studio.tracking.catalogue import TRACKERS
+from studio.tracking.frame_loop import search_frame
+from studio.tracking.tracker import Carried, FrameProblem, FrameResult, LayerRecord, SearchSpace
+from studio.weighting.catalogue import WEIGHTINGS
+
+Array = NDArray[np.float64]
+
+PICTURE = (160, 120)
+FOCAL_PIXELS = 400.0
+# The arm, stretched out in any direction, fills this share of the picture's smaller half.
+FILLED = 0.9
+# True poses lie within this part of the joints' ranges, so that no answer lies on the search's border.
+TRUE_PART = 0.6
+
+
+class ArmScene(Protocol):
+    """A body to be found in one picture."""
+
+    @property
+    def name(self) -> str:
+        """The body's name."""
+        ...
+
+    @property
+    def space(self) -> SearchSpace:
+        """The joints, the range that is searched, and σ0."""
+        ...
+
+    def observed(self, pose: Array) -> FrameProblem:
+        """The picture of the body in pose (D,), as a function of poses."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TemplateArm:
+    """An arm of the body catalogue, weighed by rendered templates against its silhouette."""
+
+    name: str
+    body: BodyModel
+    camera: Camera
+    space: SearchSpace
+    weigher: Any
+
+    def observed(self, pose: Array) -> FrameProblem:
+        """The silhouette of pose (D,), as a function of poses."""
+        mask = silhouette(self.body, self.camera, pose)
+        picture = np.repeat(mask[:, :, None], 3, axis=2)
+        view = ViewEvidence(self.camera.name, picture, mask, np.zeros_like(mask))
+        return self.weigher.problem(FrameEvidence(0, (view,)))
+
+
+def template_arm(body_name: str) -> TemplateArm:
+    """A planar body before its camera, ready to be searched. Raises BodyError for an unknown body."""
+    body = load_body(body_name)
+    camera = facing_camera(body)
+    weighting = WEIGHTINGS["template"]
+    weigher = weighting.prepare(body, (camera,), weighting.settings_type())
+    half_range = np.array([(entry.upper - entry.lower) / 2.0 for entry in body.parameters])
+    return TemplateArm(body_name, body, camera, search_space(body, half_range), weigher)
+
+
+def facing_camera(body: BodyModel) -> Camera:
+    """A camera whose picture plane is parallel to the plane that the body moves in, and which sees all of
+    it.
+    """
+    limits = np.array([(entry.lower, entry.upper) for entry in body.parameters])
+    poses = np.random.default_rng(0).uniform(limits[:, 0], limits[:, 1], (500, len(limits)))
+    ends = limb_ends(body, poses).reshape(-1, 3)
+    root = limb_ends(body, body.neutral[None])[0, 0, 0]
+    # The plane's normal is the direction in which the ends do not vary.
+    normal = np.linalg.svd(ends - root, full_matrices=False)[2][2]
+    across = np.cross(normal, [0.0, 0.0, 1.0])
+    right = across / np.linalg.norm(across) if np.linalg.norm(across) > 1e-9 else np.array([1.0, 0.0, 0.0])
+    rotation = np.stack([right, np.cross(normal, right), normal]).astype(np.float64)
+    seen = (ends - root) @ rotation.T
+    middle = (seen[:, :2].max(axis=0) + seen[:, :2].min(axis=0)) / 2.0
+    extent = (
+        seen[:, :2].max(axis=0)
+        - seen[:, :2].min(axis=0)
+        + 2.0 * kinematic_tables(body).limb_shape[:, 1].max()
+    )
+    width, height = PICTURE
+    distance = FOCAL_PIXELS * float(np.max(extent / np.array(PICTURE))) / FILLED
+    matrix = np.array([[FOCAL_PIXELS, 0, (width - 1) / 2], [0, FOCAL_PIXELS, (height - 1) / 2], [0, 0, 1.0]])
+    translation = -rotation @ root + np.array([-middle[0], -middle[1], distance])
+    return Camera("front", width, height, matrix, np.zeros(5), rotation, translation)
+
+
+def silhouette(body: BodyModel, camera: Camera, pose: Array) -> NDArray[np.uint8]:
+    """(H, W) 255 where a pixel's centre lies inside the outline of a limb, else 0; pose (D,)."""
+    shapes = kinematic_tables(body).limb_shape
+    corners, _ = project(camera, limb_outlines(shapes, limb_frames(body, pose[None]), camera)[0])
+    return filled(corners, camera.width, camera.height)
+
+
+def true_pose(space: SearchSpace, seed: int) -> Array:
+    """(D,) the pose to be found: uniform over the middle TRUE_PART of the joints' ranges, keyed by the
+    seed.
+    """
+    middle, half = (space.lower + space.upper) / 2.0, (space.upper - space.lower) / 2.0
+    draws = np.random.default_rng((seed, 1)).uniform(-TRUE_PART, TRUE_PART, len(middle))
+    return middle + draws * half
+
+
+def localise(scene: ArmScene, seed: int, **changes: Any) -> tuple[FrameResult, list[LayerRecord], Array]:  # noqa: ANN401
+    """Search one picture with the annealed filter: the result, its layers, and the true pose (D,).
+
+    changes : knobs of `AnnealedSettings` that differ from the defaults.
+    """
+    tracker = TRACKERS["annealed"]
+    settings = tracker.settings_type(**changes)
+    truth = true_pose(scene.space, seed)
+    records: list[LayerRecord] = []
+    result = search_frame(
+        tracker,
+        scene.observed(truth),
+        Carried(None),
+        scene.space,
+        seed=seed,
+        frame=0,
+        settings_source=lambda: (1, settings),
+        on_layer=records.append,
+    )
+    return result, records, truth

@@ -1,0 +1,142 @@
+"""What a command has to run: the trials of all asked experiments, each once, and the footage that they need."""
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from studio.comparison.kept_trials import plain
+from studio.comparison.trials import Plain, Scale, Trial, TrialJob, measure_name
+from studio.errors import StudioError
+from studio.reproduction.experiment import Experiment
+from studio.sessions.manifest import read_manifest
+from studio.synthesis.recipe_file import find_recipe, read_recipe
+from studio.synthesis.recipes import RECIPE_COPY
+
+FULL_SEEDS, QUICK_SEEDS = 10, 3
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedExperiment:
+    """An experiment with its trials and their jobs, in the same order. problem : why it cannot be run, or ""."""
+
+    experiment: Experiment
+    scale: Scale
+    trials: tuple[Trial, ...] = ()
+    jobs: tuple[TrialJob, ...] = ()
+    problem: str = ""
+
+
+def scale_of(seeds: int | None = None, quick: bool = False) -> Scale:
+    """How much is run: ten seeds, three for a quick look, or as many as are asked for.
+
+    Raises StudioError for fewer than one.
+    """
+    count = seeds if seeds is not None else QUICK_SEEDS if quick else FULL_SEEDS
+    if count < 1:
+        raise StudioError(f"--seeds is {count}.", "Give one seed or more.")
+    return Scale(tuple(range(count)), quick)
+
+
+def plan(experiment: Experiment, scale: Scale) -> PlannedExperiment:
+    """An experiment's jobs; where they cannot be told, the reason in words."""
+    try:
+        recipes = {name: recipe_digest(name) for name in experiment.footage}
+        trials = experiment.trials(scale)
+    except StudioError as error:
+        return PlannedExperiment(experiment, scale, problem=str(error))
+    jobs = tuple(
+        TrialJob(
+            trial_key(experiment, trial, recipes),
+            experiment.name,
+            trial.label,
+            plain(trial.arguments),
+            experiment.measure,
+            footage_of(experiment, trial),
+            frames_of(trial.arguments),
+            experiment.alone,
+        )
+        for trial in trials
+    )
+    return PlannedExperiment(experiment, scale, trials, jobs)
+
+
+def trial_key(experiment: Experiment, trial: Trial, recipes: Mapping[str, str]) -> str:
+    """The name under which a trial's outcome is kept. recipes : digests of the experiment's footage, by name."""
+    made_by = {
+        "measure": measure_name(experiment.measure),
+        "alone": experiment.alone,
+        "arguments": plain(trial.arguments),
+        "footage": {name: recipes[name] for name in footage_of(experiment, trial)},
+    }
+    return hashlib.sha256(json.dumps(made_by, sort_keys=True).encode()).hexdigest()[:24]
+
+
+def footage_of(experiment: Experiment, trial: Trial) -> tuple[str, ...]:
+    """Which of the experiment's footage a trial's arguments name; all of it where they name none."""
+    named = tuple(name for name in experiment.footage if name in _texts(trial.arguments))
+    return named or experiment.footage
+
+
+def each_once(planned: Iterable[PlannedExperiment]) -> dict[str, TrialJob]:
+    """All jobs by key, in the order in which they were planned."""
+    found: dict[str, TrialJob] = {}
+    for entry in planned:
+        for job in entry.jobs:
+            found.setdefault(job.key, job)
+    return found
+
+
+def recipe_digest(name: str) -> str:
+    """What a recipe's footage is known by. Raises StudioError for an unknown recipe."""
+    return hashlib.sha256(find_recipe(name).read_bytes()).hexdigest()[:16]
+
+
+def footage_needed(jobs: Iterable[TrialJob]) -> dict[str, int | None]:
+    """The recipes that jobs look at, and how many frames of each from the first (None: all)."""
+    needed: dict[str, int | None] = {}
+    for job in jobs:
+        for name in job.footage:
+            before = needed.get(name, 0)
+            needed[name] = None if before is None or job.frames is None else max(before, job.frames)
+    return needed
+
+
+def frames_of(arguments: Plain) -> int | None:
+    """The last frame that a trial's arguments name, as `Attempt` does ("last", half open); None where they do not.
+    Where there is an attempt among them, what names no last frame does not count.
+    """
+    if not isinstance(arguments, Mapping):
+        return None
+    if "attempt" in arguments:
+        frames = [
+            value["last"] for value in arguments.values() if isinstance(value, Mapping) and "last" in value
+        ]
+        return None if None in frames else max(frames, default=None)
+    if "last" in arguments:
+        return arguments["last"]
+    within = [frames_of(value) for value in arguments.values() if isinstance(value, Mapping)]
+    named = [frames for frames in within if frames is not None]
+    return max(named) if named and len(named) == len(within) else None
+
+
+def is_rendered(name: str, folder: Path, frames: int | None) -> bool:
+    """Whether so many frames of the footage (None: all) lie in `folder` as the recipe has it now.
+
+    Raises StudioError for an unknown recipe, SessionError for a session that cannot be read.
+    """
+    session, recipe = folder / name, find_recipe(name)
+    if not (session / RECIPE_COPY).is_file() or (session / RECIPE_COPY).read_bytes() != recipe.read_bytes():
+        return False
+    whole = read_recipe(recipe).frames
+    return read_manifest(session).frame_count >= min(whole if frames is None else frames, whole)
+
+
+def _texts(value: Plain) -> set[str]:
+    """Every word in a plain value."""
+    if isinstance(value, str):
+        return {value}
+    if isinstance(value, Mapping):
+        value = list(value.values())
+    return set().union(*map(_texts, value)) if isinstance(value, list | tuple) else set()

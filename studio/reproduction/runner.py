@@ -1,0 +1,204 @@
+"""A reproduction from the first picture to the report: footage, trials, conclusions, files.
+
+All that is done is kept at once: the same command goes on where a killed one stopped, and runs nothing twice.
+"""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from studio.comparison.findings_document import Document
+from studio.comparison.kept_trials import KeptOutcome, KeptTrials, measured_by
+from studio.comparison.trials import Scale, TrialJob
+from studio.errors import RunError, SessionError, StudioError
+from studio.reproduction.conclusion import conclude
+from studio.reproduction.experiment import Experiment
+from studio.reproduction.findings_files import FOOTAGE, TRIALS, write_findings, write_overview
+from studio.reproduction.plan import PlannedExperiment, each_once, footage_needed, is_rendered, plan
+from studio.reproduction.trial_pace import Report, TrialPace
+from studio.sessions.atomic_files import PARTIAL_PREFIX, discard, move_into_place, new_folder_beside
+from studio.sessions.manifest import FILE_NAME as MANIFEST
+from studio.sessions.manifest import now
+from studio.sessions.process_lock import ProcessLock
+from studio.synthesis.recipes import synthesize
+from studio.worker.trial_pool import cores, run_jobs
+from studio.worker.trial_process import TrialResult
+
+LOCK = "reproduction.lock"
+SECONDS_BETWEEN_REPORTS = 30.0
+
+
+@dataclass(frozen=True, slots=True)
+class Reproduction:
+    """What came of a command.
+
+    documents : of the experiments that were asked for, in their order. results : of all that were ever run in the
+    folder. measured, kept, failed : trials that were run now, found, and run in vain.
+    """
+
+    documents: tuple[Document, ...]
+    results: Document
+    measured: int
+    kept: int
+    failed: int
+
+
+def reproduce(
+    experiments: Sequence[Experiment],
+    out: Path,
+    scale: Scale,
+    report: Report,
+    *,
+    catalogue: Sequence[Experiment] = (),
+    processes: int | None = None,
+) -> Reproduction:
+    """Run what is missing of some experiments and write the folder `out`.
+
+    catalogue : whose findings the report shows, by default the experiments. A trial or a conclusion that fails makes
+    its experiment "failed" and no other. Raises SessionError for a folder that cannot be used, RunError while
+    another process works in it, KeyboardInterrupt with everything kept.
+    """
+    lock = _taken(out)
+    try:
+        planned = [plan(experiment, scale) for experiment in experiments]
+        work = _Work(out, planned, tuple(catalogue or experiments), report, processes or cores())
+        try:
+            work.run()
+        finally:
+            results = work.write_overview()
+        documents = tuple(work.documents[entry.experiment.name] for entry in planned)
+        return Reproduction(documents, results, work.measured, work.found, work.failed)
+    finally:
+        lock.free()
+
+
+class _Work:
+    """The command's state: what is kept, what is concluded, what is still to be done."""
+
+    def __init__(
+        self,
+        out: Path,
+        planned: list[PlannedExperiment],
+        catalogue: tuple[Experiment, ...],
+        report: Report,
+        processes: int,
+    ) -> None:
+        self.documents: dict[str, Document] = {}
+        self._out, self._planned, self._catalogue = out, planned, catalogue
+        self._report, self._processes = report, processes
+        self._folder = KeptTrials(out / TRIALS)
+        self._jobs = each_once(planned)
+        self._kept: dict[str, KeptOutcome] = {}
+        for key in self._jobs:
+            outcome = self._folder.read(key)
+            # What failed is tried again: its cause may be gone.
+            if outcome is not None and outcome.measured is not None:
+                self._kept[key] = outcome
+        self.found, self.measured, self.failed = len(self._kept), 0, 0
+        self._pace = TrialPace(self._jobs, self._kept, processes)
+        self._written = 0.0
+
+    def run(self) -> None:
+        """Render, run and conclude what is missing."""
+        self._conclude_what_is_done()
+        missing = [job for key, job in self._jobs.items() if key not in self._kept]
+        runnable = []
+        problems = self._render(footage_needed(missing))
+        for job in missing:
+            problem = next((problems[name] for name in job.footage if name in problems), "")
+            if problem:
+                self._keep(job, TrialResult(job.key, None, problem, 0.0))
+            else:
+                runnable.append(job)
+        self._conclude_what_is_done()
+        if runnable:
+            self._tell("starting")
+            run_jobs(runnable, self._out / FOOTAGE, self._done, self._processes)
+
+    def write_overview(self) -> Document:
+        """The files of all experiments together."""
+        self._written = time.monotonic()
+        return write_overview(self._out, self._catalogue, measured_by(), now())
+
+    def _render(self, needed: dict[str, int | None]) -> dict[str, str]:
+        """Make the footage that is missing; what cannot be made, with the reason. needed : recipes to frames."""
+        problems = {}
+        for left_by_a_killed_command in (self._out / FOOTAGE).glob(f"{PARTIAL_PREFIX}*"):
+            discard(left_by_a_killed_command)
+        for name, frames in needed.items():
+            try:
+                if not is_rendered(name, self._out / FOOTAGE, frames):
+                    self._render_one(name, frames)
+            except StudioError as error:
+                problems[name] = f"The footage '{name}' cannot be made. {error}"
+        return problems
+
+    def _render_one(self, name: str, frames: int | None) -> None:
+        place = self._out / FOOTAGE / name
+        beside = new_folder_beside(place)
+        try:
+            synthesize(
+                name,
+                beside / name,
+                lambda step, done, total: self._report(f"footage {name}: {step}", done, total, None),
+                frames,
+            )
+            discard(place)
+            move_into_place(beside / name, place)
+        finally:
+            discard(beside)
+
+    def _done(self, job: TrialJob, result: TrialResult) -> None:
+        self._keep(job, result)
+        self._tell(f"{job.experiment}: {job.label}")
+        self._conclude_what_is_done()
+
+    def _keep(self, job: TrialJob, result: TrialResult) -> None:
+        outcome = KeptOutcome(
+            result.measured,
+            result.failure,
+            round(result.seconds, 3),
+            measured_by(),
+            now(),
+            job.label,
+            job.arguments,
+        )
+        self._folder.write(job.key, outcome)
+        self._kept[job.key] = outcome
+        if outcome.measured is None:
+            self.failed += 1
+        else:
+            self.measured += 1
+            self._pace.took(job, result.seconds)
+
+    def _conclude_what_is_done(self) -> None:
+        """Write the findings of every experiment whose last trial has come in."""
+        concluded = False
+        for entry in self._planned:
+            name = entry.experiment.name
+            if name not in self.documents and all(job.key in self._kept for job in entry.jobs):
+                self.documents[name] = conclude(entry, self._kept)
+                write_findings(self._out, self.documents[name])
+                concluded = True
+        if concluded and time.monotonic() - self._written > SECONDS_BETWEEN_REPORTS:
+            self.write_overview()
+
+    def _tell(self, step: str) -> None:
+        waiting = [job for key, job in self._jobs.items() if key not in self._kept]
+        self._report(step, len(self._kept), len(self._jobs), self._pace.left(waiting))
+
+
+def _taken(out: Path) -> ProcessLock:
+    if (out / MANIFEST).is_file():
+        raise SessionError(f"'{out}' is a session.", "Give another folder with --out.")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise SessionError(f"'{out}' is a file.", "Give a folder with --out.") from None
+    lock = ProcessLock.take(out / LOCK)
+    if lock is None:
+        raise RunError(
+            f"Another process reproduces into '{out}'.", "Wait for it, or give another folder with --out."
+        )
+    return lock

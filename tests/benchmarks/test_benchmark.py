@@ -1,0 +1,78 @@
+"""The benchmark measures what it says; how fast is for `studio bench` to print, never for a test to assert."""
+
+import json
+
+import numba
+import numpy as np
+import pytest
+from scipy.ndimage import label
+
+from studio.benchmarks.kernels import (
+    LIMIT_PASSES,
+    limit_contest,
+    made_evidence,
+    ring_of_cameras,
+    run_benchmark,
+)
+from studio.body.catalogue import load_body
+from studio.weighting.edge_region import EdgeRegionSettings, EdgeRegionWeigher
+
+
+@pytest.fixture(scope="module")
+def result():
+    told = []
+    threads = numba.get_num_threads()
+    found = run_benchmark(repeats=2, progress=lambda *step: told.append(step))
+    assert numba.get_num_threads() == threads
+    assert told[-1] == ("Weighing", 2, 2)
+    return json.loads(json.dumps(found))
+
+
+def test_what_is_reported(result):
+    edge_region = result["edge_region"]
+    assert list(edge_region) == [
+        "evaluations_per_second",
+        "samples",
+        "load_limit_per_second",
+        "fraction_of_load_limit",
+    ]
+    assert edge_region["samples"] == 3200
+    ratio = edge_region["evaluations_per_second"] / edge_region["load_limit_per_second"]
+    assert edge_region["fraction_of_load_limit"] == pytest.approx(ratio, abs=0.001)
+    others = result["others_evaluations_per_second"]
+    silhouettes = {
+        f"{name}_{resolution}"
+        for name in ("edge_silhouette", "edge_region_silhouette")
+        for resolution in ("half", "full")
+    }
+    assert {"edge_region_occlusion_aware", "bodytrack", "template"} | silhouettes <= set(others)
+    assert all(rate > 0 for rate in others.values())
+
+
+def test_the_scene_is_a_person_in_four_pictures():
+    body = load_body("human31")
+    cameras = ring_of_cameras(body)
+    for view in made_evidence(body, cameras, np.random.default_rng(0))["proximity"].views:
+        _, pieces = label(view.mask)
+        rows = np.flatnonzero(view.mask.any(axis=1))
+        assert pieces == 1
+        assert 150 < rows[-1] - rows[0] < 300
+        assert 0.005 < (view.edges > 128).mean() < 0.2
+
+
+def test_the_limit_reads_what_the_weighting_reads():
+    """The loads alone add up to the very terms that the weighting finds."""
+    body = load_body("human31")
+    cameras = ring_of_cameras(body)
+    rng = np.random.default_rng(0)
+    weigher = EdgeRegionWeigher(body, cameras, EdgeRegionSettings())
+    problem = weigher.problem(made_evidence(body, cameras, rng)["proximity"])
+    step = np.array([entry.max_step for entry in body.parameters]) / 60.0
+    poses = body.neutral + step * rng.normal(size=(32, 31))
+    contest = limit_contest(problem, poses)
+    assert contest.evaluations == 32 * LIMIT_PASSES
+    edge, region = problem.terms(poses)
+    sums = contest.run() / LIMIT_PASSES
+    assert sums.shape == (2, 4, 16, 2)
+    np.testing.assert_allclose(sums[..., 0].transpose(0, 2, 1).reshape(32, 4) / (255 * 320), edge)
+    np.testing.assert_allclose(sums[..., 1].transpose(0, 2, 1).reshape(32, 4) / (255 * 480), region)

@@ -1,0 +1,112 @@
+"""Live runs with the scene open: a viewer takes part, and the scene makes room for the search."""
+
+import dataclasses
+import math
+
+import pytest
+from live_driving import live_run
+from toy_session import make_session
+
+from studio.benchmarks.live import run_live_benchmark
+from studio.benchmarks.live_watching import track_watched
+from studio.runs.live_replay import compare, prepare_replay
+from studio.runs.live_summary import LiveStanding
+from studio.scene.light_viewer import LightViewer
+from studio.scene.live_search import LiveSearch
+from studio.scene.presenter import LIVE_PICTURE_SECONDS, PICTURE_SECONDS, Presenter
+from studio.scene.run_panel import status_html
+from studio.scene.stage import SceneStage
+from studio.sessions.workspace import Workspace
+from studio.worker.control import StudioControl, nothing_open
+from studio.worker.live_tracking import replay_live
+from studio.worker.watchers import Subscription
+
+
+def test_a_light_viewer_takes_part() -> None:
+    workspace = Workspace()
+    control = StudioControl(workspace)
+    stage = SceneStage(workspace, control)
+    viewer = LightViewer(stage.port, stage.relay_headers())
+    assert viewer.messages > 0
+    assert viewer.size > 0
+    viewer.close()
+    stage.stop()
+    control.close()
+
+
+def test_pictures_come_less_often_while_a_live_run_is_tracked() -> None:
+    times: list[float] = []
+
+    class Hours:
+        now = 0.0
+
+    presenter = Presenter(
+        Subscription(),
+        heard=lambda _: None,
+        tick=lambda _: False,
+        draw=lambda: None,
+        draw_pictures=lambda: times.append(Hours.now),
+        failed=lambda _: None,
+        clock=lambda: Hours.now,
+    )
+    pictures = presenter._drawings[1]
+
+    def pass_a_second() -> int:
+        before = len(times)
+        for _ in range(100):
+            Hours.now += 0.01
+            presenter.redraw()
+            if pictures.due(Hours.now):
+                pictures.done(Hours.now)
+                pictures.draw()
+        return len(times) - before
+
+    assert pass_a_second() == pytest.approx(1.0 / PICTURE_SECONDS, abs=1)
+    presenter.yield_to_live(True)
+    assert pass_a_second() == pytest.approx(1.0 / LIVE_PICTURE_SECONDS, abs=1)
+    presenter.yield_to_live(False)
+    assert pass_a_second() == pytest.approx(1.0 / PICTURE_SECONDS, abs=1)
+
+
+def test_the_panel_says_how_a_live_run_keeps_up() -> None:
+    state = dataclasses.replace(nothing_open(), session="toy", run="live", state="tracking")
+    state = dataclasses.replace(state, live=LiveStanding(3, 0.01, 24.2, 29.8))
+    assert "live · 29.8 fps · latency 24 ms · 3 dropped" in status_html(state)
+    assert "The disk is full." in status_html(dataclasses.replace(state, message="The disk is full."))
+
+
+def test_nothing_is_whole_before_its_result() -> None:
+    assert not LiveSearch().is_whole
+
+
+@pytest.mark.slow
+def test_a_live_run_with_the_scene_open() -> None:
+    workspace = Workspace()
+    session = make_session(workspace.place_for("toy"))
+    run = live_run(session, last=120, to_and_fro=True)
+    said: list[str] = []
+    found = track_watched(workspace, session, run, lambda step, done, total: said.append(step))
+    assert run.summary().status == "finished"
+    assert len(found.live.tracked) + len(found.live.dropped) == 120 - found.live.tracked[0]
+    assert found.viewer_messages > 0.0
+    assert found.viewer_bytes > 0.0
+    assert any("latency" in words for words in said)
+    made = prepare_replay(session, run)
+    assert replay_live(session, run, made, lambda *_: None).different == ()
+    assert compare(run, made).frames == len(found.live.tracked)
+
+
+@pytest.mark.slow
+def test_the_live_benchmark_measures_and_tells() -> None:
+    told = run_live_benchmark(lambda *_: None, seconds=3.0)
+    stages = {row["stage"]: row for row in told["stages"]}  # pyright: ignore[reportGeneralTypeIssues]
+    assert all(row["ms"] > 0.0 for name, row in stages.items() if name != "the rest")
+    assert stages["reconstruction"]["paper_ms"] == 28.1
+    parts = sum(row["ms"] for name, row in stages.items() if name != "whole frame")
+    assert stages["whole frame"]["ms"] == pytest.approx(parts, rel=0.2)
+    for name, frames in (("scene_open", 90), ("scene_open_pressed", 108), ("alone", 90), ("at_60_hz", 90)):
+        figures = told[name]
+        assert figures["tracked"] + figures["dropped"] <= frames  # pyright: ignore[reportIndexIssue]
+        assert figures["tracked"] > 0  # pyright: ignore[reportIndexIssue]
+        assert math.isfinite(figures["latency_ms"]["p95"])  # pyright: ignore[reportIndexIssue]
+    assert isinstance(told["sustained"], bool)

@@ -1,0 +1,206 @@
+"""Trials of the third paper's experiments: what is learnt once, true motion, frames told the truth, runs."""
+
+import dataclasses
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from studio.behaviour.feature_space import feature_space
+from studio.body.catalogue import load_body
+from studio.body.forward_kinematics import marker_points
+from studio.comparison.footage_shelf import FootageShelf
+from studio.errors import SettingsError, TruthError
+from studio.motion_files.trc import read_trc, write_trc
+from studio.reproduction.caillette import learnt_files
+from studio.reproduction.caillette.following import Follow, Followed, measure
+from studio.reproduction.caillette.learnt_files import made_once
+from studio.reproduction.caillette.pointing import POINTING, pointing_poses
+from studio.reproduction.caillette.problems import Known, known_problems, problems
+from studio.reproduction.caillette.training_set import Training, learnt, recorded
+from studio.reproduction.caillette.true_motion import joint_errors, true_motion
+from studio.sessions.process_lock import ProcessLock
+from studio.settings import changed_settings, default_settings
+from studio.weighting.problem import Expectant
+
+SAMPLES = Path(__file__).parents[2] / "sample_sessions"
+FEW = {"most_clusters": 8, "reduced_dimensions": 4, "clustering_patience": 3}
+WALK = Training(("walk",), frames=45, performances=1, smoothings=2, body="human31", clusters=FEW)
+COARSE = {"hull_depth": 5, "blob_starts": 1}
+LAST = 3
+
+
+@pytest.fixture(scope="module")
+def shelf(tmp_path_factory):
+    """The bundled walk in a folder of its own, where things can be learnt."""
+    folder = tmp_path_factory.mktemp("footage")
+    (folder / "walk").symlink_to(SAMPLES / "walk")
+    found = FootageShelf(folder)
+    yield found
+    found.close()
+
+
+def test_a_thing_is_made_once_for_what_it_is_made_from(tmp_path) -> None:
+    made = []
+
+    def make(folder: Path) -> None:
+        made.append(folder)
+        (folder / "file").write_text(str(len(made)))
+
+    shelf = FootageShelf(tmp_path)
+    first = made_once(shelf, "thing", {"seed": 1}, make)
+    assert made_once(shelf, "thing", {"seed": 1}, make) == first
+    assert (first / "file").read_text() == "1"
+    assert made_once(shelf, "thing", {"seed": 2}, make) != first
+    assert len(made) == 2
+
+
+def test_what_failed_is_made_again_and_leaves_nothing(tmp_path) -> None:
+    shelf = FootageShelf(tmp_path)
+
+    def fail(folder: Path) -> None:
+        (folder / "half").touch()
+        raise SettingsError("No.", "Yes.")
+
+    with pytest.raises(SettingsError):
+        made_once(shelf, "thing", {}, fail)
+    place = made_once(shelf, "thing", {}, lambda folder: (folder / "whole").touch())
+    assert [path.name for path in place.iterdir()] == ["whole"]
+    assert not list((tmp_path / learnt_files.LEARNT).glob(".partial-*"))
+
+
+def test_who_waits_takes_what_another_process_has_made(tmp_path, monkeypatch) -> None:
+    shelf = FootageShelf(tmp_path)
+    place = made_once(shelf, "thing", {}, lambda folder: None)
+    place.rmdir()
+    held = ProcessLock.take(place.with_name(f"{place.name}.lock"))
+    assert held is not None
+    # While we wait the other process finishes.
+    monkeypatch.setattr(learnt_files.time, "sleep", lambda seconds: place.mkdir())
+    assert made_once(shelf, "thing", {}, lambda folder: pytest.fail("made twice")) == place
+    held.free()
+
+
+def test_pointing_has_few_clusters_and_memories_share_them(tmp_path) -> None:
+    shelf = FootageShelf(tmp_path)
+    pointing = Training((POINTING,), performances=1, smoothings=1, clusters={"most_clusters": 25})
+    assert Training.of_plain(json.loads(json.dumps(pointing.plain()))) == pointing
+    lesson = learnt(shelf, pointing)
+    assert 2 <= lesson.model.clusters <= 15
+    longer = learnt(shelf, dataclasses.replace(pointing, memory=30))
+    np.testing.assert_array_equal(longer.model.mixture.means, lesson.model.mixture.means)
+    assert longer.model.making.settings.memory == 30
+    assert longer.model.states > lesson.model.states
+    again = learnt(shelf, pointing)
+    assert again.seconds == lesson.seconds
+    np.testing.assert_array_equal(again.model.automaton.probabilities, lesson.model.automaton.probabilities)
+
+
+def test_pointing_moves_one_arm_and_comes_back() -> None:
+    body = load_body("human25")
+    poses = pointing_poses(body, 30.0)
+    moved = {body.parameters[place].name for place in np.flatnonzero(np.ptp(poses, axis=0) > 1e-9)}
+    assert moved == {"right_shoulder_swing", "right_shoulder_spread", "right_elbow"}
+    np.testing.assert_allclose(poses[-1], body.neutral)
+    assert np.abs(np.diff(poses, axis=0)).max() < 0.15
+
+
+def test_a_recipe_is_fitted_once_and_from_its_beginning(shelf) -> None:
+    body = load_body("human31")
+    found = recorded(shelf, "walk", body, 45)
+    assert found.frame_count == 45
+    assert found.fps == 30.0
+    again = recorded(shelf, "walk", body, 45)
+    np.testing.assert_array_equal(found.poses, again.poses)
+
+
+def test_true_motion_lies_on_the_true_markers(shelf) -> None:
+    session = shelf.session("walk")
+    body = session.body()
+    truth = true_motion(shelf, session, LAST)
+    assert truth.poses.shape == (LAST, len(body.parameters))
+    markers = read_trc(session.truth_path)
+    names = [body.markers[place].name for place in truth.markers]
+    of_file = markers.positions[:LAST, [markers.names.index(name) for name in names]]
+    np.testing.assert_allclose(truth.points, of_file, atol=0.01)
+    away = np.linalg.norm(marker_points(body, truth.poses)[:, truth.markers] - truth.points, axis=2)
+    assert away.mean() < 25.0
+
+
+def test_footage_of_another_motion_is_refused(shelf, tmp_path) -> None:
+    session = shelf.session("walk")
+    markers = read_trc(session.truth_path)
+    moved = dataclasses.replace(markers, positions=markers.positions + 3.0)
+    write_trc(tmp_path / "moved.trc", moved)
+    fields = {"name": "walk", "body": session.body}
+    stale = SimpleNamespace(path=session.path, truth_path=tmp_path / "moved.trc", **fields)
+    empty = FootageShelf(tmp_path)
+    with pytest.raises(TruthError, match="another motion") as refused:
+        true_motion(empty, stale, LAST)  # pyright: ignore[reportArgumentType]
+    assert "rendered anew" in refused.value.hint
+    no_recipe = SimpleNamespace(path=tmp_path, truth_path=session.truth_path, **fields)
+    with pytest.raises(TruthError, match="not made by a recipe"):
+        true_motion(empty, no_recipe, LAST)  # pyright: ignore[reportArgumentType]
+
+
+def test_errors_are_wrapped_and_over_the_joints_alone(shelf) -> None:
+    session = shelf.session("walk")
+    body, truth = session.body(), true_motion(shelf, session, LAST)
+    columns = feature_space(body, 30.0).columns
+    moved = truth.poses.copy()
+    moved[:, columns[3]] += 2.0 * np.pi
+    names = [entry.name for entry in body.parameters]
+    moved[:, names.index("pelvis_x")] += 100.0
+    found = joint_errors(body, columns, moved, truth)
+    np.testing.assert_allclose(found.angle_deg, 0.0, atol=1e-9)
+    np.testing.assert_allclose(found.limb_deg, 0.0, atol=1e-4)
+    assert found.position_mm.min() > 70.0
+    tipped = truth.poses.copy()
+    tipped[:, names.index("pelvis_rz")] += 0.2
+    level = joint_errors(body, columns, tipped, truth)
+    np.testing.assert_allclose(level.angle_deg, 0.0, atol=1e-9)
+    assert 0.0 < level.limb_deg.max() < np.degrees(0.2)
+    one = truth.poses.copy()
+    one[:, columns[5]] += 0.1
+    expected = np.degrees(0.1) / np.sqrt(len(columns))
+    np.testing.assert_allclose(joint_errors(body, columns, one, truth).angle_deg, expected)
+
+
+def test_frames_are_told_the_truth_and_not_told_again(shelf) -> None:
+    session = shelf.session("walk")
+    truth = true_motion(shelf, session, LAST).poses
+    settings = changed_settings(default_settings("condensation", "blobs"), COARSE)
+    of_frame = known_problems(shelf, session, settings, truth)
+    assert isinstance(of_frame(1), Known)
+    assert not isinstance(of_frame(1), Expectant)
+    assert isinstance(problems(shelf, session, settings, LAST)(1), Expectant)
+    assert known_problems(shelf, session, settings, truth)(1) is of_frame(1)
+    away = truth[1] + np.where(np.arange(truth.shape[1]) < 3, 150.0, 0.0)
+    near, far = of_frame(1).weigh(np.stack([truth[1], away]))
+    assert near > far
+    edges = default_settings("condensation", "edge-region")
+    with pytest.raises(SettingsError, match="edge-region"):
+        known_problems(shelf, session, edges, truth)
+
+
+def test_a_guided_run_is_measured_and_gives_the_same_again(shelf) -> None:
+    changes = {"particles": 30, **COARSE}
+    wanted = Follow("walk", "behaviour", "blobs", 1, LAST, changes, from_truth=True, training=WALK)
+    arguments = json.loads(json.dumps(wanted.plain()))
+    assert Follow.of_plain(arguments) == wanted
+    first = Followed(**json.loads(json.dumps(measure(arguments, shelf), allow_nan=False)))
+    again = Followed(**measure(arguments, shelf))
+    assert dataclasses.replace(first, milliseconds=0.0) == dataclasses.replace(again, milliseconds=0.0)
+    assert len(first.angle_deg) == LAST
+    assert first.evaluations == 30
+    assert first.free
+    assert first.mean_mm < 250.0
+
+
+def test_a_blind_run_tells_of_no_model(shelf) -> None:
+    wanted = Follow("walk", "condensation", "blobs", 1, LAST, {"particles": 30, **COARSE})
+    found = Followed(**measure(wanted.plain(), shelf))
+    assert found.free == []
+    assert found.mean_mm < 250.0

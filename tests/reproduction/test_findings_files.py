@@ -1,0 +1,178 @@
+"""What is written for programs and people: valid JSON, CSV that reads back, a page that holds everything."""
+
+import base64
+import csv
+import json
+import math
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from toy_experiments import conclude, measure, toy
+
+from studio.comparison.findings import Chart, Findings, Number, Series
+from studio.comparison.findings_document import Making, as_document, failed_document
+from studio.comparison.kept_trials import plain
+from studio.comparison.trials import Outcome, Scale
+from studio.errors import SessionError
+from studio.reproduction.findings_files import (
+    as_csv,
+    number_in_words,
+    read_findings,
+    summary_markdown,
+    write_findings,
+    write_overview,
+)
+from studio.reproduction.report_document import report_html
+
+SOFTWARE, DATE = "0.1.0+12345678", "2025-01-02T03:04:05+00:00"
+
+
+def making(seeds: int = 12, quick: bool = False, measured_by: tuple[str, ...] = (SOFTWARE,)) -> Making:
+    return Making(Scale(tuple(range(seeds)), quick), 2 * seeds, 12.34, SOFTWARE, measured_by, DATE)
+
+
+@pytest.fixture
+def document(tmp_path: Path) -> dict:
+    experiment = toy("toy", tmp_path / "log")
+    trials = experiment.trials(Scale(tuple(range(12))))
+    outcomes = [Outcome(trial, plain(measure(trial.arguments, None))) for trial in trials]  # pyright: ignore
+    return as_document(experiment, conclude(outcomes), making())
+
+
+class Page(HTMLParser):
+    """Scripts by type, and every address that the page names."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.scripts: dict[str, list[str]] = {}
+        self.addresses: list[str] = []
+        self._kind = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        values = dict(attrs)
+        self.addresses += [values[name] or "" for name in ("src", "href") if name in values]
+        self._kind = (values.get("type") or "plain") if tag == "script" else ""
+
+    def handle_data(self, data: str) -> None:
+        if self._kind:
+            self.scripts.setdefault(self._kind, []).append(data)
+
+    def handle_endtag(self, tag: str) -> None:
+        self._kind = ""
+
+
+def test_the_report_holds_everything_it_needs(document: dict) -> None:
+    results = {"software": "<b>1</b>", "date": DATE, "experiments": [document]}
+    text = report_html(results)
+    page = Page(text)
+    assert page.addresses == []
+    assert json.loads(page.scripts["application/json"][0]) == results
+    assert "<b>1</b>" not in text
+    named = re.findall(r'(?:from |url\()"([^"]{0,40})', text)
+    assert len(named) == 3
+    assert all(address.startswith("data:") for address in named)
+    modules = re.findall(r'from "data:text/javascript;base64,([^"]+)"', "".join(page.scripts["module"]))
+    inner = [base64.b64decode(module).decode() for module in modules]
+    assert "drawFindings" in inner[1]
+    assert not re.search(r'from "\./', inner[1])
+    assert "--verdict" in text
+    assert "--series-0" in text
+
+
+def test_findings_read_back_and_old_charts_go(document: dict, tmp_path: Path) -> None:
+    assert read_findings(tmp_path, "toy") is None
+    write_findings(tmp_path, document)
+    assert read_findings(tmp_path, "toy") == document
+    rows = list(csv.reader((tmp_path / "toy" / "chart-1-error-over-frames.csv").read_text().splitlines()))
+    assert rows[0] == ["series", "frame", "error (mm)", "low", "high"]
+    chart = document["charts"][0]
+    assert len(rows) == 1 + sum(len(series["x"]) for series in chart["series"])
+    assert rows[1][:2] == [chart["series"][0]["name"], "0.0"]
+    assert float(rows[1][2]) == chart["series"][0]["y"][0]
+    bars = list(csv.DictReader((tmp_path / "toy" / "chart-2-error-by-setting.csv").read_text().splitlines()))
+    assert [row["setting"] for row in bars] == ["plain", "clever"]
+    assert float(bars[0]["low"]) < float(bars[0]["error (mm)"]) < float(bars[0]["high"])
+    write_findings(tmp_path, document | {"charts": []})
+    assert not list((tmp_path / "toy").glob("chart-*.csv"))
+    (tmp_path / "toy" / "findings.json").write_text("{")
+    with pytest.raises(SessionError, match="cannot be read"):
+        read_findings(tmp_path, "toy")
+
+
+def test_the_overview_has_what_was_run_in_the_catalogues_order(document: dict, tmp_path: Path) -> None:
+    known = [toy(name, tmp_path) for name in ("second", "never", "toy")]
+    write_findings(tmp_path, document)
+    write_findings(tmp_path, document | {"name": "second"})
+    results = write_overview(tmp_path, known, SOFTWARE, DATE)
+    assert [entry["name"] for entry in results["experiments"]] == ["second", "toy"]
+    assert json.loads((tmp_path / "results.json").read_text()) == results
+    assert (tmp_path / "report.html").read_text().startswith("<!doctype html>")
+
+
+def test_the_summary_is_a_table(document: dict) -> None:
+    failed = failed_document(toy("bad", Path("log")), [("seed 1", "No | luck.")], making())
+    text = summary_markdown({"software": SOFTWARE, "date": DATE, "experiments": [document, failed]})
+    lines = text.splitlines()
+    assert [line.count("|") for line in lines[:4]] == [5, 5, 5, 5]
+    assert "| reproduced |" in lines[2]
+    assert "error, plain: 40.0 mm [" in lines[2]
+    assert ", paper 40: reproduced<br>" in lines[2]
+    assert "| failed | Not concluded. seed 1: No ∣ luck. |" in lines[3]
+
+
+def test_documents_are_json_whatever_was_measured(tmp_path: Path) -> None:
+    gaps = Series("a", (0.0, 1.0), (math.nan, math.inf))
+    numbers = (Number("n", math.nan, math.nan, math.inf, seeds=12),)
+    found = Findings(
+        "answered",
+        "",
+        numbers,
+        charts=(Chart("c", "lines", "x", "y", (gaps,)),),
+        settings={"s": (1, math.nan)},
+    )
+    told = json.loads(json.dumps(as_document(toy("toy", tmp_path), found, making()), allow_nan=False))
+    assert told["charts"][0]["series"][0]["y"] == [None, None]
+    assert told["settings"] == {"s": [1, None]}
+    assert (told["numbers"][0]["ours"], told["numbers"][0]["high"]) == (None, None)
+
+
+def test_verdicts_say_what_they_rest_on(tmp_path: Path) -> None:
+    few = Findings("reproduced", "", (Number("n", 1, 0, 2, paper=1, seeds=5, verdict="reproduced"),))
+    told = as_document(toy("toy", tmp_path), few, making(12, quick=True, measured_by=(SOFTWARE, "0.0.9")))
+    assert (told["firm"], told["numbers"][0]["firm"]) == (False, False)
+    assert told["notes"][0] == "The verdict is not firm: 5 seeds of at least 10."
+    assert "quick" in told["notes"][1]
+    assert "(0.0.9)" in told["notes"][2]
+    assert as_document(toy("toy", tmp_path), Findings("answered", ""), making())["notes"] == []
+
+
+def test_many_failures_are_counted(tmp_path: Path) -> None:
+    reasons = [(f"seed {seed}", "No luck.") for seed in range(4)]
+    told = failed_document(toy("toy", tmp_path), reasons, making())
+    assert told["words"] == "Not concluded, for 4 of 24 trials failed; the first: seed 0: No luck."
+    assert len(told["failures"]) == 4
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ((1234.5, 0.12345, None, None), "n: 1234 mm [0, –]"),
+        ((34.04, 31.72, 38.21, 38.0), "n: 34.0 mm [31.7, 38.2], paper 38"),
+        ((34.04, 31.72, 37.98, 38.0), "n: 34.04 mm [31.72, 37.98], paper 38"),
+        ((0.554, 0.35, 0.674, 1.0), "n: 0.554 mm [0.350, 0.674], paper 1"),
+        ((1.0, 0.0, 1.0, 1.0), "n: 1 mm [0, 1], paper 1"),
+        ((0.0, 0.0, 0.0, None), "n: 0 mm [0, 0]"),
+    ],
+)
+def test_numbers_in_words(values: tuple, words: str) -> None:
+    ours, low, high, paper = values
+    told = {"name": "n", "ours": ours, "low": low, "high": high, "unit": "mm", "paper": paper}
+    assert number_in_words({**told, "verdict": "answered"}) == words
+    assert number_in_words({**told, "verdict": "better"}) == f"{words}: better"
+
+
+def test_csv_quotes_and_leaves_out_null() -> None:
+    assert as_csv([("a,b", None, 1.5)]) == '"a,b",,1.5\n'
