@@ -81,6 +81,11 @@ COMMANDS = {
     ),
     "bodies": ("session_commands", "bodies", "List the bodies."),
     "runs": ("session_commands", "runs", "List the runs."),
+    "verify": (
+        "verifying_commands",
+        "verify_command",
+        "Compare all that is stored with its checksums; repair frames.",
+    ),
     "bench": ("bench_commands", "bench", "Measure kernels, hulls, a slider's answer and live tracking."),
 }
 

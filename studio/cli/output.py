@@ -22,6 +22,9 @@ from studio.sessions.atomic_files import write_bytes
 P = ParamSpec("P")
 
 CANCELLED = 130
+FOUND_FAULTS = 1
+EXIT_CODE = "exit code"
+"""Key of a command's result that is not printed."""
 WRONG_INPUT = 2
 FAULT = 70
 REFUSED_BY_THE_DISK = frozenset((errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOSPC, errno.EDQUOT))
@@ -36,7 +39,7 @@ def command(function: Callable[P, Mapping[str, object]]) -> Callable[P, None]:
     """Make a function that returns its result a command body: prints it, and turns errors into words.
 
     The result is printed as one JSON object under `--json` (which this decorator adds), else as aligned
-    lines; a value under the key "text" is what a person reads instead.
+    lines; a value under the key "text" is what a person reads instead. EXIT_CODE is what the command ends with.
     """
 
     @click.option(
@@ -46,7 +49,11 @@ def command(function: Callable[P, Mapping[str, object]]) -> Callable[P, None]:
     def body(*arguments: P.args, **options: P.kwargs) -> None:
         as_json = bool(options.pop("as_json"))
         with errors_in_words():
-            tell(function(*arguments, **options), as_json)
+            result = dict(function(*arguments, **options))
+            code = int(str(result.pop(EXIT_CODE, 0)))
+            tell(result, as_json)
+        if code:
+            sys.exit(code)
 
     return body
 

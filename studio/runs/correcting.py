@@ -26,6 +26,7 @@ from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
 from studio.runs.tracking_run import TrackingRun
 from studio.sessions import atomic_files
+from studio.sessions.file_checksums import note_files
 from studio.sessions.manifest import now
 from studio.sessions.names import checked_name
 from studio.sessions.results_store import copy_frames, create_store
@@ -171,6 +172,7 @@ def _new_folder(run: StoredRun, record: RunRecord, last: int | None) -> StoredRu
         create_store(folder)
         copy_frames(run.folder, folder, last)
         write_run_record(folder, record)
+        note_files(folder)
         atomic_files.move_into_place(folder, Path(place))
     except FileExistsError:
         raise SessionError(f"Session has a run '{record.name}' already.", "Choose another name.") from None
