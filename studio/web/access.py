@@ -11,6 +11,7 @@ out.
 import hashlib
 import hmac
 import ipaddress
+import re
 import secrets
 import socket
 from dataclasses import dataclass
@@ -25,6 +26,11 @@ from studio.errors import AccessError
 from studio.web.error_responses import error_response
 
 SAFE_METHODS = frozenset(("GET", "HEAD"))
+HOST = re.compile(
+    r"(?:(?P<name>[A-Za-z0-9._-]{1,253})|\[(?P<address>[0-9A-Fa-f:.]{2,45})\])(?::(?P<port>\d{1,5}))?",
+    re.ASCII,
+)
+LAST_PORT = 65535
 LOOPBACK_NAMES = frozenset(("localhost", "127.0.0.1", "::1"))
 
 
@@ -71,10 +77,10 @@ def binding_rule(host: str, allow_remote: bool) -> HostRule:
 
 def host_name(header: str) -> str:
     """The name or address in a Host header, lower case, without port and brackets; "" if it is malformed."""
-    try:
-        return (urlsplit(f"//{header}").hostname or "").lower()
-    except ValueError:
+    found = HOST.fullmatch(header)
+    if found is None or int(found["port"] or 0) > LAST_PORT:
         return ""
+    return (found["name"] or found["address"]).lower()
 
 
 def same_origin(origin: str, host: str) -> bool:
