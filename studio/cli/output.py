@@ -3,7 +3,9 @@
 import errno
 import functools
 import os
+import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -22,6 +24,7 @@ from studio.sessions.atomic_files import write_bytes
 P = ParamSpec("P")
 
 CANCELLED = 130
+TERMINATED = 143
 FOUND_FAULTS = 1
 EXIT_CODE = "exit code"
 """Key of a command's result that is not printed."""
@@ -70,14 +73,41 @@ def tell(result: Mapping[str, object], as_json: bool) -> None:
         )
 
 
+class TerminatedError(KeyboardInterrupt):
+    """The system told the process to end (SIGTERM): everything that answers Ctrl-C answers this."""
+
+
+@contextmanager
+def termination_as_interrupt() -> Iterator[None]:
+    """While the block lasts a SIGTERM is raised in it, once, as Ctrl-C is; in the main thread only."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(number: int, frame: object) -> None:
+        # What cleans up now is not interrupted again.
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        raise TerminatedError
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
 @contextmanager
 def errors_in_words() -> Iterator[None]:
     """Turn whatever goes wrong into a cause, a remedy and an exit code; never a traceback."""
     try:
-        yield
+        with termination_as_interrupt():
+            yield
     except StudioError as error:
         _say_wrong(error.message, error.hint)
         sys.exit(WRONG_INPUT)
+    except TerminatedError:
+        messages.print("Ended from outside (SIGTERM); what was finished is kept.")
+        sys.exit(TERMINATED)
     except KeyboardInterrupt:
         messages.print("Cancelled; what was finished is kept.")
         sys.exit(CANCELLED)
