@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from studio.body.branches import within_limits
 from studio.errors import RunError, SessionError
+from studio.geometry.reach import within_reach
 from studio.progress import Progress
 from studio.runs.new_run import software_version
 from studio.runs.problem_source import ProblemSource
@@ -57,7 +58,7 @@ def prepare_correction(
     """
     record, body = run.record, run.body()
     given = np.asarray(pose, dtype=np.float64)
-    if given.shape != (len(body.parameters),) or not np.isfinite(given).all():
+    if given.shape != (len(body.parameters),) or not within_reach(given):
         raise RunError(
             f"A pose of {body.name} has {len(body.parameters)} finite numbers, the given one does not.",
             "Give radians and mm in the order of the body's parameters.",

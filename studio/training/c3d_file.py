@@ -6,7 +6,7 @@ import ezc3d
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.capture.trc import MM_PER_UNIT, MarkerMotion
+from studio.capture.trc import MM_PER_UNIT, MarkerMotion, check_reach
 from studio.errors import StudioError
 from studio.foreign_files import foreign_file
 
@@ -37,7 +37,9 @@ def read_c3d(path: Path) -> MarkerMotion:
             f"'{path.name}' has the unit '{unit}' and {rate:g} frames a second.",
             "Points must be in mm, cm or m, at 1 to 10000 frames a second.",
         )
-    unseen = ~np.isfinite(points).all(axis=2) | (points == 0.0).all(axis=2)
+    unseen = np.isnan(points).any(axis=2) | (points == 0.0).all(axis=2)
     positions = np.where(unseen[..., None], np.nan, MM_PER_UNIT[unit] * points)
     names = tuple(labels[: points.shape[1]])
-    return MarkerMotion(names, np.arange(len(positions)) / rate, positions, unit=unit, rate=rate)
+    motion = MarkerMotion(names, np.arange(len(positions)) / rate, positions, unit=unit, rate=rate)
+    check_reach(path, motion, StudioError)
+    return motion
