@@ -86,6 +86,7 @@ COMMANDS = {
         "verify_command",
         "Compare all that is stored with its checksums; repair frames.",
     ),
+    "doctor": ("doctor_commands", "doctor_command", "Try all that the studio stands on, and say what to do."),
     "bench": ("bench_commands", "bench", "Measure kernels, hulls, a slider's answer and live tracking."),
 }
 

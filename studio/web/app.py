@@ -30,6 +30,7 @@ from studio.web import (
     export_routes,
     footage_routes,
     guide_routes,
+    health_routes,
     import_routes,
     initialisation_routes,
     page_routes,
@@ -64,6 +65,7 @@ DESCRIPTION = (
     "Events: WebSocket `/api/events`."
 )
 ROUTERS = (
+    health_routes.router,
     page_routes.router,
     guide_routes.router,
     session_routes.router,
