@@ -114,7 +114,7 @@ def _numbers(version: str) -> tuple[int, ...]:
 
 
 def _threads() -> str:
-    used, cores = numba.config.NUMBA_NUM_THREADS, _cores()
+    used, cores = numba.get_num_threads(), _cores()
     if used < cores:
         raise _Fault(
             f"kernels use {used} of {cores} cores",

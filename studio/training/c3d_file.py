@@ -6,9 +6,10 @@ import ezc3d
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.capture.isolated import isolated
 from studio.capture.trc import MM_PER_UNIT, MarkerMotion, check_reach
 from studio.errors import StudioError
-from studio.foreign_files import foreign_file
+from studio.foreign_files import check_regular, foreign_file
 
 Array = NDArray[np.float64]
 
@@ -16,13 +17,20 @@ REMEDY = "Export it again from the program that it comes from."
 
 
 def read_c3d(path: Path) -> MarkerMotion:
-    """The labelled points of a C3D file as they are written, mm; NaN where a point was not seen.
+    """The labelled points of a C3D file as they are written, mm; NaN where a point was not seen. Read in a process of
+    its own.
 
     The file's third axis counts as up: learning leaves out how the whole body lies. Raises StudioError for what is no
     C3D file, and for one without points, labels or a rate.
     """
     if not path.is_file():
         raise StudioError(f"'{path}' does not exist.", "Check the path.")
+    check_regular(path, StudioError)
+    return isolated(StudioError, _read, path)
+
+
+def _read(path: Path) -> MarkerMotion:
+    """`read_c3d` itself."""
     with foreign_file(path, StudioError, "a C3D file that can be read", REMEDY):
         content = ezc3d.c3d(str(path))
         settings = content["parameters"]["POINT"]

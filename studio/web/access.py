@@ -6,6 +6,10 @@ rebinding); everything but a plain GET, and every WebSocket, must come from our 
 CORS. The cookie holds a digest of the token, so neither is ever found where the other leaks, and its name
 is derived from the token, so that two studios on one machine (cookies know no ports) do not log each other
 out.
+
+What remains: since cookies know no ports, a browser also sends this one to other servers on the same host name that a
+person opens in it, and whoever runs such a server could use it until this studio ends. Plain HTTP on loopback has no
+`__Host-` cookie that would prevent it.
 """
 
 import hashlib
