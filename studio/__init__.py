@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from studio.notebook.aligning import align as align
     from studio.notebook.aligning import unalign as unalign
     from studio.notebook.checking import check as check
+    from studio.notebook.doctor import doctor as doctor
     from studio.notebook.exporting import export_run as export_run
     from studio.notebook.learning import learn as learn
     from studio.notebook.opening import list_runs as list_runs
@@ -46,6 +47,7 @@ _PLACES = {
     ),
     "notebook.aligning": ("align", "unalign"),
     "notebook.checking": ("check",),
+    "notebook.doctor": ("doctor",),
     "notebook.solving_cameras": ("calibrate",),
     "notebook.tracking": ("correct", "go_on", "refine", "smooth", "track"),
     "notebook.recording": ("record",),

@@ -59,6 +59,12 @@ class NotFoundError(SessionError):
     status, code = 404, "not-found"
 
 
+class DamagedError(NotFoundError):
+    """A frame that was stored, but is no longer what was written: a gap, until it is tracked again."""
+
+    code = "damaged"
+
+
 class TruthError(StudioError):
     """A TRC or other reference motion that cannot be used."""
 

@@ -4,7 +4,8 @@ import logging
 import logging.handlers
 import re
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import click
@@ -14,6 +15,8 @@ from studio.errors import StudioError
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.scene.presets import PRESETS
 from studio.scene.window_scenes import WindowScenes
+from studio.sessions.atomic_files import write_text
+from studio.sessions.process_lock import ProcessLock
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 from studio.web.access import binding_rule, new_token
@@ -30,6 +33,8 @@ PORT = 8642
 LOG_NAME = "server.log"
 LOG_BYTES, LOG_FILES = 2_000_000, 3
 SECONDS_TO_CLOSE = 2
+SERVER_LOCK, SERVER_ADDRESS = "server.lock", "server.address"
+UNKNOWN_ADDRESS = "an address that is not known yet"
 TOKEN_IN_ADDRESS = re.compile(r"(token=)[A-Za-z0-9_%-]+")
 
 
@@ -37,6 +42,12 @@ class PortTakenError(StudioError):
     """Something else listens where the studio should."""
 
     status, code = 409, "port"
+
+
+class WorkspaceServedError(StudioError):
+    """Another server works on the workspace."""
+
+    status, code = 409, "served"
 
 
 def serve(
@@ -60,7 +71,8 @@ def serve(
     workspace = Workspace(workspace_root)
     log_path = _log_to_file(workspace.root / STATE_NAME)
     token = new_token()
-    with _listening(host, port) as listener:
+    with _alone_on(workspace.root) as tell_address, _listening(host, port) as listener:
+        tell_address(f"http://{_named(host)}:{listener.getsockname()[1]}")
         control = StudioControl(workspace)
         try:
             app = build_app(
@@ -99,13 +111,44 @@ def prepare_demo(workspace_root: Path) -> Session:
 
 def address(host: str, port: int, token: str, session: str | None = None, run: str | None = None) -> str:
     """The address to open; it holds the token."""
-    name = {"0.0.0.0": socket.gethostname(), "::": socket.gethostname(), "": socket.gethostname()}.get(
-        host, host
-    )
-    shown = f"[{name}]" if ":" in name else name
     wish = f"&session={session}" if session else ""
     wish += f"&run={run}" if session and run else ""
-    return f"http://{shown}:{port}/?token={token}{wish}"
+    return f"http://{_named(host)}:{port}/?token={token}{wish}"
+
+
+def _named(host: str) -> str:
+    """The host as it stands in an address: this machine's name where it listens on all."""
+    name = socket.gethostname() if host in ("0.0.0.0", "::", "") else host
+    return f"[{name}]" if ":" in name else name
+
+
+def served_at(root: Path) -> str:
+    """Where a workspace is being served, without the token; "" where no living process serves it."""
+    folder = root / STATE_NAME
+    if not ProcessLock.is_held(folder / SERVER_LOCK):
+        return ""
+    try:
+        return (folder / SERVER_ADDRESS).read_text(encoding="utf-8") or UNKNOWN_ADDRESS
+    except OSError:
+        return UNKNOWN_ADDRESS
+
+
+@contextmanager
+def _alone_on(root: Path) -> Iterator[Callable[[str], None]]:
+    """Serve a workspace as the only one; yields who is to be told the address. Raises WorkspaceServedError."""
+    folder = root / STATE_NAME
+    lock = ProcessLock.take(folder / SERVER_LOCK)
+    if lock is None:
+        raise WorkspaceServedError(
+            f"The workspace '{root}' is served already, at {served_at(root) or UNKNOWN_ADDRESS}.",
+            "Open the address that the other one printed, stop it, or choose another workspace with --workspace.",
+        )
+    try:
+        yield lambda text: write_text(folder / SERVER_ADDRESS, text)
+    finally:
+        with suppress(OSError):
+            (folder / SERVER_ADDRESS).unlink(missing_ok=True)
+        lock.free()
 
 
 def _track(control: StudioControl, session: Session, run: str) -> None:

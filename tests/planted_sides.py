@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 from store_records import layer_of, result_of
-from studio.capture.trc import read_trc
 
 from studio.body.inverse_kinematics import pose_from_markers
 from studio.evaluation.errors import rows_of_frames
+from studio.motion_files.trc import read_trc
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session

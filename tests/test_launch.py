@@ -182,3 +182,20 @@ def test_the_demo_tracks_the_walk_as_it_opens(tmp_path: Path, monkeypatch: pytes
     assert (one["open_session"], one["track"]) == ("walk", True)
     assert one["open_run"] == two["open_run"]
     assert [run.name for run in Workspace(tmp_path).session("walk").runs()] == [one["open_run"]]
+
+
+def test_a_second_server_on_a_workspace_is_refused_with_the_first_ones_address(
+    served: tuple[subprocess.Popen[str], str], tmp_path: Path
+) -> None:
+    process, printed = served
+    base = printed.partition("/?")[0]
+    with pytest.raises(StudioError, match=re.escape(f"is served already, at {base}.")) as refused:
+        serve(tmp_path / "workspace", port=0)
+    assert "--workspace" in refused.value.hint
+    assert "token" not in str(refused.value)
+    assert launch.served_at(tmp_path / "workspace") == base
+    process.kill()
+    process.wait(20)
+    assert launch.served_at(tmp_path / "workspace") == ""
+    with launch._alone_on(tmp_path / "workspace"):
+        assert launch.served_at(tmp_path / "workspace")

@@ -18,6 +18,7 @@ from studio.body.forward_kinematics import joint_frames, limb_ends
 from studio.body.inverse_kinematics import MM_PER_RADIAN
 from studio.body.model import BodyModel
 from studio.errors import BodyError
+from studio.geometry.reach import within_reach
 
 Array = NDArray[np.float64]
 
@@ -91,7 +92,7 @@ class Dragger:
         grip, wanted = self.grip(name), np.asarray(target, dtype=np.float64)
         given = np.asarray(pose, dtype=np.float64)
         fits = given.shape == (len(self.body.parameters),) and wanted.shape == (3,)
-        if not fits or not np.isfinite(given).all() or not np.isfinite(wanted).all():
+        if not fits or not within_reach(given) or not within_reach(wanted):
             raise BodyError(
                 f"A drag of body '{self.body.name}' needs {len(self.body.parameters)} numbers and a place.",
                 "Give a finite pose in the order of its parameters, and x, y, z in mm.",

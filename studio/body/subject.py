@@ -27,7 +27,6 @@ than
 """
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -54,6 +53,10 @@ STANDING_WEIGHT = 0.03
 
 # Steps of Gauss and Newton; the distances are nearly linear in the dimensions, three suffice.
 FIT_STEPS = 20
+
+SHORTEST_MM, TALLEST_MM = 300.0, 3000.0
+LONGEST_MM = 10_000.0
+"""Of a limb or a distance of markers; a ratio is far below it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,13 +167,19 @@ def in_lengths(subject: Subject, own_body: BodyModel) -> Subject:
 
 def _check(subject: Subject, where: str) -> None:
     height = subject.height_mm
-    if height is not None and not (math.isfinite(height) and height > 0.0):
-        raise BodyError(f"{where}: height_mm is {height}.", "Give the height in millimetres or leave it out.")
+    if height is not None and not SHORTEST_MM <= height <= TALLEST_MM:
+        raise BodyError(
+            f"{where}: height_mm is {height:g}.",
+            f"Give the height in millimetres, from {SHORTEST_MM:g} to {TALLEST_MM:g}, or leave it out.",
+        )
     for group in ("lengths_mm", "dimensions_mm", "ratios"):
         for name, value in getattr(subject, group).items():
             allowed = value > 0.0 or (group == "dimensions_mm" and value == 0.0)
-            if not (math.isfinite(value) and allowed):
-                raise BodyError(f"{where}: {group} entry '{name}' is {value}.", "Give a number above 0.")
+            if not (value <= LONGEST_MM and allowed):
+                raise BodyError(
+                    f"{where}: {group} entry '{name}' is {value:g}.",
+                    f"Give a number above 0, up to {LONGEST_MM:g}.",
+                )
 
 
 def _is_ratio(body: BodyModel, name: str) -> bool:

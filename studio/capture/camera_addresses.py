@@ -2,9 +2,11 @@
 
 Addresses come from people and pages, so only what a camera can be is let through: MJPEG over HTTP, RTSP, a video
 device of this machine, and (where whoever asks may read files) a file. Cameras lie in local networks, so those are
-allowed; the studio's own ports are not. What is shown or logged of an address never holds its name and password.
+allowed; the studio's own ports are not. A name is resolved once for each connection, and what was checked is what is
+connected to (`machine_of`). What is shown or logged of an address never holds its name and password.
 """
 
+import dataclasses
 import ipaddress
 import re
 import socket
@@ -31,13 +33,14 @@ REMEDY = "Give CAMERA=http://…, rtsp://…, /dev/video0 or the path of a video
 @dataclass(frozen=True, slots=True)
 class CameraAddress:
     """A camera's name in the calibration, what kind of stream it has, and where. url : may hold a password, so it is
-    left out of this value's own words; shown : the same without it.
+    left out of this value's own words; shown : the same without it. own_ports : of this machine, where no camera is.
     """
 
     name: str
     kind: Kind
     shown: str
     url: str = field(repr=False)
+    own_ports: frozenset[int] = frozenset()
 
 
 def address_from_text(text: str, *, replays: bool = False) -> CameraAddress:
@@ -68,10 +71,21 @@ def camera_address(name: str, place: str, *, replays: bool = False) -> CameraAdd
     raise FootageError(f"Camera {name} cannot be reached by '{scheme or place[:60]}'.", REMEDY)
 
 
-def refuse_own(address: CameraAddress, own_ports: Collection[int]) -> None:
-    """Raises FootageError where an address leads to the studio's own ports, to keys, or to no machine at all."""
-    if address.kind not in ("http", "rtsp"):
-        return
+def without_own(address: CameraAddress, own_ports: Collection[int]) -> CameraAddress:
+    """The address, kept off the studio's own ports whenever it is connected to. Raises FootageError where it leads
+    there now, to keys, or to no machine at all.
+    """
+    kept_off = dataclasses.replace(address, own_ports=frozenset(own_ports))
+    if address.kind in ("http", "rtsp"):
+        machine_of(kept_off)
+    return kept_off
+
+
+def machine_of(address: CameraAddress) -> tuple[str, int]:
+    """The machine (its number) and port of a camera in the network, to be connected to as they are: a name may lead
+    elsewhere the next time. Raises FootageError where any of its machines is one that no camera is on.
+    """
+    own_ports = address.own_ports
     parts = urlsplit(address.url)
     port = parts.port or USUAL_PORTS[parts.scheme.lower()]
     try:
@@ -87,6 +101,7 @@ def refuse_own(address: CameraAddress, own_ports: Collection[int]) -> None:
                 f"Camera {address.name}: '{parts.hostname}:{port}' is no camera.",
                 "Give the camera's own address.",
             )
+    return str(found[0][4][0]), port
 
 
 def check_names(addresses: Collection[CameraAddress]) -> None:

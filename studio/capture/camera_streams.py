@@ -1,12 +1,13 @@
-"""A live camera's stream opened and read: pictures as they come, by PyAV.
+"""A live camera's stream opened and read: pictures as they come, decoded by PyAV.
 
-The format is given, never guessed (a page that answers with a list of other addresses is not followed), only the
-protocols of cameras are spoken, and a read that takes too long is an error instead of a wait.
+The format is given, never guessed, only the protocols of cameras are spoken, nothing leads from a camera to another
+address, and a read that takes too long is an error instead of a wait.
 """
 
 import fractions
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.capture.camera_addresses import CameraAddress
+from studio.capture.mjpeg_over_http import mjpeg_parts
+from studio.capture.rtsp_relay import relayed
 from studio.capture.video_probe import MAX_PIXELS, open_video, reason
 from studio.errors import FootageError
 
@@ -26,11 +29,9 @@ Bytes = NDArray[np.uint8]
 SECONDS_TO_OPEN, SECONDS_TO_READ = 5.0, 2.0
 HUFFMAN_TABLES = b"\xff\xc4"
 """Some devices leave these out of their JPEG; then the bytes cannot be kept as a picture."""
-FORMATS = {"http": "mpjpeg", "rtsp": "rtsp", "usb": "video4linux2"}
+FORMATS = {"rtsp": "rtsp", "usb": "video4linux2"}
 OPTIONS = {
-    "http": {"protocol_whitelist": "http,https,tcp,tls,crypto", "fflags": "nobuffer", "probesize": "100000",
-             "reconnect": "0", "strict_mime_boundary": "0"},
-    "rtsp": {"protocol_whitelist": "rtsp,rtsps,rtp,srtp,tcp,tls,udp", "rtsp_transport": "tcp", "fflags": "nobuffer"},
+    "rtsp": {"protocol_whitelist": "rtsp,rtp,tcp", "rtsp_transport": "tcp", "fflags": "nobuffer"},
     "usb": {"input_format": "mjpeg"},
 }  # fmt: skip
 
@@ -63,6 +64,9 @@ def open_stream(
     if address.kind == "replay":
         yield from replayed_video(Path(address.url), wait, clock, released)
         return
+    if address.kind == "http":
+        yield from _decoded(address, mjpeg_parts(address, wait, (SECONDS_TO_OPEN, SECONDS_TO_READ)), clock)
+        return
     try:
         with _opened(address) as container:
             stream = container.streams.video[0]
@@ -75,6 +79,23 @@ def open_stream(
             f"Camera {address.name} ({address.shown}) gives no pictures ({_why(problem)}).",
             "Check that it is switched on, its address, and its name and password.",
         ) from None
+
+
+def _decoded(address: CameraAddress, parts: Iterator[bytes], clock: Callable[[], float]) -> Iterator[Shot]:
+    """Pictures of JPEG files as they come; one that is damaged is left out, the next one is awaited."""
+    decoder = av.CodecContext.create("mjpeg", "r")
+    assert isinstance(decoder, av.VideoCodecContext)
+    decoder.thread_type = "NONE"
+    decoder.options = {"max_pixels": str(MAX_PIXELS)}
+    for content in parts:
+        came = clock()
+        try:
+            frames = decoder.decode(av.Packet(content))
+        except av.error.FFmpegError:
+            continue
+        for frame in frames:
+            if not frame.is_corrupt:
+                yield Shot(_pixels(frame), content if HUFFMAN_TABLES in content else b"", came)
 
 
 def replayed_video(
@@ -107,18 +128,21 @@ def replayed_video(
         ) from None
 
 
-def _opened(address: CameraAddress) -> av.container.InputContainer:
-    given = {
-        "format": FORMATS[address.kind],
-        "timeout": (SECONDS_TO_OPEN, SECONDS_TO_READ),
-    }
+@contextmanager
+def _opened(address: CameraAddress) -> Iterator[av.container.InputContainer]:
+    given = {"format": FORMATS[address.kind], "timeout": (SECONDS_TO_OPEN, SECONDS_TO_READ)}
+    options = OPTIONS[address.kind]
+    if address.kind == "rtsp":
+        with relayed(address, SECONDS_TO_OPEN) as url, av.open(url, options=options, **given) as container:
+            yield container
+        return
     try:
-        return av.open(address.url, options=OPTIONS[address.kind], **given)
+        container = av.open(address.url, options=options, **given)
     except (av.error.FFmpegError, OSError):
-        if address.kind != "usb":
-            raise
         # Not every device speaks JPEG.
-        return av.open(address.url, **given)
+        container = av.open(address.url, **given)
+    with container:
+        yield container
 
 
 def _shots(

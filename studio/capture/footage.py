@@ -5,8 +5,10 @@ session can be opened twice. The last pictures are kept, so that re-annealing a 
 again decodes nothing.
 """
 
+import itertools
 import threading
-from collections import OrderedDict
+import weakref
+from collections import Counter, OrderedDict, deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +30,10 @@ EXCLUSIONS = "exclusions"
 """Folder of a session with a painted picture a camera."""
 KEPT_BYTES = 24_000_000
 """Pictures kept for each camera: eight of 1920x1080/2, twenty-six of 640x480."""
+KEPT_BYTES_IN_ALL = 96_000_000
+"""Of pictures that a process keeps, of all footage that it has open."""
+FEWEST_KEPT = 2
+"""Pictures of each camera that stay in any case."""
 MANY_PICTURES = 24
 """After so many pictures it is worth a fifth of a second to give back what their decoders held; pages that ask for one
 picture at a time do not wait for that."""
@@ -224,16 +230,16 @@ class _Kept:
 
     def __init__(self, reader: Reader, camera: CameraSource, prepare: Callable[[Bytes], Bytes]) -> None:
         self._reader, self._camera, self._prepare = reader, camera, prepare
-        self._kept: OrderedDict[int, Bytes] = OrderedDict()
         self._lock = threading.Lock()
-        self._room = max(2, KEPT_BYTES // (3 * camera.width * camera.height))
+        self._room = max(FEWEST_KEPT, KEPT_BYTES // (3 * camera.width * camera.height))
         self.read_count = 0
+        self._number = next(_NUMBERS)
+        weakref.finalize(self, _PICTURES.gone.append, self._number).atexit = False
 
     def read(self, index: int) -> Bytes:
         with self._lock:
-            found = self._kept.get(index)
+            found = _PICTURES.get(self._number, index)
             if found is not None:
-                self._kept.move_to_end(index)
                 return found
             self.read_count += 1
             picture = turned_picture(self._reader.read(index + self._camera.offset), self._camera.turned)
@@ -246,18 +252,72 @@ class _Kept:
                 )
             prepared = self._prepare(picture)
             prepared.setflags(write=False)
-            self._kept[index] = prepared
-            while len(self._kept) > self._room:
-                self._kept.popitem(last=False)
+            _PICTURES.put(self._number, index, prepared, self._room)
             return prepared
 
     def release(self) -> None:
         with self._lock:
             self._reader.close()
-            self._kept.clear()
+            _PICTURES.forget(self._number)
 
     def close(self) -> None:
         self._reader.close()
+        _PICTURES.forget(self._number)
+
+
+class _KeptPictures:
+    """The pictures that all readers of the process keep, within a size in bytes: the one used longest ago goes.
+
+    Readers are known by numbers of their own. most : bytes; FEWEST_KEPT of each reader stay in any case.
+    """
+
+    def __init__(self, most: int) -> None:
+        self.most, self.bytes = most, 0
+        self.gone: deque[int] = deque()
+        """Readers that are no more, as the garbage collector says in any thread at any time."""
+        self._lock = threading.Lock()
+        self._kept: OrderedDict[tuple[int, int], Bytes] = OrderedDict()
+        self._counts: Counter[int] = Counter()
+
+    def get(self, reader: int, index: int) -> Bytes | None:
+        with self._lock:
+            found = self._kept.get((reader, index))
+            if found is not None:
+                self._kept.move_to_end((reader, index))
+            return found
+
+    def put(self, reader: int, index: int, picture: Bytes, room: int) -> None:
+        """room : how many pictures of this reader are kept at most."""
+        with self._lock:
+            while self.gone:
+                self._drop_all(self.gone.popleft())
+            self._kept[reader, index] = picture
+            self._counts[reader] += 1
+            self.bytes += picture.nbytes
+            for key in list(self._kept):
+                full, too_many = self.bytes > self.most, self._counts[reader] > room
+                if not (full or too_many):
+                    return
+                if self._counts[key[0]] > FEWEST_KEPT and (full or key[0] == reader):
+                    self._drop(key)
+
+    def forget(self, reader: int) -> None:
+        """Keep nothing of a reader."""
+        with self._lock:
+            self._drop_all(reader)
+
+    def _drop_all(self, reader: int) -> None:
+        for key in [key for key in self._kept if key[0] == reader]:
+            self._drop(key)
+        self._counts.pop(reader, None)
+
+    def _drop(self, key: tuple[int, int]) -> None:
+        self.bytes -= self._kept.pop(key).nbytes
+        self._counts[key[0]] -= 1
+
+
+_NUMBERS = itertools.count()
+_PICTURES = _KeptPictures(KEPT_BYTES_IN_ALL)
 
 
 def _mask_reader(path: Path) -> Reader:

@@ -15,6 +15,7 @@ from studio.capture.naming import natural_key
 from studio.capture.video_probe import MAX_PIXELS
 from studio.errors import FootageError
 from studio.foreign_files import check_regular
+from studio.isolated import isolated, silent
 
 Bytes = NDArray[np.uint8]
 
@@ -69,7 +70,15 @@ def read_picture(path: Path) -> Bytes:
 
 
 def check_picture(path: Path) -> tuple[int, int]:
-    """Width and height of a picture that decodes whole. Raises FootageError for damage or an absurd size."""
+    """Width and height of a picture that decodes whole, which is tried in a process of its own. Raises FootageError for
+    damage or an absurd size.
+    """
+    check_regular(path, FootageError)
+    return isolated(FootageError, _size_of, path)
+
+
+def _size_of(path: Path) -> tuple[int, int]:
+    """`check_picture` itself."""
     check_regular(path, FootageError)
     if path.suffix.lower() in STRICTLY_DECODED:
         try:
@@ -89,26 +98,30 @@ def check_picture(path: Path) -> tuple[int, int]:
 
 
 def measure_pictures(folder: Path, on_frame: Callable[[int, int], None] | None = None) -> PicturesMeasure:
-    """Size and count of a folder's pictures, every one decoded once, and the numbers that are missing in
-    between.
+    """Size and count of a folder's pictures, every one decoded once in a process of its own, and the numbers that are
+    missing in between.
 
-        on_frame : called with pictures read and pictures in all; may raise to stop.
-        Raises FootageError if there are none, one is damaged or sizes differ.
+    on_frame : called with pictures read and pictures in all; may raise to stop. Raises FootageError if there are none,
+    one is damaged or sizes differ.
     """
+    return isolated(FootageError, _measured, folder, on_frame or silent)
+
+
+def _measured(folder: Path, on_frame: Callable[[int, int], None]) -> PicturesMeasure:
+    """`measure_pictures` itself."""
     paths = list_pictures(folder)
     if not paths:
         raise FootageError(f"'{folder.name}' holds no pictures.", "Put the frames in it as PNG, JPEG or BMP.")
-    width, height = check_picture(paths[0])
+    width, height = _size_of(paths[0])
     for number, path in enumerate(paths, 1):
-        size = check_picture(path)
+        size = _size_of(path)
         if size != (width, height):
             raise FootageError(
                 f"'{folder.name}/{path.name}' is {size[0]}x{size[1]} pixels,"
                 f" '{paths[0].name}' is {width}x{height}.",
                 "Give all pictures of a camera one size.",
             )
-        if on_frame is not None:
-            on_frame(number, len(paths))
+        on_frame(number, len(paths))
     return PicturesMeasure(width, height, len(paths), _missing_numbers(paths))
 
 

@@ -18,9 +18,10 @@ import av.video
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.capture.freed_memory import give_back_freed_memory
 from studio.capture.video_probe import MAX_FRAMES, announced_frames, check_turn, open_video, reason
 from studio.errors import FootageError
+from studio.foreign_files import check_regular
+from studio.isolated import isolated, silent
 
 Bytes = NDArray[np.uint8]
 
@@ -47,18 +48,16 @@ class VideoMeasure:
 
 
 def measure_video(path: Path, on_frame: Callable[[int, int], None] | None = None) -> VideoMeasure:
-    """Size, frame count and rate of a video, by decoding it once.
+    """Size, frame count and rate of a video, by decoding it once, in a process of its own.
 
     on_frame : called with frames decoded and frames announced (0 if unknown); may raise to stop.
     Raises FootageError naming the file and the frame where it is damaged or cut.
     """
-    try:
-        return _measured(path, on_frame)
-    finally:
-        give_back_freed_memory()
+    check_regular(path, FootageError)
+    return isolated(FootageError, _measured, path, on_frame or silent)
 
 
-def _measured(path: Path, on_frame: Callable[[int, int], None] | None) -> VideoMeasure:
+def _measured(path: Path, on_frame: Callable[[int, int], None]) -> VideoMeasure:
     """`measure_video` itself."""
     times: list[float] = []
     width = height = 0
@@ -76,8 +75,7 @@ def _measured(path: Path, on_frame: Callable[[int, int], None] | None) -> VideoM
             times.append(frame.time if frame.time is not None else float("nan"))
             if len(times) > MAX_FRAMES:
                 raise FootageError(f"'{path.name}' has more than {MAX_FRAMES} frames.", "Cut it into pieces.")
-            if on_frame is not None:
-                on_frame(len(times), announced)
+            on_frame(len(times), announced)
         nominal = float(stream.average_rate or stream.guessed_rate or 0)
     if not times:
         raise FootageError(f"'{path.name}' holds no frames.", "Record or export the video again.")

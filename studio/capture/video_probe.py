@@ -15,6 +15,7 @@ import numpy as np
 
 from studio.errors import FootageError
 from studio.foreign_files import check_regular, foreign_file
+from studio.isolated import isolated
 
 MAX_PIXELS = 64_000_000
 MAX_FRAMES = 2_000_000
@@ -46,7 +47,15 @@ class VideoProbe:
 
 
 def probe_video(path: Path) -> VideoProbe:
-    """What a video announces; only its first frame is decoded. Raises FootageError for what is refused or no video."""
+    """What a video announces; only its first frame is decoded, in a process of its own. Raises FootageError for what is
+    refused or no video.
+    """
+    check_regular(path, FootageError)
+    return isolated(FootageError, _probed, path)
+
+
+def _probed(path: Path) -> VideoProbe:
+    """`probe_video` itself."""
     with (
         foreign_file(path, FootageError, "a video", "Copy or export it again."),
         open_video(path) as container,

@@ -30,14 +30,16 @@ def check_command(session: str, run: str, track: str, every: int) -> dict[str, o
     """
     opened = Workspace().resolve(session)
     with progress(f"{opened.name} / {run}") as report:
-        found = check_run(opened, opened.run(run), track, every, progress=report)
+        stored = opened.run(run)
+        found, damage = check_run(opened, stored, track, every, progress=report), stored.damage()
     told = msgspec.to_builtins(found)
     return {
         "session": opened.name,
         "run": run,
-        "good": found.good,
+        "good": found.good and not damage,
+        "damage": damage,
         "inside_mean": found.inside_mean,
         "poor": list(found.poor),
         **{name: value for name, value in told.items() if name not in ("schema", "stamp", "count")},
-        "text": f"{opened.name} / {run}, track '{found.track}': {found.in_words()}.",
+        "text": f"{opened.name} / {run}, track '{found.track}': {found.in_words()}. {damage}".rstrip(),
     }

@@ -81,6 +81,12 @@ COMMANDS = {
     ),
     "bodies": ("session_commands", "bodies", "List the bodies."),
     "runs": ("session_commands", "runs", "List the runs."),
+    "verify": (
+        "verifying_commands",
+        "verify_command",
+        "Compare all that is stored with its checksums; repair frames.",
+    ),
+    "doctor": ("doctor_commands", "doctor_command", "Try all that the studio stands on, and say what to do."),
     "bench": ("bench_commands", "bench", "Measure kernels, hulls, a slider's answer and live tracking."),
 }
 

@@ -3,7 +3,9 @@
 import errno
 import functools
 import os
+import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -22,6 +24,10 @@ from studio.sessions.atomic_files import write_bytes
 P = ParamSpec("P")
 
 CANCELLED = 130
+TERMINATED = 143
+FOUND_FAULTS = 1
+EXIT_CODE = "exit code"
+"""Key of a command's result that is not printed."""
 WRONG_INPUT = 2
 FAULT = 70
 REFUSED_BY_THE_DISK = frozenset((errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOSPC, errno.EDQUOT))
@@ -36,7 +42,7 @@ def command(function: Callable[P, Mapping[str, object]]) -> Callable[P, None]:
     """Make a function that returns its result a command body: prints it, and turns errors into words.
 
     The result is printed as one JSON object under `--json` (which this decorator adds), else as aligned
-    lines; a value under the key "text" is what a person reads instead.
+    lines; a value under the key "text" is what a person reads instead. EXIT_CODE is what the command ends with.
     """
 
     @click.option(
@@ -46,7 +52,11 @@ def command(function: Callable[P, Mapping[str, object]]) -> Callable[P, None]:
     def body(*arguments: P.args, **options: P.kwargs) -> None:
         as_json = bool(options.pop("as_json"))
         with errors_in_words():
-            tell(function(*arguments, **options), as_json)
+            result = dict(function(*arguments, **options))
+            code = int(str(result.pop(EXIT_CODE, 0)))
+            tell(result, as_json)
+        if code:
+            sys.exit(code)
 
     return body
 
@@ -63,14 +73,41 @@ def tell(result: Mapping[str, object], as_json: bool) -> None:
         )
 
 
+class TerminatedError(KeyboardInterrupt):
+    """The system told the process to end (SIGTERM): everything that answers Ctrl-C answers this."""
+
+
+@contextmanager
+def termination_as_interrupt() -> Iterator[None]:
+    """While the block lasts a SIGTERM is raised in it, once, as Ctrl-C is; in the main thread only."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def end(number: int, frame: object) -> None:
+        # What cleans up now is not interrupted again.
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        raise TerminatedError
+
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
 @contextmanager
 def errors_in_words() -> Iterator[None]:
     """Turn whatever goes wrong into a cause, a remedy and an exit code; never a traceback."""
     try:
-        yield
+        with termination_as_interrupt():
+            yield
     except StudioError as error:
         _say_wrong(error.message, error.hint)
         sys.exit(WRONG_INPUT)
+    except TerminatedError:
+        messages.print("Ended from outside (SIGTERM); what was finished is kept.")
+        sys.exit(TERMINATED)
     except KeyboardInterrupt:
         messages.print("Cancelled; what was finished is kept.")
         sys.exit(CANCELLED)

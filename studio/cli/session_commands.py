@@ -9,6 +9,7 @@ from studio.capture.calibration_files import WORLDS
 from studio.cli.arguments import camera_numbers, footage_options
 from studio.cli.output import command, note, progress
 from studio.sessions.importers.catalogue import import_source
+from studio.sessions.stored_run import damage_in_words
 from studio.sessions.workspace import Workspace
 
 INTO_HELP = "Name of the new session in the workspace, or a path."
@@ -128,12 +129,14 @@ def runs(session: str | None) -> dict[str, object]:
             "frames": [run.first, run.last],
             "done": run.done,
             "status": run.status,
+            "damaged": list(run.damaged),
         }
         for name, run in found
     ]
     lines = [
         f"{entry['session']:18} {entry['run']:12} {entry['tracker']:14} {entry['weighting']:14} "
         f"{entry['done']:>5} of {run.last - run.first} frames  {entry['status']}"
+        + (f"  {damage_in_words(run.damaged)}" if run.damaged else "")
         for entry, (_, run) in zip(entries, found, strict=True)
     ]
     return {"workspace": str(workspace.root), "runs": entries, "text": "\n".join(lines) or "No runs yet."}

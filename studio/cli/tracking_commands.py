@@ -241,6 +241,7 @@ def _told(run: StoredRun, result: BatchResult) -> dict[str, object]:
         "seconds": round(result.seconds, 3),
         "start_pose": record.start_source,
         **_went(run),
+        "damaged": run.damage(),
     }
     if exchanged := exchanged_sides(run):
         told["exchanged"] = list(exchanged)

@@ -145,9 +145,14 @@ def export_run(
         len(motion.frames),
         motion.fps,
         written.checked,
-        (*notes, *motion.notes, *written.notes),
+        (*notes, *_damage(run), *motion.notes, *written.notes),
         options.track if "track" in form.takes else "",
     )
+
+
+def _damage(run: StoredRun) -> tuple[str, ...]:
+    damage = run.damage()
+    return (damage,) if damage else ()
 
 
 def _working_folder(place: Path) -> Path:

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.errors import StudioError
-from studio.foreign_files import foreign_file
-from studio.motion_files.trc import MM_PER_UNIT, MarkerMotion
+from studio.foreign_files import check_regular, foreign_file
+from studio.isolated import isolated
+from studio.motion_files.trc import MM_PER_UNIT, MarkerMotion, check_reach
 
 Array = NDArray[np.float64]
 
@@ -20,13 +21,20 @@ REMEDY = "Export it again from the program that it comes from."
 
 
 def read_c3d(path: Path) -> MarkerMotion:
-    """The labelled points of a C3D file as they are written, mm; NaN where a point was not seen.
+    """The labelled points of a C3D file as they are written, mm; NaN where a point was not seen. Read in a process of
+    its own.
 
     The file's third axis counts as up: learning leaves out how the whole body lies. Raises StudioError for what is no
     C3D file, and for one without points, labels or a rate.
     """
     if not path.is_file():
         raise StudioError(f"'{path}' does not exist.", "Check the path.")
+    check_regular(path, StudioError)
+    return isolated(StudioError, _read, path)
+
+
+def _read(path: Path) -> MarkerMotion:
+    """`read_c3d` itself."""
     with foreign_file(path, StudioError, "a C3D file that can be read", REMEDY):
         content = ezc3d.c3d(str(path))
         settings = content["parameters"]["POINT"]
@@ -41,10 +49,12 @@ def read_c3d(path: Path) -> MarkerMotion:
             f"'{path.name}' has the unit '{unit}' and {rate:g} frames a second.",
             "Points must be in mm, cm or m, at 1 to 10000 frames a second.",
         )
-    unseen = ~np.isfinite(points).all(axis=2) | (points == 0.0).all(axis=2)
+    unseen = np.isnan(points).any(axis=2) | (points == 0.0).all(axis=2)
     positions = np.where(unseen[..., None], np.nan, MM_PER_UNIT[unit] * points)
     names = tuple(labels[: points.shape[1]])
-    return MarkerMotion(names, np.arange(len(positions)) / rate, positions, unit=unit, rate=rate)
+    motion = MarkerMotion(names, np.arange(len(positions)) / rate, positions, unit=unit, rate=rate)
+    check_reach(path, motion, StudioError)
+    return motion
 
 
 def write_c3d(path: Path, motion: MarkerMotion, *, up: str, source: Mapping[str, str]) -> None:

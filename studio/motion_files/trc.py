@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.errors import TruthError
+from studio.errors import StudioError, TruthError
 from studio.foreign_files import foreign_file
+from studio.geometry.reach import FARTHEST_MM, REACH_HINT
 
 Array = NDArray[np.float64]
 
@@ -90,7 +91,21 @@ def _read(path: Path) -> MarkerMotion:
             "Sort the rows by time and remove repeated ones.",
         )
     positions = table[:, 1:].reshape(len(rows), len(header.names), 3)[:, :, WORLD_FROM_TRC]
-    return MarkerMotion(header.names, times, positions * MM_PER_UNIT[header.unit], header.unit, header.rate)
+    motion = MarkerMotion(header.names, times, positions * MM_PER_UNIT[header.unit], header.unit, header.rate)
+    check_reach(path, motion, TruthError)
+    return motion
+
+
+def check_reach(path: Path, motion: MarkerMotion, wrong: type[StudioError]) -> None:
+    """Raises `wrong` naming file, row and marker where a coordinate is infinite or farther away than a place can be."""
+    beyond = np.isinf(motion.positions) | (np.abs(motion.positions) > FARTHEST_MM)
+    if beyond.any():
+        row, marker, axis = (int(at[0]) for at in np.nonzero(beyond))
+        value = motion.positions[row, marker, axis]
+        raise wrong(
+            f"In '{path.name}' marker '{motion.names[marker]}' is at {value:g} mm in row {row + 1}.",
+            REACH_HINT,
+        )
 
 
 def write_trc(path: Path, motion: MarkerMotion) -> None:

@@ -20,12 +20,14 @@ from numpy.typing import NDArray
 
 from studio.body.branches import within_limits
 from studio.errors import RunError, SessionError
+from studio.geometry.reach import within_reach
 from studio.progress import Progress
 from studio.runs.new_run import software_version
 from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
 from studio.runs.tracking_run import TrackingRun
 from studio.sessions import atomic_files
+from studio.sessions.file_checksums import note_files
 from studio.sessions.manifest import now
 from studio.sessions.names import checked_name
 from studio.sessions.results_store import copy_frames, create_store
@@ -56,7 +58,7 @@ def prepare_correction(
     """
     record, body = run.record, run.body()
     given = np.asarray(pose, dtype=np.float64)
-    if given.shape != (len(body.parameters),) or not np.isfinite(given).all():
+    if given.shape != (len(body.parameters),) or not within_reach(given):
         raise RunError(
             f"A pose of {body.name} has {len(body.parameters)} finite numbers, the given one does not.",
             "Give radians and mm in the order of the body's parameters.",
@@ -171,6 +173,7 @@ def _new_folder(run: StoredRun, record: RunRecord, last: int | None) -> StoredRu
         create_store(folder)
         copy_frames(run.folder, folder, last)
         write_run_record(folder, record)
+        note_files(folder)
         atomic_files.move_into_place(folder, Path(place))
     except FileExistsError:
         raise SessionError(f"Session has a run '{record.name}' already.", "Choose another name.") from None

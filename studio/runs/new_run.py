@@ -17,6 +17,7 @@ from studio.body.branches import within_limits
 from studio.body.model import BodyModel
 from studio.body.subject import Subject
 from studio.errors import BodyError, RunError, StudioError
+from studio.geometry.reach import within_reach
 from studio.runs.behaviour_models import chosen_model
 from studio.runs.initialising import InitialPose, Progress, initialise
 from studio.runs.live_request import check_live, live_changes
@@ -178,7 +179,7 @@ def start_pose(
     """
     if given is not None:
         pose = np.asarray(given, dtype=np.float64)
-        if pose.shape != (len(body.parameters),) or not np.isfinite(pose).all():
+        if pose.shape != (len(body.parameters),) or not within_reach(pose):
             raise BodyError(
                 f"A start pose of {body.name} has {len(body.parameters)} finite numbers, this one does not.",
                 "Give radians and mm in the order of the body's parameters.",

@@ -6,6 +6,8 @@ that a route can ask for one picture after another.
 """
 
 import threading
+import time
+import weakref
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -18,6 +20,7 @@ from numpy.typing import NDArray
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.capture.footage import Footage
+from studio.capture.freed_memory import give_back_freed_memory
 from studio.errors import NotFoundError, StudioError
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.frame_evidence import ViewEvidence
@@ -41,6 +44,7 @@ Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 Found = TypeVar("Found")
 
+REST_SECONDS = 20.0
 _NEED_EVIDENCE = {"mask", "edges"}
 _KEPT_COMPOSERS, _KEPT_PIXELS = 3, 18_000_000
 """How many are kept at most, and pixels of all their cameras. A pixel holds about 100 bytes (decoder, background,
@@ -61,6 +65,9 @@ class ViewComposer:
         self._settings = settings or _settings_of(session, run)
         self._truth = _truth_of(session)
         self._lock = threading.RLock()
+        self._used = time.monotonic()
+        self._rests = False
+        _all_composers.add(self)
 
     @property
     def pixels(self) -> int:
@@ -93,6 +100,7 @@ class ViewComposer:
         """
         _check_layers(layers)
         with self._lock:
+            self._used, self._rests = time.monotonic(), False
             view = self._view(frame, camera, layers)
             marks = self._marks(camera, frame, layers, pose, clouds, limbs, body or self.body)
         scale = 1.0 if height is None else height / view.picture.shape[0]
@@ -102,6 +110,19 @@ class ViewComposer:
         """Let go of the footage."""
         with self._lock:
             self._footage.close()
+
+    def rest(self, before: float) -> bool:
+        """Let go of files, pictures and background models where nothing was asked since a time (`time.monotonic`); they
+        are made again when needed. Whether there was anything to let go.
+        """
+        with self._lock:
+            if self._rests or self._used >= before:
+                return False
+            self._rests = True
+            for camera in self.cameras:
+                self._backgrounds.release(camera)
+            self._footage.close()
+        return True
 
     def _view(self, frame: int, camera: str, layers: Sequence[str]) -> ViewEvidence:
         if camera not in self.cameras:
@@ -166,6 +187,7 @@ class ViewComposer:
         return project(camera, self._truth.positions[place][np.array(links)])[0]
 
 
+_all_composers: "weakref.WeakSet[ViewComposer]" = weakref.WeakSet()
 _composers: OrderedDict[tuple[Path, str], ViewComposer] = OrderedDict()
 _composers_lock = threading.Lock()
 
@@ -219,6 +241,13 @@ def forget_composers() -> None:
         for composer in _composers.values():
             composer.close()
         _composers.clear()
+
+
+def let_composers_rest(seconds: float = REST_SECONDS) -> None:
+    """Give back what composers hold that were not asked for so long, the scene's too."""
+    before = time.monotonic() - seconds
+    if any([composer.rest(before) for composer in list(_all_composers)]):
+        give_back_freed_memory()
 
 
 def _composer(session: Session, run: StoredRun | None) -> ViewComposer:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from studio.body.branches import within_limits
 from studio.errors import RunError
 from studio.evidence.distance_maps import silhouette_distances
+from studio.geometry.reach import within_reach
 from studio.progress import Cancelled, Progress, watched
 from studio.runs.problem_source import ProblemSource
 from studio.runs.refined_frames import JUDGE
@@ -65,7 +66,7 @@ def better_pose(
     """
     body = run.body() if run else session.body()
     given = np.asarray(pose, dtype=np.float64)
-    if given.shape != (len(body.parameters),) or not np.isfinite(given).all():
+    if given.shape != (len(body.parameters),) or not within_reach(given):
         raise RunError(
             f"A pose of {body.name} has {len(body.parameters)} finite numbers, the given one does not.",
             "Give radians and mm in the order of the body's parameters.",

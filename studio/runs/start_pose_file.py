@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from studio.body.inverse_kinematics import known_markers, pose_from_markers
 from studio.body.model import BodyModel
 from studio.errors import RunError, TruthError
+from studio.geometry.reach import within_reach
 from studio.motion_files.trc import read_trc
 from studio.runs.search_space import parameter_names
 from studio.sessions.made_from import note
@@ -35,7 +36,7 @@ def keep_start_pose(session: Session, body: BodyModel, pose: Array, frame: int |
             f"A pose of body '{body.name}' is no start pose of session '{session.name}'.",
             f"Its body is '{session.manifest.body}'; keep the pose with a run of the other one.",
         )
-    if not np.isfinite(given).all():
+    if not within_reach(given):
         raise RunError("The pose holds numbers that are not finite.", "Give radians and mm.")
     of = session.start_pose_frame() if frame is None else frame
     if not 0 <= of < max(1, session.manifest.frame_count):

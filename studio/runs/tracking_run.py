@@ -104,10 +104,7 @@ class TrackingRun:
         if not self.history.entries:
             recorded = settings_from_values(self.record.tracker, self.record.weighting, self.record.settings)
             self._apply(1, recorded, self.record.first, 0)
-        frames = self._reader.frames()
-        self.next_frame = frames[-1] + 1 if frames else self.record.first
-        self.done = len(frames)
-        self._handed = HandedOn(self._reader, self.record, frames)
+        self._go_to_next()
         self._search: FrameSearch | None = None
         self._layers: list[LayerRecord] = []
         self._spent: list[float] = []
@@ -115,6 +112,20 @@ class TrackingRun:
         self._take_up_partial()
         if self.next_frame >= self.record.last:
             self._behaviour.keep_missing()
+
+    def _go_to_next(self) -> None:
+        """Stand before the next frame: a damaged one first, those tracked backwards from the last down. The frames of a
+        live run came on a clock, and are not tracked again.
+        """
+        frames = self._reader.frames()
+        damaged = {} if self.record.live else self._reader.damaged()
+        backwards = [frame for frame in damaged if self.record.is_anew(frame)]
+        self.damaged = len(damaged)
+        """How many damaged frames are to be tracked again, before any other."""
+        end = max([*frames, *damaged], default=self.record.first - 1) + 1
+        self.next_frame = max(backwards, default=min(damaged, default=end))
+        self.done = len(frames)
+        self._handed = HandedOn(self._reader, self.record, [at for at in frames if at < self.next_frame])
 
     def _take_up_partial(self) -> None:
         partial = self._reader.partial()
@@ -203,8 +214,11 @@ class TrackingRun:
         self._handed.stored(result)
         self._watch.stored(result)
         self._search, self._layers, self._saved = None, [], True
-        self.next_frame += 1
-        self.done += 1
+        if self.damaged:
+            self._go_to_next()
+        else:
+            self.next_frame += 1
+            self.done += 1
         if self.finished:
             self._behaviour.keep()
 
@@ -252,7 +266,8 @@ class TrackingRun:
 
     def _settings_for(self, frame: int, layer: int) -> tuple[int, RunSettings, bool]:
         """The settings of a layer: new ones if there are, else those that the history has for it."""
-        version, settings = self.settings_source()
+        # A damaged frame is tracked again as it was.
+        version, settings = self.latest_settings() if self.damaged else self.settings_source()
         if version > self.history.entries[-1].version:
             self._apply(version, settings, frame, layer)
             return version, settings, True

@@ -9,7 +9,7 @@ from studio.runs.way_step import StepStatus, counted, enumerated
 from studio.sessions.footage_changes import stale_runs
 from studio.sessions.run_record import CAMERAS_NAME
 from studio.sessions.session import CAMERAS_PATH, Session
-from studio.sessions.stored_run import StoredRun
+from studio.sessions.stored_run import StoredRun, damage_in_words
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +56,8 @@ def track_step(session: Session) -> StepStatus:
         return StepStatus("track", "running", words)
     if not summary.done:
         return StepStatus("track", "ready", f"{run.name} has not begun")
+    if summary.damaged:
+        return StepStatus("track", "stale", words, damage_in_words(summary.damaged))
     changed = run_changes(session, run)
     if changed:
         why = f"{run.name} was tracked before {enumerated(changed)} changed: track again."

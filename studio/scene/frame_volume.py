@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from numpy import float64
 from numpy.typing import NDArray
 
+from studio.capture.freed_memory import give_back_freed_memory
 from studio.errors import StudioError
 from studio.numba_in_threads import numba
 from studio.runs.problem_source import ProblemSource
@@ -33,6 +34,8 @@ Array = NDArray[float64]
 BLOBS = "blobs"
 FEWEST_VIEWS = 2
 KEPT = 6
+REST_SECONDS = 20.0
+"""After so long without a wish, the footage and background models are given back."""
 LEAST_PAUSE_SECONDS, LONGEST_PAUSE_SECONDS = 0.05, 0.5
 """Between two frames: as long as the last one took, so that at most half a core goes into it."""
 NICENESS = 10
@@ -120,7 +123,10 @@ class FrameVolumes:
         problems: ProblemSource | None = None
         try:
             while not self._stopping.is_set():
-                self._wake.wait()
+                if not self._wake.wait(REST_SECONDS) and problems is not None:
+                    problems.close()
+                    problems = None
+                    give_back_freed_memory()
                 self._wake.clear()
                 with self._lock:
                     wish, self._wish = self._wish, None

@@ -57,8 +57,12 @@ class GuardedServer(viser.ViserServer):
         connection = self._websock_server._live_connections.get(client.client_id)
         if connection is None or connection.request is None:
             return
-        shown = connection.request.headers.get(RELAY_HEADER, "")
-        if not hmac.compare_digest(shown.encode(), self._relay_secret.encode()):
+        shown = connection.request.headers.get_all(RELAY_HEADER)
+        # Headers are bytes of any kind, and there may be several: whatever is not the one secret is refused.
+        known = len(shown) == 1 and hmac.compare_digest(
+            shown[0].encode("utf-8", "surrogatepass"), self._relay_secret.encode()
+        )
+        if not known:
             await connection.close(_POLICY_VIOLATION, "This socket is for the studio's relay only.")
 
 

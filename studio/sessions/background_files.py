@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from studio.capture.exclusions import painted_picture, png_of, with_polygon
 from studio.capture.footage import EXCLUSIONS, background_turn
 from studio.capture.footage_source import CameraSource
-from studio.capture.pictures import is_picture, read_picture
+from studio.capture.pictures import check_picture, is_picture
 from studio.capture.video import measure_video
 from studio.errors import FootageError, NotFoundError
 from studio.evidence.backgrounds import check_plate_size
@@ -96,8 +96,7 @@ def set_backgrounds(session: Session, files: Mapping[str, Path]) -> Session:
             raise NotFoundError(f"There is no file '{path}'.", "Give a picture or a video of the empty room.")
         size = (source.width, source.height)
         if is_picture(path):
-            picture = read_picture(path)
-            given = (picture.shape[1], picture.shape[0])
+            given = check_picture(path)
         else:
             video = measure_video(path)
             given = (video.width, video.height)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from studio.errors import BodyError
 from studio.foreign_files import check_regular
+from studio.geometry.reach import REACH_HINT, within_reach
 from studio.sessions.atomic_files import write_text
 
 Array = NDArray[np.float64]
@@ -127,6 +128,8 @@ def _number(path: Path, line: int, name: str, entry: str) -> float:
         value = math.nan
     if not math.isfinite(value):
         raise BodyError(f"Line {line} of '{path.name}' has {entry!r} for '{name}'.", "Give a finite number.")
+    if not within_reach(value):
+        raise BodyError(f"Line {line} of '{path.name}' has {entry!r} for '{name}'.", REACH_HINT)
     return value
 
 

@@ -4,13 +4,16 @@ import json
 import math
 import sqlite3
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.errors import NotFoundError, SessionError
+from studio.errors import DamagedError, NotFoundError, SessionError
+from studio.sessions.results_checksums import FRAME, GIVEN_UP, PARTIAL, SETTINGS, VERIFIED, Sums
 from studio.sessions.results_codec import unpack, unpack_layer, unpack_result
 from studio.settings import SettingsEntry
 from studio.tracking.tracker import TRACKED, FrameResult, LayerRecord
@@ -19,6 +22,9 @@ Array = NDArray[np.float64]
 FILE_NAME = "results.sqlite"
 UNWATCHED = (TRACKED, None, 0)
 """State, overlap and doubts of a frame that was stored before a loss could be noticed."""
+ROWS = "SELECT frames.frame, log_weight, milliseconds, evaluations, layers, settings_version, pose"
+NUMBERS, RESULT, LOST = "its numbers", "its result", "all of it"
+"""What of a frame is damaged, in words; of layers: "layer 3"."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,8 +63,11 @@ class ResultsReader:
 
     def __init__(self, run_folder: Path) -> None:
         self._folder = run_folder
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
+        self._within = False
         self._connection: sqlite3.Connection | None = None
+        self._known: tuple[object, list[tuple], dict[int, str]] | None = None
+        self._fitting: dict[int, tuple[str, tuple]] = {}
 
     def __enter__(self) -> "ResultsReader":
         return self
@@ -72,69 +81,209 @@ class ResultsReader:
             if self._connection is not None:
                 self._connection.close()
                 self._connection = None
+            self._known = None
 
-    def frames(self) -> list[int]:
-        """The finished frames, ascending."""
-        return [row[0] for row in self._query("SELECT frame FROM frames ORDER BY frame")]
+    def frames(self, *, blobs: bool = True) -> list[int]:
+        """The finished frames that are whole, ascending. blobs : as `damaged`."""
+        return [row[0] for row in self._state(blobs)[0]]
+
+    def damaged(self, *, blobs: bool = True) -> dict[int, str]:
+        """The finished frames that are no longer what was written, and what of each is damaged, in words.
+
+        blobs : also look at results and layers that this process has not yet found whole; else only at the numbers.
+        Frames without checksums (of older stores) count as whole.
+        """
+        return self._state(blobs)[1]
+
+    def unchecked(self) -> list[int]:
+        """The finished frames that have no checksums: they were stored before there were any."""
+        sums = self._sums(FRAME)
+        return [row[0] for row in self._rows() if row[0] not in sums]
+
+    def check_all_again(self) -> None:
+        """Let everything be read anew, also what was found whole before."""
+        VERIFIED.forget(self._folder)
+        self._known = None
+        self._fitting.clear()
+
+    def check_again(self, frame: int) -> str:
+        """What of a frame without checksums cannot be unpacked, in words; "" where all can."""
+        try:
+            self.result(frame)
+            self.layers(frame)
+        except NotFoundError as error:
+            return RESULT if isinstance(error, DamagedError) else ""
+        except SessionError:
+            return RESULT
+        return ""
+
+    def stored_poses(self) -> dict[int, Array]:
+        """The pose (D,) of every finished frame whose numbers are whole, whatever else of it is damaged."""
+        sums = self._sums(FRAME)
+        return {
+            row[0]: np.frombuffer(row[6], dtype="<f8")
+            for row in self._rows()
+            if row[0] not in sums or Sums(sums[row[0]]).row_fits(row)
+        }
+
+    def partial_is_damaged(self) -> bool:
+        """Whether a frame is half searched, and what is stored of it is not what was written."""
+        return bool(self._query("SELECT 1 FROM partial")) and self.partial() is None
 
     def result(self, frame: int) -> FrameResult:
-        """The result of a finished frame."""
-        return unpack_result(
-            self._one("SELECT blob FROM frames WHERE frame = ?", (frame,), f"frame {frame}")[0]
-        )
+        """The result of a finished frame. Raises DamagedError where it is not what was written."""
+        with self._snapshot():
+            text = self._sums(FRAME, frame).get(frame)
+            rows = self._query("SELECT blob FROM frames WHERE frame = ?", (frame,))
+        if not rows and text is None:
+            raise self._missing(f"frame {frame}")
+        if not rows or (text is not None and not Sums(text).fits("result", rows[0][0])):
+            raise self._is_damaged(frame, RESULT if rows else LOST)
+        try:
+            return unpack_result(rows[0][0])
+        except Exception:
+            raise self._is_damaged(frame, RESULT) from None
 
     def layers(self, frame: int) -> list[LayerRecord]:
-        """The layers of a frame in the order they ran; of the unfinished frame those that are done."""
-        rows = self._query(
-            "SELECT blob, layer FROM layers WHERE frame = ?1 UNION ALL "
-            "SELECT blob, layer FROM partial_layers WHERE (SELECT frame FROM partial) = ?1 ORDER BY layer",
-            (frame,),
-        )
-        if not rows:
+        """The layers of a frame in the order they ran; of the unfinished frame those that are done. Raises DamagedError
+        where one is not what was written.
+        """
+        blobs = self._layer_blobs(frame)
+        if not blobs:
             raise self._missing(f"layers of frame {frame}")
-        return [unpack_layer(row[0]) for row in rows]
+        return [self._unpacked(frame, layer, blob) for layer, blob in blobs.items()]
 
     def layer(self, frame: int, layer: int) -> LayerRecord:
-        """One layer of a frame, finished or not."""
-        row = self._one(
-            "SELECT blob FROM layers WHERE frame = ?1 AND layer = ?2 UNION ALL "
-            "SELECT blob FROM partial_layers WHERE (SELECT frame FROM partial) = ?1 AND layer = ?2 LIMIT 1",
-            (frame, layer),
-            f"layer {layer} of frame {frame}",
-        )
-        return unpack_layer(row[0])
+        """One layer of a frame, finished or not. Raises DamagedError as `layers`."""
+        blobs = self._layer_blobs(frame)
+        if layer not in blobs:
+            raise self._missing(f"layer {layer} of frame {frame}")
+        return self._unpacked(frame, layer, blobs[layer])
 
     def poses(self) -> tuple[NDArray[np.int64], Array]:
-        """The finished frames (K,) and their estimates (K, D), radians and mm."""
-        rows = self._query("SELECT frame, pose FROM frames ORDER BY frame")
+        """The finished frames (K,) that are whole and their estimates (K, D), radians and mm."""
+        rows = self._whole_rows()
         frames = np.array([row[0] for row in rows], dtype=np.int64)
         if not rows:
             return frames, np.zeros((0, 0))
-        return frames, np.stack([np.frombuffer(row[1], dtype="<f8") for row in rows]).astype(np.float64)
+        return frames, np.stack([np.frombuffer(row[6], dtype="<f8") for row in rows]).astype(np.float64)
 
     def timeline(self) -> Timeline:
-        """Weight, time and effort of every finished frame."""
-        rows = self._query(
-            "SELECT frame, log_weight, milliseconds, evaluations, layers, settings_version "
-            "FROM frames ORDER BY frame"
-        )
-        columns = list(zip(*rows, strict=True)) if rows else [[]] * 6
+        """Weight, time and effort of every finished frame that is whole."""
+        rows = self._whole_rows()
+        columns = list(zip(*rows, strict=True)) if rows else [[]] * 12
         whole = [np.array(columns[index], dtype=np.int64) for index in (0, 3, 4, 5)]
         real = [np.array(columns[index], dtype=np.float64) for index in (1, 2)]
-        known = self._tracking()
-        told = [known.get(int(frame), UNWATCHED) for frame in whole[0]]
+        went = [row[7:10] if row[7] is not None else UNWATCHED for row in rows]
         return Timeline(
             *(whole[0], real[0], real[1], whole[1], whole[2], whole[3]),
-            tracking=tuple(entry[0] for entry in told),
-            overlaps=np.array([math.nan if entry[1] is None else entry[1] for entry in told]),
-            doubts=np.array([entry[2] for entry in told], dtype=np.int64),
+            tracking=tuple(entry[0] for entry in went),
+            overlaps=np.array([math.nan if entry[1] is None else entry[1] for entry in went]),
+            doubts=np.array([entry[2] for entry in went], dtype=np.int64),
         )
 
-    def _tracking(self) -> dict[int, tuple[str, float | None, int]]:
-        """How each frame went; nothing in stores older than that table."""
-        if not self._has_table("tracking"):
+    # ------------------------------------------------------------------ what is still as it was written
+
+    def _whole_rows(self) -> list[tuple]:
+        return self._state(True)[0]
+
+    def _state(self, blobs: bool) -> tuple[list[tuple], dict[int, str]]:
+        """The rows of the frames that are whole, and what of the others is damaged; kept until the store changes."""
+        version, known = self._query("PRAGMA data_version"), self._known
+        if known is not None and known[0] == (version, blobs):
+            return known[1], known[2]
+        with self._snapshot():
+            sums, rows = self._sums(FRAME), {row[0]: row for row in self._rows()}
+            parts = {frame: self._damage(frame, text, rows.get(frame), blobs) for frame, text in sums.items()}
+        damaged = {frame: part for frame, part in sorted(parts.items()) if part}
+        whole = [row for frame, row in rows.items() if frame not in damaged]
+        self._known = ((version, blobs), whole, damaged)
+        return whole, damaged
+
+    def _damage(self, frame: int, text: str, row: tuple | None, blobs: bool) -> str:
+        """What of a frame does not fit its checksums, in words; "" where all does, or was found to before."""
+        if row is None:
+            return LOST
+        if self._fitting.get(frame) != (text, row):
+            if text == GIVEN_UP or not Sums(text).row_fits(row):
+                return NUMBERS
+            self._fitting[frame] = (text, row)
+        if blobs and not VERIFIED.holds(self._folder, frame, text):
+            part = self._damaged_blobs(frame, text)
+            if part:
+                return part
+            VERIFIED.add(self._folder, frame, text)
+        return ""
+
+    def _rows(self) -> list[tuple]:
+        """Every finished frame's numbers and pose, without its blobs."""
+        how = "state, overlap, doubts" if self._has_table("tracking") else "NULL, NULL, NULL"
+        came = "arrived, ready" if self._has_table("arrivals") else "NULL, NULL"
+        joined = "".join(
+            f" LEFT JOIN {table} USING (frame)"
+            for table, columns in (("tracking", how), ("arrivals", came))
+            if not columns.startswith("NULL")
+        )
+        return self._query(f"{ROWS}, {how}, {came} FROM frames{joined} ORDER BY frames.frame")
+
+    def _sums(self, what: str, number: int | None = None) -> dict[int, str]:
+        """The stored checksums; nothing in stores that are older than these."""
+        if not self._has_table("checksums"):
             return {}
-        return {row[0]: row[1:] for row in self._query("SELECT frame, state, overlap, doubts FROM tracking")}
+        one = "" if number is None else f" AND number = {int(number)}"
+        rows = self._query(f"SELECT number, sums FROM checksums WHERE what = '{what}'{one}")
+        return dict(rows)
+
+    def _damaged_blobs(self, frame: int, text: str) -> str:
+        """What of a frame's blobs does not fit its checksums, in words; "" where all do."""
+        sums = Sums(text)
+        try:
+            blob = self._query("SELECT blob FROM frames WHERE frame = ?", (frame,))
+            layers = dict(self._query("SELECT layer, blob FROM layers WHERE frame = ?", (frame,)))
+        except SessionError:
+            return LOST
+        if not blob or not sums.fits("result", blob[0][0]):
+            return RESULT if blob else LOST
+        wrong = sums.wrong_layers(layers)
+        return ", ".join(f"layer {layer}" for layer in wrong)
+
+    def _layer_blobs(self, frame: int) -> dict[int, bytes]:
+        """The layers of a frame, each as it was written. Raises DamagedError."""
+        with self._snapshot():
+            rows = dict(
+                self._query("SELECT layer, blob FROM layers WHERE frame = ? ORDER BY layer", (frame,))
+            )
+            text = self._sums(FRAME, frame).get(frame)
+            if not rows and text is None:
+                rows = dict(
+                    self._query(
+                        "SELECT layer, blob FROM partial_layers WHERE (SELECT frame FROM partial) = ? "
+                        "ORDER BY layer",
+                        (frame,),
+                    )
+                )
+                text = self._sums(PARTIAL).get(0)
+        wrong = Sums(text).wrong_layers(rows) if text is not None and rows else []
+        if wrong:
+            raise self._is_damaged(frame, ", ".join(f"layer {layer}" for layer in wrong))
+        return rows
+
+    def _unpacked(self, frame: int, layer: int, blob: bytes) -> LayerRecord:
+        try:
+            return unpack_layer(blob)
+        except Exception:
+            raise self._is_damaged(frame, f"layer {layer}") from None
+
+    def _is_damaged(self, frame: int, part: str) -> DamagedError:
+        VERIFIED.forget(self._folder)
+        self._known = None
+        checked = frame in self._sums(FRAME)
+        return DamagedError(
+            f"Frame {frame} of run '{self._folder.name}' is damaged on the disk ({part}).",
+            "Resume the run: the frame is tracked again."
+            if checked
+            else "Repair it with 'studio verify --repair'.",
+        )
 
     def _has_table(self, name: str) -> bool:
         """Whether the store has a table; older ones have fewer."""
@@ -142,24 +291,54 @@ class ResultsReader:
         return bool(rows)
 
     def settings_history(self) -> list[SettingsEntry]:
-        """Every version of the settings that was in use, oldest first."""
+        """Every version of the settings that was in use, oldest first. Raises SessionError where one is not what was
+        written.
+        """
         rows = self._query('SELECT version, frame, layer, "values" FROM settings ORDER BY version')
+        wrong = self.damaged_settings()
+        if wrong:
+            raise SessionError(
+                f"Version {wrong[0]} of the settings of run '{self._folder.name}' is damaged on the disk.",
+                "Repair the run with 'studio verify --repair', or start it again.",
+            )
         return [
             SettingsEntry(version, frame, layer, json.loads(text)) for version, frame, layer, text in rows
         ]
 
+    def damaged_settings(self) -> list[int]:
+        """The versions of the settings that are lost, or not what was written."""
+        with self._snapshot():
+            found = self._query('SELECT version, frame, layer, "values" FROM settings')
+            sums = self._sums(SETTINGS)
+        rows = {row[0]: row for row in found}
+        return sorted(
+            version
+            for version, text in sums.items()
+            if version not in rows or not Sums(text).row_fits(rows[version])
+        )
+
     def partial(self) -> PartialFrame | None:
-        """Where the search stopped inside a frame, if it did."""
-        rows = self._query("SELECT frame, next_layer, blob FROM partial")
+        """Where the search stopped inside a frame, if it did; what is damaged of it does not count."""
+        with self._snapshot():
+            rows = self._query("SELECT frame, next_layer, blob FROM partial")
+            layers = dict(self._query("SELECT layer, blob FROM partial_layers"))
+            text = self._sums(PARTIAL).get(0)
         if not rows:
             return None
         frame, next_layer, blob = rows[0]
-        return PartialFrame(frame, next_layer, unpack(blob))
+        sums = Sums(text) if text is not None else None
+        if sums is not None and not (sums.row_fits((frame, next_layer)) and sums.fits("state", blob)):
+            return None
+        if sums is not None and sums.wrong_layers(layers):
+            return None
+        try:
+            return PartialFrame(frame, next_layer, unpack(blob))
+        except SessionError:
+            return None
 
     def done(self) -> int:
         """How many frames are finished."""
-        rows = self._query("SELECT COUNT(*) FROM frames")
-        return rows[0][0] if rows else 0
+        return len(self._whole_rows())
 
     def last_before(self, frame: int) -> int | None:
         """The last finished frame before one; None where there is none."""
@@ -181,17 +360,28 @@ class ResultsReader:
         rows = self._query("SELECT value FROM meta WHERE key = 'ended'")
         return rows[0][0] if rows else ""
 
-    def _one(self, sql: str, values: tuple[int, ...], what: str) -> tuple[bytes]:
-        rows = self._query(sql, values)
-        if not rows:
-            raise self._missing(what)
-        return rows[0]
-
     def _missing(self, what: str) -> NotFoundError:
         return NotFoundError(
             f"Run '{self._folder.name}' has no {what}.",
             "Track further, or choose a frame that has been tracked.",
         )
+
+    @contextmanager
+    def _snapshot(self) -> Iterator[None]:
+        """All that is read inside is of one moment; a writer may go on meanwhile."""
+        with self._lock:
+            opened = not self._within and (self._connection is not None or bool(self._query("SELECT 1")))
+            if not opened:
+                yield
+                return
+            self._query("BEGIN")
+            self._within = True
+            try:
+                yield
+            finally:
+                self._within = False
+                with suppress(SessionError):
+                    self._query("ROLLBACK")
 
     def _query(self, sql: str, values: tuple[int, ...] = ()) -> list[tuple]:
         with self._lock:
@@ -221,4 +411,6 @@ def _open_to_read(path: Path) -> sqlite3.Connection:
         connection = sqlite3.connect(
             f"{address}?immutable=1", uri=True, timeout=10.0, isolation_level=None, check_same_thread=False
         )
+    # A blob that a flipped bit made a text fits no checksum, and is no reason not to read the others.
+    connection.text_factory = lambda content: content.decode("utf-8", "replace")
     return connection

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from studio.errors import RunError, SessionError
 from studio.sessions.process_lock import ProcessLock
+from studio.sessions.results_checksums import FRAME, GIVEN_UP, PARTIAL, SETTINGS, sums_text
 from studio.sessions.results_codec import pack, pack_layer, pack_result
 from studio.sessions.results_reader import FILE_NAME, ResultsReader
 from studio.sessions.unwritable import unwritable
@@ -27,7 +28,7 @@ from studio.tracking.tracker import FrameResult, LayerRecord
 Array = NDArray[np.float64]
 Value = bool | int | float | str
 
-__all__ = ["ResultsReader", "ResultsWriter", "is_being_written"]
+__all__ = ["FILE_NAME", "ResultsReader", "ResultsWriter", "is_being_written"]
 
 LOCK_NAME = "results.lock"
 RESULTS = "The results in"
@@ -48,7 +49,10 @@ CREATE TABLE IF NOT EXISTS tracking (
     frame INTEGER PRIMARY KEY, state TEXT NOT NULL, overlap REAL, doubts INTEGER NOT NULL);
 CREATE TABLE IF NOT EXISTS partial_layers (layer INTEGER PRIMARY KEY, blob BLOB NOT NULL);
 CREATE TABLE IF NOT EXISTS arrivals (frame INTEGER PRIMARY KEY, arrived REAL NOT NULL, ready REAL NOT NULL);
+CREATE TABLE IF NOT EXISTS checksums (
+    what TEXT NOT NULL, number INTEGER NOT NULL, sums TEXT NOT NULL, PRIMARY KEY (what, number));
 """
+_SUMS = "INSERT OR REPLACE INTO checksums VALUES (?, ?, ?)"
 
 
 def is_being_written(run_folder: Path) -> bool:
@@ -85,6 +89,12 @@ def copy_frames(source: Path, into: Path, last: int | None = None) -> None:
                 connection.execute(
                     f"INSERT INTO main.{table} SELECT * FROM old.{table} WHERE frame < ?", (end,)
                 )
+        if "checksums" in known:
+            connection.execute(
+                "INSERT INTO main.checksums SELECT what, number, sums FROM old.checksums WHERE "
+                "(what = ?1 AND number < ?2) OR (what = ?3 AND number IN (SELECT version FROM main.settings))",
+                (FRAME, end, SETTINGS),
+            )
         connection.execute("COMMIT")
     except sqlite3.DatabaseError as error:
         raise SessionError(
@@ -166,27 +176,26 @@ class ResultsWriter:
         ]
         if came is not None:
             statements.append(("INSERT INTO arrivals VALUES (?, ?, ?)", (result.frame, *came)))
-        overlap = result.overlap if math.isfinite(result.overlap) else None
-        told = (result.frame, result.tracking, overlap, result.doubts)
-        statements.append(("INSERT INTO tracking VALUES (?, ?, ?, ?)", told))
-        for record in layers:
-            statements.append(
-                (
-                    "INSERT INTO layers VALUES (?, ?, ?)",
-                    (record.frame, record.layer, pack_layer(record, particles)),
-                )
-            )
+        overlap = float(result.overlap) if math.isfinite(result.overlap) else None
+        how = (result.tracking, overlap, int(result.doubts))
+        statements.append(("INSERT INTO tracking VALUES (?, ?, ?, ?)", (result.frame, *how)))
+        packed = [(record.layer, pack_layer(record, particles)) for record in layers]
+        for layer, blob in packed:
+            statements.append(("INSERT INTO layers VALUES (?, ?, ?)", (result.frame, layer, blob)))
         row = (
-            result.frame,
-            result.estimate.log_weight,
-            result.milliseconds,
-            result.evaluations,
-            result.layers,
-            result.settings_version,
+            int(result.frame),
+            float(result.estimate.log_weight),
+            float(result.milliseconds),
+            int(result.evaluations),
+            int(result.layers),
+            int(result.settings_version),
             np.ascontiguousarray(result.estimate.pose, dtype="<f8").tobytes(),
-            pack_result(result),
         )
-        statements.append(("INSERT OR REPLACE INTO frames VALUES (?, ?, ?, ?, ?, ?, ?, ?)", row))
+        blob = pack_result(result)
+        statements.append(("INSERT OR REPLACE INTO frames VALUES (?, ?, ?, ?, ?, ?, ?, ?)", (*row, blob)))
+        times = (None, None) if came is None else (float(came[0]), float(came[1]))
+        sums = sums_text((*row, *how, *times), {"result": blob}, dict(packed))
+        statements.append((_SUMS, (FRAME, result.frame, sums)))
         self._transaction([*statements, *_FORGET_PARTIAL])
 
     def write_partial(
@@ -195,12 +204,22 @@ class ResultsWriter:
         """Store where the search stopped inside a frame: its state (named arrays, whole) and its layers so
         far."""
         statements: list[tuple[str, tuple[object, ...]]] = list(_FORGET_PARTIAL)
-        statements.append(("INSERT INTO partial VALUES (1, ?, ?, ?)", (frame, next_layer, pack(dict(state)))))
-        for record in layers:
-            statements.append(
-                ("INSERT INTO partial_layers VALUES (?, ?)", (record.layer, pack_layer(record)))
-            )
+        blob = pack(dict(state))
+        statements.append(("INSERT INTO partial VALUES (1, ?, ?, ?)", (frame, next_layer, blob)))
+        packed = {record.layer: pack_layer(record) for record in layers}
+        for row in packed.items():
+            statements.append(("INSERT INTO partial_layers VALUES (?, ?)", row))
+        sums = sums_text((int(frame), int(next_layer)), {"state": blob}, packed)
+        statements.append((_SUMS, (PARTIAL, 0, sums)))
         self._transaction(statements)
+
+    def give_up(self, frame: int) -> None:
+        """Let a frame count as damaged, so that it is tracked again; for frames without checksums, or lost ones."""
+        self._transaction([(_SUMS, (FRAME, frame, GIVEN_UP))])
+
+    def forget_partial(self) -> None:
+        """Drop where the search stopped inside a frame."""
+        self._transaction([*_FORGET_PARTIAL])
 
     def forget_from(self, frame: int) -> None:
         """Drop the results of `frame` and all later ones, and the settings that were first used in them.
@@ -213,9 +232,14 @@ class ResultsWriter:
                 ("DELETE FROM layers WHERE frame >= ?", (frame,)),
                 ("DELETE FROM tracking WHERE frame >= ?", (frame,)),
                 ("DELETE FROM arrivals WHERE frame >= ?", (frame,)),
+                ("DELETE FROM checksums WHERE what = ? AND number >= ?", (FRAME, frame)),
                 (
                     "DELETE FROM settings WHERE frame >= ? AND version > (SELECT MIN(version) FROM settings)",
                     (frame,),
+                ),
+                (
+                    "DELETE FROM checksums WHERE what = ? AND number NOT IN (SELECT version FROM settings)",
+                    (SETTINGS,),
                 ),
                 ("DELETE FROM meta WHERE key = 'ended'", ()),
                 *_FORGET_PARTIAL,
@@ -224,8 +248,13 @@ class ResultsWriter:
 
     def write_settings(self, version: int, frame: int, layer: int, values: Mapping[str, Value]) -> None:
         """Note that settings `version` are in use since (frame, layer)."""
-        row = (version, frame, layer, json.dumps(dict(values)))
-        self._transaction([("INSERT OR REPLACE INTO settings VALUES (?, ?, ?, ?)", row)])
+        row = (int(version), int(frame), int(layer), json.dumps(dict(values)))
+        self._transaction(
+            [
+                ("INSERT OR REPLACE INTO settings VALUES (?, ?, ?, ?)", row),
+                (_SUMS, (SETTINGS, version, sums_text(row, {}, {}))),
+            ]
+        )
 
     def mark_ended(self, how: str) -> None:
         """Note that a person ended the run (`how`: "cancelled"), that a live one is over ("finished"), or with "" that
@@ -280,4 +309,5 @@ class ResultsWriter:
 _FORGET_PARTIAL: tuple[tuple[str, tuple[object, ...]], ...] = (
     ("DELETE FROM partial", ()),
     ("DELETE FROM partial_layers", ()),
+    ("DELETE FROM checksums WHERE what = 'partial'", ()),
 )

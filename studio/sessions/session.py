@@ -18,6 +18,7 @@ from studio.capture.footage import Footage, open_footage
 from studio.errors import NotFoundError, SessionError
 from studio.geometry.camera import Camera
 from studio.sessions import atomic_files
+from studio.sessions.file_checksums import note_files
 from studio.sessions.manifest import SessionManifest, read_manifest, write_manifest
 from studio.sessions.named_rows import Array, pose_frame, read_pose, read_sigma
 from studio.sessions.names import checked_name, free_name, inside
@@ -201,6 +202,7 @@ class Session:
                     atomic_files.copy_file(behaviour, folder / BEHAVIOUR_NAME)
                 create_store(folder)
                 write_run_record(folder, record)
+                note_files(folder)
                 atomic_files.move_into_place(folder, place)
             except FileExistsError:
                 raise SessionError(

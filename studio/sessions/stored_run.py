@@ -1,6 +1,7 @@
 """A run on disk: its record, its results, and how it stands, computed from them."""
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +17,8 @@ from studio.sessions.results_store import ResultsReader, is_being_written
 from studio.sessions.run_record import BEHAVIOUR_NAME, CAMERAS_NAME, RunRecord, read_run_record
 
 BODY_FOLDER = "body"
+NAMED = 10
+"""So many damaged frames are named in a sentence."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +26,8 @@ class RunSummary:
     """A run as a line of a list.
 
     status : "new", "tracking" (some process has it open), "interrupted", "cancelled" or "finished".
-    done : finished frames of first … last. tracked_to : the frame after the last finished one.
+    done : finished frames of first … last that are whole. tracked_to : the frame after the last of them. damaged : the
+    frames that were stored but are no longer what was written; resuming the run tracks them again.
     """
 
     session: str
@@ -38,6 +42,17 @@ class RunSummary:
     done: int
     tracked_to: int
     status: str
+    damaged: tuple[int, ...] = ()
+
+
+def damage_in_words(frames: Sequence[int]) -> str:
+    """Which frames are damaged and what to do, as a sentence; "" where none is."""
+    if not frames:
+        return ""
+    named = ", ".join(str(frame) for frame in list(frames)[:NAMED])
+    more = f" and {len(frames) - NAMED} more" if len(frames) > NAMED else ""
+    which = f"Frame {named} is" if len(frames) == 1 else f"Frames {named}{more} are"
+    return f"{which} damaged on the disk and left out: resume the run to track them again."
 
 
 class StoredRun:
@@ -94,12 +109,23 @@ class StoredRun:
         """Whether some living process has the run open for tracking."""
         return is_being_written(self.folder)
 
-    def summary(self) -> RunSummary:
-        """The run as a line of a list, its status computed from the facts in its store. Raises
-        SessionError."""
+    def damage(self) -> str:
+        """Which frames are damaged on the disk and what to do, as a sentence; "" where none is. Raises SessionError."""
+        with self.results() as results:
+            return damage_in_words(list(results.damaged()))
+
+    def summary(self, *, blobs: bool = True) -> RunSummary:
+        """The run as a line of a list, its status computed from the facts in its store. Raises SessionError.
+
+        blobs : also check results and layers that this process has not checked yet (`ResultsReader.damaged`).
+        """
         record = self.record
         with self.results() as results:
-            frames, ended = results.frames(), results.ended()
+            damaged, frames, ended = (
+                results.damaged(blobs=blobs),
+                results.frames(blobs=blobs),
+                results.ended(),
+            )
         done = len(frames)
         if done >= record.frame_count or ended == "finished":
             status = "finished"
@@ -110,7 +136,9 @@ class StoredRun:
         else:
             status = "interrupted" if done else "new"
         tracked_to = frames[-1] + 1 if frames else record.first
-        return dataclasses.replace(self.empty_summary(), done=done, tracked_to=tracked_to, status=status)
+        return dataclasses.replace(
+            self.empty_summary(), done=done, tracked_to=tracked_to, status=status, damaged=tuple(damaged)
+        )
 
     def empty_summary(self) -> RunSummary:
         """The run as if nothing had been tracked."""

@@ -270,7 +270,7 @@ def _run_summary(folder: Path, entry: RunEntry) -> RunSummary:
     """A run's line; one whose results are damaged says so as its status."""
     assert entry.record is not None
     try:
-        return StoredRun(folder, entry.record).summary()
+        return StoredRun(folder, entry.record).summary(blobs=False)
     except StudioError:
         empty = StoredRun(folder, entry.record).empty_summary()
         return dataclasses.replace(empty, status="damaged")

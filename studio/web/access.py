@@ -6,11 +6,16 @@ rebinding); everything but a plain GET, and every WebSocket, must come from our 
 CORS. The cookie holds a digest of the token, so neither is ever found where the other leaks, and its name
 is derived from the token, so that two studios on one machine (cookies know no ports) do not log each other
 out.
+
+What remains: since cookies know no ports, a browser also sends this one to other servers on the same host name that a
+person opens in it, and whoever runs such a server could use it until this studio ends. Plain HTTP on loopback has no
+`__Host-` cookie that would prevent it.
 """
 
 import hashlib
 import hmac
 import ipaddress
+import re
 import secrets
 import socket
 from dataclasses import dataclass
@@ -25,6 +30,13 @@ from studio.errors import AccessError
 from studio.web.error_responses import error_response
 
 SAFE_METHODS = frozenset(("GET", "HEAD"))
+HOST = re.compile(
+    r"(?:(?P<name>[A-Za-z0-9._-]{1,253})|\[(?P<address>[0-9A-Fa-f:.]{2,45})\])(?::(?P<port>\d{1,5}))?",
+    re.ASCII,
+)
+LAST_PORT = 65535
+HEALTH_PATH = "/health"
+"""Answered to whoever asks by the right name."""
 LOOPBACK_NAMES = frozenset(("localhost", "127.0.0.1", "::1"))
 
 
@@ -71,10 +83,10 @@ def binding_rule(host: str, allow_remote: bool) -> HostRule:
 
 def host_name(header: str) -> str:
     """The name or address in a Host header, lower case, without port and brackets; "" if it is malformed."""
-    try:
-        return (urlsplit(f"//{header}").hostname or "").lower()
-    except ValueError:
+    found = HOST.fullmatch(header)
+    if found is None or int(found["port"] or 0) > LAST_PORT:
         return ""
+    return (found["name"] or found["address"]).lower()
 
 
 def same_origin(origin: str, host: str) -> bool:
@@ -144,6 +156,8 @@ class AccessGuard:
             return AccessError(
                 "The request names a host that is not this studio.", "Open the printed address."
             )
+        if scope["type"] == "http" and scope["method"] in SAFE_METHODS and scope["path"] == HEALTH_PATH:
+            return None
         bearer = headers.get("authorization", "").partition(" ")
         by_header = bearer[0].lower() == "bearer" and hmac.compare_digest(
             bearer[2].strip().encode(), self._token

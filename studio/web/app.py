@@ -12,7 +12,7 @@ from pathlib import Path
 from fastapi import FastAPI
 from starlette.staticfiles import StaticFiles
 
-from studio.runs.overlay_pictures import forget_composers
+from studio.runs.overlay_pictures import forget_composers, let_composers_rest
 from studio.sessions.workspace import Workspace
 from studio.web import (
     alignment_routes,
@@ -30,6 +30,7 @@ from studio.web import (
     export_routes,
     footage_routes,
     guide_routes,
+    health_routes,
     import_routes,
     initialisation_routes,
     page_routes,
@@ -64,6 +65,7 @@ DESCRIPTION = (
     "Events: WebSocket `/api/events`."
 )
 ROUTERS = (
+    health_routes.router,
     page_routes.router,
     guide_routes.router,
     session_routes.router,
@@ -164,7 +166,8 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
 
 
 async def _close_unused_scenes(doors: Doors) -> None:
-    """Let the scenes of windows that are gone go, over and over."""
+    """Let the scenes of windows that are gone go, and what was not looked at for long, over and over."""
     while True:
         await asyncio.sleep(SWEEP_SECONDS)
         await asyncio.to_thread(doors.scenes.close_unused, doors.events.windows())
+        await asyncio.to_thread(let_composers_rest)

@@ -11,7 +11,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
 
-from studio.capture.camera_addresses import CameraAddress, camera_address, refuse_own
+from studio.capture.camera_addresses import CameraAddress, camera_address, without_own
 from studio.capture.stream_files import preview_jpeg
 from studio.errors import NotFoundError
 from studio.runs.new_run import RunRequest
@@ -127,9 +127,7 @@ def _address(wish: CameraWish, doors: Doors) -> CameraAddress:
 
 
 def _open(doors: Doors, addresses: list[CameraAddress], ports: set[int]) -> None:
-    for address in addresses:
-        refuse_own(address, ports)
-    doors.cameras.open(addresses)
+    doors.cameras.open([without_own(address, ports) for address in addresses])
 
 
 def _view(doors: Doors) -> CamerasView:

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Query, Response
 from numpy.typing import NDArray
 
 from studio.errors import NotFoundError, SettingsError
+from studio.geometry.reach import within_reach
 from studio.runs.overlay_drawing import encode_jpeg
 from studio.runs.overlay_pictures import compose_view
 from studio.runs.session_settings import session_settings
@@ -98,7 +99,7 @@ def _posed(session: Session, text: str) -> NDArray[np.float64] | None:
         pose = np.array([float(word) for word in text.split(",")])
     except ValueError:
         pose = np.zeros(0)
-    if len(pose) != len(session.body().parameters) or not np.isfinite(pose).all():
+    if len(pose) != len(session.body().parameters) or not within_reach(pose):
         raise SettingsError(
             "The pose is not one of the session's body.",
             "Give its parameters in order, with commas, or 'start'.",

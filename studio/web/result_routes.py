@@ -50,7 +50,7 @@ def frames(
     """Weight, time and (with truth) error of every finished frame, where settings changed, what was corrected."""
     record = run.record
     with run.results() as results:
-        timeline, partial = results.timeline(), results.partial()
+        timeline, partial, damaged = results.timeline(), results.partial(), results.damaged()
     lines = [
         FrameLine(
             frame=int(timeline.frames[at]),
@@ -71,6 +71,7 @@ def frames(
         describe=describe(record),
         frames=lines,
         settings_changes=changes_of(history_of(run)),
+        damaged=damaged,
         partial=partial.frame if partial else None,
         mean_milliseconds=float(times.mean()) if len(times) else None,
         made_from=record.made_from or None,

@@ -50,6 +50,9 @@ class FramesSummary(Answer):
     describe: str
     frames: list[FrameLine]
     settings_changes: list[SettingsChange]
+    damaged: dict[int, str] = Field(
+        {}, description="Frames damaged on the disk, and what of each; resuming the run tracks them again."
+    )
     partial: int | None = Field(None, description="The frame in which the search stands, if it does.")
     mean_mm: Number = None
     worst_mm: Number = None

@@ -62,6 +62,9 @@ class RunLine(Answer):
     done: int
     tracked_to: int
     status: str
+    damaged: list[int] = Field(
+        [], description="Frames that are damaged on the disk; resuming tracks them again."
+    )
     describe: str = Field("", description="Tracker, layers and particles in a few words.")
     mean_mm: Number = Field(None, description="Mean marker error where the session has a truth.")
 

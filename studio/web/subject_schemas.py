@@ -4,6 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from studio.body.subject import SHORTEST_MM, TALLEST_MM
 from studio.web.job_schemas import NumberedJob
 from studio.web.schemas import Answer, Number, Numbers, Request, RunName
 
@@ -11,7 +12,7 @@ from studio.web.schemas import Answer, Number, Numbers, Request, RunName
 class SubjectRequest(Request):
     """A person by height alone (mm), all lengths by published proportions, and measured lengths if there are any."""
 
-    height_mm: float = Field(ge=300, le=3000)
+    height_mm: float = Field(ge=SHORTEST_MM, le=TALLEST_MM)
     body: RunName | None = Field(None, description="Kinematic tree; null: the session's.")
     lengths_mm: dict[str, float] = Field(
         default_factory=dict, description="Pairs of markers: RHip_RKnee to mm."
@@ -56,7 +57,7 @@ class FitSubjectRequest(Request):
     radii: bool = True
     run: RunName | None = Field(None, description="Whose poses to begin with; null: the newest.")
     body: RunName | None = None
-    height_mm: float | None = Field(None, ge=300, le=3000)
+    height_mm: float | None = Field(None, ge=SHORTEST_MM, le=TALLEST_MM)
     seed: int = Field(0, ge=0, le=2**63 - 1)
     keep: bool = Field(True, description="Write it as the session's subject; the old one stays beside it.")
 

@@ -8,7 +8,7 @@ from studio.capture.camera_addresses import (
     address_from_text,
     camera_address,
     check_names,
-    refuse_own,
+    without_own,
 )
 from studio.errors import FootageError
 
@@ -77,18 +77,18 @@ def test_passwords_are_not_shown() -> None:
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "[::1]", "0.0.0.0", "127.1.2.3"])
 def test_the_studio_does_not_ask_itself(host: str) -> None:
     with pytest.raises(FootageError, match="no camera"):
-        refuse_own(camera_address("cam1", f"http://{host}:8642/"), (8642,))
-    refuse_own(camera_address("cam1", f"http://{host}:8081/"), (8642,))
+        without_own(camera_address("cam1", f"http://{host}:8642/"), (8642,))
+    without_own(camera_address("cam1", f"http://{host}:8081/"), (8642,))
 
 
 def test_keys_of_hosting_companies_are_not_asked_for() -> None:
     with pytest.raises(FootageError, match="no camera"):
-        refuse_own(camera_address("cam1", "http://169.254.169.254/latest/meta-data"), ())
+        without_own(camera_address("cam1", "http://169.254.169.254/latest/meta-data"), ())
 
 
 def test_a_machine_that_is_not_there_is_named() -> None:
     with pytest.raises(FootageError, match=r"no machine 'camera\.invalid'"):
-        refuse_own(camera_address("cam1", "http://camera.invalid/"), ())
+        without_own(camera_address("cam1", "http://camera.invalid/"), ())
 
 
 def test_names_and_cameras_are_given_once() -> None:

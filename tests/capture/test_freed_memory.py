@@ -10,6 +10,7 @@ from toy_session import make_session
 
 from studio.capture import footage
 from studio.capture.freed_memory import give_back_freed_memory
+from studio.runs.overlay_pictures import compose_view, forget_composers, let_composers_rest
 
 MEASURED = """
 import sys
@@ -55,3 +56,38 @@ def test_only_footage_that_was_read_much_makes_others_wait(
         opened.picture(name, frame)
     opened.close()
     assert len(told) == given_back
+
+
+def test_all_open_footage_keeps_no_more_than_so_many_bytes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever scrubs has the footage open several times: for the page, for the scene, for hulls."""
+    kept = footage._KeptPictures(10 * 160 * 120 * 3)
+    monkeypatch.setattr(footage, "_PICTURES", kept)
+    session = make_session(tmp_path / "toy")
+    several = [session.footage() for _ in range(4)]
+    (name,) = session.footage().cameras
+    for frame in range(session.manifest.frame_count):
+        for opened in several:
+            wanted = session.footage().picture(name, frame)
+            assert (opened.picture(name, frame) == wanted).all()
+            assert kept.bytes <= kept.most
+    assert kept.bytes > kept.most / 2
+    several[0].close()
+    several[1].release(name)
+    del opened, several
+    session.footage().picture(name, 0)
+    assert kept.bytes == 160 * 120 * 3
+
+
+def test_what_nobody_looks_at_is_given_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    kept = footage._KeptPictures(footage.KEPT_BYTES_IN_ALL)
+    monkeypatch.setattr(footage, "_PICTURES", kept)
+    session = make_session(tmp_path / "toy")
+    first = compose_view(session, None, 0, "front", ("mask",))
+    let_composers_rest(60.0)
+    assert kept.bytes
+    let_composers_rest(0.0)
+    assert not kept.bytes
+    assert (compose_view(session, None, 0, "front", ("mask",)) == first).all()
+    forget_composers()

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from toy_footage import HEIGHT, WIDTH, number_of, numbered_frame, write_video
 
-from studio.capture import video_probe
+from studio.capture import video, video_probe
 from studio.capture.video import VideoReader, measure_video
 from studio.capture.video_probe import probe_video
 from studio.errors import FootageError
+from studio.isolated import silent
 
 COUNT = 12
 FRAMES = [numbered_frame(number) for number in range(COUNT)]
@@ -79,6 +80,11 @@ def test_mirroring_is_refused(plain: Path, matrix: tuple[int, ...]) -> None:
         assert "mirroring" in caught.value.hint
 
 
+def _measured_here(path: Path) -> object:
+    """In this process, where the limits are patched."""
+    return video._measured(path, silent)
+
+
 def test_limits_hold_before_anything_is_decoded(plain: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, limit, said in (
         ("MAX_PIXELS", WIDTH * HEIGHT - 1, f"is {WIDTH}x{HEIGHT} pixels, more than"),
@@ -88,7 +94,7 @@ def test_limits_hold_before_anything_is_decoded(plain: Path, monkeypatch: pytest
     ):
         with monkeypatch.context() as patch:
             patch.setattr(video_probe, name, limit)
-            for look in (probe_video, measure_video):
+            for look in (video_probe._probed, _measured_here):
                 with pytest.raises(FootageError, match=said):
                     look(plain)
     assert probe_video(plain).frame_count == COUNT

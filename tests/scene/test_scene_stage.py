@@ -2,6 +2,7 @@
 
 import asyncio
 import dataclasses
+import socket
 from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any, cast
@@ -335,3 +336,22 @@ def test_a_start_pose_that_was_found_is_shown_with_its_confidence_until_it_is_le
     stage.poses.propose("swaying", [0.0] * 4, "found in frame 1, confidence 50 %", 1)
     until(lambda: stage.shown.run == "" and body_stands_at(stage, human, human.neutral))
     assert not stage.shown.editing, "a pose of another body is not edited"
+
+
+@pytest.mark.parametrize(
+    "shown",
+    [b"X-Studio-Relay: \xe9\xff\xed\xa0\x80", b"X-Studio-Relay: a\r\nX-Studio-Relay: b", b"X-Studio-Relay:"],
+)
+def test_a_strange_relay_header_is_no_way_in(stage: SceneStage, shown: bytes) -> None:
+    """Not ASCII, or given twice: what compares it must not fail and leave the stranger inside."""
+    protocol = f"viser-v{viser.__version__}".encode()
+    with socket.create_connection(("127.0.0.1", stage.port), 10.0) as knocking:
+        knocking.sendall(
+            b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n"
+            b"Sec-WebSocket-Protocol: " + protocol + b"\r\n" + shown + b"\r\n\r\n"
+        )
+        got = b""
+        while b"relay only" not in got and (piece := knocking.recv(65536)):
+            got += piece
+    assert b"relay only" in got

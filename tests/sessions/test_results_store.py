@@ -96,6 +96,7 @@ def test_how_a_frame_went_is_kept_and_stores_without_it_read_as_tracked(tmp_path
         assert reader.timeline().tracking == ("tracked", "tracked", "no evidence", "recovered", "tracked")
     older = sqlite3.connect(folder / "results.sqlite")
     older.execute("DROP TABLE tracking")
+    older.execute("DROP TABLE checksums")
     older.commit()
     older.close()
     with ResultsReader(folder) as reader:

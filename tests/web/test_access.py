@@ -4,7 +4,7 @@ import json
 
 import httpx
 import pytest
-from web_doubles import TOKEN, Studio, cookie_header
+from web_doubles import TOKEN, Studio, cookie_header, state_of
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
@@ -42,7 +42,23 @@ def test_remote_rule_still_refuses_names_that_are_not_ours() -> None:
         ("A.B", "a.b"),
         ("", ""),
         ("[::1", ""),
-        ("a:b:c", "a"),
+        ("a:b:c", ""),
+        ("user@localhost", ""),
+        ("localhost/x", ""),
+        ("localhost?x", ""),
+        ("localhost#x", ""),
+        ("localhost\\x", ""),
+        ("localhost:", ""),
+        ("localhost:abc", ""),
+        ("localhost:99999", ""),
+        ("localhost:8642 ", ""),
+        (" localhost", ""),
+        ("localhost:٨٠", ""),
+        ("[::1%eth0]:80", ""),
+        ("[127.0.0.1]", "127.0.0.1"),
+        ("[localhost]", ""),
+        ("l\u00f6calhost", ""),
+        ("127.0.0.1:80:80", ""),
     ],
 )
 def test_host_header_is_taken_apart(header: str, name: str) -> None:
@@ -221,3 +237,19 @@ def test_pages_need_nothing_inline(studio: Studio) -> None:
         assert "onclick" not in text
         assert 'src="http' not in text
         assert 'href="http' not in text
+
+
+def test_health_is_told_to_whoever_asks_by_the_right_name(
+    studio: Studio, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answer = httpx.get(f"{studio.base}/health")
+    assert (answer.status_code, answer.json()) == (200, {"status": "ok"})
+    assert httpx.get(f"{studio.base}/health", headers={"host": "attacker.example"}).status_code == 403
+    assert httpx.post(f"{studio.base}/health").status_code == 403
+    assert httpx.get(f"{studio.base}/health/").status_code == 403
+    studio.control.state = state_of(state="lost")
+    answer = httpx.get(f"{studio.base}/health")
+    assert (answer.status_code, answer.json()) == (503, {"status": "tracking process lost"})
+    studio.control.state = state_of()
+    monkeypatch.setattr("studio.web.health_routes.LEAST_FREE_BYTES", 1 << 62)
+    assert httpx.get(f"{studio.base}/health").json() == {"status": "disk full"}

@@ -1,15 +1,20 @@
 """Results through the API equal those in the store."""
 
+import contextlib
 import csv
 import io
+import sqlite3
 
 import cv2
 import numpy as np
 import pytest
+from flipped_bytes import flip_stored
 from web_doubles import Studio
 
 from studio.body.forward_kinematics import marker_points
 from studio.motion_files.trc import MarkerMotion, write_trc
+from studio.sessions.results_checksums import VERIFIED
+from studio.sessions.results_reader import FILE_NAME
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
@@ -201,3 +206,28 @@ def test_pictures_that_are_not_there(studio: Studio, tracked: StoredRun, path: s
     answer = studio.client.get(f"{RUN}/{path}")
     assert answer.status_code == status
     assert answer.json()["message"]
+
+
+def test_every_flip_in_a_store_is_a_named_gap_and_no_fault_of_the_server(
+    studio: Studio, tracked: StoredRun
+) -> None:
+    store, rng = tracked.folder / FILE_NAME, np.random.default_rng(5)
+    with contextlib.closing(sqlite3.connect(store)) as connection:
+        connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    before = store.read_bytes()
+    for _ in range(40):
+        frame = flip_stored(store, rng)
+        VERIFIED.forget(tracked.folder)
+        answer = studio.client.get(f"{RUN}/frames").json()
+        assert list(answer["damaged"]) == [str(frame)]
+        assert [entry["frame"] for entry in answer["frames"]] == [1 - frame]
+        [line] = studio.client.get("/api/sessions/take1/runs").json()["runs"]
+        assert (line["damaged"], line["done"]) == ([frame], 1)
+        statuses = {
+            studio.client.get(f"{RUN}/frames/{frame}{end}").status_code
+            for end in ("", "/layers/0", "/layers/0/particles", "/variance.csv")
+        }
+        assert statuses <= {200, 404}
+        for ending in ("", "-wal", "-shm"):
+            store.with_name(store.name + ending).unlink(missing_ok=True)
+        store.write_bytes(before)

@@ -127,6 +127,7 @@ function runRow(entry, run) {
   const value = element("div", "figure");
   if (run.mean_mm != null) { value.append(figure(run.mean_mm), " "); value.append(Object.assign(element("small", ""), { textContent: "mm" })); }
   else value.append(element("small", "done", `${run.done}/${run.last - run.first}`));
+  if (run.damaged?.length) value.append(" ", Object.assign(element("small", "damaged", `${run.damaged.length} damaged`), { title: `Frames ${run.damaged.join(", ")} are damaged on the disk: resume the run to track them again.` }));
   const more = element("button", "more", "⋯");
   more.setAttribute("aria-label", `More for ${run.name}`);
   more.onclick = (event) => { event.stopPropagation(); runMenu(more, entry, run); };

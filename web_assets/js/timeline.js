@@ -13,10 +13,17 @@ const PADDING = 6;
 const STATES = {
   lost: ["bad", "the tracker lost the body here and searches for it"],
   "limb lost": ["warn", "a limb is off: the silhouettes deny it"],
+  damaged: ["bad", "damaged on the disk: resume the run to track it again"],
   "no evidence": ["text-quiet", "nothing to be seen: the pose is held"],
   recovered: ["good", "found again"],
 };
 const BAND = 5;
+
+/** The finished frames, and those that are damaged on the disk as frames of that state. */
+function known(summary) {
+  const damaged = Object.entries(summary?.damaged ?? {}).map(([frame, part]) => ({ frame: Number(frame), tracking: "damaged", part }));
+  return damaged.length ? [...summary.frames, ...damaged].sort((one, other) => one.frame - other.frame) : summary?.frames ?? [];
+}
 
 /** First and last frame (half open) of the run that is open. */
 export function range() {
@@ -41,11 +48,11 @@ export function marks(frames) {
 /** Show the next mark, or (by < 0) the one before. */
 export function goToMark(by) {
   const summary = get("summary");
-  const known = marks(summary?.frames ?? []);
+  const found = marks(known(summary));
   const at = get("frame") ?? -Infinity;
-  const found = by > 0 ? known.find((frame) => frame > at) : known.findLast((frame) => frame < at);
-  if (found === undefined) return say(known.length ? `No mark ${by > 0 ? "after" : "before"} this frame.` : "The tracker was never lost: the timeline has no marks.");
-  goTo(found);
+  const next = by > 0 ? found.find((frame) => frame > at) : found.findLast((frame) => frame < at);
+  if (next === undefined) return say(found.length ? `No mark ${by > 0 ? "after" : "before"} this frame.` : "The tracker was never lost: the timeline has no marks.");
+  goTo(next);
 }
 
 function position(frame, width) {
@@ -54,13 +61,13 @@ function position(frame, width) {
 }
 
 function curve(pen, frames, key, colour, width, height, fromZero) {
-  const known = frames.filter((entry) => Number.isFinite(entry[key]) && entry[key] !== null);
-  if (known.length < 2) return;
-  const values = known.map((entry) => entry[key]);
+  const measured = frames.filter((entry) => Number.isFinite(entry[key]) && entry[key] !== null);
+  if (measured.length < 2) return;
+  const values = measured.map((entry) => entry[key]);
   const low = fromZero ? 0 : Math.min(...values);
   const span = Math.max(...values) - low || 1;
   pen.beginPath();
-  for (const entry of known) pen.lineTo(position(entry.frame, width), height - 5 - ((entry[key] - low) / span) * (height - 12));
+  for (const entry of measured) pen.lineTo(position(entry.frame, width), height - 5 - ((entry[key] - low) / span) * (height - 12));
   pen.strokeStyle = colour;
   pen.lineWidth = 1.3;
   pen.stroke();
@@ -76,7 +83,7 @@ function drawTimeline() {
   pen.clearRect(0, 0, width, height);
   const summary = get("summary");
   if (!summary) return;
-  const frames = summary.frames;
+  const frames = known(summary);
   if (frames.length) {
     const start = position(frames[0].frame, width);
     pen.fillStyle = token("accent-soft");
@@ -177,10 +184,10 @@ function frameAt(event) {
 /** What the pointer stands on, where the tracker has something to say of it. */
 function toldOf(frame) {
   const summary = get("summary");
-  const entry = summary?.frames.find((one) => one.frame === frame);
+  const entry = known(summary).find((one) => one.frame === frame);
   const state = STATES[entry?.tracking];
   if (isCorrected(summary) && frame === summary.corrected) return `frame ${frame}: put right by hand in ${summary.made_from}, tracked ${summary.backwards_to === null ? "on" : `backwards to ${summary.backwards_to}`} from it`;
-  return state ? `frame ${frame}: ${entry.tracking} – ${state[1]}` : "";
+  return state ? `frame ${frame}: ${entry.tracking} – ${state[1]}${entry.part ? ` (${entry.part})` : ""}` : "";
 }
 
 /** Wire the timeline. */

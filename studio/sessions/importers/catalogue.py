@@ -10,6 +10,7 @@ from studio.errors import FootageError, SessionError
 from studio.progress import Cancelled, Progress, watched
 from studio.sessions.archives import FOOTAGE_PARTS, folder_of, is_archive
 from studio.sessions.atomic_files import discard, move_into_place, new_folder_beside
+from studio.sessions.file_checksums import note_files
 from studio.sessions.importers.bodytrack import is_bodytrack, plan_bodytrack
 from studio.sessions.importers.checking import check_rig
 from studio.sessions.importers.folder_layout import plan_folder
@@ -109,6 +110,7 @@ def _written(
     try:
         manifest = write_session(folder, into.name, plan, read, measured, person, copy=copy, progress=report)
         report("finishing", 1, 1)
+        note_files(folder)
         move_into_place(folder, into)
     finally:
         discard(folder)

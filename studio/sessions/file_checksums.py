@@ -1,0 +1,116 @@
+"""Checksums of the files of a folder (`.checksums.json` in it), to tell what is no longer as it was written.
+
+A file whose content changed though its time did not is damaged; one whose time changed, too, was written again. What
+the studio never writes again (footage, what a run was made from) is damaged in either case. Results stores have
+checksums of their own.
+"""
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from studio.sessions.atomic_files import write_bytes
+
+NAME = ".checksums.json"
+RUNS = "runs"
+STORES = "results."
+WRITTEN_ONCE = (
+    "videos/",
+    "pictures/",
+    "calibration/original",
+    "run.json",
+    "cameras.toml",
+    "body/",
+    "behaviour.model",
+)
+"""Beginnings of paths in a session or a run."""
+
+
+class Noted(msgspec.Struct, frozen=True, array_like=True):
+    """size : bytes. time : of the last change, ns. digest : BLAKE2b, hexadecimal."""
+
+    size: int
+    time: int
+    digest: str
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedFiles:
+    """count : files read. damaged : path in the folder and what is wrong with it. written_again : paths. new : paths of
+    files that were not noted before.
+    """
+
+    count: int
+    damaged: dict[str, str]
+    written_again: tuple[str, ...]
+    new: tuple[str, ...]
+
+
+def note_files(folder: Path) -> None:
+    """Note the checksums of all files as they are. Raises OSError."""
+    _write(folder, {name: _noted(path) for name, path in _files(folder)})
+
+
+def check_files(folder: Path, *, note: bool = True) -> CheckedFiles:
+    """Compare the files with what was noted of them. note : note those that are new or were written again."""
+    known, readable = _read(folder)
+    now: dict[str, Noted] = {}
+    damaged: dict[str, str] = {} if readable else {NAME: "the checksums cannot be read"}
+    again: list[str] = []
+    new: list[str] = []
+    for name, path in _files(folder):
+        try:
+            found = _noted(path)
+        except OSError as error:
+            damaged[name] = f"cannot be read ({error.strerror})"
+            continue
+        before = known.get(name)
+        if before is None:
+            new.append(name)
+        elif found.digest != before.digest:
+            if found.time == before.time or name.startswith(WRITTEN_ONCE):
+                damaged[name] = "is not what was written"
+                found = before
+            else:
+                again.append(name)
+        now[name] = found
+    for name in known.keys() - now.keys() - damaged.keys():
+        if name.startswith(WRITTEN_ONCE):
+            damaged[name] = "is gone"
+            now[name] = known[name]
+    count = len(now)
+    if note and readable and now != known:
+        _write(folder, now)
+    return CheckedFiles(count, damaged, tuple(again), tuple(new))
+
+
+def _files(folder: Path) -> Iterator[tuple[str, Path]]:
+    for path in sorted(folder.rglob("*")):
+        parts = path.relative_to(folder).parts
+        own = parts[0] != RUNS and not any(part.startswith((".", STORES)) for part in parts)
+        if own and path.is_file() and not path.is_symlink():
+            yield "/".join(parts), path
+
+
+def _noted(path: Path) -> Noted:
+    status = path.stat()
+    with path.open("rb") as stream:
+        digest = hashlib.file_digest(stream, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
+    return Noted(status.st_size, status.st_mtime_ns, digest)
+
+
+def _read(folder: Path) -> tuple[dict[str, Noted], bool]:
+    """What was noted, and whether that can be read; nothing where nothing was noted."""
+    try:
+        return msgspec.json.decode((folder / NAME).read_bytes(), type=dict[str, Noted]), True
+    except FileNotFoundError:
+        return {}, True
+    except (OSError, ValueError):
+        return {}, False
+
+
+def _write(folder: Path, noted: dict[str, Noted]) -> None:
+    write_bytes(folder / NAME, msgspec.json.encode(noted))
