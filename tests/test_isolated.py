@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from moving_bodies import write_c3d
 
-from studio.capture import isolated as isolation
+from studio import isolated as isolation
 from studio.capture.pictures import measure_pictures
 from studio.capture.video import measure_video
 from studio.errors import FootageError

@@ -17,6 +17,7 @@ import numpy as np
 from studio.errors import RunError
 from studio.knobs import knobs_of
 from studio.tracking.tracker import (
+    HIDDEN,
     Array,
     Carried,
     Foreseeing,
@@ -186,10 +187,12 @@ class FrameSearch:
         return kept[2]
 
     def _remembered(self, told: FrameProblem, particles: ParticleSet, settings: Any) -> Mapping[str, Array]:  # noqa: ANN401
-        """What the weighting hands to the next frame, having seen this one's estimate."""
+        """What the weighting hands to the next frame, having seen this one's estimate, and what is none of it."""
+        before = self.previous.memory
         if not isinstance(told, Expectant):
-            return self.previous.memory
-        return told.remembered(self.tracker.end_frame(particles, self.space, settings).pose)
+            return before
+        found = told.remembered(self.tracker.end_frame(particles, self.space, settings).pose)
+        return {**{name: values for name, values in before.items() if name.startswith(HIDDEN)}, **found}
 
 
 def search_frame(

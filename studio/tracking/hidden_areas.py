@@ -18,6 +18,7 @@ from studio.geometry.camera import Camera
 from studio.tracking.agreement import FAR_MM, Agreement, Disagreement
 from studio.tracking.agreement_kernels import count_cells
 from studio.tracking.refinement import Distances
+from studio.tracking.tracker import HIDDEN
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.float64]
@@ -30,8 +31,6 @@ MOST_BARE = 0.01
 """Of the body's area: where more of the masks is left bare, the pose is in doubt and nothing is learnt."""
 ROUGH = 1.5
 """Times the reach of clothes: so far about what is hidden a border is not the body's."""
-PREFIX = "hidden "
-"""Of the names under which the counts of a camera are handed on."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,7 +48,7 @@ class Uncovered:
 
 def counts_of(memory: Mapping[str, Array], camera: Camera) -> Counts:
     """(H, W) frames by cell, so far."""
-    known = memory.get(PREFIX + camera.name)
+    known = memory.get(HIDDEN + camera.name)
     if known is not None:
         return known
     cell = cell_size(camera)
@@ -75,7 +74,7 @@ def without_hidden(
 
 def _without_hidden(view: Distances, camera: Camera, memory: Mapping[str, Array], mm: float) -> Distances:
     """The same of one view, as far about what is hidden as masks may be rough. mm : of a pixel."""
-    counts = memory.get(PREFIX + camera.name)
+    counts = memory.get(HIDDEN + camera.name)
     if counts is None or not view.signed.size:
         return view
     hidden = counts >= FRAMES
@@ -122,5 +121,5 @@ def learnt(
     for camera, quads, view, scale in zip(agreement.cameras, corners, masks, mm, strict=True):
         counts = counts_of(memory, camera).copy()
         count_cells(quads, view.signed, view.corner, cell_size(camera), FAR_MM / scale, counts)
-        found[PREFIX + camera.name] = counts
+        found[HIDDEN + camera.name] = counts
     return found

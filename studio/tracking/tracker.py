@@ -83,14 +83,18 @@ class ParticleSet:
     extra: dict[str, Array] = field(default_factory=dict)
 
 
+HIDDEN = "hidden "
+"""Begins the names under which a camera's hidden areas are handed on."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Carried:
     """What one frame hands to the next; also how a run starts.
 
     particles : the weighted set at the end of the frame; None = start uniformly over the space's limits.
     estimate, previous_estimate : (D,) the last two reported poses (dynamics, Eq. 10); None where there is
-    none yet. memory : what the weighting learnt so far (`weighting.problem.Expectant`), which trackers hand on
-    unread.
+    none yet. memory : what the weighting learnt so far (`weighting.problem.Expectant`), and under names that begin with
+    HIDDEN what stands before the body (`hidden_areas`); trackers hand both on unread.
     """
 
     particles: ParticleSet | None

@@ -13,8 +13,8 @@ from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.sessions.results_codec import pack_result, unpack_result
 from studio.tracking.frame_refinement import FrameRefinementSettings, FrameRefiner
-from studio.tracking.hidden_areas import FRAMES, PREFIX
-from studio.tracking.tracker import Carried, Estimate, FrameResult, ParticleSet
+from studio.tracking.hidden_areas import FRAMES
+from studio.tracking.tracker import HIDDEN, Carried, Estimate, FrameResult, ParticleSet
 from studio.weighting.catalogue import WEIGHTINGS
 
 CAMERAS = ring_of_cameras(4, 480, 360)
@@ -72,7 +72,7 @@ def test_legs_behind_a_box_are_lost_at_first_and_then_known_to_be_hidden(
     known = followed(body, evidence, truth, int(FRAMES) + 1)
     assert known.limbs_lost == ()
     hidden = {name for name, counts in known.carried.memory.items() if (counts >= FRAMES).any()}
-    assert hidden == {PREFIX + camera.name for camera in CAMERAS[:2]}
+    assert hidden == {HIDDEN + camera.name for camera in CAMERAS[:2]}
 
 
 def test_an_arm_that_is_lost_is_not_taken_for_a_hidden_one(body: BodyModel, truth: np.ndarray) -> None:
