@@ -9,7 +9,6 @@ from toy_problems import Bowl, toy_space
 
 from studio.knobs import knobs_of
 from studio.tracking.catalogue import TRACKERS
-from studio.tracking.evaluations import evaluations_of
 from studio.tracking.frame_loop import FrameSearch, SearchState, search_frame
 from studio.tracking.tracker import Carried, FrameResult, LayerRecord, ParticleSet, SearchSpace
 
@@ -96,7 +95,9 @@ def test_shapes(name: str) -> None:
         layers = TRACKERS[name].layer_count(TRACKERS[name].settings_type())
         assert result.layers == layers
         assert result.evaluations == 70 * layers
-        assert result.evaluations == evaluations_of(name, TRACKERS[name].settings_type(**SIZES[name](70)))
+        assert result.evaluations == TRACKERS[name].evaluations(
+            TRACKERS[name].settings_type(**SIZES[name](70))
+        )
         last = result.carried.particles
         assert last is not None
         assert np.exp(last.log_weights).sum() == pytest.approx(1.0)
