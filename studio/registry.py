@@ -68,6 +68,15 @@ class Registry(Mapping[str, Member], Generic[Member]):
         """What is wrong with members that packages promise, a sentence or two each."""
         return tuple(str(problem) for problem in self._added[1].values())
 
+    @property
+    def packages(self) -> tuple[str, ...]:
+        """The packages that add members, with their versions."""
+        found = metadata.entry_points(group=self.group)
+        used = {
+            f"{point.dist.name} {point.dist.version}" for point in found if point.dist and point.name in self
+        }
+        return tuple(sorted(used))
+
     @cached_property
     def _added(self) -> tuple[dict[str, Member], dict[str, PlugInError]]:
         """The members of packages, and what is wrong with the others, by name."""

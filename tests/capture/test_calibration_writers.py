@@ -14,7 +14,7 @@ from studio.capture.calibration_files import (
     read_calibration,
 )
 from studio.capture.calibration_writers import without_k3
-from studio.errors import CalibrationError
+from studio.errors import CalibrationError, SettingsError
 from studio.geometry.camera import Camera
 
 CAMERAS = tuple(
@@ -136,5 +136,5 @@ def test_a_skew_is_said_and_no_cameras_or_formats_are_refused(tmp_path: Path) ->
         assert "skew" in note
         with pytest.raises(CalibrationError, match="no cameras"):
             export_calibration((), tmp_path / "none.toml", writer)
-    with pytest.raises(CalibrationError, match="no calibration format 'vicon'"):
+    with pytest.raises(SettingsError, match="no calibration format 'vicon'"):
         export_calibration(CAMERAS, tmp_path / "c.xcp", "vicon")
