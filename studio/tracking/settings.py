@@ -138,12 +138,8 @@ def layer_survivals(settings: AnnealedSettings, layers: int) -> tuple[float, ...
 _IMPROVED: dict[str, Value] = {
     name: getattr(AnnealedSettings(), name)
     for name in (
-        "survival",
-        "adaptive_diffusion",
-        "diffusion_form",
-        "diffusion_fraction",
-        "crossover",
-        "crossover_by",
+        *("survival", "adaptive_diffusion", "diffusion_form"),
+        *("diffusion_fraction", "crossover", "crossover_by"),
     )
 }
 _AS_THE_PAPER: dict[str, Value] = {

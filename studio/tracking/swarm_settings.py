@@ -117,27 +117,15 @@ def _check_iterations(name: str, iterations: int, stages: int) -> None:
 
 
 # The swarm paper's figures are the tracker's own defaults.
+_PAPERS = (
+    *("stage1_particles", "stage1_iterations", "stage2_particles", "stage2_iterations", "c_first", "c_last"),
+    *("partition", "start_velocity", "position_divisor", "constraints", "limbs_apart"),
+)
 PRESETS = (
     Preset(
         "paper, swarm",
         "The swarm as its paper has it: Table 1, two soft stages, impossible poses drawn again.",
-        {
-            name: getattr(SwarmSettings(), name)
-            for name in (
-                "stage1_particles",
-                "stage1_iterations",
-                "stage2_particles",
-                "stage2_iterations",
-                "c_first",
-                "c_last",
-                "partition",
-                "start_velocity",
-                "position_divisor",
-                "constraints",
-                "limbs_apart",
-            )
-        }
-        | {"refine_frames": False},
+        {name: getattr(SwarmSettings(), name) for name in _PAPERS} | {"refine_frames": False},
     ),
 )
 

@@ -76,7 +76,7 @@ _OWN = (
         EdgeRegionSettings,
         "proximity",
         EdgeRegionWeigher,
-        LossLimit(spread=0.09, spreads=5.0),
+        LossLimit(0.09, 5.0),
     ),
     Weighting(
         "edge-silhouette",
@@ -84,7 +84,7 @@ _OWN = (
         EdgeSilhouetteSettings,
         "proximity",
         EdgeSilhouetteWeigher,
-        LossLimit(spread=0.6, spreads=4.5),
+        LossLimit(0.6, 4.5),
     ),
     Weighting(
         "edge-region-silhouette",
@@ -92,7 +92,7 @@ _OWN = (
         EdgeRegionSilhouetteSettings,
         "proximity",
         EdgeRegionSilhouetteWeigher,
-        LossLimit(spread=0.1, spreads=5.5),
+        LossLimit(0.1, 5.5),
     ),
     Weighting(
         "bodytrack",
@@ -100,7 +100,7 @@ _OWN = (
         BodytrackSettings,
         "bodytrack",
         BodytrackWeigher,
-        LossLimit(spread=0.02, spreads=5.5),
+        LossLimit(0.02, 5.5),
     ),
     Weighting(
         "template",
@@ -108,7 +108,7 @@ _OWN = (
         TemplateSettings,
         "none",
         TemplateWeigher,
-        LossLimit(spread=0.001, spreads=5.0),
+        LossLimit(0.001, 5.0),
     ),
     Weighting(
         "blobs",
@@ -116,7 +116,7 @@ _OWN = (
         BlobSettings,
         "hull",
         BlobWeigher,
-        LossLimit(spread=0.12, spreads=4.5),
+        LossLimit(0.12, 4.5),
         reads_pictures=True,
     ),
 )
