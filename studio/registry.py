@@ -68,7 +68,7 @@ class Registry(Mapping[str, Member], Generic[Member]):
         """What is wrong with members that packages promise, a sentence or two each."""
         return tuple(str(problem) for problem in self._added[1].values())
 
-    @property
+    @cached_property
     def packages(self) -> tuple[str, ...]:
         """The packages that add members, with their versions."""
         found = metadata.entry_points(group=self.group)

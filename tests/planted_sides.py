@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 from store_records import layer_of, result_of
-from studio.capture.trc import read_trc
 
 from studio.body.inverse_kinematics import pose_from_markers
 from studio.evaluation.errors import rows_of_frames

@@ -36,7 +36,8 @@ class WrittenCalibration:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationFormat:
-    """Another tool's format. label : for people; suffix : of its files; unit : of the translations.
+    """Another tool's format. label : for people; suffix : of its files; unit : of the translations. file_name : that
+    the tool looks for, {} in it the session's name.
 
     write(cameras, path) -> WrittenCalibration; raises CalibrationError. A format that the studio does not read by
     itself (`calibration_files`) brings both: recognises(path) -> whether a file is of it; read(path) -> FoundCameras,
@@ -49,6 +50,7 @@ class CalibrationFormat:
     write: Callable[[tuple[Camera, ...], Path], WrittenCalibration]
     recognises: Callable[[Path], bool] | None = None
     read: Callable[[Path], FoundCameras] | None = None
+    file_name: str = "cameras"
 
 
 def write_pose2sim(cameras: tuple[Camera, ...], path: Path) -> WrittenCalibration:
@@ -188,8 +190,10 @@ CALIBRATION_FORMATS: Registry[CalibrationFormat] = Registry(
     "calibration format",
     "studio.calibrations",
     {
-        "pose2sim": CalibrationFormat("Pose2Sim TOML", ".toml", "m", write_pose2sim),
-        "aniposelib": CalibrationFormat("aniposelib TOML", ".toml", "mm", write_aniposelib),
+        "pose2sim": CalibrationFormat("Pose2Sim TOML", ".toml", "m", write_pose2sim, file_name="Calib_{}"),
+        "aniposelib": CalibrationFormat(
+            "aniposelib TOML", ".toml", "mm", write_aniposelib, file_name="calibration"
+        ),
         "opencv": CalibrationFormat("OpenCV YAML, one file a camera", ".yml", "mm", write_opencv),
     },
     _check,

@@ -49,7 +49,6 @@ router = APIRouter(prefix="/api", tags=["calibration"])
 
 HERE = "/sessions/{session}/calibration"
 CURRENT = "current"
-FILE_NAMES = {"pose2sim": "Calib_{}.toml", "aniposelib": "calibration.toml"}
 
 
 @router.get(HERE)
@@ -146,7 +145,7 @@ def export(session: OpenSession, form: Annotated[str, Query(alias="format", max_
     cameras = proposal_in_use(session).cameras
     with tempfile.TemporaryDirectory() as folder:
         writer = CALIBRATION_FORMATS[form]
-        place = Path(folder) / FILE_NAMES.get(form, f"cameras{writer.suffix}").format(session.name)
+        place = Path(folder) / (writer.file_name.format(session.name) + writer.suffix)
         written = export_calibration(cameras, place, form)
         name, content = _packed(written.files, f"{session.name}-{form}.zip")
     headers = {

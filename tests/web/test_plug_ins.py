@@ -5,12 +5,12 @@ import os
 import re
 import subprocess
 import sys
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from guide_package import FILES, ROOT, install_guide_package, lay_out
 from test_real_worker import Page
 from toy_session import make_session, true_poses
 from web_doubles import TOKEN, cookie_header, let_in, serving
@@ -19,6 +19,7 @@ from websockets.sync.client import connect
 from studio.body.catalogue import list_bodies, load_body
 from studio.capture.calibration_files import find_calibrations, read_calibration
 from studio.capture.calibration_writers import CALIBRATION_FORMATS
+from studio.comparison.kept_trials import measured_by
 from studio.errors import SettingsError
 from studio.export.formats import FORMATS
 from studio.registry import PlugInError, Registry, UnknownMemberError
@@ -32,31 +33,15 @@ from studio.web.guide_routes import rendered
 from studio.weighting.catalogue import WEIGHTINGS
 from studio.worker.control import StudioControl
 
-ROOT = Path(__file__).resolve().parents[2]
-PAGE = (ROOT / "web_assets" / "guide" / "adding.md").read_text(encoding="utf-8")
-FILES = dict(re.findall(r"^```(?:toml|python)\n# (\S+)\n(.*?)^```$", PAGE, re.DOTALL | re.MULTILINE))
 REGISTRIES: tuple[Registry, ...] = (TRACKERS, WEIGHTINGS, FORMATS, CALIBRATION_FORMATS)
 CHOSEN = ("--tracker", "random", "--weighting", "inside", "--set", "particles=300", "--set", "reach=0.8")
-
-
-def lay_out(folder: Path, files: dict[str, str], name: str, points: dict[str, dict[str, str]]) -> None:
-    """What installing a package leaves: its modules, and its entry points beside them."""
-    for path, text in files.items():
-        (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_text(text, encoding="utf-8")
-    about = folder / f"{name.replace('-', '_')}-1.0.dist-info"
-    about.mkdir(parents=True)
-    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n", encoding="utf-8")
-    lines = [
-        f"[{group}]\n" + "".join(f"{k} = {v}\n" for k, v in kept.items()) for group, kept in points.items()
-    ]
-    (about / "entry_points.txt").write_text("\n".join(lines), encoding="utf-8")
 
 
 def forget() -> None:
     """Let every registry look for packages anew."""
     for registry in REGISTRIES:
-        registry.__dict__.pop("_added", None)
+        for cached in ("_added", "packages"):
+            registry.__dict__.pop(cached, None)
     rendered.cache_clear()
 
 
@@ -78,9 +63,7 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @pytest.fixture
 def installed(site: Path) -> Path:
     """The guide's package, installed."""
-    project = tomllib.loads(FILES["pyproject.toml"])["project"]
-    modules = {path: text for path, text in FILES.items() if path.startswith("my_capture/")}
-    lay_out(site, modules, project["name"], project["entry-points"])
+    install_guide_package(site)
     return site
 
 
@@ -149,6 +132,7 @@ def test_the_page_is_offered_them_and_tracks_with_them(page: Page) -> None:
     assert {"name": "random", "label": "Random search", "needs_behaviour": False} in choices["trackers"]
     assert {"name": "inside", "label": "Inside the silhouettes"} in choices["weightings"]
     assert choices["problems"] == []
+    assert measured_by().endswith(", my-capture 1.0"), "what another version measured is measured again"
     knobs = get("/api/knobs", params={"tracker": "random", "weighting": "inside"}).json()["values"]
     assert {"reach": 1.0, "points_a_limb": 12}.items() <= knobs.items()
     entrants = {entry["name"]: entry for entry in get("/api/comparisons/choices").json()["entrants"]}
