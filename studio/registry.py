@@ -9,14 +9,24 @@ Entry points are read when the members are listed, or one is sought that the stu
 cannot be loaded, or is not what its group is for, is left out; `problems` says why, and so does asking for it by name.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 from importlib import metadata
-from typing import Generic, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 from studio.errors import SettingsError, StudioError
 
-Member = TypeVar("Member")
+
+class Named(Protocol):
+    """What has a name."""
+
+    @property
+    def name(self) -> str:
+        """Its key in the registry."""
+        ...
+
+
+Member = TypeVar("Member", bound=Named)
 
 
 class UnknownMemberError(SettingsError, KeyError):
@@ -34,14 +44,20 @@ class PlugInError(UnknownMemberError):
 class Registry(Mapping[str, Member], Generic[Member]):
     """Members by name, the studio's own first, then those of packages by their names.
 
-    kind : what a member is, in a message ("tracker"). group : of the entry points. own : the studio's. check : called
-    with a name and what its entry point gives; raises StudioError or AttributeError where that is no such member.
+    kind : what a member is, in a message ("tracker"). group : of the entry points. member_type : of every member, which
+    has a `name`. own : the studio's. check : raises StudioError where what a package adds cannot be used.
     """
 
     def __init__(
-        self, kind: str, group: str, own: Mapping[str, Member], check: Callable[[str, Member], None]
+        self,
+        kind: str,
+        group: str,
+        member_type: type,
+        own: Iterable[Member],
+        check: Callable[[Member], object],
     ) -> None:
-        self.kind, self.group, self._own, self._check = kind, group, dict(own), check
+        self.kind, self.group, self._type, self._check = kind, group, member_type, check
+        self._own = {member.name: member for member in own}
 
     def __getitem__(self, name: str) -> Member:
         """The member of that name. Raises UnknownMemberError, PlugInError."""
@@ -88,7 +104,11 @@ class Registry(Mapping[str, Member], Generic[Member]):
                 if point.name in self._own or point.name in added:
                     raise StudioError(f"there is a {self.kind} of that name already")
                 member = point.load()
-                self._check(point.name, member)
+                if not isinstance(member, self._type):
+                    raise StudioError(f"it is no {self._type.__name__} but {member!r:.80}")
+                if member.name != point.name:
+                    raise StudioError(f"it calls itself '{member.name}'")
+                self._check(member)
             except Exception as error:  # whatever a package's code may raise
                 why = error.message if isinstance(error, StudioError) else f"{type(error).__name__}: {error}"
                 problems.setdefault(

@@ -36,14 +36,15 @@ class WrittenCalibration:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationFormat:
-    """Another tool's format. label : for people; suffix : of its files; unit : of the translations. file_name : that
-    the tool looks for, {} in it the session's name.
+    """Another tool's format. name : its key. label : for people. suffix : of its files. unit : of the translations.
+    file_name : that the tool looks for, {} in it the session's name.
 
     write(cameras, path) -> WrittenCalibration; raises CalibrationError. A format that the studio does not read by
     itself (`calibration_files`) brings both: recognises(path) -> whether a file is of it; read(path) -> FoundCameras,
     raising CalibrationError.
     """
 
+    name: str
     label: str
     suffix: str
     unit: str
@@ -178,10 +179,8 @@ def _plain(name: str) -> str:
     return "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in name)
 
 
-def _check(name: str, form: CalibrationFormat) -> None:
-    """Raise CalibrationError where something is no format of calibrations."""
-    if not isinstance(form, CalibrationFormat):
-        raise CalibrationError(f"it is no CalibrationFormat but {form!r:.80}")
+def _check(form: CalibrationFormat) -> None:
+    """Raise CalibrationError where half of what reading takes is lacking."""
     if (form.recognises is None) != (form.read is None):
         raise CalibrationError("it brings one of 'recognises' and 'read' without the other")
 
@@ -189,13 +188,14 @@ def _check(name: str, form: CalibrationFormat) -> None:
 CALIBRATION_FORMATS: Registry[CalibrationFormat] = Registry(
     "calibration format",
     "studio.calibrations",
-    {
-        "pose2sim": CalibrationFormat("Pose2Sim TOML", ".toml", "m", write_pose2sim, file_name="Calib_{}"),
-        "aniposelib": CalibrationFormat(
-            "aniposelib TOML", ".toml", "mm", write_aniposelib, file_name="calibration"
+    CalibrationFormat,
+    (
+        CalibrationFormat("pose2sim", "Pose2Sim TOML", ".toml", "m", write_pose2sim, file_name="Calib_{}"),
+        CalibrationFormat(
+            "aniposelib", "aniposelib TOML", ".toml", "mm", write_aniposelib, file_name="calibration"
         ),
-        "opencv": CalibrationFormat("OpenCV YAML, one file a camera", ".yml", "mm", write_opencv),
-    },
+        CalibrationFormat("opencv", "OpenCV YAML, one file a camera", ".yml", "mm", write_opencv),
+    ),
     _check,
 )
 

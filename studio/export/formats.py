@@ -166,20 +166,16 @@ _OWN = (
 )
 
 
-def _check(name: str, form: ExportFormat) -> None:
-    """Raise ExportError where something is no format of that name."""
-    if not isinstance(form, ExportFormat) or form.write is None:
-        raise ExportError(f"it is no ExportFormat with a writer but {form!r:.80}")
-    if form.name != name:
-        raise ExportError(f"it calls itself '{form.name}'")
+def _check(form: ExportFormat) -> None:
+    """Raise ExportError where there is no writer, or an option that exports do not have."""
+    if form.write is None:
+        raise ExportError("it has no writer")
     for option in form.takes:
         if option not in (entry.name for entry in knobs_of(ExportOptions)):
             raise ExportError(f"exports have no option '{option}'")
 
 
-FORMATS: Registry[ExportFormat] = Registry(
-    "export format", "studio.exports", {entry.name: entry for entry in _OWN}, _check
-)
+FORMATS: Registry[ExportFormat] = Registry("export format", "studio.exports", ExportFormat, _OWN, _check)
 
 
 def format_of(name: str) -> ExportFormat:

@@ -14,12 +14,8 @@ from studio.tracking.tracker import Preset, Tracker, Value
 NEEDED_KNOBS = ("start_repeats",)
 
 
-def _check(name: str, tracker: Tracker) -> None:
-    """Raise SettingsError where something is no tracker of that name."""
-    if not isinstance(tracker, Tracker):
-        raise SettingsError(f"it is no instance of a Tracker but {tracker!r:.80}")
-    if tracker.name != name:
-        raise SettingsError(f"it calls itself '{tracker.name}'")
+def _check(tracker: Tracker) -> None:
+    """Raise SettingsError where a knob is lacking."""
     has = {entry.name for entry in knobs_of(tracker.settings_type)}
     for knob in (*NEEDED_KNOBS, *(one for names in tracker.size_knobs for one in names)):
         if knob not in has:
@@ -29,10 +25,8 @@ def _check(name: str, tracker: Tracker) -> None:
 TRACKERS: Registry[Tracker] = Registry(
     "tracker",
     "studio.trackers",
-    {
-        entry.name: entry
-        for entry in (AnnealedParticleFilter(), BehaviourGuided(), Condensation(), ParticleSwarm())
-    },
+    Tracker,
+    (AnnealedParticleFilter(), BehaviourGuided(), Condensation(), ParticleSwarm()),
     _check,
 )
 

@@ -228,9 +228,9 @@ class Tracker(ABC):
     knobs that they set.
     """
 
-    name: ClassVar[str]
-    label: ClassVar[str]
-    settings_type: ClassVar[type]
+    name: str
+    label: str
+    settings_type: type
     size_knobs: ClassVar[tuple[tuple[str, ...], ...]] = (("particles",),)
     needs_behaviour: ClassVar[bool] = False
     scales_likelihood: ClassVar[bool] = False

@@ -58,12 +58,8 @@ class Weighting:
     reads_pictures: bool = False
 
 
-def _check(name: str, weighting: Weighting) -> None:
-    """Raise SettingsError where something is no weighting of that name."""
-    if not isinstance(weighting, Weighting):
-        raise SettingsError(f"it is no Weighting but {weighting!r:.80}")
-    if weighting.name != name:
-        raise SettingsError(f"it calls itself '{weighting.name}'")
+def _check(weighting: Weighting) -> None:
+    """Raise SettingsError where the evidence is not to be had."""
     if weighting.edge_kind not in EDGE_KINDS:
         raise SettingsError(f"there are no edges '{weighting.edge_kind}', only {', '.join(EDGE_KINDS)}")
     knobs_of(weighting.settings_type)
@@ -120,6 +116,4 @@ _OWN = (
         reads_pictures=True,
     ),
 )
-WEIGHTINGS: Registry[Weighting] = Registry(
-    "weighting", "studio.weightings", {entry.name: entry for entry in _OWN}, _check
-)
+WEIGHTINGS: Registry[Weighting] = Registry("weighting", "studio.weightings", Weighting, _OWN, _check)

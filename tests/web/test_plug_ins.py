@@ -201,7 +201,7 @@ def test_a_broken_package_is_named_and_hinders_nothing(site: Path, toy_root: Pat
         PlugInError, match=r"'broken-capture' adds a tracker 'missing'.*no_such_module_anywhere"
     ):
         default_settings("missing")
-    with pytest.raises(PlugInError, match=r"'number'.*no instance of a Tracker"):
+    with pytest.raises(PlugInError, match=r"'number'.*it is no Tracker but 3"):
         default_settings("number")
     assert len(TRACKERS.problems) == 3
     assert "of that name already" in TRACKERS.problems[0]
