@@ -13,7 +13,6 @@ import uvicorn
 
 from studio.errors import StudioError
 from studio.runs.new_run import RunRequest, prepare_run
-from studio.scene.presets import PRESETS
 from studio.scene.window_scenes import WindowScenes
 from studio.sessions.atomic_files import write_text
 from studio.sessions.process_lock import ProcessLock
@@ -82,7 +81,6 @@ def serve(
                 token,
                 hosts=hosts,
                 footage_roots=default_footage_roots(workspace.root),
-                presets=PRESETS,
                 log_path=log_path,
             )
             if track and open_session and open_run:

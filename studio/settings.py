@@ -96,13 +96,12 @@ class SettingsHistory:
 def default_settings(
     tracker_name: str = DEFAULT_TRACKER, weighting_name: str = DEFAULT_WEIGHTING
 ) -> RunSettings:
-    """The defaults of a tracker and a weighting; raises SettingsError for an unknown name of either."""
-    for kind, name, known in (("tracker", tracker_name, TRACKERS), ("weighting", weighting_name, WEIGHTINGS)):
-        if name not in known:
-            raise SettingsError(f"There is no {kind} '{name}'.", f"Known: {', '.join(sorted(known))}.")
+    """The defaults of a tracker and a weighting; raises SettingsError for an unknown name of either, or for a
+    knob that two groups have.
+    """
     tracker = TRACKERS[tracker_name].settings_type()
     weighting = WEIGHTINGS[weighting_name].settings_type()
-    return RunSettings(
+    settings = RunSettings(
         tracker_name,
         weighting_name,
         tracker,
@@ -112,6 +111,14 @@ def default_settings(
         RecoverySettings(),
         RecordingSettings(),
     )
+    names = [entry.name for entry in all_knobs(settings)]
+    if len(names) > len(set(names)):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise SettingsError(
+            f"Setting '{twice}' means two things with tracker '{tracker_name}' and weighting '{weighting_name}'.",
+            "Give the knob of the one that you added another name.",
+        )
+    return settings
 
 
 def changed_settings(settings: RunSettings, changes: Mapping[str, object]) -> RunSettings:

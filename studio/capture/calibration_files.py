@@ -2,7 +2,7 @@
 
 Everything is converted to mm. Where a format does not name its unit, the distance between cameras
 tells: rigs are metres wide, so a number above 50 means mm. Names, rotations, lenses and shapes are checked; see
-`sanity.py` and `calibration_parts.py`. Formats to write for other tools: `CALIBRATION_WRITERS`.
+`sanity.py` and `calibration_parts.py`. Formats to write for other tools: `CALIBRATION_FORMATS`.
 """
 
 import dataclasses
@@ -23,7 +23,12 @@ from studio.capture.calibration_parts import AssumedCrop, FoundCameras, Intrinsi
 from studio.capture.calibration_qualisys import is_qualisys, read_qualisys
 from studio.capture.calibration_storage import STORAGE_SUFFIXES
 from studio.capture.calibration_toml import is_canonical, looks_like_calibration, read_toml, write_toml
-from studio.capture.calibration_writers import CALIBRATION_WRITERS, CalibrationWriter, WrittenCalibration
+from studio.capture.calibration_writers import (
+    CALIBRATION_FORMATS,
+    CalibrationFormat,
+    WrittenCalibration,
+    added_reader,
+)
 from studio.capture.naming import listed, natural_key
 from studio.capture.sanity import quarter_turns
 from studio.errors import CalibrationError
@@ -31,10 +36,10 @@ from studio.foreign_files import foreign_file
 from studio.geometry.camera import Camera
 
 __all__ = [
-    "CALIBRATION_WRITERS",
+    "CALIBRATION_FORMATS",
     "AssumedCrop",
     "Calibration",
-    "CalibrationWriter",
+    "CalibrationFormat",
     "Intrinsics",
     "WrittenCalibration",
     "export_calibration",
@@ -170,17 +175,14 @@ def write_calibration(
 
 
 def export_calibration(cameras: tuple[Camera, ...], path: Path, writer: str) -> WrittenCalibration:
-    """Write cameras for another tool. writer : a name of `CALIBRATION_WRITERS`. Raises CalibrationError."""
-    if writer not in CALIBRATION_WRITERS:
-        raise CalibrationError(
-            f"There is no calibration format '{writer}' to write.", f"Known: {listed(CALIBRATION_WRITERS)}."
-        )
-    return CALIBRATION_WRITERS[writer].write(cameras, path)
+    """Write cameras for another tool. writer : of `CALIBRATION_FORMATS`. Raises CalibrationError, SettingsError."""
+    return CALIBRATION_FORMATS[writer].write(cameras, path)
 
 
 def _of_other_tools(folder: Path) -> list[Path]:
-    """Qualisys files, EasyMocap's pair, OpenCV files (all of them together are one calibration)."""
-    found = [path for path in folder.iterdir() if path.is_file() and is_qualisys(path)]
+    """Qualisys files, those of added formats, EasyMocap's pair, OpenCV files (which together are one calibration)."""
+    files = [path for path in folder.iterdir() if path.is_file()]
+    found = [path for path in files if is_qualisys(path) or added_reader(path)]
     if is_easymocap(folder):
         return [*found, folder / INTRINSICS]
     opened = opencv_files(folder)
@@ -200,6 +202,9 @@ def _read(path: Path) -> FoundCameras:
         return read_qualisys(path)
     if path.name.lower() in (INTRINSICS, EXTRINSICS):
         return read_easymocap(path)
+    added = added_reader(path)
+    if added is not None:
+        return added(path)
     if suffix in STORAGE_SUFFIXES:
         return read_opencv(path)
     if suffix in PICKLES:

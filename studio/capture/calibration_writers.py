@@ -12,10 +12,12 @@ import numpy as np
 import tomli_w
 from numpy.typing import NDArray
 
+from studio.capture.calibration_parts import FoundCameras
 from studio.capture.naming import natural_key
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
 from studio.geometry.rotations import vector_from_rotation
+from studio.registry import Registry
 
 Array = NDArray[np.float64]
 
@@ -33,16 +35,23 @@ class WrittenCalibration:
 
 
 @dataclass(frozen=True, slots=True)
-class CalibrationWriter:
-    """A format to write. label : for people; suffix : of its files; unit : of the translations.
+class CalibrationFormat:
+    """Another tool's format. name : its key. label : for people. suffix : of its files. unit : of the translations.
+    file_name : that the tool looks for, {} in it the session's name.
 
-    write(cameras, path) -> WrittenCalibration; raises CalibrationError.
+    write(cameras, path) -> WrittenCalibration; raises CalibrationError. A format that the studio does not read by
+    itself (`calibration_files`) brings both: recognises(path) -> whether a file is of it; read(path) -> FoundCameras,
+    raising CalibrationError.
     """
 
+    name: str
     label: str
     suffix: str
     unit: str
     write: Callable[[tuple[Camera, ...], Path], WrittenCalibration]
+    recognises: Callable[[Path], bool] | None = None
+    read: Callable[[Path], FoundCameras] | None = None
+    file_name: str = "cameras"
 
 
 def write_pose2sim(cameras: tuple[Camera, ...], path: Path) -> WrittenCalibration:
@@ -170,8 +179,30 @@ def _plain(name: str) -> str:
     return "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in name)
 
 
-CALIBRATION_WRITERS: dict[str, CalibrationWriter] = {
-    "pose2sim": CalibrationWriter("Pose2Sim TOML", ".toml", "m", write_pose2sim),
-    "aniposelib": CalibrationWriter("aniposelib TOML", ".toml", "mm", write_aniposelib),
-    "opencv": CalibrationWriter("OpenCV YAML, one file a camera", ".yml", "mm", write_opencv),
-}
+def _check(form: CalibrationFormat) -> None:
+    """Raise CalibrationError where half of what reading takes is lacking."""
+    if (form.recognises is None) != (form.read is None):
+        raise CalibrationError("it brings one of 'recognises' and 'read' without the other")
+
+
+CALIBRATION_FORMATS: Registry[CalibrationFormat] = Registry(
+    "calibration format",
+    "studio.calibrations",
+    CalibrationFormat,
+    (
+        CalibrationFormat("pose2sim", "Pose2Sim TOML", ".toml", "m", write_pose2sim, file_name="Calib_{}"),
+        CalibrationFormat(
+            "aniposelib", "aniposelib TOML", ".toml", "mm", write_aniposelib, file_name="calibration"
+        ),
+        CalibrationFormat("opencv", "OpenCV YAML, one file a camera", ".yml", "mm", write_opencv),
+    ),
+    _check,
+)
+
+
+def added_reader(path: Path) -> Callable[[Path], FoundCameras] | None:
+    """What reads a file of a format that a package adds; None where none of them recognises it."""
+    for form in CALIBRATION_FORMATS.values():
+        if form.recognises is not None and form.recognises(path):
+            return form.read
+    return None

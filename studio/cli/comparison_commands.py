@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from studio.cli.arguments import frame_range
-from studio.cli.output import command, note, progress
+from studio.cli.output import MemberChoice, command, note, progress
 from studio.comparison.candidates import DEFAULT_LAYERS, LINEUPS, VARIANTS, Lineup, read_assignments
 from studio.comparison.comparison_findings import document, table_text
 from studio.comparison.folders import differences, new_comparison, place_of, unfinished_like
@@ -56,7 +56,7 @@ Names that stand for several:
 )
 @click.option(
     "--weighting",
-    type=click.Choice(sorted(WEIGHTINGS)),
+    type=MemberChoice(WEIGHTINGS),
     default=None,
     help="Of all; default: the session's own.",
 )

@@ -2,7 +2,7 @@
 
 import click
 
-from studio.cli.output import command, note, notes_once, progress
+from studio.cli.output import MemberChoice, command, note, notes_once, progress
 from studio.runs.initialising import WEIGHTING, InitialPose, initialise, keep_pose
 from studio.runs.new_run import checked_frames
 from studio.sessions.workspace import Workspace
@@ -18,7 +18,7 @@ UNSURE = 0.75
 @click.option("--behaviour", default="", metavar="MODEL", help="Its prototypes are poses to try.")
 @click.option(
     "--weighting",
-    type=click.Choice(sorted(WEIGHTINGS)),
+    type=MemberChoice(WEIGHTINGS),
     default=WEIGHTING,
     show_default=True,
     help="What tells poses apart.",

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from studio.cli.knob_options import SET_OPTION, chosen_changes, given
-from studio.cli.output import command, note, progress
+from studio.cli.output import MemberChoice, command, note, progress
 from studio.cli.recording_commands import CAMERA_OPTION, addresses_of
 from studio.cli.tracking_commands import (
     DESPITE_OPTION,
@@ -33,8 +33,8 @@ from studio.worker.live_tracking import replay_live, track_live
 
 @click.command()
 @click.argument("session")
-@click.option("--tracker", type=click.Choice(sorted(TRACKERS)), default="behaviour", show_default=True)
-@click.option("--weighting", type=click.Choice(sorted(WEIGHTINGS)), default="blobs", show_default=True)
+@click.option("--tracker", type=MemberChoice(TRACKERS), default="behaviour", show_default=True)
+@click.option("--weighting", type=MemberChoice(WEIGHTINGS), default="blobs", show_default=True)
 @click.option("--body", default="", metavar="NAME", help="Kinematic tree; the session's subject scales it.")
 @click.option("--behaviour", default="", metavar="MODEL", help="Behaviour model, by name or file.")
 @own_options

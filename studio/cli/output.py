@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import ParamSpec
+from typing import Any, ParamSpec
 
 import click
 import msgspec
@@ -19,6 +19,7 @@ from rich.console import Console
 from studio.errors import StudioError
 from studio.notebook.progress import bar
 from studio.progress import Progress
+from studio.registry import Registry
 from studio.sessions.atomic_files import write_bytes
 
 P = ParamSpec("P")
@@ -36,6 +37,22 @@ SAID = ".notes-said.json"
 """In a session's folder: notes that commands have said of it."""
 
 messages = Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+class MemberChoice(click.Choice):
+    """A member of a registry by name; what is wrong with one that a package adds is said where it is chosen."""
+
+    def __init__(self, registry: Registry[Any]) -> None:
+        super().__init__(sorted(registry))
+        self._registry = registry
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """The name itself."""
+        try:
+            self._registry[value]
+        except StudioError as problem:
+            self.fail(str(problem), param, ctx)
+        return value
 
 
 def command(function: Callable[P, Mapping[str, object]]) -> Callable[P, None]:

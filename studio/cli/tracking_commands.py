@@ -13,7 +13,7 @@ import click
 from studio.body.subject import read_subject
 from studio.cli.arguments import frame_range
 from studio.cli.knob_options import chosen_changes, given, knob_options
-from studio.cli.output import command, note, notes_once, progress
+from studio.cli.output import MemberChoice, command, note, notes_once, progress
 from studio.errors import RunError
 from studio.progress import Progress
 from studio.runs.new_run import DESPITE, RunRequest, prepare_run
@@ -80,12 +80,10 @@ def told_run(run: StoredRun) -> dict[str, object]:
 
 @click.command()
 @click.argument("session")
-@click.option(
-    "--tracker", type=click.Choice(sorted(TRACKERS)), help="Default: the session's own, else annealed."
-)
+@click.option("--tracker", type=MemberChoice(TRACKERS), help="Default: the session's own, else annealed.")
 @click.option(
     "--weighting",
-    type=click.Choice(sorted(WEIGHTINGS)),
+    type=MemberChoice(WEIGHTINGS),
     help=f"Default: the session's own, else {DEFAULT_WEIGHTING}.",
 )
 @click.option(
@@ -247,7 +245,7 @@ def _told(run: StoredRun, result: BatchResult) -> dict[str, object]:
         told["exchanged"] = list(exchanged)
     if record.behaviour:
         told["behaviour"] = record.behaviour
-    if record.tracker == "condensation":
+    if TRACKERS[record.tracker].scales_likelihood:
         told["likelihood_scale"] = result.last_beta
     return told
 

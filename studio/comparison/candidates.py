@@ -11,10 +11,9 @@ from dataclasses import dataclass, field
 
 from studio.errors import SettingsError
 from studio.settings import RunSettings, changed_settings, default_settings, values
-from studio.tracking.catalogue import TRACKERS
-from studio.tracking.evaluations import evaluations_of, knobs_for_evaluations
-
-Value = bool | int | float | str
+from studio.tracking.catalogue import TRACKERS, knobs_for_evaluations
+from studio.tracking.swarm_settings import PARTITIONS
+from studio.tracking.tracker import Value
 
 LABEL = re.compile(r"[A-Za-z0-9_-]{1,40}")
 WEIGHTING = "weighting"
@@ -23,59 +22,17 @@ DEFAULT_LAYERS = 10
 UNEQUAL_SHARE = 0.01
 
 
-@dataclass(frozen=True, slots=True)
-class Variant:
-    """A tracker with knobs that have a name. help : what it is, one line. changes : knobs by flat name."""
-
-    help: str
-    changes: Mapping[str, Value]
-
-
-VARIANTS: dict[str, Variant] = {
-    "annealed:improved": Variant(
-        "adaptive diffusion with shrinkage (Eq. 18) and crossover by limbs (Eq. 19)",
-        {"adaptive_diffusion": True, "diffusion_form": "shrink", "crossover": 0.5, "crossover_by": "limbs"},
-    ),
-    "annealed:eq13": Variant(
-        "the planned noise of Eq. 13 alone, no crossover", {"adaptive_diffusion": False, "crossover": 0.0}
-    ),
-    "annealed:paper": Variant(
-        "Eq. 18 and 19 as Deutscher & Reid write them, half of the particles surviving",
-        {
-            "adaptive_diffusion": True,
-            "diffusion_form": "paper",
-            "crossover": 0.5,
-            "crossover_by": "parameters",
-            "survival": 0.5,
-        },
-    ),
-}
-
-VARIANTS |= {
-    f"{tracker}:guided": Variant(
-        "first sets predicted by a behaviour model (Caillette et al.), a fifth of the particles without it",
-        {"prediction": "behaviour"},
-    )
-    for tracker in ("annealed", "swarm")
-}
-
-PARTITION_WORDS = {
-    "soft-three": "three soft stages: root, trunk and head, all",
-    "hard-two": "two hard stages: the root stays fixed in the second (Fig. 2a)",
-    "hard-twelve": "twelve hard stages along the hierarchy (John, Trucco & Ivekovic)",
-    "global-local": "the whole pose, then legs and arms apart (GLPSO)",
-    "global": "the whole pose at once, no partition",
-}
-VARIANTS |= {
-    f"swarm:{partition}": Variant(words, {"partition": partition})
-    for partition, words in PARTITION_WORDS.items()
+VARIANTS = {
+    f"{name}:{label}": variant
+    for name, tracker in TRACKERS.items()
+    for label, variant in tracker.variants.items()
 }
 
 LINEUPS: dict[str, tuple[str, ...]] = {
     "improvements": ("annealed:improved", "annealed:eq13", "condensation"),
     "papers": ("swarm", "annealed:improved", "annealed:eq13", "condensation"),
     "guided": ("behaviour", "annealed:guided", "annealed", "condensation"),
-    "partitions": ("swarm", *(f"swarm:{partition}" for partition in PARTITION_WORDS)),
+    "partitions": ("swarm", *(f"swarm:{partition}" for partition in PARTITIONS[1:])),
 }
 
 
@@ -181,9 +138,9 @@ def _candidate(name: str, lineup: Lineup) -> Candidate:
         else lineup.layers
     )
     equal = knobs_for_evaluations(tracker, lineup.evaluations, layers)
-    usual = evaluations_of(tracker, changed_settings(settings, equal).tracker)
+    usual = TRACKERS[tracker].evaluations(changed_settings(settings, equal).tracker)
     changed = changed_settings(settings, {**equal, **wanted})
-    total = evaluations_of(tracker, changed.tracker)
+    total = TRACKERS[tracker].evaluations(changed.tracker)
     if abs(total - lineup.evaluations) > max(
         abs(usual - lineup.evaluations), UNEQUAL_SHARE * lineup.evaluations
     ):

@@ -17,6 +17,8 @@ import studio
 from studio.comparison.trials import Plain
 from studio.runs.new_run import software_version
 from studio.sessions.atomic_files import write_text
+from studio.tracking.catalogue import TRACKERS
+from studio.weighting.catalogue import WEIGHTINGS
 
 # What decides on an outcome; pages, commands and reports do not.
 SCIENCE = (
@@ -63,8 +65,11 @@ class KeptTrials:
 
 
 def measured_by() -> str:
-    """The studio's version and a digest of the code that decides on outcomes: "0.1.0+1a2b3c4d"."""
-    return f"{software_version()}+{code_digest(SCIENCE)}"
+    """The studio's version and a digest of the code that decides on outcomes: "0.1.0+1a2b3c4d"; then the packages that
+    add trackers or weightings.
+    """
+    packages = dict.fromkeys((*TRACKERS.packages, *WEIGHTINGS.packages))
+    return ", ".join((f"{software_version()}+{code_digest(SCIENCE)}", *packages))
 
 
 @cache

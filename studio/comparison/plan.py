@@ -18,7 +18,7 @@ from studio.comparison.statistics import SignTest, sign_test
 from studio.comparison.tracked import Attempt
 from studio.comparison.tracking_trials import tracking_trial
 from studio.comparison.trials import Outcome, Trial
-from studio.errors import NotFoundError, RunError, TruthError
+from studio.errors import RunError, TruthError
 from studio.runs.behaviour_models import ChosenModel, chosen_model, needs_model
 from studio.runs.new_run import checked_frames, start_pose
 from studio.sessions.session import Session
@@ -133,11 +133,7 @@ def plan_comparison(
             f"Session '{session.name}' has no truth to measure trackers against.",
             "Take one made by 'studio synthesize', or import it with a truth/*.trc.",
         )
-    weighting = lineup.weighting or session.manifest.weighting or DEFAULT_WEIGHTING
-    if weighting not in WEIGHTINGS:
-        raise NotFoundError(
-            f"There is no weighting '{weighting}'.", f"Known: {', '.join(sorted(WEIGHTINGS))}."
-        )
+    weighting = WEIGHTINGS[lineup.weighting or session.manifest.weighting or DEFAULT_WEIGHTING].name
     if (
         not 0 < len(seeds) <= MOST_SEEDS
         or len(set(seeds)) < len(seeds)

@@ -10,6 +10,10 @@ from studio.evidence.yuv_background import YuvBackground
 Bytes = NDArray[np.uint8]
 
 
+EDGE_KINDS = ("proximity", "bodytrack", "none", "hull")
+"""Maps that a weighting reads; "hull": no map, but what a visual hull is carved from (knob hull_evidence)."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewEvidence:
     """One camera's evidence.

@@ -17,15 +17,13 @@ from studio.capture.footage import Footage
 from studio.errors import FootageError
 from studio.evidence.backgrounds import Backgrounds, FittedKind
 from studio.evidence.edges import bodytrack_edges, proximity_edges
-from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
+from studio.evidence.frame_evidence import EDGE_KINDS, FrameEvidence, ViewEvidence
 from studio.evidence.masks import cleaned
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
 
 Bytes = NDArray[np.uint8]
 
-EDGE_KINDS = ("proximity", "bodytrack", "none", "hull")
-"""Maps that a weighting reads; "hull": no map, but what a visual hull is carved from (knob hull_evidence)."""
 KINDS: dict[str, FittedKind] = {"median": "median", "combined": "combined", "mog2": "mog2", "knn": "knn"}
 """Models by the knob's word; what is not here is a Gaussian."""
 

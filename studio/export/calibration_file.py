@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from studio.capture.calibration_files import CALIBRATION_WRITERS, export_calibration, read_calibration
+from studio.capture.calibration_files import CALIBRATION_FORMATS, export_calibration, read_calibration
 from studio.errors import ExportError
 from studio.export.task import ExportTask, Written, agreed, turned_apart
 
@@ -14,9 +14,9 @@ def write_cameras(task: ExportTask) -> Written:
     that there is not, or that writes another kind of file.
     """
     name = task.options.calibration or USUAL[task.place.suffix]
-    writer = CALIBRATION_WRITERS.get(name)
+    writer = CALIBRATION_FORMATS.get(name)
     if writer is None or writer.suffix != task.place.suffix:
-        fitting = [known for known, entry in CALIBRATION_WRITERS.items() if entry.suffix == task.place.suffix]
+        fitting = [known for known, entry in CALIBRATION_FORMATS.items() if entry.suffix == task.place.suffix]
         raise ExportError(
             f"No calibration '{name[:40]}' is written as '{task.place.suffix}'.",
             f"Choose {' or '.join(fitting)}.",

@@ -8,16 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from studio.errors import ExportError
-from studio.export.bvh_writing import write_bvh
-from studio.export.calibration_file import write_cameras
 from studio.export.formats import ExportFormat
-from studio.export.glb_writing import write_glb
-from studio.export.marker_files import write_c3d_file, write_trc_file
-from studio.export.mot_file import write_mot
 from studio.export.motion import motion_of, no_motion
 from studio.export.options import AUTO, ExportOptions
-from studio.export.overlay_video import write_videos
-from studio.export.table_files import write_csv, write_npz, write_parquet
 from studio.export.task import ExportTask, Writer, Written
 from studio.knobs import changed
 from studio.progress import Progress, watched
@@ -25,21 +18,6 @@ from studio.runs.tracks import BEST, best_track
 from studio.sessions.atomic_files import discard, new_folder_beside, sync_folder
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-
-WRITERS: dict[str, Writer] = {
-    "bvh": write_bvh,
-    "glb": write_glb,
-    "trc": write_trc_file,
-    "mot": write_mot,
-    "c3d": write_c3d_file,
-    "csv": write_csv,
-    "parquet": write_parquet,
-    "npz": write_npz,
-    "mp4": write_videos,
-    "toml": write_cameras,
-    "yml": write_cameras,
-}
-"""Formats that this storey writes itself; a scene's recording is handed in from the storey of the scene."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +92,7 @@ def export_run(
     cannot be read.
     """
     options = settled(form, asked)
-    writer = record_scene if form.what == "scene" else WRITERS.get(form.name)
+    writer = form.write or record_scene
     if writer is None:
         raise ExportError(
             f"{form.title} cannot be written here.", "Export it from the page or the command line."

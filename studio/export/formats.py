@@ -1,9 +1,23 @@
-"""The formats that a run can be exported to, what opens them, and which options each takes."""
+"""The formats that a run can be exported to, what opens and writes them, and which options each takes.
+
+A new one is one module and one entry here, or a package's entry point (`studio.registry`).
+"""
 
 from dataclasses import dataclass
 from pathlib import Path
 
 from studio.errors import ExportError
+from studio.export.bvh_writing import write_bvh
+from studio.export.calibration_file import write_cameras
+from studio.export.glb_writing import write_glb
+from studio.export.marker_files import write_c3d_file, write_trc_file
+from studio.export.mot_file import write_mot
+from studio.export.options import ExportOptions
+from studio.export.overlay_video import write_videos
+from studio.export.table_files import write_csv, write_npz, write_parquet
+from studio.export.task import Writer
+from studio.knobs import knobs_of
+from studio.registry import Registry
 
 FRAMES = ("track", "first", "last", "fps", "lost")
 POINTS = (*FRAMES, "unit", "up", "names")
@@ -14,29 +28,28 @@ class ExportFormat:
     """One format.
 
     name : as in `--to FILE.name`. opens : a line on what opens it. takes : names of the options that mean something
-    here. unit, up : what "auto" stands for. what : "motion", "video", "scene" or "cameras".
+    here. write : makes the file; None for a scene's recording, whose writer the storey of the scene hands in. unit,
+    up : what "auto" stands for. what : "motion", "video", "scene" or "cameras".
     """
 
     name: str
     title: str
     opens: str
     takes: tuple[str, ...]
+    write: Writer | None
     unit: str = ""
     up: str = ""
     what: str = "motion"
     media_type: str = "application/octet-stream"
 
 
-def _named(*formats: ExportFormat) -> dict[str, ExportFormat]:
-    return {entry.name: entry for entry in formats}
-
-
-FORMATS = _named(
+_OWN = (
     ExportFormat(
         "bvh",
         "BVH skeleton animation",
         "Opens in Blender, Maya, MotionBuilder and Unity add-ons; the body as joints with rotations.",
         (*POINTS, "rest", "euler"),
+        write_bvh,
         unit="m",
         up="y",
         media_type="text/plain; charset=utf-8",
@@ -46,6 +59,7 @@ FORMATS = _named(
         "GLB animated body",
         "Opens in Blender, Unity, Godot, three.js and Windows' 3D viewer; skeleton, cones and motion in one file.",
         (*FRAMES, "names", "rest"),
+        write_glb,
         unit="m",
         up="y",
         media_type="model/gltf-binary",
@@ -55,6 +69,7 @@ FORMATS = _named(
         "TRC markers",
         "Opens in OpenSim and Pose2Sim; points over time, gaps left blank.",
         POINTS,
+        write_trc_file,
         unit="m",
         up="y",
         media_type="text/plain; charset=utf-8",
@@ -64,6 +79,7 @@ FORMATS = _named(
         "OpenSim motion",
         "Opens in OpenSim beside the TRC: the body's joint angles in degrees over time, places in m.",
         FRAMES,
+        write_mot,
         media_type="text/plain; charset=utf-8",
     ),
     ExportFormat(
@@ -71,6 +87,7 @@ FORMATS = _named(
         "C3D markers",
         "Opens in Vicon Nexus, Qualisys, Mokka, Visual3D and OpenSim; points over time, gaps marked.",
         (*POINTS, "split"),
+        write_c3d_file,
         unit="mm",
         up="z",
     ),
@@ -79,6 +96,7 @@ FORMATS = _named(
         "CSV table",
         "Opens in any spreadsheet, R and pandas; a row a frame with every angle and point.",
         (*POINTS, "angles"),
+        write_csv,
         unit="mm",
         up="z",
         media_type="text/csv; charset=utf-8",
@@ -88,6 +106,7 @@ FORMATS = _named(
         "Parquet table",
         "Opens in pandas, polars, R and DuckDB; a row a point and frame, with confidence.",
         POINTS,
+        write_parquet,
         unit="mm",
         up="z",
     ),
@@ -96,6 +115,7 @@ FORMATS = _named(
         "NPZ arrays",
         "Opens with numpy.load: poses, points, joints and confidence as arrays.",
         POINTS,
+        write_npz,
         unit="mm",
         up="z",
     ),
@@ -104,6 +124,7 @@ FORMATS = _named(
         "Overlay video",
         "Plays anywhere; each camera's footage with the body drawn over it.",
         ("track", "first", "last", "camera", "height"),
+        write_videos,
         what="video",
         media_type="video/mp4",
     ),
@@ -112,6 +133,7 @@ FORMATS = _named(
         "Scene recording",
         "Plays in viser's own browser client: the 3-D scene with body and cameras, to be looked at from any side.",
         ("track", "first", "last", "lost"),
+        None,
         what="scene",
     ),
     ExportFormat(
@@ -119,6 +141,7 @@ FORMATS = _named(
         "Scene page",
         "Opens in any browser, nothing installed: the same scene as one page, played and turned with the mouse.",
         ("track", "first", "last", "lost"),
+        None,
         what="scene",
         media_type="text/html; charset=utf-8",
     ),
@@ -127,6 +150,7 @@ FORMATS = _named(
         "Calibration TOML",
         "Opens in Pose2Sim, anipose, FreeMoCap and Caliscope; the cameras of the run.",
         ("calibration",),
+        write_cameras,
         what="cameras",
         media_type="application/toml",
     ),
@@ -135,22 +159,32 @@ FORMATS = _named(
         "OpenCV calibration",
         "Opens with OpenCV's FileStorage; the cameras of the run.",
         ("calibration",),
+        write_cameras,
         what="cameras",
         media_type="application/yaml",
     ),
 )
 
 
+def _check(form: ExportFormat) -> None:
+    """Raise ExportError where there is no writer, or an option that exports do not have."""
+    if form.write is None:
+        raise ExportError("it has no writer")
+    for option in form.takes:
+        if option not in (entry.name for entry in knobs_of(ExportOptions)):
+            raise ExportError(f"exports have no option '{option}'")
+
+
+FORMATS: Registry[ExportFormat] = Registry("export format", "studio.exports", ExportFormat, _OWN, _check)
+
+
 def format_of(name: str) -> ExportFormat:
-    """A format by its name or a file's ending. Raises ExportError."""
-    found = FORMATS.get(name.lower().removeprefix("."))
-    if found is None:
-        raise ExportError(f"There is no export to '{name[:40]}'.", f"Choose one of {', '.join(FORMATS)}.")
-    return found
+    """A format by its name or a file's ending. Raises SettingsError."""
+    return FORMATS[name.lower().removeprefix(".")]
 
 
 def format_of_file(path: Path) -> ExportFormat:
-    """The format that a file's ending names. Raises ExportError."""
+    """The format that a file's ending names. Raises ExportError, SettingsError."""
     if not path.suffix:
         raise ExportError(
             f"'{path.name}' has no ending that names a format.", f"End it in one of .{', .'.join(FORMATS)}."

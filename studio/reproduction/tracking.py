@@ -18,7 +18,7 @@ from studio.comparison.tracking_trials import group_of, measure_tracking, tracki
 from studio.comparison.trials import Outcome, Trial
 from studio.reproduction.drawing import seeds_and_mean
 from studio.reproduction.experiment import Experiment, concluding
-from studio.tracking.evaluations import knobs_for_evaluations
+from studio.tracking.catalogue import knobs_for_evaluations
 
 Array = NDArray[np.float64]
 T = TypeVar("T")

@@ -18,10 +18,10 @@ from studio.sessions.names import is_name
 from studio.sessions.session import Session
 from studio.sessions.workspace import workspace_root
 from studio.settings import RunSettings
+from studio.tracking.catalogue import TRACKERS
 from studio.tracking.shared_knobs import BEHAVIOUR
 
 MODELS_NAME, SUFFIX = "models", ".behaviour"
-GUIDED_TRACKER = "behaviour"
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +106,7 @@ def fitting(model: BehaviourModel, body: BodyModel, fps: float) -> BehaviourMode
 
 def needs_model(tracker: str, settings: object) -> bool:
     """Whether a tracker with these knobs of its own cannot go without a behaviour model."""
-    return tracker == GUIDED_TRACKER or getattr(settings, "prediction", "") == BEHAVIOUR
+    return TRACKERS[tracker].needs_behaviour or getattr(settings, "prediction", "") == BEHAVIOUR
 
 
 def check_prediction(settings: RunSettings, has_model: bool) -> None:
@@ -137,7 +137,8 @@ def chosen_model(session: Session, body: BodyModel, settings: RunSettings, asked
     if len(fit) == 1:
         note = f"Behaviour model '{fit[0].name}': the only one of body '{body.name}'."
         return ChosenModel(fit[0].name, fit[0].path, note)
-    wants = "Tracker 'behaviour'" if settings.tracker_name == GUIDED_TRACKER else "Prediction by behaviour"
+    name = settings.tracker_name
+    wants = f"Tracker '{name}'" if TRACKERS[name].needs_behaviour else "Prediction by behaviour"
     if fit:
         several = ", ".join(f"'{line.name}'" for line in fit)
         raise BehaviourError(

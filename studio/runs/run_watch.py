@@ -35,6 +35,7 @@ from studio.tracking.tracker import (
     ParticleSet,
     SearchSpace,
 )
+from studio.weighting.catalogue import WEIGHTINGS, LossLimit
 
 Array = NDArray[np.float64]
 
@@ -148,7 +149,7 @@ class RunWatch:
             before = dataclasses.replace(before, state=TRACKED, doubts=0)
         if not sight.seen:
             return _held(result, carried)
-        watch = before.watch if before.weighed == _weighed(settings) else WeightWatch(settings.weighting_name)
+        watch = before.watch if before.weighed == _weighed(settings) else _watch(settings)
         if not watch.is_lost(result.estimate.log_weight, sight):
             back = sought or before.state in (LOST, NO_EVIDENCE)
             state = RECOVERED if back else LIMB_LOST if result.limbs_lost else TRACKED
@@ -180,7 +181,7 @@ class RunWatch:
     def _standing(self, frame: int) -> Standing:
         """What all frames before one say."""
         if self._known is None or self._known[0] != frame:
-            line, standing = self._results.timeline(), Standing(WeightWatch(""))
+            line, standing = self._results.timeline(), Standing(WeightWatch(LossLimit()))
             for at in np.flatnonzero(line.frames < frame):
                 self._tell(
                     standing,
@@ -198,7 +199,7 @@ class RunWatch:
     ) -> None:
         settings = self._settings_in(frame)
         if standing.weighed != _weighed(settings):
-            standing.watch, standing.weighed = WeightWatch(settings.weighting_name), _weighed(settings)
+            standing.watch, standing.weighed = _watch(settings), _weighed(settings)
         if state in (TRACKED, RECOVERED) and not doubts:
             standing.watch.well_tracked(log_weight, overlap)
         standing.streak = standing.streak + 1 if state == standing.state else 1
@@ -258,6 +259,10 @@ def _seeking(settings: RunSettings) -> RunSettings:
         evidence=settings.evidence,
         recovery=settings.recovery,
     )
+
+
+def _watch(settings: RunSettings) -> WeightWatch:
+    return WeightWatch(WEIGHTINGS[settings.weighting_name].loss)
 
 
 def _weighed(settings: RunSettings) -> tuple[object, ...]:

@@ -27,6 +27,7 @@ from studio.settings import RunSettings, default_settings
 from studio.volume.alignment import root_parameters
 from studio.volume.blob_model import BlobMixture, BlobModel
 from studio.volume.hull import Hull
+from studio.weighting.blob_settings import BlobSettings
 from studio.weighting.blobs import BlobProblem, blob_mixture
 
 Array = NDArray[float64]
@@ -64,7 +65,7 @@ class _Wish:
 
 def has_blobs(settings: RunSettings) -> bool:
     """Whether a run with these settings has blobs to show."""
-    return settings.weighting_name == BLOBS
+    return isinstance(settings.weighting, BlobSettings)
 
 
 class FrameVolumes:

@@ -12,8 +12,9 @@ import viser
 from studio.errors import StudioError
 from studio.knobs import Knob, Value, knobs_of
 from studio.scene.knob_input import KnobInput
-from studio.scene.presets import Preset, offered
 from studio.settings import RunSettings, values
+from studio.tracking.catalogue import presets
+from studio.tracking.tracker import Preset
 from studio.worker.events import SettingsApplied
 
 _FOREMOST = 6
@@ -124,7 +125,7 @@ class SettingsPanel:
                 self._add(declared, now)
 
     def _add_presets(self) -> None:
-        self._presets = offered(self._names)
+        self._presets = tuple(one for one in presets() if one.values.keys() <= set(self._names))
         if not self._presets:
             return
         self.preset = self._gui.add_dropdown(

@@ -17,8 +17,6 @@ from its ancestor's at the end of the last frame by the cluster of its pose and 
 Reference: J. Deutscher, I. Reid, Articulated Body Motion Capture by Stochastic Search, IJCV 61(2), 185-205.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -47,24 +45,42 @@ from studio.tracking.particles import (
     weighted_variance,
 )
 from studio.tracking.resampling import draw, equal_draw
-from studio.tracking.settings import AnnealedSettings, layer_survivals
-from studio.tracking.tracker import Carried, Estimate, FrameProblem, LayerRecord, ParticleSet, SearchSpace
+from studio.tracking.settings import PRESETS, VARIANTS, AnnealedSettings, layer_survivals
+from studio.tracking.tracker import (
+    Carried,
+    Estimate,
+    FrameProblem,
+    LayerRecord,
+    ParticleSet,
+    SearchSpace,
+    Tracker,
+)
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 
-@dataclass(frozen=True, slots=True)
-class AnnealedParticleFilter:
+class AnnealedParticleFilter(Tracker):
     """One frame in M annealing layers; evaluations = layers × particles."""
 
-    name: str = "annealed"
-    label: str = "Annealed particle filter"
-    settings_type: type = AnnealedSettings
+    name = "annealed"
+    label = "Annealed particle filter"
+    settings_type = AnnealedSettings
+    size_knobs = (("layers", "particles"),)
+    variants = VARIANTS
+    presets = PRESETS
 
     def layer_count(self, settings: AnnealedSettings) -> int:
         """M."""
         return settings.layers
+
+    def evaluation_knobs(self, evaluations: int, layers: int) -> dict[str, int]:
+        """`layers` layers of evaluations / layers particles."""
+        return {"layers": layers, "particles": round(evaluations / max(layers, 1))}
+
+    def least_evaluations(self, layers: int) -> int:
+        """Two particles in each layer."""
+        return 2 * layers
 
     def begin_frame(
         self, rng: np.random.Generator, previous: Carried, space: SearchSpace, settings: AnnealedSettings

@@ -15,8 +15,6 @@ Without a model in the search space the tracker is a particle filter with noise 
 (`runs.behaviour_models`).
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,18 +35,26 @@ from studio.tracking.particles import (
     weighted_variance,
 )
 from studio.tracking.resampling import draw
-from studio.tracking.tracker import Carried, Estimate, FrameProblem, LayerRecord, ParticleSet, SearchSpace
+from studio.tracking.tracker import (
+    Carried,
+    Estimate,
+    FrameProblem,
+    LayerRecord,
+    ParticleSet,
+    SearchSpace,
+    Tracker,
+)
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class BehaviourGuided:
+class BehaviourGuided(Tracker):
     """One frame in one layer; evaluations = particles."""
 
-    name: str = "behaviour"
-    label: str = "Guided by behaviour"
-    settings_type: type = BehaviourSettings
+    name = "behaviour"
+    label = "Guided by behaviour"
+    settings_type = BehaviourSettings
+    needs_behaviour = True
 
     def layer_count(self, settings: BehaviourSettings) -> int:
         """One."""

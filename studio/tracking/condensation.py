@@ -9,8 +9,6 @@ geometric mean is used ever after. The scale in use stands in every record as `b
 particles as `extra["log_scales"]`.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,20 +27,28 @@ from studio.tracking.particles import (
 )
 from studio.tracking.resampling import draw
 from studio.tracking.settings import CondensationSettings
-from studio.tracking.tracker import Carried, Estimate, FrameProblem, LayerRecord, ParticleSet, SearchSpace
+from studio.tracking.tracker import (
+    Carried,
+    Estimate,
+    FrameProblem,
+    LayerRecord,
+    ParticleSet,
+    SearchSpace,
+    Tracker,
+)
 
 Array = NDArray[np.float64]
 
 SCALES = "log_scales"
 
 
-@dataclass(frozen=True, slots=True)
-class Condensation:
+class Condensation(Tracker):
     """One frame in one layer; evaluations = particles."""
 
-    name: str = "condensation"
-    label: str = "Condensation"
-    settings_type: type = CondensationSettings
+    name = "condensation"
+    label = "Condensation"
+    settings_type = CondensationSettings
+    scales_likelihood = True
 
     def layer_count(self, settings: CondensationSettings) -> int:
         """One."""

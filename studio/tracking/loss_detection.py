@@ -10,8 +10,8 @@ Three answers, of which only the first moves the tracker:
 
 The weight of a pose depends on clothes, light and masks as much as on the pose, so it is compared with the run's own
 median over its last well tracked frames, in units of their own spread (1.4826 × the median distance from the median)
-but never of less than the weighting's usual one. Overlap is f_s (`weighting.silhouette_areas`), which means the same
-everywhere; it also speaks for the first frames, before there is a distribution.
+but never of less than the weighting's usual one (`Weighting.loss`). Overlap is f_s (`weighting.silhouette_areas`): it
+means the same everywhere; it also speaks for the first frames, before there is a distribution.
 
 Measured with the annealed filter, 1000 evaluations, on rendered footage: the twin of the Lee walk at 20 Hz, a circle
 seen by three cameras at 20 Hz, the bundled walk; masks by subtraction. Tracked: frames with a mean marker error below
@@ -43,6 +43,7 @@ from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
 from studio.tracking.tracker import FrameProblem
+from studio.weighting.catalogue import LossLimit
 from studio.weighting.outlines import OutlineProjector
 from studio.weighting.problem import SelfJudging
 from studio.weighting.silhouette_areas import HALF, Silhouettes
@@ -61,28 +62,6 @@ LEAST_AREA = 0.2
 """Mask, as a share of the body's own silhouette, below which a view shows no body."""
 BLANK_SPREAD, BLANK_STEP = 4.0, 8
 """A picture whose grey levels, every eighth pixel, differ by less (standard deviation) is blank."""
-
-
-@dataclass(frozen=True, slots=True)
-class Limit:
-    """spread : usual standard deviation of the log weight over well tracked frames, as the weighting gives it.
-    spreads : how many of them below the median is lost.
-    """
-
-    spread: float
-    spreads: float
-
-
-LIMITS: dict[str, Limit] = {
-    "edge-region": Limit(spread=0.09, spreads=5.0),
-    "edge-silhouette": Limit(spread=0.6, spreads=4.5),
-    "edge-region-silhouette": Limit(spread=0.1, spreads=5.5),
-    "bodytrack": Limit(spread=0.02, spreads=5.5),
-    "template": Limit(spread=0.001, spreads=5.0),
-    "blobs": Limit(spread=0.12, spreads=4.5),
-}
-OTHERS = Limit(spread=0.1, spreads=6.0)
-"""For a weighting that nobody measured."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,8 +123,8 @@ class Onlooker:
 class WeightWatch:
     """A run's distribution of well tracked frames, a function of what it was told in order."""
 
-    def __init__(self, weighting: str, told: Iterable[tuple[float, float]] = ()) -> None:
-        self._limit = LIMITS.get(weighting, OTHERS)
+    def __init__(self, limit: LossLimit, told: Iterable[tuple[float, float]] = ()) -> None:
+        self._limit = limit
         self._weights: deque[float] = deque(maxlen=REMEMBERED)
         self._overlaps: deque[float] = deque(maxlen=REMEMBERED)
         for log_weight, overlap in told:

@@ -22,7 +22,7 @@ weigh the same.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +32,17 @@ from studio.tracking.guided_swarm import BEFORE, handed_on, leader_arrived, pred
 from studio.tracking.hard_priors import Indices, Mask, Proposals, possible, settled
 from studio.tracking.model_free import FREE, judged, share_in
 from studio.tracking.particles import checked_values, expected, uniform_poses, unweighted
-from studio.tracking.partitions import Stage, layer_count, moment_of, stages_of
-from studio.tracking.swarm_settings import SwarmSettings
-from studio.tracking.tracker import Carried, Estimate, FrameProblem, LayerRecord, ParticleSet, SearchSpace
+from studio.tracking.partitions import Stage, evaluations, layer_count, moment_of, stages_of
+from studio.tracking.swarm_settings import PRESETS, VARIANTS, SwarmSettings
+from studio.tracking.tracker import (
+    Carried,
+    Estimate,
+    FrameProblem,
+    LayerRecord,
+    ParticleSet,
+    SearchSpace,
+    Tracker,
+)
 from studio.weighting.problem import WHOLE_BODY
 
 Array = NDArray[np.float64]
@@ -49,18 +57,51 @@ VELOCITIES, BEST_POSES, BEST_VALUES, BEST_POSSIBLE = (
 LEADER, LEADER_VALUE, LEADER_POSSIBLE = "leader", "leader_value", "leader_possible"
 START, FREEDOM = "start", "freedom"
 
+# Table 1: 10 particles × 20 iterations, then 20 × 40.
+STAGE1_ITERATIONS, STAGE2_ITERATIONS = 20, 40
+# A particle alone has nobody to learn from.
+SMALLEST_SWARM = 2
 
-@dataclass(frozen=True, slots=True)
-class ParticleSwarm:
+
+class ParticleSwarm(Tracker):
     """One frame in the iterations of all stages; evaluations = Σ particles × iterations."""
 
-    name: str = "swarm"
-    label: str = "Particle swarm"
-    settings_type: type = SwarmSettings
+    name = "swarm"
+    label = "Particle swarm"
+    settings_type = SwarmSettings
+    size_knobs = (("stage1_particles", "stage1_iterations"), ("stage2_particles", "stage2_iterations"))
+    score = ("Best fitness", "f")
+    variants = VARIANTS
+    presets = PRESETS
 
     def layer_count(self, settings: SwarmSettings) -> int:
         """N of all stages together."""
         return layer_count(settings)
+
+    def evaluations(self, settings: SwarmSettings) -> int:
+        """Of all stages together."""
+        return evaluations(settings)
+
+    def evaluation_knobs(self, evaluations: int, layers: int) -> dict[str, int]:
+        """Table 1 in proportion: n1 and n2 with 20 n1 + 40 n2 as close to the total as can be, n2 as close to 2 n1.
+
+        The paper prints the table for 1000 evaluations only; our choice is that the iterations stay and the particles
+        of both stages scale, so that every total that is a multiple of 20 is met exactly.
+        """
+        twenties = round(evaluations / STAGE1_ITERATIONS)
+        first = max(round(twenties / 5), SMALLEST_SWARM)
+        # What is left over must be divisible by two, as the second stage has twice the iterations.
+        first += (twenties - first) % 2
+        return {
+            "stage1_particles": first,
+            "stage1_iterations": STAGE1_ITERATIONS,
+            "stage2_particles": (twenties - first) // 2,
+            "stage2_iterations": STAGE2_ITERATIONS,
+        }
+
+    def least_evaluations(self, layers: int) -> int:
+        """The smallest swarm in both stages."""
+        return SMALLEST_SWARM * (STAGE1_ITERATIONS + STAGE2_ITERATIONS)
 
     def begin_frame(
         self, rng: np.random.Generator, previous: Carried, space: SearchSpace, settings: SwarmSettings

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from studio.errors import SettingsError
 from studio.knobs import knob
 from studio.tracking import shared_knobs
+from studio.tracking.tracker import Preset, Value, Variant
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,3 +132,69 @@ def layer_survivals(settings: AnnealedSettings, layers: int) -> tuple[float, ...
             "Write one rate from 0.02 to 0.98 for each layer, separated by commas, or nothing.",
         )
     return tuple(rates[min(index, len(rates) - 1)] for index in range(layers))
+
+
+# What makes the improved filter is the tracker's own default.
+_IMPROVED: dict[str, Value] = {
+    name: getattr(AnnealedSettings(), name)
+    for name in (
+        *("survival", "adaptive_diffusion", "diffusion_form"),
+        *("diffusion_fraction", "crossover", "crossover_by"),
+    )
+}
+_AS_THE_PAPER: dict[str, Value] = {
+    "adaptive_diffusion": True,
+    "diffusion_form": "paper",
+    "crossover": 0.5,
+    "crossover_by": "parameters",
+    "survival": 0.5,
+}
+_TEN_BY_200: dict[str, Value] = {"layers": 10, "particles": 200, "refine_frames": False}
+
+PRESETS = (
+    Preset(
+        "the studio's own",
+        "The improved filter, 10 × 100, and each frame refined on its silhouettes.",
+        _IMPROVED | {"layers": 10, "particles": 100, "refine_frames": True},
+    ),
+    Preset(
+        "improved filter",
+        "Adaptive diffusion with shrinkage and crossover by limbs, 10 × 200, nothing refined.",
+        _IMPROVED | _TEN_BY_200,
+    ),
+    Preset(
+        "paper, Eq. 13",
+        "The annealed filter without its improvements: a fixed plan of noise, no crossover, 10 × 200.",
+        {"adaptive_diffusion": False, "diffusion_decay": "variance", "crossover": 0.0, "survival": 0.5}
+        | _TEN_BY_200,
+    ),
+    Preset(
+        "paper, Eq. 18 and 19",
+        "Adaptive diffusion without shrinkage and crossover by parameters, as the paper writes them.",
+        _AS_THE_PAPER | _TEN_BY_200,
+    ),
+    Preset("fast preview", "A quarter of the work: 5 × 50.", _IMPROVED | {"layers": 5, "particles": 50}),
+    Preset(
+        "careful",
+        "Six times the work, in more layers: 15 × 400.",
+        _IMPROVED | {"layers": 15, "particles": 400},
+    ),
+)
+
+GUIDED = Variant(
+    "first sets predicted by a behaviour model (Caillette et al.), a fifth of the particles without it",
+    {"prediction": shared_knobs.BEHAVIOUR},
+)
+VARIANTS = {
+    "improved": Variant(
+        "adaptive diffusion with shrinkage (Eq. 18) and crossover by limbs (Eq. 19)",
+        {"adaptive_diffusion": True, "diffusion_form": "shrink", "crossover": 0.5, "crossover_by": "limbs"},
+    ),
+    "eq13": Variant(
+        "the planned noise of Eq. 13 alone, no crossover", {"adaptive_diffusion": False, "crossover": 0.0}
+    ),
+    "paper": Variant(
+        "Eq. 18 and 19 as Deutscher & Reid write them, half of the particles surviving", _AS_THE_PAPER
+    ),
+    "guided": GUIDED,
+}

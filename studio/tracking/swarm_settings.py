@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from studio.errors import SettingsError
 from studio.knobs import knob
 from studio.tracking import shared_knobs
+from studio.tracking.settings import GUIDED
+from studio.tracking.tracker import Preset, Variant
 
 PARTITIONS = ("soft", "soft-three", "hard-two", "hard-twelve", "global-local", "global")
 # Eq. 2 divides by N - 2.
@@ -112,3 +114,28 @@ def _check_iterations(name: str, iterations: int, stages: int) -> None:
             f"Setting '{name}' leaves {iterations} iterations{over}: Eq. 2 needs more than 2 in each.",
             f"Ask for {FEWEST_ITERATIONS * stages} iterations or more.",
         )
+
+
+# The swarm paper's figures are the tracker's own defaults.
+_PAPERS = (
+    *("stage1_particles", "stage1_iterations", "stage2_particles", "stage2_iterations", "c_first", "c_last"),
+    *("partition", "start_velocity", "position_divisor", "constraints", "limbs_apart"),
+)
+PRESETS = (
+    Preset(
+        "paper, swarm",
+        "The swarm as its paper has it: Table 1, two soft stages, impossible poses drawn again.",
+        {name: getattr(SwarmSettings(), name) for name in _PAPERS} | {"refine_frames": False},
+    ),
+)
+
+_PARTITION_WORDS = {
+    "soft-three": "three soft stages: root, trunk and head, all",
+    "hard-two": "two hard stages: the root stays fixed in the second (Fig. 2a)",
+    "hard-twelve": "twelve hard stages along the hierarchy (John, Trucco & Ivekovic)",
+    "global-local": "the whole pose, then legs and arms apart (GLPSO)",
+    "global": "the whole pose at once, no partition",
+}
+VARIANTS = {"guided": GUIDED} | {
+    partition: Variant(words, {"partition": partition}) for partition, words in _PARTITION_WORDS.items()
+}

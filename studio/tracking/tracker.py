@@ -6,9 +6,10 @@ are all "layers", counted from 0 in the order they are run (the paper's layer m 
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from studio.behaviour.model import BehaviourModel
 from studio.weighting.problem import WHOLE_BODY
 
 Array = NDArray[np.float64]
+Value = bool | int | float | str
 
 TRACKED, LOST, NO_EVIDENCE, RECOVERED = "tracked", "lost", "no evidence", "recovered"
 LIMB_LOST = "limb lost"
@@ -202,28 +204,61 @@ class FrameProblem(Protocol):
         ...
 
 
-class Tracker(Protocol):
-    """A stochastic search of one frame, a layer at a time."""
+@dataclass(frozen=True, slots=True)
+class Preset:
+    """Ready-made settings. name : words on screen. help : what it is for, one sentence. values : knobs by flat name."""
 
-    @property
-    def name(self) -> str:
-        """The tracker's key in the catalogue."""
-        ...
+    name: str
+    help: str
+    values: Mapping[str, Value]
 
-    @property
-    def label(self) -> str:
-        """The tracker's name on screen."""
-        ...
 
-    @property
-    def settings_type(self) -> type:
-        """The frozen dataclass of its knobs."""
-        ...
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """A tracker with knobs that have a name. help : what it is, one line. changes : knobs by flat name."""
 
+    help: str
+    changes: Mapping[str, Value]
+
+
+class Tracker(ABC):
+    """A stochastic search of one frame, a layer at a time, with all that the studio asks of its kind.
+
+    name : its key in the catalogue. label : its name on screen. settings_type : the frozen dataclass of its knobs, with
+    `start_repeats` among them. The rest has defaults. size_knobs : knobs that say how much is searched, of each stage
+    those that are multiplied. needs_behaviour : it cannot go without a behaviour model. scales_likelihood : it
+    multiplies log w by a scale of its own (`beta` of its records). score : what the best particle is reported by, and
+    its unit. variants : known changes, by label, for comparisons. presets : for the pages, offered where a run has all
+    knobs that they set.
+    """
+
+    name: str
+    label: str
+    settings_type: type
+    size_knobs: ClassVar[tuple[tuple[str, ...], ...]] = (("particles",),)
+    needs_behaviour: ClassVar[bool] = False
+    scales_likelihood: ClassVar[bool] = False
+    score: ClassVar[tuple[str, str]] = ("Best weight", "log w")
+    variants: ClassVar[Mapping[str, Variant]] = {}
+    presets: ClassVar[tuple[Preset, ...]] = ()
+
+    def evaluations(self, settings: Any) -> int:  # noqa: ANN401 - the tracker's own settings_type
+        """Poses weighed in a frame (of the first frame: in each of its searches)."""
+        return self.layer_count(settings) * settings.particles
+
+    def evaluation_knobs(self, evaluations: int, layers: int) -> dict[str, int]:
+        """Knobs with which about so many poses are weighed a frame. layers : wanted, where they can be chosen."""
+        return {"particles": round(evaluations / self.layer_count(self.settings_type()))}
+
+    def least_evaluations(self, layers: int) -> int:
+        """The fewest evaluations a frame that it can be given. layers : as in `evaluation_knobs`."""
+        return 2 * self.layer_count(self.settings_type())
+
+    @abstractmethod
     def layer_count(self, settings: Any) -> int:  # noqa: ANN401 - the tracker's own settings_type
         """How many layers a frame takes."""
-        ...
 
+    @abstractmethod
     def begin_frame(
         self,
         rng: np.random.Generator,
@@ -232,8 +267,8 @@ class Tracker(Protocol):
         settings: Any,  # noqa: ANN401
     ) -> ParticleSet:
         """The unweighted set that the first layer weighs."""
-        ...
 
+    @abstractmethod
     def step_layer(
         self,
         rng: np.random.Generator,
@@ -247,11 +282,10 @@ class Tracker(Protocol):
 
         The record's frame, settings_version and milliseconds are filled in by the frame loop.
         """
-        ...
 
+    @abstractmethod
     def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: Any) -> Estimate:  # noqa: ANN401
         """The pose that is reported, from the last layer's weighted set."""
-        ...
 
 
 @runtime_checkable

@@ -5,7 +5,7 @@ things (the scene, the tracking process, the stream of events) start and stop wi
 """
 
 import asyncio
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
@@ -55,7 +55,6 @@ from studio.web.doors import Control, Doors, Scenes
 from studio.web.error_responses import ErrorsInWords, add_error_handlers, log
 from studio.web.event_stream import EventStream
 from studio.web.pages import assets_folder
-from studio.web.presets import Preset
 from studio.web.schemas import ErrorAnswer
 
 DESCRIPTION = (
@@ -109,16 +108,15 @@ def build_app(
     *,
     hosts: HostRule | None = None,
     footage_roots: tuple[Path, ...] = (),
-    presets: Sequence[Preset] = (),
     log_path: Path | None = None,
 ) -> FastAPI:
     """The application. It ends `scenes` and `control` when it stops.
 
     token : what lets a browser in. hosts : the Host headers that are answered (default: this machine's
-    loopback). presets : the studio's own. footage_roots : folders from which footage may be imported by
+    loopback). footage_roots : folders from which footage may be imported by
     path. log_path : named in answers to unforeseen errors.
     """
-    doors = Doors(workspace, control, scenes, EventStream(control), footage_roots, presets, log_path)
+    doors = Doors(workspace, control, scenes, EventStream(control), footage_roots, log_path)
     app = FastAPI(
         title="Capture studio",
         responses={status: {"model": ErrorAnswer} for status in (403, 404, 409, 422, 500)},

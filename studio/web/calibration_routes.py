@@ -20,7 +20,7 @@ from studio.calibration.coverage import coverage_picture
 from studio.calibration.floor_clicks import Click
 from studio.calibration.world_picture import world_picture
 from studio.capture.calibration_files import (
-    CALIBRATION_WRITERS,
+    CALIBRATION_FORMATS,
     export_calibration,
     find_calibrations,
     read_calibration,
@@ -49,7 +49,6 @@ router = APIRouter(prefix="/api", tags=["calibration"])
 
 HERE = "/sessions/{session}/calibration"
 CURRENT = "current"
-FILE_NAMES = {"pose2sim": "Calib_{}.toml", "aniposelib": "calibration.toml"}
 
 
 @router.get(HERE)
@@ -139,16 +138,14 @@ def coverage(session: OpenSession, identifier: str, camera: str, doors: Door) ->
 
 
 @router.get(HERE + "/export", response_class=Response)
-def export(
-    session: OpenSession, form: Annotated[Literal["pose2sim", "aniposelib", "opencv"], Query(alias="format")]
-) -> Response:
+def export(session: OpenSession, form: Annotated[str, Query(alias="format", max_length=64)]) -> Response:
     """The calibration in use for another tool; several files as a zip. What the format cannot hold is told in the
     header x-studio-notes (percent-encoded lines).
     """
     cameras = proposal_in_use(session).cameras
     with tempfile.TemporaryDirectory() as folder:
-        writer = CALIBRATION_WRITERS[form]
-        place = Path(folder) / FILE_NAMES.get(form, f"cameras{writer.suffix}").format(session.name)
+        writer = CALIBRATION_FORMATS[form]
+        place = Path(folder) / (writer.file_name.format(session.name) + writer.suffix)
         written = export_calibration(cameras, place, form)
         name, content = _packed(written.files, f"{session.name}-{form}.zip")
     headers = {

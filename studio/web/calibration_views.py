@@ -9,7 +9,7 @@ import numpy as np
 from studio.calibration.board_folders import find_board_footage
 from studio.calibration.findings import blocking
 from studio.calibration.report import report_of
-from studio.capture.calibration_files import CALIBRATION_WRITERS
+from studio.capture.calibration_files import CALIBRATION_FORMATS
 from studio.errors import CalibrationError
 from studio.sessions.calibration_changes import earlier_calibrations, stale_runs
 from studio.sessions.session import CAMERAS_PATH, Session
@@ -41,7 +41,7 @@ def calibration_view(session: Session, notes: Sequence[str]) -> CalibrationView:
         stale_runs=list(stale_runs(session)),
         board_footage=_has_boards(session),
         footage=[source.name for source in session.manifest.footage.cameras],
-        formats={name: writer.label for name, writer in CALIBRATION_WRITERS.items()},
+        formats={name: writer.label for name, writer in CALIBRATION_FORMATS.items()},
         notes=list(notes),
     )
 

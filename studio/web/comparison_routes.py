@@ -55,16 +55,19 @@ Kept = Annotated[KeptComparison, Depends(comparison_of)]
 @router.get("/choices")
 def choices() -> ComparisonChoices:
     """Who can be compared: trackers, labels that bring their knobs, line-ups of several."""
-    plain = [
-        EntrantChoice(name=name, tracker=name, help=getattr(entry.settings_type, "title", name))
-        for name, entry in TRACKERS.items()
-    ]
-    labelled = [
-        EntrantChoice(name=name, tracker=name.partition(":")[0], help=entry.help, changes=dict(entry.changes))
-        for name, entry in VARIANTS.items()
+    entrants = [
+        EntrantChoice(
+            name=name,
+            tracker=tracker.name,
+            help=entry.help if entry else tracker.label,
+            sized_by=[knob for names in tracker.size_knobs for knob in names],
+            changes=dict(entry.changes) if entry else {},
+        )
+        for name, entry in {**dict.fromkeys(TRACKERS), **VARIANTS}.items()
+        for tracker in (TRACKERS[name.partition(":")[0]],)
     ]
     return ComparisonChoices(
-        entrants=plain + labelled,
+        entrants=entrants,
         lineups=[LineupChoice(name=name, trackers=list(members)) for name, members in LINEUPS.items()],
         weightings=list(WEIGHTINGS),
     )

@@ -30,7 +30,7 @@ class ComparisonRequest(Request):
     behaviour: RunName | None = Field(None, description="Behaviour model of those that need one.")
     first: int = Field(0, ge=0)
     last: int | None = Field(None, ge=1, description="Frame after the last one; null: all.")
-    layers: int = Field(10, ge=1, le=60, description="Of annealed trackers.")
+    layers: int = Field(10, ge=1, le=60, description="Of trackers whose layers can be chosen.")
     settings: dict[str, Value] = Field(
         default_factory=dict, description="Knobs of all trackers that have them."
     )
@@ -77,11 +77,14 @@ class ComparisonDetail(Answer):
 
 
 class EntrantChoice(Answer):
-    """A name that can take part. changes: the knobs that it brings along."""
+    """A name that can take part. changes: the knobs that it brings along. sized_by: those that follow from the
+    evaluations.
+    """
 
     name: str
     tracker: str
     help: str
+    sized_by: list[str]
     changes: dict[str, Value] = Field(default_factory=dict)
 
 

@@ -19,7 +19,6 @@ from studio.sessions.workspace import Workspace
 from studio.web.background_jobs import BackgroundJobs
 from studio.web.calibration_proposals import Proposals
 from studio.web.event_stream import EventStream
-from studio.web.presets import Preset
 from studio.web.windows import Window
 from studio.worker.camera_desk import CameraDesk, DeskRecording
 from studio.worker.commands import Close, Command
@@ -216,7 +215,7 @@ class Scenes(Protocol):
 class Doors:
     """Everything a route may use, kept in `app.state.doors`.
 
-    scenes : of all windows. footage_roots : folders that may be imported from. presets : the studio's own. log_path :
+    scenes : of all windows. footage_roots : folders that may be imported from. log_path :
     the server's log file. proposals : calibrations not in use yet. uploads : those under way, by their identifiers.
     jobs : work in the background. desk : where comparisons are worked at, learning : where behaviour models are
     learnt, cameras : where live ones are looked at and recorded.
@@ -227,7 +226,6 @@ class Doors:
     scenes: Scenes
     events: EventStream
     footage_roots: tuple[Path, ...] = ()
-    presets: Sequence[Preset] = ()
     log_path: Path | None = None
     proposals: Proposals = field(default_factory=Proposals)
     uploads: dict[str, dict[str, int]] = field(default_factory=dict)

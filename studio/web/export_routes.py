@@ -3,7 +3,7 @@
 from fastapi import APIRouter
 from fastapi.responses import FileResponse, Response
 
-from studio.capture.calibration_files import CALIBRATION_WRITERS
+from studio.capture.calibration_files import CALIBRATION_FORMATS
 from studio.export.exporting import settled
 from studio.export.formats import FORMATS, format_of
 from studio.export.kept_exports import (
@@ -39,7 +39,7 @@ router = APIRouter(prefix="/api", tags=["exports"])
 def choices() -> ExportChoices:
     """The formats, what opens them, and the options that they take."""
     calibrations: dict[str, list[str]] = {}
-    for name, writer in CALIBRATION_WRITERS.items():
+    for name, writer in CALIBRATION_FORMATS.items():
         calibrations.setdefault(writer.suffix, []).append(name)
     return ExportChoices(
         formats=[FormatView.model_validate(form) for form in FORMATS.values()],

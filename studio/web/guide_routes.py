@@ -1,4 +1,4 @@
-"""`/guide`: the packaged text, with a table of every knob made from the declarations; `/guide/python`: examples."""
+"""`/guide`: the packaged text, with a table of every knob made from the declarations; beside it pages of examples."""
 
 import html
 import itertools
@@ -47,6 +47,12 @@ def guide() -> HTMLResponse:
 def python_examples() -> HTMLResponse:
     """The page of examples for scripts and notebooks."""
     return HTMLResponse(rendered("python.md", "Python"), headers={"cache-control": "no-cache"})
+
+
+@router.get("/guide/adding")
+def adding() -> HTMLResponse:
+    """How to add a body, a tracker, a likelihood, a format."""
+    return HTMLResponse(rendered("adding.md", "Adding your own"), headers={"cache-control": "no-cache"})
 
 
 @cache

@@ -5,7 +5,7 @@ from contextlib import suppress
 
 from fastapi import APIRouter
 
-from studio.errors import SettingsError, StudioError
+from studio.errors import StudioError
 from studio.runs.initialising import WEIGHTING, InitialPose, initialise, keep_pose
 from studio.runs.new_run import checked_frames
 from studio.web.background_jobs import Job
@@ -27,10 +27,7 @@ async def begin_initialisation(
     """Begin to look for the pose in a frame. Ask for its state, or wait for `initialise` events."""
     checked_frames(session, wish.frame, wish.frame + 1)
     body = await asyncio.to_thread(session.body, wish.body or None)
-    if wish.weighting and wish.weighting not in WEIGHTINGS:
-        raise SettingsError(
-            f"There is no weighting '{wish.weighting}'.", f"Known: {', '.join(sorted(WEIGHTINGS))}."
-        )
+    weighting = WEIGHTINGS[wish.weighting or WEIGHTING].name
 
     def work(job: Job) -> dict[str, object]:
         found = initialise(
@@ -38,7 +35,7 @@ async def begin_initialisation(
             wish.frame,
             body=body,
             behaviour=wish.behaviour or "",
-            weighting=wish.weighting or WEIGHTING,
+            weighting=weighting,
             seed=wish.seed,
             progress=job.report,
             cancelled=job.cancelled,

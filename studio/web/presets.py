@@ -3,15 +3,15 @@ workspace).
 """
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Protocol
 
 import msgspec
 
 from studio.errors import NotFoundError, StudioError
 from studio.sessions.atomic_files import write_bytes
 from studio.settings import in_todays_names, knob_table
+from studio.tracking.catalogue import presets
 from studio.typed_decoding import decode_json
 from studio.web.setting_schemas import PresetView
 
@@ -29,56 +29,35 @@ class PresetError(StudioError):
     status, code = 422, "preset"
 
 
-class Preset(Protocol):
-    """A preset of the studio's own (`launch` hands them in)."""
-
-    @property
-    def name(self) -> str:
-        """Words on screen."""
-        ...
-
-    @property
-    def help(self) -> str:
-        """What it is for, one sentence."""
-        ...
-
-    @property
-    def values(self) -> dict[str, Value]:
-        """Knobs by flat name."""
-        ...
-
-
 class _Kept(msgspec.Struct):
     help: str
     values: dict[str, Value]
 
 
-def all_presets(built_in: Sequence[Preset], folder: Path) -> list[PresetView]:
+def all_presets(folder: Path) -> list[PresetView]:
     """The studio's presets, then a person's own by name."""
-    brought = [_view(entry.name, entry.help, entry.values, False) for entry in built_in]
+    brought = [_view(entry.name, entry.help, entry.values, False) for entry in presets()]
     own = [_view(name, kept.help, kept.values, True) for name, kept in sorted(_read(folder).items())]
     return brought + own
 
 
-def preset(name: str, built_in: Sequence[Preset], folder: Path) -> PresetView:
+def preset(name: str, folder: Path) -> PresetView:
     """The preset of that name. Raises NotFoundError."""
-    presets = all_presets(built_in, folder)
-    for entry in presets:
+    known = all_presets(folder)
+    for entry in known:
         if entry.name == name:
             return entry
-    known = ", ".join(entry.name for entry in presets)
-    raise NotFoundError(f"There is no preset '{name[:64]}'.", f"Known: {known}.")
+    names = ", ".join(entry.name for entry in known)
+    raise NotFoundError(f"There is no preset '{name[:64]}'.", f"Known: {names}.")
 
 
-def keep_preset(
-    name: str, help_text: str, values: dict[str, Value], built_in: Sequence[Preset], folder: Path
-) -> None:
+def keep_preset(name: str, help_text: str, values: dict[str, Value], folder: Path) -> None:
     """Keep a preset of a person's own, replacing one of the same name.
 
     Raises PresetError for a name that the studio's own presets have, an unknown knob, or too many.
     """
     words = " ".join(name.split())
-    if not 0 < len(words) <= 64 or any(entry.name == words for entry in built_in):
+    if not 0 < len(words) <= 64 or any(entry.name == words for entry in presets()):
         raise PresetError(
             f"'{name[:64]}' cannot be a preset's name.", "Use 1 to 64 characters, no name taken."
         )
@@ -103,7 +82,7 @@ def drop_preset(name: str, folder: Path) -> None:
         _write(folder, kept)
 
 
-def _view(name: str, help_text: str, values: dict[str, Value], own: bool) -> PresetView:
+def _view(name: str, help_text: str, values: Mapping[str, Value], own: bool) -> PresetView:
     # A person's preset may be older than a knob's name.
     return PresetView(name=name, label=name, help=help_text, values=in_todays_names(values), own=own)
 

@@ -15,7 +15,8 @@ from studio.runs.live_summary import summary_of
 from studio.runs.tracks import RAW
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.tracking.tracker import LayerRecord
+from studio.tracking.catalogue import TRACKERS
+from studio.tracking.tracker import LayerRecord, Tracker
 from studio.web.event_encoding import layer_summary
 from studio.web.result_schemas import (
     EvaluationView,
@@ -69,6 +70,7 @@ def frames(
         last=record.last,
         fps=record.fps,
         describe=describe(record),
+        score=TRACKERS.get(record.tracker, Tracker).score,
         frames=lines,
         settings_changes=changes_of(history_of(run)),
         damaged=damaged,

@@ -48,6 +48,7 @@ class FramesSummary(Answer):
     last: int
     fps: float
     describe: str
+    score: tuple[str, str] = Field(description="What the best particle is reported by, and its unit.")
     frames: list[FrameLine]
     settings_changes: list[SettingsChange]
     damaged: dict[int, str] = Field(

@@ -13,15 +13,9 @@ from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session
 from studio.sessions.workspace import SessionSummary
 from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING
+from studio.tracking.catalogue import size_in_words
 from studio.web.run_errors import mean_error
 from studio.web.schemas import BodyView, CameraView, ParameterView, RunLine, SessionDetail, SessionLine
-
-# Knobs that say how much is searched: a filter's layers and particles, a swarm's stages.
-SIZES = (
-    ("layers", "particles"),
-    ("stage1_particles", "stage1_iterations"),
-    ("stage2_particles", "stage2_iterations"),
-)
 
 
 def session_line(summary: SessionSummary, session: Session | None) -> SessionLine:
@@ -66,9 +60,7 @@ def completed(line: RunLine, session: Session) -> RunLine:
 
 def describe(record: RunRecord) -> str:
     """A run in a few words: tracker, layers × particles, weighting where it is not the tracker's usual one."""
-    known = record.settings
-    stages = ["×".join(str(known[name]) for name in names if name in known) for names in SIZES]
-    size = " + ".join(stage for stage in stages if stage)
+    size = size_in_words(record.tracker, record.settings)
     unusual = "" if record.weighting == DEFAULT_WEIGHTING else f" · {record.weighting}"
     return f"{record.tracker} {size}".strip() + unusual
 

@@ -123,7 +123,7 @@ class BehaviourChoice(Answer):
 
 
 class Choices(Answer):
-    """What a new run can be made of. default_body and the like are the session's own."""
+    """What a new run can be made of. problems : what is wrong with trackers and weightings that packages add."""
 
     trackers: list[TrackerChoice]
     weightings: list[Choice]
@@ -132,3 +132,4 @@ class Choices(Answer):
     presets: list[PresetView]
     default_tracker: RunName
     default_weighting: RunName
+    problems: list[str]

@@ -13,7 +13,7 @@ from fastapi import APIRouter, Query
 
 from studio.body.catalogue import list_bodies, load_body
 from studio.errors import SettingsError, StudioError
-from studio.runs.behaviour_models import check_prediction, models_folder, models_in, needs_model
+from studio.runs.behaviour_models import check_prediction, models_folder, models_in
 from studio.sessions.stored_run import StoredRun
 from studio.settings import (
     DEFAULT_TRACKER,
@@ -61,8 +61,8 @@ def choices(doors: Door) -> Choices:
         trackers=[
             TrackerChoice(
                 name=name,
-                label=_title(entry.settings_type),
-                needs_behaviour=needs_model(name, None),
+                label=entry.label,
+                needs_behaviour=entry.needs_behaviour,
             )
             for name, entry in TRACKERS.items()
         ],
@@ -79,9 +79,10 @@ def choices(doors: Door) -> Choices:
             )
             for line in models_in([models_folder(doors.workspace.root)])
         ],
-        presets=all_presets(doors.presets, doors.state_folder),
+        presets=all_presets(doors.state_folder),
         default_tracker=DEFAULT_TRACKER,
         default_weighting=DEFAULT_WEIGHTING,
+        problems=[*TRACKERS.problems, *WEIGHTINGS.problems],
     )
 
 
@@ -136,20 +137,20 @@ def reset_settings(run: OpenRun, wish: ResetRequest, doors: Door) -> SettingsInU
 @router.post(RUN + "/settings/preset")
 def use_preset(run: OpenRun, wish: PresetChoice, doors: Door) -> SettingsInUse:
     """Change the knobs that a preset sets."""
-    chosen = preset(wish.name, doors.presets, doors.state_folder)
+    chosen = preset(wish.name, doors.state_folder)
     return _change(doors, run, chosen.values)
 
 
 @router.get("/presets")
 def presets(doors: Door) -> PresetList:
     """The studio's presets, then a person's own."""
-    return PresetList(presets=all_presets(doors.presets, doors.state_folder))
+    return PresetList(presets=all_presets(doors.state_folder))
 
 
 @router.put("/presets/{name}")
 def put_preset(name: str, wish: PresetRequest, doors: Door) -> PresetList:
     """Keep settings under a name."""
-    keep_preset(name, wish.help, wish.values, doors.presets, doors.state_folder)
+    keep_preset(name, wish.help, wish.values, doors.state_folder)
     return presets(doors)
 
 
@@ -187,7 +188,3 @@ def _bodies(folders: tuple[Path, ...], _stamp: tuple[tuple[str, int], ...]) -> t
             BodyChoice(name=name, label=body.title, parameters=len(body.parameters), limbs=len(body.drawn))
         )
     return tuple(found)
-
-
-def _title(settings_type: type) -> str:
-    return getattr(settings_type, "title", settings_type.__name__)

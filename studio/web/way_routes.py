@@ -11,7 +11,7 @@ from studio.runs.way import Way, way_of
 from studio.runs.way_results import newest_run
 from studio.sessions.beginning import begin_session
 from studio.sessions.session import Session
-from studio.tracking.evaluations import knobs_for_evaluations
+from studio.tracking.catalogue import knobs_for_evaluations
 from studio.web.doors import Door, Doors
 from studio.web.job_kinds import BACKGROUND, EXPORT, START_POSE, SUBJECT, TRACK
 from studio.web.pages import NAME, html_page

@@ -9,12 +9,12 @@ import pytest
 from toy_footage import rig
 
 from studio.capture.calibration_files import (
-    CALIBRATION_WRITERS,
+    CALIBRATION_FORMATS,
     export_calibration,
     read_calibration,
 )
 from studio.capture.calibration_writers import without_k3
-from studio.errors import CalibrationError
+from studio.errors import CalibrationError, SettingsError
 from studio.geometry.camera import Camera
 
 CAMERAS = tuple(
@@ -97,9 +97,9 @@ def test_opencv_reads_its_own_format(tmp_path: Path, suffix: str) -> None:
     assert export_calibration(CAMERAS[:1], tmp_path / "one.yml", "opencv").files == (tmp_path / "one.yml",)
 
 
-@pytest.mark.parametrize("writer", CALIBRATION_WRITERS)
+@pytest.mark.parametrize("writer", CALIBRATION_FORMATS)
 def test_the_studio_reads_what_it_wrote(tmp_path: Path, writer: str) -> None:
-    path = tmp_path / f"calibration{CALIBRATION_WRITERS[writer].suffix}"
+    path = tmp_path / f"calibration{CALIBRATION_FORMATS[writer].suffix}"
     written = export_calibration(CAMERAS, path, writer)
     found = read_calibration(written.files[0] if len(written.files) == 1 else tmp_path)
     assert [camera.name for camera in found.cameras] == [camera.name for camera in CAMERAS]
@@ -131,10 +131,10 @@ def test_a_skew_is_said_and_no_cameras_or_formats_are_refused(tmp_path: Path) ->
     camera = CAMERAS[0]
     skewed = camera.matrix + np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     slanted = Camera("s", 128, 96, skewed, camera.distortion, camera.rotation, camera.translation)
-    for writer in CALIBRATION_WRITERS:
+    for writer in CALIBRATION_FORMATS:
         (note,) = export_calibration((slanted,), tmp_path / f"{writer}.yml", writer).notes
         assert "skew" in note
         with pytest.raises(CalibrationError, match="no cameras"):
             export_calibration((), tmp_path / "none.toml", writer)
-    with pytest.raises(CalibrationError, match="no calibration format 'vicon'"):
+    with pytest.raises(SettingsError, match="no calibration format 'vicon'"):
         export_calibration(CAMERAS, tmp_path / "c.xcp", "vicon")

@@ -62,7 +62,7 @@ def test_options_reach_the_file(run: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "cause"),
     [
-        (("--to", "arm.fbx"), "There is no export to '.fbx'"),
+        (("--to", "arm.fbx"), "There is no export format 'fbx'"),
         (("--to", "arm.glb", "--unit", "m"), "means nothing to GLB"),
         (("--to", "arm.bvh", "--track", "smooth"), "has no track 'smooth'"),
         (("--to", "arm.bvh", "--first", "3", "--last", "2"), "No frame lies from 3"),

@@ -5,7 +5,7 @@ import pytest
 from studio.comparison.candidates import LINEUPS, VARIANTS, Candidate, Lineup, candidates, read_assignments
 from studio.errors import SettingsError, StudioError
 from studio.settings import changed_settings, default_settings
-from studio.tracking.evaluations import evaluations_of
+from studio.tracking.catalogue import TRACKERS
 
 
 def made(
@@ -21,7 +21,9 @@ def test_everyone_weighs_as_many_poses() -> None:
     assert list(found) == ["annealed", "annealed:eq13", "condensation"]
     for candidate in found.values():
         assert (
-            evaluations_of(candidate.tracker, candidate.settings().tracker) == candidate.evaluations == 1000
+            TRACKERS[candidate.tracker].evaluations(candidate.settings().tracker)
+            == candidate.evaluations
+            == 1000
         )
     assert (found["annealed"].settings().tracker.layers, found["annealed"].settings().tracker.particles) == (
         10,

@@ -19,7 +19,7 @@ from studio.reproduction.fleischmann.setting import EQ13, EVALUATIONS, SWARM, TW
 from studio.reproduction.tracking import Contender
 from studio.settings import DEFAULT_WEIGHTING
 from studio.synthesis.recipes import synthesize
-from studio.tracking.evaluations import knobs_for_evaluations
+from studio.tracking.catalogue import knobs_for_evaluations
 
 pytestmark = [pytest.mark.slow, pytest.mark.real_data]
 

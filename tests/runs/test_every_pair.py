@@ -15,8 +15,7 @@ from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.search_space import default_sigma, search_space
 from studio.sessions.session import Session
 from studio.settings import changed_settings, default_settings
-from studio.tracking.catalogue import TRACKERS
-from studio.tracking.evaluations import evaluations_of, knobs_for_evaluations
+from studio.tracking.catalogue import TRACKERS, knobs_for_evaluations
 from studio.tracking.frame_loop import search_frame
 from studio.tracking.tracker import FrameResult, start_of
 from studio.weighting.catalogue import WEIGHTINGS
@@ -80,7 +79,7 @@ def test_a_pair_moves_a_person_towards_the_pictures(
         )
 
     result = searched()
-    assert result.evaluations == evaluations_of(tracker, settings) == EVALUATIONS
+    assert result.evaluations == TRACKERS[tracker].evaluations(settings) == EVALUATIONS
     assert np.isfinite(result.estimate.pose).all()
     assert problem.fitness(result.estimate.mode[None])[0] > problem.fitness(start[None])[0]
     np.testing.assert_array_equal(searched().estimate.pose, result.estimate.pose)

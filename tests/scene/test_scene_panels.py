@@ -13,14 +13,13 @@ from studio.knobs import knobs_of
 from studio.runs.colour_tokens import colour_tokens
 from studio.scene.guarded_server import GuardedServer
 from studio.scene.knob_input import knob_value, slider_range
-from studio.scene.presets import PRESETS, offered
 from studio.scene.run_panel import RunPanel, Transport, clock, status_html
 from studio.scene.settings_panel import SettingsPanel, SettingsTabs
 from studio.scene.show_panel import ShowPanel
 from studio.scene.view_options import ViewOptions
 from studio.scene.wishes import Wishes
 from studio.settings import all_knobs, changed_settings, default_settings, values
-from studio.tracking.catalogue import TRACKERS
+from studio.tracking.catalogue import TRACKERS, presets
 from studio.tracking.settings import AnnealedSettings
 from studio.worker.events import SettingsApplied, StateChanged
 
@@ -130,7 +129,7 @@ def test_half_written_text_stays(panel: SettingsPanel, asked: Asked) -> None:
 
 
 def test_presets_and_resets_are_one_wish(panel: SettingsPanel, asked: Asked, server: GuardedServer) -> None:
-    careful = next(preset for preset in PRESETS if preset.name == "careful")
+    careful = next(preset for preset in presets() if preset.name == "careful")
     panel.ask_all(careful.values)
     assert asked.wishes == [{"layers": 15, "particles": 400}], "only what differs is asked for"
     panel.settle("wish-1", True)
@@ -140,15 +139,18 @@ def test_presets_and_resets_are_one_wish(panel: SettingsPanel, asked: Asked, ser
     assert len(asked.wishes) == 2
 
 
-def test_every_preset_is_allowed_and_offered_where_its_knobs_exist() -> None:
-    shown = {tracker: offered(tuple(values(default_settings(tracker)))) for tracker in TRACKERS}
-    for tracker, presets in shown.items():
-        for preset in presets:
-            assert changed_settings(default_settings(tracker), preset.values) is not None
-    assert all(any(preset in presets for presets in shown.values()) for preset in PRESETS)
-    assert [preset.name for preset in shown["swarm"]] == ["paper, swarm"]
-    assert len(shown["annealed"]) > 1
-    assert offered(("particles",)) == ()
+def test_every_preset_is_allowed_and_offered_where_its_knobs_exist(panel: SettingsPanel) -> None:
+    for tracker in TRACKERS.values():
+        for preset in tracker.presets:
+            assert changed_settings(default_settings(tracker.name), preset.values) is not None
+
+    def offered(tracker: str) -> list[str]:
+        panel.show_settings(default_settings(tracker))
+        return [preset.name for preset in panel._presets]
+
+    assert offered("swarm") == ["paper, swarm"]
+    assert offered("annealed") == [preset.name for preset in TRACKERS["annealed"].presets]
+    assert offered("condensation") == []
 
 
 def test_another_run_does_not_show_since_when_the_one_before_used_its_settings(panel: SettingsPanel) -> None:

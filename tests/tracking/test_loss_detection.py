@@ -10,7 +10,6 @@ from studio.body.catalogue import load_body
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.tracking.loss_detection import (
     FEWEST,
-    LIMITS,
     REMEMBERED,
     Onlooker,
     Sight,
@@ -48,7 +47,9 @@ def told(weighting: str = "edge-region", seed: int = 0, spread: float = 0.1) -> 
     """A watch that has seen forty well tracked frames."""
     rng = np.random.default_rng(seed)
     numbers = zip(rng.normal(-2.0, spread, 40), rng.normal(0.85, 0.01, 40), strict=True)
-    return WeightWatch(weighting, [(float(weight), float(overlap)) for weight, overlap in numbers])
+    return WeightWatch(
+        WEIGHTINGS[weighting].loss, [(float(weight), float(overlap)) for weight, overlap in numbers]
+    )
 
 
 def test_a_pose_on_the_body_overlaps_and_one_beside_it_does_not() -> None:
@@ -105,7 +106,7 @@ def test_a_weight_far_below_its_own_run_is_lost() -> None:
 
 def test_a_calm_run_is_given_the_weightings_usual_spread() -> None:
     calm, sight = told(spread=1e-4), Sight(0.85, seen=True)
-    limit = LIMITS["edge-region"]
+    limit = WEIGHTINGS["edge-region"].loss
     assert not calm.is_lost(-2.0 - 0.9 * limit.spreads * limit.spread, sight)
     assert calm.is_lost(-2.0 - 1.1 * limit.spreads * limit.spread, sight)
 
@@ -113,7 +114,7 @@ def test_a_calm_run_is_given_the_weightings_usual_spread() -> None:
 def test_little_overlap_is_lost_whatever_the_weight() -> None:
     assert told().is_lost(-1.9, Sight(0.7, seen=True))
     assert not told().is_lost(-1.9, Sight(0.78, seen=True))
-    nothing_known = WeightWatch("edge-region")
+    nothing_known = WeightWatch(WEIGHTINGS["edge-region"].loss)
     assert nothing_known.is_lost(-1.9, Sight(0.3, seen=True))
     assert not nothing_known.is_lost(-99.0, Sight(0.6, seen=True))
     assert not told().is_lost(-2.0, Sight(float("nan"), seen=True))
@@ -124,7 +125,7 @@ def test_a_weighting_that_judges_itself_is_believed() -> None:
 
 
 def test_few_frames_make_no_distribution_and_old_ones_are_forgotten() -> None:
-    watch = WeightWatch("edge-region", [(-2.0, 0.85)] * (FEWEST - 1))
+    watch = WeightWatch(WEIGHTINGS["edge-region"].loss, [(-2.0, 0.85)] * (FEWEST - 1))
     sight = Sight(0.85, seen=True)
     assert not watch.is_lost(-9.0, sight)
     watch.well_tracked(-2.0, 0.85)
@@ -136,6 +137,6 @@ def test_few_frames_make_no_distribution_and_old_ones_are_forgotten() -> None:
 
 @pytest.mark.parametrize("weighting", sorted(WEIGHTINGS))
 def test_every_weighting_was_calibrated(weighting: str) -> None:
-    limit = LIMITS[weighting]
+    limit = WEIGHTINGS[weighting].loss
     assert limit.spread > 0.0
     assert 4.0 <= limit.spreads <= 6.0

@@ -9,8 +9,7 @@ from toy_problems import Bowl, toy_hierarchy, toy_space
 from studio.errors import SettingsError
 from studio.knobs import changed
 from studio.tracking import partitions
-from studio.tracking.catalogue import TRACKERS
-from studio.tracking.evaluations import evaluations_of, knobs_for_evaluations
+from studio.tracking.catalogue import TRACKERS, knobs_for_evaluations
 from studio.tracking.frame_loop import FrameSearch
 from studio.tracking.particle_swarm import LEADER, ParticleSwarm
 from studio.tracking.swarm_settings import PARTITIONS, SwarmSettings
@@ -169,7 +168,7 @@ def test_settings_made_by_hand_are_checked_too(wrong: dict[str, float]) -> None:
 def test_knobs_give_the_evaluations_asked_for(tracker: str, wanted: int) -> None:
     knobs = knobs_for_evaluations(tracker, wanted)
     settings = changed(TRACKERS[tracker].settings_type(), knobs)
-    assert evaluations_of(tracker, settings) == wanted
+    assert TRACKERS[tracker].evaluations(settings) == wanted
 
 
 def test_table_1_in_proportion() -> None:

@@ -116,7 +116,7 @@ def test_an_interrupted_one_is_offered_to_go_on(compared: Studio) -> None:
         ({"trackers": [{"name": "../x"}]}, 422, "name"),
         ({"trackers": [{"name": "annealed", "settings": {"layers": 99}}]}, 422, "layers"),
         ({"trackers": [{"name": "annealed"}, {"name": "annealed"}]}, 422, "twice"),
-        ({"weighting": "none"}, 404, "no weighting"),
+        ({"weighting": "none"}, 422, "no weighting"),
         ({"body": "none"}, 422, "body"),
         ({"last": 1000}, 409, "0:150"),
         ({"evaluations": 1}, 422, "too few"),

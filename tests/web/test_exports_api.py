@@ -80,7 +80,7 @@ def test_the_scene_is_recorded_by_the_stage(studio: Studio, tracked: StoredRun) 
 @pytest.mark.parametrize(
     ("wish", "status", "words"),
     [
-        ({"format": "fbx"}, 422, "no export to 'fbx'"),
+        ({"format": "fbx"}, 422, "no export format 'fbx'"),
         ({"format": "glb", "options": {"unit": "cm"}}, 422, "means nothing"),
         ({"format": "bvh", "options": {"colour": "red"}}, 422, "no setting 'colour'"),
         ({"format": "bvh", "options": {"fps": "many"}}, 422, "'fps'"),

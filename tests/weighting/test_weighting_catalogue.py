@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from weighting_scene import scattered
 
-from studio.evidence.pipeline import EDGE_KINDS
+from studio.evidence.frame_evidence import EDGE_KINDS
 from studio.evidence.settings import EvidenceSettings
 from studio.knobs import knobs_of
 from studio.weighting.catalogue import WEIGHTINGS

@@ -112,7 +112,7 @@ export function showForm(content, { sessions, choices, bodies, wish, started }) 
     labelled("Session", session), labelled("Evaluations a frame, each", number("evaluations", wish.evaluations ?? 1000, { min: 1 })),
     labelled("Seeds", number("seeds", wish.seeds ?? 5, { min: 1, max: 1000 })), labelled("Weighting of all", weighting),
     labelled("Frames", element("span", { className: "two" }, first, element("span", { textContent: "to" }), last)),
-    labelled("Layers of annealed trackers", number("layers", wish.layers ?? 10, { min: 1, max: 60 })),
+    labelled("Layers, where they can be chosen", number("layers", wish.layers ?? 10, { min: 1, max: 60 })),
     labelled("Body", body), labelled("Name", element("input", { name: "name", placeholder: "numbered", pattern: "[A-Za-z0-9_\\-]{0,64}" })));
   const lineup = element("select", { ariaLabel: "Line-up" }, option("", "Line-up…", ""), ...choices.lineups.map((one) => option(one.name, `${one.name}: ${one.trackers.join(", ")}`)));
   lineup.onchange = () => { const found = choices.lineups.find((one) => one.name === lineup.value); if (found) entrants.fill(found.trackers.map((name) => ({ name }))); lineup.value = ""; };

@@ -94,13 +94,13 @@ function askToRemove(line) {
 
 /** What the form has to be filled with to ask for the same again. */
 function wishLike({ comparison: line, settings, body }) {
-  const brought = new Set(["layers", "particles", "stage1_particles", "stage1_iterations", "stage2_particles", "stage2_iterations"]);
   const first = settings[line.trackers[0]].weighting;
   const common = line.trackers.every((name) => settings[name].weighting === first) ? first : null;
   const trackers = line.trackers.map((name) => {
     const { weighting, ...knobs } = settings[name];
     const known = choices.entrants.find((one) => one.name === name)?.changes ?? {};
-    const own = Object.entries(knobs).filter(([knob, value]) => !brought.has(knob) && known[knob] !== value);
+    const brought = choices.entrants.find((one) => one.tracker === name.split(":")[0])?.sized_by ?? [];
+    const own = Object.entries(knobs).filter(([knob, value]) => !brought.includes(knob) && known[knob] !== value);
     return { name, settings: Object.fromEntries(own), weighting: common ? null : weighting };
   });
   const layers = Object.values(settings).find((one) => one.layers)?.layers;

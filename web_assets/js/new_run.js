@@ -33,7 +33,7 @@ function showBehaviour(form, knobs, trackers) {
 
 /** Open the form for a session; `like` is a run whose settings are taken over. */
 export async function newRunForm(entry, like = null) {
-  const { trackers, weightings, bodies, behaviours, presets } = await fetchJson("/api/choices");
+  const { trackers, weightings, bodies, behaviours, presets, problems } = await fetchJson("/api/choices");
   // Bodies whose every parameter has limits may begin anywhere between them; the others need a pose.
   const detail = await fetchJson(sessionPath(entry.name));
   const needsPose = !detail.has_start_pose && detail.body.parameters.some((one) => one.lower === null || one.upper === null);
@@ -42,7 +42,7 @@ export async function newRunForm(entry, like = null) {
   const bodyChoices = [{ value: "", label: `the session's (${entry.body})` }, ...bodies.map((body) => ({ value: body.name, label: `${body.name} · ${body.parameters} parameters` }))];
   openForm({
     heading: `New run of ${entry.name}`, action: "Track",
-    intro: detail.doubts.length ? `The footage speaks against the calibration. ${detail.doubts[0]}` : "",
+    intro: [...(detail.doubts.length ? [`The footage speaks against the calibration. ${detail.doubts[0]}`] : []), ...problems].join(" "),
     rows: [
       [{ name: "tracker", label: "Tracker", choices: trackers.map((one) => ({ value: one.name, label: one.label })), value: first.tracker },
         { name: "weighting", label: "Weighting", choices: weightings.map((one) => ({ value: one.name, label: one.label })), value: first.weighting }],

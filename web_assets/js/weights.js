@@ -37,8 +37,7 @@ export function startWeights() {
   watch(["summary", "frame"], () => {
     const summary = get("summary");
     const some = summary?.frames.length ? summary : null;
-    // A swarm seeks the greatest fitness; the others weigh.
-    const [name, unit] = summary?.describe?.startsWith("swarm") ? ["Best fitness", "f"] : ["Best weight", "log w"];
+    const [name, unit] = summary?.score ?? [];
     weight.draw(() => some && overFrames(some, { key: "log_weight", name, unit, colour: token("accent") }));
     const measured = some?.frames.some((entry) => entry.error_mm !== null && entry.error_mm !== undefined) ? some : null;
     const note = measured && summary.mean_mm ? `mean ${figure(summary.mean_mm)} mm, worst frame ${figure(summary.worst_mm)} mm, no alignment` : "";

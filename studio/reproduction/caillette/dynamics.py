@@ -63,7 +63,7 @@ from studio.reproduction.caillette.setting import (
 from studio.reproduction.deutscher_reid.setting import share_number, times_in_words
 from studio.reproduction.experiment import Experiment, concluding
 from studio.reproduction.tracking import Contender
-from studio.tracking.evaluations import knobs_for_evaluations
+from studio.tracking.catalogue import knobs_for_evaluations
 
 Claim = Callable[[Groups], Number | None]
 

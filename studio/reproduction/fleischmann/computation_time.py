@@ -21,8 +21,7 @@ from studio.reproduction.fleischmann.setting import EVALUATIONS, SOURCE, SWARM, 
 from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import search_space, session_sigma
 from studio.settings import changed_settings, default_settings
-from studio.tracking.catalogue import TRACKERS
-from studio.tracking.evaluations import knobs_for_evaluations
+from studio.tracking.catalogue import TRACKERS, knobs_for_evaluations
 from studio.tracking.frame_loop import search_frame
 from studio.tracking.tracker import WHOLE_BODY, FrameProblem, start_of
 from studio.weighting.catalogue import WEIGHTINGS
