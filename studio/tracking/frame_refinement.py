@@ -21,7 +21,7 @@ from studio.knobs import knob
 from studio.tracking.agreement import Agreement, Disagreement
 from studio.tracking.hidden_areas import learnt, without_hidden
 from studio.tracking.refinement import Distances, RefinementSettings, Refiner, bounded_angles
-from studio.tracking.tracker import LIMB_LOST_SHARE, Carried, FrameProblem, FrameResult, SearchSpace
+from studio.tracking.tracker import Carried, FrameProblem, FrameResult, SearchSpace
 
 Array = NDArray[np.float64]
 
@@ -32,8 +32,6 @@ DRAWS, REFINED_DRAWS, APART = 1024, 3, 0.4
 """Poses drawn of a doubtful limb; how many are refined; radians by which these differ at least in some joint."""
 SPREADS = (0.1, 0.3)
 """Half of the draws lie about where the limb is, by shares of its range; the others anywhere in it."""
-PATIENCE = 3
-"""Limbs that are doubtful but not lost are drawn anew in every so many frames: mostly it is the mask that is rough."""
 BETTER = 0.85
 """Share of the loss below which another pose is taken. Masks that end at a box say so by a tenth (a drawn walk behind
 boxes: with 0.95, 117 mm instead of 40); where a limb was lost, its place has a third to four fifths of the loss."""
@@ -107,8 +105,7 @@ class FrameRefiner:
         silhouettes = without_hidden(masks, agreement.cameras, agreement.mm_per_pixel(start), memory)
         pose, evaluations = refiner.refine(start, silhouettes).pose, 0
         off = agreement.of(pose, silhouettes)
-        least = LIMB_LOST_SHARE if result.frame % PATIENCE else DOUBTFUL_SHARE
-        if settings.redraw_limbs and max(off.shares().values()) >= least:
+        if settings.redraw_limbs and max(off.shares().values()) >= DOUBTFUL_SHARE:
             rng = np.random.Generator(
                 np.random.Philox(np.random.SeedSequence((self._seed, result.frame, 0, 0, REDRAWN)))
             )

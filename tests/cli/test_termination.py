@@ -44,6 +44,8 @@ def test_a_tracked_run_ends_with_what_is_finished(
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        # A shell's background jobs ignore SIGINT, and so would their children.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     while not run.summary().done and process.poll() is None:
         time.sleep(0.02)

@@ -111,4 +111,4 @@ def test_recorded_times_give_offsets_that_nobody_applies(studio: Studio) -> None
 def test_evaluations_are_turned_into_knobs(studio: Studio) -> None:
     told = studio.client.get("/api/evaluations", params={"tracker": "annealed", "evaluations": 2000}).json()
     assert told == {"layers": 10, "particles": 200}
-    assert studio.client.get("/api/evaluations", params={"tracker": "x", "evaluations": 5}).status_code == 404
+    assert studio.client.get("/api/evaluations", params={"tracker": "x", "evaluations": 5}).status_code == 422
