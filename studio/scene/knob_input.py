@@ -5,6 +5,7 @@ field. A changed value carries a dot in its label and a button that puts the def
 """
 
 import math
+import threading
 from collections.abc import Callable
 
 import viser
@@ -41,6 +42,8 @@ class KnobInput:
         self._change = change
         self._refused = refused
         self._awaited: dict[str, Value] = {}
+        # What is shown and what was accepted change together: viser reports every change later, from its own thread.
+        self._together = threading.RLock()
         self.handle = _make(gui, knob, value)
         self.handle.on_update(self._updated)
         # A group of one button: as slight as what it resets, and in line with it.
@@ -91,19 +94,22 @@ class KnobInput:
 
     async def _updated(self, event: viser.GuiEvent) -> None:
         # Assigning the handle's value from Python arrives here as well: what is shown already is no wish.
-        value = knob_value(self.knob, event.target.value)
-        if value != self.accepted:
+        with self._together:
+            value = knob_value(self.knob, event.target.value)
+            wished = value != self.accepted
+        if wished:
             self.ask(value)
 
     async def _reset(self, _: viser.GuiEvent) -> None:
         self.ask(self.knob.default)
 
     def _put(self, value: Value) -> None:
-        self.accepted = value
-        shown = slider_value(self.knob, value)
-        self._widen(shown)
-        if self.handle.value != shown:
-            self.handle.value = shown
+        with self._together:
+            self.accepted = value
+            shown = slider_value(self.knob, value)
+            self._widen(shown)
+            if self.handle.value != shown:
+                self.handle.value = shown
         self._dress()
 
     def _put_back(self) -> None:
