@@ -1,6 +1,8 @@
 """How far every pixel is from the silhouette's border, and the border itself, for searches that follow slopes."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import cv2
 import numpy as np
@@ -43,11 +45,17 @@ def silhouette_distances(evidence: FrameEvidence, most: int = MOST_POINTS) -> tu
     return tuple(distances_of(view.mask, most) for view in evidence.views)
 
 
-def silhouettes_by_camera(evidence: FrameEvidence, most: int = MOST_POINTS) -> dict[str, SilhouetteDistances]:
+_known: WeakKeyDictionary[FrameEvidence, dict[int, Mapping[str, SilhouetteDistances]]] = WeakKeyDictionary()
+
+
+def silhouettes_by_camera(evidence: FrameEvidence, most: int = MOST_POINTS) -> Mapping[str, SilhouetteDistances]:
     """The distances of every view's mask by its camera, summed over steps from pixel to pixel: a quarter of the time,
-    and up to a fiftieth too long.
+    and up to a fiftieth too long. Kept as long as the evidence is, so that they can be made ready beforehand.
     """
-    return {view.camera: distances_of(view.mask, most, exact=False) for view in evidence.views}
+    by_points = _known.setdefault(evidence, {})
+    if most not in by_points:
+        by_points[most] = {view.camera: distances_of(view.mask, most, exact=False) for view in evidence.views}
+    return by_points[most]
 
 
 def distances_of(mask: Bytes, most: int = MOST_POINTS, *, exact: bool = True) -> SilhouetteDistances:

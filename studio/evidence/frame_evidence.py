@@ -31,7 +31,7 @@ class ViewEvidence:
     background: YuvBackground | None = None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class FrameEvidence:
     """All cameras' evidence of one frame, in the order of the session's cameras."""
 

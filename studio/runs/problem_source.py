@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 from studio.body.model import BodyModel
 from studio.capture.footage import Footage
 from studio.evidence.backgrounds import Backgrounds
+from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
 from studio.geometry.camera import Camera
@@ -112,6 +113,8 @@ class ProblemSource:
         if found is not None:
             return found
         evidence = self.evidence(frame, settings)
+        if settings.refinement.refine_frames:
+            silhouettes_by_camera(evidence, settings.refinement.refine_frame_points)
         with self._making:
             weigher = self._weigher(settings, self.cameras_in(frame))
             return _keep(self._problems, key, weigher.problem(evidence), KEPT_FRAMES)

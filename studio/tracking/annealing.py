@@ -67,20 +67,21 @@ def anneal(log_weights: Array, wanted: float, start: float | None = None) -> Ann
 
 def _root(below: Array, smallest_gap: float, effective: float, start: float | None) -> float:
     """β at which D (Eq. 11) equals `effective`, or the nearest bound; below : (K,) max log w - log w."""
+    negative = -below
 
     def excess(log_beta: float) -> float:
-        with np.errstate(over="ignore", under="ignore"):
-            powers = np.exp(-below * math.exp(log_beta))
-        return float(np.sum(powers)) ** 2 / float(np.sum(powers * powers)) - effective
+        powers = np.exp(negative * math.exp(log_beta))
+        return float(np.add.reduce(powers)) ** 2 / float(np.add.reduce(powers * powers)) - effective
 
     lowest = max(math.log(1e-9) - math.log(float(np.max(below))), -LOG_BETA_BOUND)
     highest = min(math.log(FAR) - math.log(smallest_gap), LOG_BETA_BOUND)
-    if excess(lowest) <= 0.0:
-        return math.exp(lowest)
-    if excess(highest) >= 0.0:
-        return math.exp(highest)
-    low, high = _bracket(excess, lowest, highest, _first_guess(below, start))
-    root = brentq(excess, low, high, xtol=ROOT_TOLERANCE, rtol=np.float64(ROOT_TOLERANCE), maxiter=200)
+    with np.errstate(over="ignore", under="ignore"):
+        low, high = _bracket(excess, lowest, highest, _first_guess(below, start))
+        if low == lowest and excess(low) <= 0.0:
+            return math.exp(low)
+        if high == highest and excess(high) >= 0.0:
+            return math.exp(high)
+        root = brentq(excess, low, high, xtol=ROOT_TOLERANCE, rtol=np.float64(ROOT_TOLERANCE), maxiter=200)
     return math.exp(float(root))  # pyright: ignore[reportArgumentType] - full_output is off
 
 

@@ -215,9 +215,8 @@ class Refiner:
         """One damped step inside the limits; parameters that press against a limit stay there."""
         held = ((pose <= self.lower) & (gradient > 0.0)) | ((pose >= self.upper) & (gradient < 0.0))
         free = np.flatnonzero(~held)
-        part = matrix[np.ix_(free, free)]
-        lift = damping * np.diag(part) + 1e-9 * np.trace(matrix) / len(matrix) + 1e-12
-        part = part + np.diag(lift)
+        part = matrix[free[:, None], free]
+        part.flat[:: len(free) + 1] += damping * part.diagonal() + 1e-9 * np.trace(matrix) / len(matrix) + 1e-12
         step = np.zeros(len(pose))
         step[free] = -np.linalg.solve(part, gradient[free])
         return np.clip(pose + step * self.unit, self.lower, self.upper)
