@@ -26,11 +26,14 @@ from studio.runs.behaviour_models import check_prediction, fitting, model_folder
 from studio.runs.run_behaviour import learner_of
 from studio.runs.search_space import search_space, session_sigma
 from studio.runs.shape_on_the_way import WEIGHTING, FittedShape, shaped_body
+from studio.runs.sides import known_silhouettes
 from studio.sessions.session import Session
 from studio.settings import RunSettings, changed_settings, default_settings
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.frame_loop import search_frame
 from studio.tracking.frame_refinement import FrameRefiner, space_after
+from studio.tracking.refinement import Distances
+from studio.tracking.side_exchange import with_sides_right
 from studio.tracking.tracker import LayerRecord, start_of
 from studio.weighting.catalogue import WEIGHTINGS
 
@@ -139,15 +142,20 @@ def track(
         shaped = follow.shaped(body, start, frames[: attempt.shape_frames])
         body, start = shaped.body, tuple(float(value) for value in shaped.start)
     found = follow(body, start, frames, on_layer=on_layer, on_frame=on_frame)
+    if settings.refinement.refine_frames:
+        found.poses = follow.sides_right(body, frames, found)
     return measured(session, body, found.poses, np.array(frames), found.evaluations, found.seconds)
 
 
 @dataclass(slots=True, eq=False)
 class _Followed:
-    """poses (F, D) and log_weights (F,) of frames; evaluations of one after the first; seconds of the search."""
+    """poses (F, D) and log_weights (F,) of frames; memories: what the search knew in each; evaluations of one after the
+    first; seconds of the search.
+    """
 
     poses: Array
     log_weights: Array
+    memories: list[Mapping[str, Array]] = field(default_factory=list[Mapping[str, Array]])
     evaluations: int = 0
     seconds: float = 0.0
 
@@ -236,9 +244,22 @@ class _Following:
                 found.seconds += time.perf_counter() - began
             carried, found.evaluations = result.carried, result.evaluations
             found.poses[number], found.log_weights[number] = result.estimate.pose, result.estimate.log_weight
+            found.memories.append(carried.memory)
             if on_frame is not None:
                 on_frame(number + 1, len(frames))
         return found
+
+    def sides_right(self, body: BodyModel, frames: range, found: _Followed) -> Array:
+        """(F, D) the poses with left and right, front and back put right, as a finished run has them."""
+        rows = {frame: row for row, frame in enumerate(frames)}
+
+        def silhouettes_of(frame: int) -> Mapping[str, Distances]:
+            row = rows[frame]
+            seen = self.evidence(frame)
+            return known_silhouettes(body, self.seen_with, seen, found.poses[row], found.memories[row])
+
+        rate = self.session.manifest.fps / self.attempt.every
+        return with_sides_right(body, self.seen_with, np.array(frames), found.poses, rate, silhouettes_of)[0]
 
 
 def measured(

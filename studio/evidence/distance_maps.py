@@ -48,7 +48,9 @@ def silhouette_distances(evidence: FrameEvidence, most: int = MOST_POINTS) -> tu
 _known: WeakKeyDictionary[FrameEvidence, dict[int, Mapping[str, SilhouetteDistances]]] = WeakKeyDictionary()
 
 
-def silhouettes_by_camera(evidence: FrameEvidence, most: int = MOST_POINTS) -> Mapping[str, SilhouetteDistances]:
+def silhouettes_by_camera(
+    evidence: FrameEvidence, most: int = MOST_POINTS
+) -> Mapping[str, SilhouetteDistances]:
     """The distances of every view's mask by its camera, summed over steps from pixel to pixel: a quarter of the time,
     and up to a fiftieth too long. Kept as long as the evidence is, so that they can be made ready beforehand.
     """

@@ -4,13 +4,16 @@ What was tracked stays. Where something was exchanged, the poses with sides put 
 says in `made_by` what was exchanged; where nothing was, there is no such track.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
+from studio.body.model import BodyModel
 from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence
+from studio.geometry.camera import Camera
 from studio.runs.refined_frames import MaskSettings
 from studio.runs.run_watch import Sightings
 from studio.runs.tracks import (
@@ -30,6 +33,8 @@ from studio.tracking.hidden_areas import without_hidden
 from studio.tracking.loss_detection import Onlooker
 from studio.tracking.refinement import Distances, mm_at
 from studio.tracking.side_exchange import with_sides_right
+
+Array = NDArray[np.float64]
 
 BORDER_POINTS = 150
 EXCHANGED = "exchanged"
@@ -53,13 +58,9 @@ def put_sides_right(
     body, cameras, poses = problems.body, problems.cameras, dict(zip(track.frames, track.poses, strict=True))
     with run.results() as results:
 
-        def silhouettes_of(frame: int) -> dict[str, Distances]:
-            """The frame's, without what the run knew to be hidden there."""
-            seen = silhouettes_by_camera(evidence(frame), BORDER_POINTS)
-            own = [camera for camera in cameras if camera.name in seen]
-            hidden, mm = results.result(frame).carried.memory, mm_at(body, own, poses[frame])
-            shown = without_hidden([seen[camera.name] for camera in own], own, mm, hidden)
-            return {camera.name: view for camera, view in zip(own, shown, strict=True)}
+        def silhouettes_of(frame: int) -> Mapping[str, Distances]:
+            memory = results.result(frame).carried.memory
+            return known_silhouettes(body, cameras, evidence(frame), poses[frame], memory)
 
         found, changes = with_sides_right(
             body, cameras, track.frames, track.poses, run.record.fps, silhouettes_of
@@ -75,6 +76,20 @@ def put_sides_right(
     made_by = {"verb": SIDES, SOURCE: RAW, SOURCE_DIGEST: track_digest(track), EXCHANGED: words}
     write_track(run, Track(SIDES, track.frames, found, confidence, track.states, made_by), replace=True)
     return words
+
+
+def known_silhouettes(
+    body: BodyModel,
+    cameras: Sequence[Camera],
+    evidence: FrameEvidence,
+    pose: Array,
+    memory: Mapping[str, Array],
+) -> Mapping[str, Distances]:
+    """A frame's silhouettes by camera, without what was known to be hidden there. pose (D,), memory : of the frame."""
+    seen = silhouettes_by_camera(evidence, BORDER_POINTS)
+    own = [camera for camera in cameras if camera.name in seen]
+    shown = without_hidden([seen[camera.name] for camera in own], own, mm_at(body, own, pose), memory)
+    return {camera.name: view for camera, view in zip(own, shown, strict=True)}
 
 
 def can_be_looked_at(run: StoredRun) -> bool:

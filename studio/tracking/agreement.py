@@ -79,11 +79,13 @@ class Agreement:
             own *= (step * mm) ** 2
         return Disagreement(counts[..., 0], counts[..., 1], counts[..., 2], self._limbs)
 
-    def of_places(self, poses: Array, silhouettes: Sequence[Distances]) -> Array:
+    def of_places(self, poses: Array, silhouettes: Sequence[Distances], without: str | None = None) -> Array:
         """(N,) mm² by which poses (N, D) that differ in a limb or two disagree with a frame's silhouettes there, on a
-        coarse grid: what these limbs cover outside, and silhouette far from all limbs.
+        coarse grid: what these limbs cover outside, and silhouette far from all limbs. without : a limb that counts as
+        not there.
         """
         corners, _ = self._projector.corners(poses)
+        corners[:, :, [limb == without for limb in self._limbs]] = np.nan
         moving = (corners != corners[:1]).any(axis=(0, 1, 3, 4))
         found = np.zeros(len(poses))
         for number, (view, mm) in enumerate(zip(silhouettes, self.mm_per_pixel(poses[0]), strict=True)):

@@ -216,7 +216,9 @@ class Refiner:
         held = ((pose <= self.lower) & (gradient > 0.0)) | ((pose >= self.upper) & (gradient < 0.0))
         free = np.flatnonzero(~held)
         part = matrix[free[:, None], free]
-        part.flat[:: len(free) + 1] += damping * part.diagonal() + 1e-9 * np.trace(matrix) / len(matrix) + 1e-12
+        part.flat[:: len(free) + 1] += (
+            damping * part.diagonal() + 1e-9 * np.trace(matrix) / len(matrix) + 1e-12
+        )
         step = np.zeros(len(pose))
         step[free] = -np.linalg.solve(part, gradient[free])
         return np.clip(pose + step * self.unit, self.lower, self.upper)

@@ -24,6 +24,7 @@ from studio.weighting.catalogue import WEIGHTINGS
 
 CAMERAS = ring_of_cameras(4, 480, 360)
 SETTINGS = FrameRefinementSettings()
+Angles = tuple[float, ...]
 
 
 @pytest.fixture(scope="module")
@@ -103,6 +104,32 @@ def test_an_arm_that_is_lost_is_drawn_anew(body: BodyModel, truth: np.ndarray, r
     assert not found.limbs_lost
     assert off(body, found.estimate.pose, truth) < 0.5 * off(body, stuck.estimate.pose, truth)
     assert found.evaluations > stuck.evaluations
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "left_astray", "right_astray"),
+    [
+        ((0.6, -1.9, -1.7, -0.3), (-0.4, 2.5, 2.9, -0.1), (-0.5, -2.0, 0.0, -1.5), (0.6, 1.5, 2.1, -2.3)),
+        ((-0.4, -2.8, -0.9, -0.2), (0.3, 0.9, 2.0, 0.2), (0.7, -1.9, -0.2, -0.7), (-1.0, 1.7, 2.2, -1.1)),
+    ],
+)
+def test_two_arms_that_stand_in_for_each_other_are_drawn_anew_together(
+    body: BodyModel, left: Angles, right: Angles, left_astray: Angles, right_astray: Angles
+) -> None:
+    """Neither finds its own place while the other one lies there: drawn anew one by one, both stay lost."""
+    names = [entry.name for entry in body.parameters]
+    angles = ("shoulder_rx", "shoulder_ry", "shoulder_rz", "elbow_ry")
+    arms = [names.index(f"{side}_{angle}") for side in ("left", "right") for angle in angles]
+    shown, astray = body.neutral.copy(), body.neutral.copy()
+    shown[arms], astray[arms] = left + right, left_astray + right_astray
+    shown[names.index("pelvis_z")] = astray[names.index("pelvis_z")] = 950.0
+    evidence = drawn_evidence(body, shown, CAMERAS)
+    weighting = WEIGHTINGS["edge-silhouette"]
+    problem = weighting.prepare(body, CAMERAS, weighting.settings_type()).problem(evidence)
+    seen = partial(silhouettes_by_camera, evidence)
+    found = FrameRefiner(body, CAMERAS, 7).refined(searched(astray), seen, problem, SETTINGS)
+    assert not found.limbs_lost
+    assert off(body, found.estimate.pose, shown) < 30.0
 
 
 def test_an_arm_hidden_in_the_trunk_is_found_where_silhouettes_are_bare(
