@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.array_archives import read_archive
+from studio.arrays import read_archive
 from studio.behaviour.automaton import Automaton
 from studio.behaviour.feature_space import FeatureSpace
 from studio.behaviour.gaussian_mixture import GaussianMixture

@@ -9,13 +9,11 @@ such as "a knee bends backwards" mean one of these spellings, and a pose from el
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.forward_kinematics import joint_frames, marker_points
 from studio.body.model import TURN, BodyModel, Joint
 from studio.body.tables import kinematic_tables
-
-Array = NDArray[np.float64]
 
 # How far (mm; and share of a limb's cross-section) a rewritten body may differ: rounding and nothing else.
 SAME = 1e-6

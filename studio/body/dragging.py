@@ -9,9 +9,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from studio.arrays import Array, Indices
 from studio.body.branches import within_limits
 from studio.body.extremities import extremities
 from studio.body.forward_kinematics import joint_frames, limb_ends
@@ -19,8 +19,6 @@ from studio.body.inverse_kinematics import MM_PER_RADIAN
 from studio.body.model import BodyModel
 from studio.errors import BodyError
 from studio.geometry.reach import within_reach
-
-Array = NDArray[np.float64]
 
 REACHED = 1.0
 """mm; a chain that comes this near needs no help of the rest of the body."""
@@ -165,7 +163,7 @@ class Dragger:
         self,
         pose: Array,
         start: Array,
-        free: NDArray[np.int64],
+        free: Indices,
         pull: Array,
         grip: Grip,
         wanted: Array,
@@ -204,7 +202,7 @@ class Dragger:
         found[free] = np.clip(answer.x * scale, lower, upper)
         return found
 
-    def _chain(self, joint: int) -> NDArray[np.int64]:
+    def _chain(self, joint: int) -> Indices:
         """The parameters that move a joint's frame, root's left out, from the root outwards."""
         found: list[int] = []
         while joint >= 0:

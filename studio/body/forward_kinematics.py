@@ -7,14 +7,13 @@ motions world_from_joint: three axis columns and the origin (mm).
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from studio.arrays import Array
 from studio.body.model import MOVE, BodyModel
 from studio.body.tables import kinematic_tables
 from studio.errors import BodyError
 from studio.numba_in_threads import numba
-
-Array = NDArray[np.float64]
 
 
 def joint_frames(body: BodyModel, poses: ArrayLike) -> Array:

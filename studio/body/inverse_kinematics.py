@@ -11,15 +11,13 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from studio.arrays import Array, Indices
 from studio.body.branches import within_limits
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
 from studio.errors import BodyError
-
-Array = NDArray[np.float64]
 
 # Headings tried for the root, evenly around; starts that are fitted whole.
 HEADINGS = 8
@@ -130,7 +128,7 @@ class _MarkerProblem:
             shifted[place] += away[axis]
         return np.clip(shifted, self.lower, self.upper)
 
-    def fitted(self, pose: Array, free: NDArray[np.int64]) -> Array:
+    def fitted(self, pose: Array, free: Indices) -> Array:
         """The pose with its `free` parameters at the least squares."""
         scale, lower, upper = self.scale[free], self.lower[free], self.upper[free]
         pull = PULL * (pose if free is not self.everything else self.start)[free] / scale
@@ -172,7 +170,7 @@ class _MarkerProblem:
         return np.where((nearer >= self.lower) & (nearer <= self.upper), nearer, pose)
 
 
-def _root(body: BodyModel) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+def _root(body: BodyModel) -> tuple[Indices, Indices, Indices]:
     """The parameters of the first joint that moves: all, its angles, its lengths."""
     for joint in body.joints:
         used = [step.parameter for step in joint.steps if step.parameter >= 0]
@@ -183,7 +181,7 @@ def _root(body: BodyModel) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArra
     return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64)
 
 
-def _axes(body: BodyModel, moves: NDArray[np.int64]) -> list[int]:
+def _axes(body: BodyModel, moves: Indices) -> list[int]:
     """The axis along which each of the root's lengths moves the body."""
     axis = {step.parameter: step.axis for joint in body.joints for step in joint.steps}
     return [axis[int(place)] for place in moves]

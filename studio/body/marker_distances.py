@@ -5,13 +5,11 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array, Indices
 from studio.body.dimensions import with_dimensions
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
-
-Array = NDArray[np.float64]
 
 # How far joints bend in an ordinary standing posture, and how little a distance that is measured standing may
 # change by it.
@@ -119,7 +117,7 @@ class MarkerDistances:
         ends = self._places(pairs)
         return points[ends[:, 0]] - points[ends[:, 1]]
 
-    def _places(self, pairs: list[str]) -> NDArray[np.int64]:
+    def _places(self, pairs: list[str]) -> Indices:
         return np.array([self._ends(pair) for pair in pairs], dtype=np.int64)
 
     def _ends(self, pair: str) -> tuple[int, int] | None:

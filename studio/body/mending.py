@@ -6,15 +6,13 @@ flat or on the toes; in the air stretched as a dancer's. In one of them a knee i
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 from scipy.spatial.transform import Rotation
 
+from studio.arrays import Array
 from studio.body.person import SIDES, PersonMotion, joint_points
 from studio.body.retargeting import FLOOR_SHARE, above_floor
 from studio.geometry.rotations import axis_turn
-
-Array = NDArray[np.float64]
 
 SMOOTHING_S = 0.04
 TURNED_OVER = 1.0  # trace of a turn by 90 degrees

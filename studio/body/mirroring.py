@@ -7,9 +7,9 @@ turn that a parameter makes at rest, mirrored, is its twin's, or the reverse of 
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from studio.arrays import Array, Indices
 from studio.body.branches import within_limits
 from studio.body.dragging import root_joint
 from studio.body.forward_kinematics import joint_frames, limb_ends
@@ -17,8 +17,6 @@ from studio.body.inverse_kinematics import DIFFERENCE, MM_PER_RADIAN
 from studio.body.model import BodyModel
 from studio.errors import BodyError
 from studio.geometry.rotations import vector_from_rotation
-
-Array = NDArray[np.float64]
 
 SMALL = 1e-3
 UNEVEN = 5.0
@@ -67,7 +65,7 @@ class Mirror:
         """Whether the body's root can turn."""
         return any(self.body.parameters[at].kind == "angle" for at in self._root.tolist())
 
-    def exchanged(self, pose: Array, own: NDArray[np.int64], limbs: NDArray[np.int64]) -> Array:
+    def exchanged(self, pose: Array, own: Indices, limbs: Indices) -> Array:
         """The pose (D,) with each of a pair's limbs (indices of drawn ones) where its twin is, as near as the pair's
         own parameters can bring them; all else stays.
         """
@@ -118,7 +116,7 @@ class Mirror:
         return best
 
     def _fitted(
-        self, pose: Array, wanted: Array, free: NDArray[np.int64], limbs: NDArray[np.int64] | None = None
+        self, pose: Array, wanted: Array, free: Indices, limbs: Indices | None = None
     ) -> tuple[Array, float]:
         """The pose with its `free` parameters where the limbs are nearest to `wanted`, limits kept, and half the sum of
         squares that remains. limbs : which drawn ones, None for all.
@@ -183,7 +181,7 @@ class Mirror:
         return np.where(along < -0.01 * SMALL**2, -1.0, 1.0)
 
 
-def name_twins(names: list[str]) -> NDArray[np.int64]:
+def name_twins(names: list[str]) -> Indices:
     """Each name's place, or that of the one that says left where it says right."""
     places = {name: at for at, name in enumerate(names)}
     found = []
@@ -193,7 +191,7 @@ def name_twins(names: list[str]) -> NDArray[np.int64]:
     return np.array(found, dtype=np.int64)
 
 
-def _parameter_twins(body: BodyModel) -> NDArray[np.int64]:
+def _parameter_twins(body: BodyModel) -> Indices:
     """Each parameter's place, or that of its like in the group of the other side (left arm, right arm)."""
     groups: dict[str, list[int]] = {}
     for at, entry in enumerate(body.parameters):
@@ -206,6 +204,6 @@ def _parameter_twins(body: BodyModel) -> NDArray[np.int64]:
     return found
 
 
-def _parameters_of(body: BodyModel, joint: int) -> NDArray[np.int64]:
+def _parameters_of(body: BodyModel, joint: int) -> Indices:
     steps = body.joints[joint].steps if joint >= 0 else ()
     return np.array([step.parameter for step in steps if step.parameter >= 0], dtype=np.int64)

@@ -9,12 +9,9 @@ down. Lengths in mm, angles in radians here (degrees in body files).
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array, Indices
 from studio.body.definition import BodyDefinition
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 MOVE, TURN = 0, 1
 
@@ -97,13 +94,13 @@ class KinematicTables:
     length, radius_start, radius_end, scale_x, scale_y.
     """
 
-    parent: IntArray
-    first_step: IntArray
-    step_kind: IntArray
-    step_axis: IntArray
-    step_parameter: IntArray
+    parent: Indices
+    first_step: Indices
+    step_kind: Indices
+    step_axis: Indices
+    step_parameter: Indices
     step_value: Array
-    limb_joint: IntArray
+    limb_joint: Indices
     limb_shape: Array
 
 

@@ -8,13 +8,11 @@ the thorax's z axis, which turns about the pelvis centre. Knees and elbows are h
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
+from studio.arrays import Array
 from studio.motion_files.trc import MarkerMotion
-
-Array = NDArray[np.float64]
 
 SIDES = ("left", "right")
 # Frames on either side of what is sampled that the curves go through.

@@ -9,14 +9,13 @@ hips, shoulders and crown instead, since their joints are divided differently ev
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
+from studio.arrays import Array
 from studio.body.person import SIDES, PersonMotion, Skeleton, joint_points
 from studio.errors import StudioError
 from studio.motion_files.recorded_motion import RecordedMotion
 
-Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 FORWARD: Vector = (1.0, 0.0, 0.0)

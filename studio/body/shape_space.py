@@ -13,14 +13,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.definition import BodyDefinition, split_sign
 from studio.body.dimensions import with_dimensions
 from studio.body.model import BodyModel
 from studio.errors import BodyError
-
-Array = NDArray[np.float64]
 
 SIDE = re.compile(r"(^|_)(left|right)(_|$)")
 SMALL = ("foot_heel", "foot_drop", "ankle_height")

@@ -34,7 +34,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import tomli_w
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
@@ -43,8 +43,6 @@ from studio.body.model import BodyModel
 from studio.errors import BodyError
 from studio.foreign_files import check_regular
 from studio.typed_decoding import decode_toml
-
-Array = NDArray[np.float64]
 
 DEFAULT_BODY = "human31"
 

@@ -5,8 +5,8 @@ from itertools import combinations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array, Indices
 from studio.calibration.board_poses import pair_pose, view_of
 from studio.calibration.boards import Board
 from studio.calibration.extrinsics import Rig
@@ -16,8 +16,6 @@ from studio.calibration.intrinsics import Lens
 from studio.calibration.scale_checks import scale_finding
 from studio.calibration.sightings import Sighting
 from studio.geometry.camera import Camera
-
-Array = NDArray[np.float64]
 
 GOOD_PX = 3.0
 """Pixels per 1000 of width by which two sound views of a board may miss each other, median."""
@@ -174,9 +172,9 @@ def _shared(
 
 def _two_views(
     one: Camera, two: Camera, first: Sighting, second: Sighting, board: Board
-) -> tuple[Array, Array, NDArray[np.int64]]:
+) -> tuple[Array, Array, Indices]:
     """(K, 3) common corners in the world, (K,) pixels per 1000 by which they miss the views, (K,) ids."""
-    best: tuple[Array, Array, NDArray[np.int64]] | None = None
+    best: tuple[Array, Array, Indices] | None = None
     for end in (False, True) if board.turn_symmetric else (False,):
         ids = len(board.points) - 1 - second.ids if end else second.ids
         both, left, right = np.intersect1d(first.ids, ids, return_indices=True)

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Bytes, Indices
 from studio.calibration.detection import BoardFinder, sharpness
 from studio.calibration.sightings import Sighting
 from studio.capture.footage import background_turn, turned_picture
@@ -16,8 +16,6 @@ from studio.capture.pictures import is_picture, list_pictures, read_picture
 from studio.capture.video import VIDEO_SUFFIXES, VideoReader, measure_video
 from studio.errors import CalibrationError
 from studio.progress import Progress
-
-Bytes = NDArray[np.uint8]
 
 LENS_FRAMES, RIG_FRAMES = 60, 120
 LENS_PICTURES = 30
@@ -155,7 +153,7 @@ def frame_count(footage: BoardFootage) -> int:
     return len(footage.pictures) if footage.video is None else measure_video(footage.video).frame_count
 
 
-def frames_in_step(counts: Sequence[int], most: int) -> NDArray[np.int64]:
+def frames_in_step(counts: Sequence[int], most: int) -> Indices:
     """Frame numbers to look at, the same for all cameras of these frame counts."""
     least = min(counts)
     step = max(1, -(-least // most))
@@ -196,7 +194,7 @@ def _looked(
     camera: str,
     footage: BoardFootage,
     count: int,
-    frames: NDArray[np.int64],
+    frames: Indices,
     progress: Progress | None,
     taken: HowTaken,
     begin: int = 0,
@@ -218,9 +216,7 @@ def footage_picture(footage: BoardFootage, frame: int) -> Bytes:
     return next(iter(_pictures(footage, count, np.array([min(max(frame, 0), count - 1)]))))[2]
 
 
-def _pictures(
-    footage: BoardFootage, count: int, frames: NDArray[np.int64]
-) -> Iterator[tuple[int, str, Bytes]]:
+def _pictures(footage: BoardFootage, count: int, frames: Indices) -> Iterator[tuple[int, str, Bytes]]:
     """Frame number, name and picture."""
     if footage.video is None:
         for frame in frames.tolist():

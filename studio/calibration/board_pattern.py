@@ -4,12 +4,9 @@ from dataclasses import dataclass
 
 import cv2.aruco
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array, Bytes
 from studio.calibration.boards import Board
-
-Array = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,12 +7,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.calibration.boards import Board
 from studio.calibration.intrinsics import Lens
 from studio.calibration.sightings import Sighting
 from studio.geometry.rigid import compose, inverse, rigid
-
-Array = NDArray[np.float64]
 
 NEAR_ANGLE, NEAR_SHARE = np.radians(6.0), 0.06
 """Two votes for the pose of a camera agree within this turn and this share of the board's distance."""

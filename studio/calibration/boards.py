@@ -11,11 +11,9 @@ from typing import Literal
 import cv2
 import cv2.aruco
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.errors import CalibrationError
-
-Array = NDArray[np.float64]
 
 DEFAULT_DICTIONARY = "DICT_4X4_250"
 SPELLING = (

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.sparse import csr_matrix, lil_matrix
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from studio.arrays import Array, Indices
 
 LOSS_PX = 1.0
 POSE, LENS = 6, 4

@@ -5,11 +5,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Bytes, Indices
 from studio.calibration.sightings import Sighting
-
-Bytes = NDArray[np.uint8]
 
 CELLS_ACROSS = 10
 ENOUGH = 8
@@ -20,7 +18,7 @@ ENOUGH = 8
 class Coverage:
     """counts : (rows, columns) corners seen in each cell of a grid over the picture. share : of the cells with any."""
 
-    counts: NDArray[np.int64]
+    counts: Indices
     size: tuple[int, int]
 
     @property

@@ -11,11 +11,9 @@ import cv2.aruco
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array, Bytes, Indices
 from studio.calibration.boards import Board
 from studio.calibration.sightings import Sighting
-
-Array = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
 
 FEWEST_CORNERS = 6
 SUBPIXEL_REACH = (2, 5)
@@ -48,7 +46,7 @@ class BoardFinder:
         size = (int(grey.shape[1]), int(grey.shape[0]))
         return Sighting(camera, frame, name or f"frame {frame}", size, *found, mirrored=mirrored)
 
-    def _corners(self, grey: NDArray) -> tuple[NDArray[np.int64], Array] | None:
+    def _corners(self, grey: NDArray) -> tuple[Indices, Array] | None:
         if self._charuco is not None:
             return _charuco_corners(self.board, self._charuco, grey)
         pixels = _chessboard_corners(self.board, grey, self._thorough)
@@ -75,7 +73,7 @@ def _charuco_detector(board: Board) -> cv2.aruco.CharucoDetector:
 
 def _charuco_corners(
     board: Board, detector: cv2.aruco.CharucoDetector, grey: NDArray
-) -> tuple[NDArray[np.int64], Array] | None:
+) -> tuple[Indices, Array] | None:
     """(K,) ids and (K, 2) pixels.
 
     OpenCV 4.10 gives corners half a pixel off; all are refined again here, in a window that leaves the markers out.
@@ -96,7 +94,7 @@ def _charuco_corners(
     return numbers[kept], np.asarray(fine[kept], dtype=np.float64)
 
 
-def _spacing(board: Board, ids: NDArray[np.int64], pixels: NDArray) -> float:
+def _spacing(board: Board, ids: Indices, pixels: NDArray) -> float:
     """Pixels from corner to corner: the median over all pairs, by their distance on the board."""
     plan = np.linalg.norm(board.points[ids][:, None] - board.points[ids][None], axis=-1) / board.square_mm
     seen = np.linalg.norm(pixels[:, None] - pixels[None], axis=-1)

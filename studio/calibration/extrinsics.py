@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.calibration.board_poses import BoardView, PairPose, pair_pose, views_by_camera
 from studio.calibration.boards import Board
 from studio.calibration.bundle import Bundle, Observations, adjusted, errors_of, kept_inliers
@@ -22,8 +22,6 @@ from studio.geometry.camera import Camera
 from studio.geometry.rigid import compose, inverse, rigid
 from studio.geometry.rotations import rotation_from_vector, vector_from_rotation
 from studio.progress import Progress
-
-Array = NDArray[np.float64]
 
 MOST_FRAMES = 90
 CLIPPED_PX = 30.0

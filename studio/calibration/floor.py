@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.calibration.board_poses import view_of
 from studio.calibration.boards import Board
 from studio.calibration.extrinsics import Rig
@@ -17,8 +17,6 @@ from studio.calibration.sightings import Sighting
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
 from studio.geometry.rigid import best_fit, compose, inverse, rigid, transform
-
-Array = NDArray[np.float64]
 
 FEWEST_POINTS = 3
 STRETCHED = 1e-2

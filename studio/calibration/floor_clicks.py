@@ -11,16 +11,14 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.calibration.floor import floor_from_points, triangulated, world_from_points
 from studio.errors import CalibrationError
 from studio.foreign_files import foreign_file
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.geometry.rigid import transform
-
-Array = NDArray[np.float64]
 
 LENGTHS_AGREE = 0.03
 

@@ -5,14 +5,12 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.calibration.boards import Board
 from studio.calibration.coverage import Coverage, coverage_of
 from studio.calibration.sightings import Sighting
 from studio.errors import CalibrationError
-
-Array = NDArray[np.float64]
 
 FEWEST_PICTURES = 3
 OUTLYING, LEAST_OUTLYING_PX = 3.0, 0.7

@@ -2,11 +2,9 @@
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.geometry.camera import Camera
-
-Array = NDArray[np.float64]
 
 
 def rays_of(camera: Camera, pixels: Array) -> Array:

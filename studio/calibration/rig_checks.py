@@ -3,15 +3,13 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.calibration.fault_hypotheses import inverted, transposed
 from studio.calibration.findings import Finding
 from studio.capture.sanity import common_target
 from studio.geometry.camera import Camera
 from studio.geometry.rotations import orthonormality_error
-
-Array = NDArray[np.float64]
 
 ROTATION_TOLERANCE = 1e-3
 SMALLEST_RIG_MM, LARGEST_RIG_MM = 100.0, 100_000.0

@@ -3,10 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from studio.arrays import Array, Indices
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,7 +20,7 @@ class Sighting:
     frame: int
     picture: str
     size: tuple[int, int]
-    ids: NDArray[np.int64]
+    ids: Indices
     pixels: Array
     mirrored: bool = False
 

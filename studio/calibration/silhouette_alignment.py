@@ -15,16 +15,15 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from studio.arrays import Array, Indices
 from studio.calibration.rays import rays_of
 from studio.calibration.silhouette_checks import WIDEST
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
 from studio.geometry.rotations import rotation_from_vector
 
-Array = NDArray[np.float64]
 Outlines = Mapping[int, Mapping[str, Array]]
 
 ROBUST_PIXELS = 4.0
@@ -101,7 +100,7 @@ def _rays_in_cameras(cameras: Sequence[Camera], outlines: Outlines) -> list[dict
 
 def _misses(
     cameras: Sequence[Camera], rays: Sequence[Mapping[str, Array]], turns: Array
-) -> tuple[Array, NDArray[np.int64]]:
+) -> tuple[Array, Indices]:
     """(T,) signed misses in pixels, NaN where a pair cannot tell, and (T, 2) the cameras of each."""
     now = turned(cameras, turns)
     missed: list[float] = []

@@ -10,8 +10,8 @@ from itertools import combinations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array, Bytes
 from studio.calibration.boards import Board
 from studio.calibration.fault_hypotheses import explained
 from studio.calibration.findings import Finding
@@ -20,8 +20,6 @@ from studio.calibration.scale_checks import height_finding, unit_finding
 from studio.calibration.standing import Posture, postures, standing_height
 from studio.geometry.camera import Camera
 
-Array = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
 Masks = Mapping[int, Mapping[str, Bytes]]
 
 GOOD = 0.1

@@ -12,12 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array, Bytes
 from studio.calibration.rays import rays_of
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
-
-Array = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
 
 CELLS = 48
 SLABS = 20

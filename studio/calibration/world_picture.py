@@ -6,11 +6,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array, Bytes
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
-
-Array = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
 
 REACH_MM, STEP_MM, AXIS_MM, POLE_MM = 2000.0, 500.0, 1000.0, 1800.0
 PIECES = 24

@@ -6,8 +6,8 @@ x is a camera's name. Written by EasyMocap line by line in OpenCV's YAML, with C
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.capture.calibration_parts import FoundCameras, Intrinsics, checked_intrinsics
 from studio.capture.calibration_storage import Storage
 from studio.capture.naming import listed
@@ -73,7 +73,7 @@ def _lens(inner: Storage, name: str, sized: bool) -> Intrinsics:
 def _camera(outer: Storage, lens: Intrinsics) -> Camera:
     """A lens at its place; Rot_x and R_x must say the same."""
     where = f"{outer.where}, camera {lens.name}"
-    found: list[NDArray[np.float64]] = []
+    found: list[Array] = []
     if outer.first(f"Rot_{lens.name}"):
         found.append(check_rotation(outer.shaped(f"Rot_{lens.name}", 3, 3), where))
     if outer.first(f"R_{lens.name}"):

@@ -10,8 +10,8 @@ import re
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.capture.calibration_easymocap import NO_SIZE
 from studio.capture.calibration_parts import FoundCameras, Intrinsics, checked_intrinsics
 from studio.capture.calibration_storage import STORAGE_SUFFIXES, Storage, storage_text
@@ -20,8 +20,6 @@ from studio.capture.sanity import check_rotation
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
 from studio.geometry.rotations import rotation_from_vector
-
-Array = NDArray[np.float64]
 
 MATRICES = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "M1")
 DISTORTIONS = ("distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "dist_coeffs", "dist", "D")

@@ -7,12 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
-
-Array = NDArray[np.float64]
 
 DISTORTION_NUMBERS = (4, 5)
 FOCAL_SHARES = (0.1, 100.0)

@@ -10,16 +10,14 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.capture.calibration_parts import FoundCameras, Intrinsics, checked_intrinsics
 from studio.capture.calibration_storage import storage_text, xml_root
 from studio.capture.naming import listed
 from studio.capture.sanity import check_rotation
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
-
-Array = NDArray[np.float64]
 
 QUALISYS_SUFFIXES = (".qca.txt", ".qca")
 SUBPIXELS = 64.0

@@ -12,11 +12,10 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.errors import CalibrationError
 
-Array = NDArray[np.float64]
 # A scalar as it is written, a list of scalars, or a map of these. What is nested deeper is kept as an empty map.
 Entry = str | list[str] | dict[str, "Entry"]
 

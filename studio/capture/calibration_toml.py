@@ -12,15 +12,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 import tomli_w
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.capture.calibration_parts import AssumedCrop, FoundCameras, Intrinsics, checked_intrinsics
 from studio.capture.sanity import check_rotation
 from studio.errors import CalibrationError
 from studio.foreign_files import foreign_file
 from studio.geometry.camera import Camera
-
-Array = NDArray[np.float64]
 
 CANONICAL = "capture-studio"
 

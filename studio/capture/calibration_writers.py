@@ -10,16 +10,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 import tomli_w
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.capture.calibration_parts import FoundCameras
 from studio.capture.naming import natural_key
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
 from studio.geometry.rotations import vector_from_rotation
 from studio.registry import Registry
-
-Array = NDArray[np.float64]
 
 GRID = 21
 SEEN = 0.01

@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.capture.camera_streams import Shot
 
 APART = 0.5
@@ -86,7 +86,7 @@ def furthest(times: Mapping[str, float]) -> str:
     return max(times, key=lambda name: (abs(times[name] - middle), times[name]))
 
 
-def spread_figures(spreads: NDArray[np.float64], lagging: Sequence[str]) -> SpreadFigures:
+def spread_figures(spreads: Array, lagging: Sequence[str]) -> SpreadFigures:
     """Figures of sets with these spreads (K,), seconds, and the lagging camera of each ("" where none lags)."""
     late = [name for name in lagging if name]
     worst = max(sorted(set(late)), key=late.count, default="")

@@ -16,15 +16,13 @@ import av.container
 import av.error
 import av.video
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Bytes
 from studio.capture.camera_addresses import CameraAddress
 from studio.capture.mjpeg_over_http import mjpeg_parts
 from studio.capture.rtsp_relay import relayed
 from studio.capture.video_probe import MAX_PIXELS, open_video, reason
 from studio.errors import FootageError
-
-Bytes = NDArray[np.uint8]
 
 SECONDS_TO_OPEN, SECONDS_TO_READ = 5.0, 2.0
 HUFFMAN_TABLES = b"\xff\xc4"

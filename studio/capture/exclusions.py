@@ -2,11 +2,9 @@
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array, Bytes
 from studio.errors import FootageError
-
-Bytes = NDArray[np.uint8]
 
 MOST_BYTES = 40_000_000
 
@@ -31,7 +29,7 @@ def painted_picture(content: bytes) -> Bytes:
     return np.where(level > (127 if picture.dtype == np.uint8 else 32767), np.uint8(255), np.uint8(0))
 
 
-def with_polygon(painted: Bytes, corners: NDArray[np.float64]) -> Bytes:
+def with_polygon(painted: Bytes, corners: Array) -> Bytes:
     """The picture (H, W) with a polygon (K, 2) of pixels painted too."""
     out = painted.copy()
     cv2.fillPoly(out, [np.rint(corners).astype(np.int32)], 255)

@@ -15,16 +15,14 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Bytes
 from studio.capture.footage_source import CameraSource, FootageSource
 from studio.capture.freed_memory import give_back_freed_memory
 from studio.capture.numbered_pictures import NumberedReader, has_picture
 from studio.capture.pictures import PictureReader, read_picture
 from studio.capture.video import VideoReader
 from studio.errors import FootageError, NotFoundError
-
-Bytes = NDArray[np.uint8]
 
 EXCLUSIONS = "exclusions"
 """Folder of a session with a painted picture a camera."""

@@ -10,8 +10,8 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Bytes
 from studio.capture.calibration_parts import AssumedCrop
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
@@ -48,7 +48,7 @@ def fit_camera(
     return fitted, AssumedCrop(left, top, left, top, (camera.width, camera.height), scale)
 
 
-def black_margins(pictures: Sequence[NDArray[np.uint8]]) -> Margins:
+def black_margins(pictures: Sequence[Bytes]) -> Margins:
     """How many columns and rows are black in all pictures: left, top, right, bottom.
 
     pictures : (H, W, 3) each. A dark scene is no bar: the row or column beside a bar must hold something
@@ -59,7 +59,7 @@ def black_margins(pictures: Sequence[NDArray[np.uint8]]) -> Margins:
     return _run(columns), _run(rows), _run(columns[::-1]), _run(rows[::-1])
 
 
-def _run(levels: NDArray[np.uint8]) -> int:
+def _run(levels: Bytes) -> int:
     """Length of the black run at the start of a line of levels, 0 if it does not end in content."""
     most = int(WIDEST_BAR * len(levels))
     bright = np.flatnonzero(levels[:most] >= BLACK)

@@ -11,11 +11,9 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Bytes
 from studio.errors import FootageError
-
-Bytes = NDArray[np.uint8]
 
 BAND_BYTES = 8_000_000
 """Of all pictures together that are held at a time."""

@@ -6,13 +6,9 @@ no set of pictures was complete; in its place stands the last picture before it.
 
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from studio.arrays import Bytes
 from studio.capture.pictures import read_picture
 from studio.errors import FootageError
-
-Bytes = NDArray[np.uint8]
 
 SUFFIX = ".jpg"
 DIGITS = 6

@@ -9,15 +9,13 @@ import av
 import av.error
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Bytes
 from studio.capture.naming import natural_key
 from studio.capture.video_probe import MAX_PIXELS
 from studio.errors import FootageError
 from studio.foreign_files import check_regular
 from studio.isolated import isolated, silent
-
-Bytes = NDArray[np.uint8]
 
 PICTURE_SUFFIXES = frozenset((".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm"))
 STRICTLY_DECODED = frozenset((".png", ".jpg", ".jpeg", ".bmp"))

@@ -4,12 +4,10 @@ A rotation that is none, or a mirrored one, is refused. Doubts that need more ar
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
-
-Array = NDArray[np.float64]
 
 ROTATION_TOLERANCE = 1e-3
 STRAIGHT_DOWN = 0.05

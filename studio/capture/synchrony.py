@@ -15,12 +15,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array, Bytes
 from studio.capture.footage_source import FootageSource
 from studio.capture.naming import listed
 from studio.errors import FootageError
 from studio.progress import Progress
-
-Array = NDArray[np.float64]
 
 WIDTH = 96
 MOST_FRAMES = 3000
@@ -74,7 +73,7 @@ class Synchrony:
 
 
 def motion_energy(
-    read: Callable[[int], NDArray[np.uint8]], count: int, tell: Callable[[int], None] | None = None
+    read: Callable[[int], Bytes], count: int, tell: Callable[[int], None] | None = None
 ) -> Array:
     """(count - 1,) mean absolute difference of each picture to the one before it, grey levels.
 
@@ -158,7 +157,7 @@ def pair_lag(first: str, second: str, a: Array, b: Array, most: int) -> PairLag:
 
 def estimate_synchrony(
     source: FootageSource,
-    reader: Callable[[int], Callable[[int], NDArray[np.uint8]]],
+    reader: Callable[[int], Callable[[int], Bytes]],
     progress: Progress | None = None,
     most_seconds: float = MOST_SECONDS,
 ) -> Synchrony:

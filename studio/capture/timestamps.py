@@ -11,13 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.capture.naming import listed, natural_key
 from studio.errors import FootageError
 from studio.foreign_files import check_regular
-
-Array = NDArray[np.float64]
 
 OLDER_NAME = "frame_time_history.csv"
 TIMESTAMP_NAMES = ("timestamps.csv", "frame_timestamps.csv", OLDER_NAME)

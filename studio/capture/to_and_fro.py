@@ -5,13 +5,9 @@ way it came. Videos can only be decoded onwards, so on the way back stretches of
 stretch costs some ten frames' time, every now and then.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
+from studio.arrays import Bytes
 from studio.capture.footage import KEPT_BYTES, Footage
 from studio.errors import NotFoundError
-
-Bytes = NDArray[np.uint8]
 
 STRETCH = 24
 

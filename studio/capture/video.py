@@ -16,14 +16,12 @@ import av.container
 import av.error
 import av.video
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array, Bytes
 from studio.capture.video_probe import MAX_FRAMES, announced_frames, check_turn, open_video, reason
 from studio.errors import FootageError
 from studio.foreign_files import check_regular
 from studio.isolated import isolated, silent
-
-Bytes = NDArray[np.uint8]
 
 VIDEO_SUFFIXES = frozenset((".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".ts", ".mts"))
 STEADY = 0.6
@@ -192,7 +190,7 @@ def _decoded(
         ) from None
 
 
-def _rate(times: NDArray[np.float64], nominal: float) -> tuple[float, int]:
+def _rate(times: Array, nominal: float) -> tuple[float, int]:
     """Frames per second, and the first frame off an even spacing (-1: none)."""
     if len(times) < 2 or not np.all(np.isfinite(times)):
         return nominal, -1

@@ -1,9 +1,8 @@
 """Laying one set of points over another: at a root point, or by the best similarity."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from studio.arrays import Array
 
 FEWEST_POINTS = 3
 

@@ -12,15 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array, Indices
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
 from studio.errors import TruthError
 from studio.evaluation.alignment import FEWEST_POINTS, moved_to_root, similarity_aligned
 from studio.motion_files.trc import MarkerMotion
 from studio.runs.marker_lines import marker_links, marker_sides
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 LOST_MM = 150.0
 TRUNK = "head and trunk"
@@ -67,7 +65,7 @@ class Evaluation:
     offsets_mm: dict[str, float] = field(default_factory=dict)
 
 
-def evaluate(poses: Array, frames: IntArray, body: BodyModel, truth: MarkerMotion, fps: float) -> Evaluation:
+def evaluate(poses: Array, frames: Indices, body: BodyModel, truth: MarkerMotion, fps: float) -> Evaluation:
     """The errors of poses (K, D) of the given frames (K,) of a body against true markers.
 
     The truth's first row is frame 0; its other rows belong to the frames nearest to (Time - first Time) ×
@@ -212,8 +210,8 @@ def _common_markers(
 
 
 def _common_frames(
-    frames: IntArray, truth: MarkerMotion, of_truth: list[int], fps: float
-) -> tuple[IntArray, IntArray, Array]:
+    frames: Indices, truth: MarkerMotion, of_truth: list[int], fps: float
+) -> tuple[Indices, Indices, Array]:
     """Frames (K',) in which the truth has any of the markers, their places in `frames`, and the true
     positions (K', M, 3) mm of the markers in the truth's columns `of_truth`, NaN where missing.
     """

@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.export.options import MM_PER_UNIT
-
-Array = NDArray[np.float64]
 
 # x forward, y left, z up becomes z forward, x left, y up: as TRC files have it, and as Blender and Maya expect a BVH.
 Y_UP = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])

@@ -8,16 +8,14 @@ are. What a frame has no pose for is interpolated: BVH cannot say "missing".
 import warnings
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from studio.arrays import Array
 from studio.export.axes import Axes
 from studio.export.naming import joint_names
 from studio.export.skeleton import Skeleton, follow, skeleton_of
 from studio.export.task import ExportTask, Written, agreed, apart, turned_apart
 from studio.motion_files.bvh import read_bvh_file
-
-Array = NDArray[np.float64]
 
 DECIMALS = {"mm": 4, "cm": 5, "m": 7}
 END_SITE = "End Site"

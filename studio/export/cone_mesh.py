@@ -1,16 +1,14 @@
 """The body's cones as triangles with normals, for files that carry a surface."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array, Indices
 from studio.body.model import Limb
-
-Array = NDArray[np.float64]
 
 SECTIONS = 24
 
 
-def cone(limb: Limb, sections: int = SECTIONS) -> tuple[Array, Array, NDArray[np.int64]]:
+def cone(limb: Limb, sections: int = SECTIONS) -> tuple[Array, Array, Indices]:
     """Vertices (V, 3) mm and outward normals (V, 3) in the limb's frame, and faces (T, 3), counter-clockwise as seen
     from outside: a side with smooth normals and two flat caps with rims of their own.
     """

@@ -4,8 +4,6 @@ import numpy as np
 import pygltflib as gltf
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-
 COMPONENTS = {"f4": gltf.FLOAT, "u2": gltf.UNSIGNED_SHORT, "u4": gltf.UNSIGNED_INT}
 
 

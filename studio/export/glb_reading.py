@@ -5,12 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pygltflib as gltf
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
+from studio.arrays import Array
 from studio.errors import ExportError
-
-Array = NDArray[np.float64]
 
 WIDTHS = {gltf.SCALAR: 1, gltf.VEC3: 3, gltf.VEC4: 4}
 

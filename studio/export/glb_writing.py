@@ -7,9 +7,9 @@ extras tell which.
 
 import numpy as np
 import pygltflib as gltf
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from studio.arrays import Array
 from studio.export.axes import Axes
 from studio.export.cone_mesh import cone
 from studio.export.glb_packing import Packing
@@ -18,8 +18,6 @@ from studio.export.naming import joint_names
 from studio.export.skeleton import Skeleton, follow, skeleton_of
 from studio.export.task import ExportTask, Written, agreed, apart, turned_apart
 from studio.runs.colour_tokens import colour_tokens
-
-Array = NDArray[np.float64]
 
 SIDES = ("left", "right", "middle")
 AXES = Axes("m", "y")

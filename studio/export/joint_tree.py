@@ -7,13 +7,9 @@ varying turns all go through one point, its pivot; a piece whose pivot itself mo
 import dataclasses
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from studio.arrays import Array
 from studio.body.forward_kinematics import joint_frames
 from studio.body.model import MOVE, TURN, BodyModel, Joint, Step
-
-Array = NDArray[np.float64]
 
 BASE = "base"
 

@@ -1,16 +1,14 @@
 """Points over time as TRC and C3D, gaps as gaps."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.errors import ExportError
 from studio.export.naming import Points, points_of
 from studio.export.task import ExportTask, Written, agreed, apart
 from studio.motion_files.c3d import MOST_FRAMES as MOST_C3D_FRAMES
 from studio.motion_files.c3d import read_c3d_points, write_c3d
 from studio.motion_files.trc import TRC_FROM_WORLD, MarkerMotion, read_trc, write_trc
-
-Array = NDArray[np.float64]
 
 
 def marked_points(task: ExportTask) -> tuple[Points, Array]:

@@ -9,12 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.errors import ExportError
 from studio.export.task import ExportTask, Written, agreed
-
-Array = NDArray[np.float64]
 
 MM_PER_M = 1000.0
 END = "endheader"

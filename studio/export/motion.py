@@ -10,14 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array, Indices
 from studio.body.model import BodyModel
 from studio.errors import ExportError
 from studio.export.options import ExportOptions
 from studio.runs.tracks import Track, read_track
 from studio.sessions.stored_run import StoredRun
 from studio.tracking.tracker import LOST, NO_EVIDENCE
-
-Array = NDArray[np.float64]
 
 UNSEEN = (LOST, NO_EVIDENCE)
 LATE = 1e-9
@@ -44,7 +43,7 @@ class Motion:
     notes: tuple[str, ...] = ()
 
     @property
-    def numbers(self) -> NDArray[np.int64] | Array:
+    def numbers(self) -> Indices | Array:
         """(K,) the frames' numbers, whole where all of them are."""
         whole = np.round(self.frames).astype(np.int64)
         return whole if np.array_equal(whole, self.frames) else self.frames
@@ -86,7 +85,7 @@ def even_motion(body: BodyModel, fps: float, track: Track, options: ExportOption
     return filled if abs(wanted - fps) < LATE * fps else _at_rate(filled, wanted)
 
 
-def _filled(body: BodyModel, fps: float, track: Track, rows: NDArray[np.int64], lost: str) -> Motion:
+def _filled(body: BodyModel, fps: float, track: Track, rows: Indices, lost: str) -> Motion:
     """Every frame from the first to the last of the chosen rows. Lost frames that a smoother filled are poses."""
     first, count = int(track.frames[rows[0]]), int(track.frames[rows[-1]] - track.frames[rows[0]]) + 1
     states = [""] * count

@@ -9,15 +9,13 @@ from importlib.resources import files
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array, Indices
 from studio.body.forward_kinematics import joint_frames
 from studio.body.model import BodyModel
 from studio.errors import ExportError
 from studio.export.options import OWN
 from studio.typed_decoding import decode_toml
-
-Array = NDArray[np.float64]
 
 
 class PlaceEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -44,7 +42,7 @@ class Points:
     """M points fixed to joints. joints (M,), offsets (M, 3) mm in the joints' frames. note : what is missing."""
 
     names: tuple[str, ...]
-    joints: NDArray[np.int64]
+    joints: Indices
     offsets: Array
     note: str = ""
 

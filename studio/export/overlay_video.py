@@ -5,13 +5,11 @@ from pathlib import Path
 
 import av
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Bytes
 from studio.errors import ExportError, NotFoundError
 from studio.export.task import ExportTask, Written
 from studio.runs.overlay_pictures import compose_view
-
-Bytes = NDArray[np.uint8]
 
 QUALITY = "21"
 PRESET = "veryfast"

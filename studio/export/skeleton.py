@@ -9,13 +9,11 @@ with the palms down, facing x; otherwise the body's neutral pose.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
 from studio.export.joint_tree import JointTree, joint_tree
-
-Array = NDArray[np.float64]
 
 LIMB_MARKERS = tuple(
     f"{side}{name}" for side in "LR" for name in ("Shoulder", "Elbow", "Wrist", "Hip", "Knee", "Ankle")

@@ -9,14 +9,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from studio.array_archives import read_archive
+from studio.arrays import Array, read_archive
 from studio.body.forward_kinematics import joint_frames
 from studio.errors import ExportError
 from studio.export.axes import Axes
 from studio.export.marker_files import marked_points
 from studio.export.task import ExportTask, Written, agreed, apart
-
-Array = NDArray[np.float64]
 
 DEGREE_SIGNS = {"degrees": "deg", "radians": "rad"}
 FIRST_COLUMNS = ("frame", "time [s]", "state", "confidence")

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.errors import ExportError
 from studio.export.axes import Axes
 from studio.export.motion import Motion
@@ -14,8 +14,6 @@ from studio.export.options import ExportOptions
 from studio.progress import Progress
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-
-Array = NDArray[np.float64]
 
 LEAST_MM, LEAST_DEGREES = 0.1, 0.01
 

@@ -11,11 +11,9 @@ room.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.geometry.camera import Camera
-
-Array = NDArray[np.float64]
 
 # A camera this close (mm) to a cone's axis, seen along it, has no sideways direction: any u will do.
 ON_AXIS = 1e-9

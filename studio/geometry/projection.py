@@ -1,11 +1,9 @@
 """World points to pixels, by the distortion model of the Bouguet toolbox and OpenCV."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.geometry.camera import Camera
-
-Array = NDArray[np.float64]
 
 
 def project(camera: Camera, points: Array) -> tuple[Array, Array]:

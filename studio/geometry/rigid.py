@@ -4,11 +4,9 @@
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.geometry.rotations import nearest_rotation
-
-Array = NDArray[np.float64]
 
 
 def rigid(rotation: Array, translation: Array) -> Array:

@@ -1,9 +1,9 @@
 """Rotations as 3 by 3 matrices (column vectors, right-handed turns, radians)."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from studio.arrays import Array
 
 # Below this angle (radians) sin(a)/a is 1 to the last bit of a double.
 SMALL_ANGLE = 1e-8

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.errors import StudioError
 from studio.geometry.rotations import axis_turn
 from studio.motion_files.recorded_motion import (
@@ -21,8 +21,6 @@ from studio.motion_files.recorded_motion import (
     numbers,
     text_lines,
 )
-
-Array = NDArray[np.float64]
 
 INCH = 25.4
 CMU_RATE = 120.0

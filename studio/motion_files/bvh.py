@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.errors import StudioError
 from studio.geometry.rotations import axis_turn
 from studio.motion_files.recorded_motion import (
@@ -21,8 +22,6 @@ from studio.motion_files.recorded_motion import (
     numbers,
     text_lines,
 )
-
-Array = NDArray[np.float64]
 
 CMU_UNIT = 25.4 / 0.45
 CHANNELS = {f"{axis}{kind}": (kind, "XYZ".index(axis)) for axis in "XYZ" for kind in ("position", "rotation")}

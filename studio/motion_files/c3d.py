@@ -5,14 +5,12 @@ from pathlib import Path
 
 import ezc3d
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.errors import StudioError
 from studio.foreign_files import check_regular, foreign_file
 from studio.isolated import isolated
 from studio.motion_files.trc import MM_PER_UNIT, MarkerMotion, check_reach
-
-Array = NDArray[np.float64]
 
 MOST_FRAMES = 65_535
 """C3D counts them with sixteen bits."""

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from studio.arrays import Array
 from studio.errors import StudioError
 from studio.motion_files.recorded_motion import RecordedMotion, moved_skeleton
-
-Array = NDArray[np.float64]
 
 ENTRIES = (
     "rotation_local_xyzw",

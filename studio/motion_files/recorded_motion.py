@@ -5,12 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.errors import StudioError
 from studio.foreign_files import check_regular
-
-Array = NDArray[np.float64]
 
 UP_FROM_Y_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Files with y up and people facing z become z up, facing x: (x, y, z) -> (z, x, y), a proper rotation."""

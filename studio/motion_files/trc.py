@@ -12,13 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.errors import StudioError, TruthError
 from studio.foreign_files import foreign_file
 from studio.geometry.reach import FARTHEST_MM, REACH_HINT
-
-Array = NDArray[np.float64]
 
 MM_PER_UNIT = {"mm": 1.0, "cm": 10.0, "m": 1000.0}
 WORLD_FROM_TRC = (2, 0, 1)

@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.array_archives import read_archive
+from studio.arrays import read_archive
 from studio.errors import NotFoundError, SessionError
 from studio.foreign_files import foreign_file
 from studio.sessions.atomic_files import write_bytes

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array, Bytes
 from studio.capture.exclusions import painted_picture, png_of, with_polygon
 from studio.capture.footage import EXCLUSIONS, background_turn
 from studio.capture.footage_source import CameraSource
@@ -28,7 +28,6 @@ from studio.sessions.session import Session, described_anew
 EVIDENCE_NAME, BACKGROUND_NAME = "evidence.json", "background"
 SCHEMA_VERSION = 1
 
-Bytes = NDArray[np.uint8]
 Knob = bool | int | float | str
 
 
@@ -154,7 +153,7 @@ def set_exclusion(session: Session, camera: str, content: bytes) -> int:
     return count
 
 
-def polygon_exclusion(session: Session, camera: str, corners: NDArray[np.float64]) -> int:
+def polygon_exclusion(session: Session, camera: str, corners: Array) -> int:
     """Add a polygon (K, 2) of pixels to what does not count. Returns the pixels of all. Raises NotFoundError."""
     source = _source(session, camera)
     path = session.path / EXCLUSIONS / f"{camera}.png"

@@ -12,14 +12,12 @@ import math
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array, Indices
 from studio.errors import BodyError
 from studio.foreign_files import check_regular
 from studio.geometry.reach import REACH_HINT, within_reach
 from studio.sessions.atomic_files import write_text
-
-Array = NDArray[np.float64]
 
 FRAME, FPS = "frame", "fps"
 
@@ -80,7 +78,7 @@ def write_sigma(path: Path, names: tuple[str, ...], sigma: Array, fps: float) ->
     write_text(path, _as_csv([[FPS, *names], [repr(float(fps)), *(repr(float(value)) for value in sigma)]]))
 
 
-def poses_csv(names: tuple[str, ...], frames: NDArray[np.int64], poses: Array) -> str:
+def poses_csv(names: tuple[str, ...], frames: Indices, poses: Array) -> str:
     """Poses as CSV text: a column `frame`, then one a parameter. frames : (K,). poses : (K, D) radians and
     mm."""
     rows = [

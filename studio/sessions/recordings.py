@@ -6,8 +6,8 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.capture.calibration_files import read_calibration
 from studio.capture.camera_sets import APART, SpreadFigures, furthest, spread_figures
 from studio.capture.cut_recordings import mend_recording
@@ -113,7 +113,7 @@ def spreads_of(path: Path, session: Session) -> SpreadFigures:
     return figures_of({name: moments[:count] for name, moments in cut.items()}, source.fps)
 
 
-def figures_of(times: dict[str, NDArray[np.float64]], fps: float) -> SpreadFigures:
+def figures_of(times: dict[str, Array], fps: float) -> SpreadFigures:
     """Figures of frames whose pictures came at these times (K,) by camera, seconds."""
     rows = np.stack(list(times.values()), axis=1) if times else np.zeros((0, 1))
     spreads = rows.max(axis=1) - rows.min(axis=1) if len(rows) else np.zeros(0)

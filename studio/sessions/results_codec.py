@@ -10,13 +10,10 @@ import math
 
 import numpy as np
 import zstandard
-from numpy.typing import NDArray
 
-from studio.array_archives import read_archive
+from studio.arrays import Array, Indices, read_archive
 from studio.errors import SessionError
 from studio.tracking.tracker import TRACKING_STATES, Carried, Estimate, FrameResult, LayerRecord, ParticleSet
-
-Array = NDArray[np.float64]
 
 LEVEL = 1
 LARGEST_BLOB = 1 << 30
@@ -40,7 +37,7 @@ def unpack(blob: bytes) -> dict[str, Array]:
         ) from None
 
 
-def kept_rows(log_weights: Array, wanted: int) -> NDArray[np.int64]:
+def kept_rows(log_weights: Array, wanted: int) -> Indices:
     """The rows of a set that are recorded when `wanted` are: the heaviest, in the order that they have in the
     set.
 

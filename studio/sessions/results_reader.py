@@ -10,15 +10,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array, Indices
 from studio.errors import DamagedError, NotFoundError, SessionError
 from studio.sessions.results_checksums import FRAME, GIVEN_UP, PARTIAL, SETTINGS, VERIFIED, Sums
 from studio.sessions.results_codec import unpack, unpack_layer, unpack_result
 from studio.settings import SettingsEntry
 from studio.tracking.tracker import TRACKED, FrameResult, LayerRecord
 
-Array = NDArray[np.float64]
 FILE_NAME = "results.sqlite"
 UNWATCHED = (TRACKED, None, 0)
 """State, overlap and doubts of a frame that was stored before a loss could be noticed."""
@@ -42,15 +41,15 @@ class Timeline:
     each frame went, of `tracking.tracker.TRACKING_STATES`. overlaps : NaN where unknown. doubts : int.
     """
 
-    frames: NDArray[np.int64]
+    frames: Indices
     log_weights: Array
     milliseconds: Array
-    evaluations: NDArray[np.int64]
-    layers: NDArray[np.int64]
-    settings_versions: NDArray[np.int64]
+    evaluations: Indices
+    layers: Indices
+    settings_versions: Indices
     tracking: tuple[str, ...]
     overlaps: Array
-    doubts: NDArray[np.int64]
+    doubts: Indices
 
 
 class ResultsReader:
@@ -160,7 +159,7 @@ class ResultsReader:
             raise self._missing(f"layer {layer} of frame {frame}")
         return self._unpacked(frame, layer, blobs[layer])
 
-    def poses(self) -> tuple[NDArray[np.int64], Array]:
+    def poses(self) -> tuple[Indices, Array]:
         """The finished frames (K,) that are whole and their estimates (K, D), radians and mm."""
         rows = self._whole_rows()
         frames = np.array([row[0] for row in rows], dtype=np.int64)
@@ -345,7 +344,7 @@ class ResultsReader:
         rows = self._query("SELECT MAX(frame) FROM frames WHERE frame < ?", (frame,))
         return rows[0][0] if rows else None
 
-    def arrivals(self) -> tuple[NDArray[np.int64], Array]:
+    def arrivals(self) -> tuple[Indices, Array]:
         """Of a live run the finished frames (K,) that came on a clock, and when (K, 2) their pictures had come and
         their poses were ready, seconds; nothing of other runs.
         """

@@ -15,8 +15,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.errors import RunError, SessionError
 from studio.sessions.process_lock import ProcessLock
 from studio.sessions.results_checksums import FRAME, GIVEN_UP, PARTIAL, SETTINGS, sums_text
@@ -25,7 +25,6 @@ from studio.sessions.results_reader import FILE_NAME, ResultsReader
 from studio.sessions.unwritable import unwritable
 from studio.tracking.tracker import FrameResult, LayerRecord
 
-Array = NDArray[np.float64]
 Value = bool | int | float | str
 
 __all__ = ["FILE_NAME", "ResultsReader", "ResultsWriter", "is_being_written"]

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.array_archives import read_archive
+from studio.arrays import read_archive
 from studio.body.forward_kinematics import limb_frames, marker_points
 from studio.body.model import BodyModel
 from studio.body.person import first_frames, marker_motion

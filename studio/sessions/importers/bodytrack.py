@@ -11,16 +11,14 @@ import re
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from studio.arrays import Array
 from studio.body.catalogue import load_body
 from studio.body.subject import subject_from_shape
 from studio.capture.naming import natural_key
 from studio.errors import BodyError
 from studio.sessions.importers.folder_layout import choose_calibration
 from studio.sessions.importers.plan import SourcePlan
-
-Array = NDArray[np.float64]
 
 BODY = "human31"
 RATE = 60.0

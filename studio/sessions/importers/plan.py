@@ -4,12 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from studio.arrays import Array
 from studio.body.subject import Subject
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

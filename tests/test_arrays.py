@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studio import array_archives
-from studio.array_archives import read_archive
+from studio import arrays
+from studio.arrays import read_archive
 from studio.sessions.results_codec import pack, unpack
 
 LOAD = np.load
@@ -43,7 +43,7 @@ def test_stored_results_are_never_read_by_two_threads_at_once(monkeypatch: pytes
         def __exit__(self, *_: object) -> None:
             inside.pop()
 
-    monkeypatch.setattr(array_archives.np, "load", Watched)
+    monkeypatch.setattr(arrays.np, "load", Watched)
     blob = pack({"values": np.arange(5.0)})
     with ThreadPoolExecutor(4) as threads:
         read = list(threads.map(unpack, [blob] * 12))

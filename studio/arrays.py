@@ -1,4 +1,4 @@
-"""Named arrays out of npz archives, one archive at a time.
+"""Arrays as all rooms call them, and named arrays out of npz archives, one archive at a time.
 
 NumPy reads the head of each array with Python's own parser (`ast`), which counts its depth for the whole process: two
 threads that parse at the same moment may both end in "AST constructor recursion depth mismatch" (seen with Python 3.11,
@@ -11,6 +11,10 @@ from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Bytes = NDArray[np.uint8]
+Indices = NDArray[np.int64]
 
 _one_at_a_time = threading.Lock()
 
