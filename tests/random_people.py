@@ -12,7 +12,7 @@ from studio.capture.calibration_files import write_calibration
 from studio.geometry.camera import Camera
 from studio.geometry.rotations import axis_turn
 from studio.motion_files.trc import write_trc
-from studio.sessions.importers.catalogue import import_source
+from studio.sessions.importers.importing import import_source
 from studio.sessions.session import Session
 from studio.synthesis.person import yaw_pitch_roll
 from studio.synthesis.person_footage import render_person

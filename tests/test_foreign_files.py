@@ -145,7 +145,7 @@ from studio.capture.video import measure_video
 from studio.capture.video_probe import probe_video
 from studio.errors import StudioError
 from studio.sessions.archives import unpack
-from studio.sessions.importers.catalogue import import_source
+from studio.sessions.importers.importing import import_source
 from studio.sessions.manifest import read_manifest
 from studio.sessions.named_rows import pose_frame
 

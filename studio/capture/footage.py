@@ -173,7 +173,7 @@ class Footage:
 def open_footage(source: FootageSource, session_folder: Path) -> Footage:
     """The footage that a manifest describes. Raises FootageError if a file is gone."""
     for camera in source.cameras:
-        for entry in filter(None, (camera.path, camera.masks, camera.background)):
+        for entry in filter(None, camera.places):
             if not (session_folder / entry).exists():
                 raise FootageError(
                     f"Footage '{entry}' of camera {camera.name} is not there.",

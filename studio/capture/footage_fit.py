@@ -7,7 +7,7 @@ that do not fill a block). Either moves the principal point; the assumption is s
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -25,10 +25,12 @@ BARS_AGREE = 1.5
 """Bars are those of a shrunk picture if their widths are right within this many pixels."""
 
 Margins = tuple[int, int, int, int]
+NO_BARS: Margins = (0, 0, 0, 0)
+BAR_FRAMES = 4
 
 
 def fit_camera(
-    camera: Camera, width: int, height: int, bars: Margins = (0, 0, 0, 0)
+    camera: Camera, width: int, height: int, bars: Margins = NO_BARS
 ) -> tuple[Camera, AssumedCrop | None]:
     """The camera for pictures of width x height, and the crop that was assumed (None: sizes agree).
 
@@ -48,12 +50,13 @@ def fit_camera(
     return fitted, AssumedCrop(left, top, left, top, (camera.width, camera.height), scale)
 
 
-def black_margins(pictures: Sequence[Bytes]) -> Margins:
-    """How many columns and rows are black in all pictures: left, top, right, bottom.
+def black_margins(read: Callable[[int], Bytes], count: int) -> Margins:
+    """How many columns and rows are black in a few frames spread over footage: left, top, right, bottom.
 
-    pictures : (H, W, 3) each. A dark scene is no bar: the row or column beside a bar must hold something
-    bright.
+    read(k) : (H, W, 3) of frame k of `count`. A dark scene is no bar: the row or column beside a bar must hold
+    something bright.
     """
+    pictures = [read(count * k // BAR_FRAMES) for k in range(BAR_FRAMES)]
     brightest = np.max([picture.max(axis=2) for picture in pictures], axis=0)
     columns, rows = brightest.max(axis=0), brightest.max(axis=1)
     return _run(columns), _run(rows), _run(columns[::-1]), _run(rows[::-1])

@@ -37,6 +37,11 @@ class CameraSource:
     turned: Turn = 0
 
     @property
+    def places(self) -> tuple[str, str, str]:
+        """Of its footage, masks and background, "" where there are none."""
+        return self.path, self.masks, self.background
+
+    @property
     def last(self) -> int:
         """Frames of the session that the camera has: those before it lie within its file."""
         return self.frame_count - self.offset

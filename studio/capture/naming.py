@@ -16,7 +16,7 @@ CAMERA_WORDS = frozenset(("camera", "cam", "c", "view", "port", "video", "vid", 
 
 
 @dataclass(frozen=True, slots=True)
-class NameMatch:
+class CameraMatch:
     """One piece of footage and the camera it was taken for. how : the reason, in words."""
 
     footage: str
@@ -43,7 +43,7 @@ def words(name: str) -> tuple[str, ...]:
 
 def match_names(
     footage: Sequence[str], cameras: Sequence[str], what: str, wrong: type[StudioError]
-) -> tuple[NameMatch, ...]:
+) -> tuple[CameraMatch, ...]:
     """The camera of every piece of footage, in the order of `footage`.
 
     what : plural noun for messages ("videos", "masks"). Raises `wrong`, naming both lists, if a name of
@@ -59,7 +59,7 @@ def match_names(
     for how, fits in rules:
         found = _one_to_one(footage, cameras, fits)
         if found is not None:
-            return tuple(NameMatch(name, camera, how) for name, camera in zip(footage, found, strict=True))
+            return tuple(CameraMatch(name, camera, how) for name, camera in zip(footage, found, strict=True))
     raise wrong(
         f"The {what} ({listed(footage)}) cannot be matched one to one with the calibrated cameras"
         f" ({listed(cameras)}).",

@@ -8,7 +8,7 @@ from studio.body.catalogue import list_bodies, load_body
 from studio.capture.calibration_files import WORLDS
 from studio.cli.arguments import camera_numbers, footage_options
 from studio.cli.output import command, note, progress
-from studio.sessions.importers.catalogue import import_source
+from studio.sessions.importers.importing import import_source
 from studio.sessions.stored_run import damage_in_words
 from studio.sessions.workspace import Workspace
 

@@ -10,7 +10,7 @@ from studio.export.kept_exports import exported_files
 from studio.runs.way import way_of
 from studio.runs.way_results import newest_run
 from studio.sessions.beginning import begin_session
-from studio.sessions.importers.adding import FootageWish, add_footage
+from studio.sessions.importers.importing import ImportOptions, add_footage
 from studio.sessions.workspace import Workspace
 
 MARKS = {"done": "✓", "ready": "·", "blocked": " ", "stale": "!", "running": "…"}
@@ -47,7 +47,7 @@ def add_footage_command(
     copy: bool,
 ) -> dict[str, object]:
     """Add the footage of a folder to a SESSION that is there, before or after it is calibrated."""
-    wish = FootageWish(
+    wish = ImportOptions(
         calibration=calibration,
         fps=fps,
         copy=copy,

@@ -19,7 +19,7 @@ from studio.runs.mask_quality import MaskQuality, measure_masks
 from studio.runs.subject_choice import body_of_choice, choose_subject, keep_fitted
 from studio.runs.subject_fitting import COUNT, FitRequest, FittedSubject, fit_session_subject
 from studio.sessions.background_files import polygon_exclusion, set_backgrounds, set_exclusion
-from studio.sessions.importers.catalogue import import_source
+from studio.sessions.importers.importing import import_source
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 

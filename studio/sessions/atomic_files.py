@@ -5,10 +5,14 @@ one's place in one step (`os.replace`); syncing the folder makes the step itself
 Copies of whole folders are made beside their place under a hidden name and renamed into it the same way.
 """
 
+import contextlib
 import os
 import shutil
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
+
+from studio.errors import SessionError
 
 PARTIAL_PREFIX = ".partial-"
 
@@ -60,6 +64,29 @@ def move_into_place(folder: Path, path: Path) -> None:
 def discard(folder: Path) -> None:
     """Remove a folder that did not reach its place."""
     shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def made_whole(place: Path) -> Iterator[Path]:
+    """An empty hidden folder to be filled, which is then renamed to `place`; where anything fails, nothing is left.
+
+    Raises SessionError if something is at the place.
+    """
+    folder = new_folder_beside(place)
+    try:
+        yield folder
+        move_into_place(folder, place)
+    except FileExistsError:
+        raise taken(place) from None
+    finally:
+        discard(folder)
+
+
+def taken(place: Path) -> SessionError:
+    """The error for a place where something is."""
+    return SessionError(
+        f"There is something at '{place}' already.", "Choose another name, or delete what is there first."
+    )
 
 
 def sync_folder(folder: Path) -> None:

@@ -6,7 +6,7 @@ from studio.body.catalogue import load_body
 from studio.body.subject import DEFAULT_BODY
 from studio.capture.footage_source import FootageSource
 from studio.errors import SessionError
-from studio.sessions.atomic_files import discard, move_into_place, new_folder_beside
+from studio.sessions.atomic_files import made_whole
 from studio.sessions.manifest import SessionManifest, now, write_manifest
 from studio.sessions.session import Session
 
@@ -27,16 +27,8 @@ def begin_session(place: Path, title: str = "", body: str = "") -> Session:
         )
     name = load_body(body).name if body else DEFAULT_BODY
     manifest = SessionManifest(name=place.name, title=words, created=now(), body=name, footage=NO_FOOTAGE)
-    folder = new_folder_beside(place)
-    try:
+    with made_whole(place) as folder:
         write_manifest(folder, manifest)
-        move_into_place(folder, place)
-    except FileExistsError:
-        raise SessionError(
-            f"There is something at '{place}' already.", "Choose another name, or delete that session first."
-        ) from None
-    finally:
-        discard(folder)
     return Session(place)
 
 

@@ -21,11 +21,11 @@ import numpy as np
 from studio.calibration.report import write_calibrated
 from studio.calibration.verbs import Calibrated
 from studio.capture.calibration_files import AssumedCrop, read_calibration, write_calibration
-from studio.capture.naming import listed
-from studio.errors import CalibrationError, NotFoundError, SessionError
+from studio.capture.naming import CameraMatch, listed
+from studio.errors import CalibrationError, NotFoundError
 from studio.geometry.camera import Camera
 from studio.sessions import atomic_files, made_from
-from studio.sessions.manifest import CameraMatch, SessionManifest
+from studio.sessions.manifest import SessionManifest
 from studio.sessions.names import inside
 from studio.sessions.run_record import CAMERAS_NAME
 from studio.sessions.session import CAMERAS_PATH, THUMBNAIL_NAME, Session, described_anew
@@ -70,11 +70,7 @@ def replace_calibration(session: Session, new: NewCalibration) -> CalibrationCha
 
     Raises SessionError while a run is being tracked, CalibrationError where a camera of the footage is missing.
     """
-    for run in session.runs():
-        if run.summary().status == "tracking":
-            raise SessionError(
-                f"Run '{run.name}' of session '{session.name}' is being tracked.", "Stop it, or wait for it."
-            )
+    session.check_idle()
     names = {camera.name for camera in new.cameras}
     missing = [source.name for source in session.manifest.footage.cameras if source.name not in names]
     if missing or not new.cameras:
@@ -147,16 +143,12 @@ def _keep(folder: Path) -> Path:
     """Copy everything of the calibration in use to a folder of its own."""
     now = datetime.datetime.now(datetime.UTC)
     place = folder / EARLIER / now.strftime("%Y%m%d-%H%M%S-%f")
-    made = atomic_files.new_folder_beside(place)
-    try:
+    with atomic_files.made_whole(place) as made:
         for path in _own_parts(folder):
             if path.is_dir():
                 shutil.copytree(path, made / path.name)
             else:
                 shutil.copyfile(path, made / path.name)
-        atomic_files.move_into_place(made, place)
-    finally:
-        atomic_files.discard(made)
     return place
 
 

@@ -5,16 +5,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from studio.capture.calibration_files import AssumedCrop, Calibration
-from studio.capture.footage_fit import Margins, black_margins, fit_camera
+from studio.capture.footage_fit import NO_BARS, Margins, black_margins, fit_camera
 from studio.capture.footage_source import CameraSource
-from studio.capture.naming import listed, match_names
+from studio.capture.naming import CameraMatch, listed, match_names
 from studio.errors import CalibrationError, FootageError
 from studio.geometry.camera import Camera
-from studio.sessions.manifest import CameraMatch
 from studio.sessions.session import Session
-
-BAR_FRAMES = 4
-NO_BARS: Margins = (0, 0, 0, 0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,8 +64,7 @@ def fit_to_session(
     left = [camera.name for camera in cameras if camera.name not in {match.camera for match in matches}]
     if left:
         warnings.append(f"Calibrated camera {listed(left)} has no footage and is left out.")
-    matching = tuple(CameraMatch(match.footage, match.camera, match.how) for match in matches)
-    return FittedCameras(tuple(fitted), crops, matching, tuple(warnings))
+    return FittedCameras(tuple(fitted), crops, matches, tuple(warnings))
 
 
 def _bars(session: Session, source: CameraSource) -> Margins:
@@ -79,10 +74,7 @@ def _bars(session: Session, source: CameraSource) -> Margins:
     except FootageError:
         return NO_BARS
     try:
-        count = footage.frame_count
-        return black_margins(
-            [footage.picture(source.name, count * k // BAR_FRAMES) for k in range(BAR_FRAMES)]
-        )
+        return black_margins(lambda frame: footage.picture(source.name, frame), footage.frame_count)
     except FootageError:
         return NO_BARS
     finally:

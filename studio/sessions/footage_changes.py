@@ -14,7 +14,7 @@ from pathlib import Path
 import msgspec
 
 from studio.capture.footage import camera_reader
-from studio.capture.footage_source import TURNS, CameraSource, FootageSource
+from studio.capture.footage_source import CameraSource, FootageSource
 from studio.capture.naming import listed, match_names
 from studio.capture.pictures import list_pictures
 from studio.capture.synchrony import MOST_SECONDS, Synchrony, estimate_synchrony
@@ -22,12 +22,11 @@ from studio.capture.timestamps import TimedOffsets, offsets_from_times, read_tim
 from studio.capture.video_probe import probe_video
 from studio.errors import FootageError, SessionError
 from studio.progress import Progress
+from studio.sessions.importers.alignment import checked_turn, in_step
 from studio.sessions.made_from import adopt
 from studio.sessions.run_record import FILE_NAME as RUN_FILE_NAME
 from studio.sessions.session import START_POSE_NAME, THUMBNAIL_NAME, Session, described_anew
 from studio.sessions.stored_run import StoredRun
-
-MOST_OFFSET = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,12 +47,7 @@ def change_footage(
     Raises FootageError where no common frame is left, masks are too few, or a turned picture is not of the calibrated
     size; SessionError while a run is being tracked.
     """
-    for run in session.runs():
-        if run.summary().status == "tracking":
-            raise SessionError(
-                f"Run '{run.name}' of session '{session.name}' is being tracked.",
-                "Stop it first, or wait for it.",
-            )
+    session.check_idle()
     if not session.has_footage:
         raise SessionError(f"Session '{session.name}' has no footage yet.", "Add it first.")
     before = session.manifest.footage
@@ -114,19 +108,13 @@ def _changed(
     unknown = sorted({*offsets, *rotations} - set(names))
     if unknown:
         raise FootageError(f"There is no camera '{unknown[0]}'.", f"The cameras are {listed(names)}.")
-    placed = {camera.name: offsets.get(camera.name, camera.offset) for camera in source.cameras}
-    far = [name for name, offset in placed.items() if abs(offset) > MOST_OFFSET]
-    if far:
-        raise FootageError(
-            f"Camera {far[0]} cannot be {placed[far[0]]} frames off.", "Give its offset in frames."
-        )
-    least = min(placed.values(), default=0)
+    placed = in_step({camera.name: offsets.get(camera.name, camera.offset) for camera in source.cameras})
     known = session.cameras() if session.is_calibrated else ()
     sizes = {camera.name: (camera.width, camera.height) for camera in known}
     cameras = tuple(
         dataclasses.replace(
             _turned(camera, rotations.get(camera.name, camera.turned), sizes.get(camera.name)),
-            offset=placed[camera.name] - least,
+            offset=placed[camera.name],
         )
         for camera in source.cameras
     )
@@ -166,12 +154,7 @@ def _masks_of(session: Session, camera: CameraSource) -> int:
 
 def _turned(camera: CameraSource, degrees: int, calibrated: tuple[int, int] | None) -> CameraSource:
     """A camera's footage at another turn. calibrated : (width, height), None before. Raises FootageError."""
-    turn = next((turn for turn in TURNS if turn == degrees % 360), None)
-    if turn is None:
-        raise FootageError(
-            f"Camera {camera.name} cannot be turned by {degrees} degrees.",
-            "Turn it by 90, 180 or 270 degrees.",
-        )
+    turn = checked_turn(camera.name, degrees)
     width, height = camera.width, camera.height
     if (turn - camera.turned) % 180:
         width, height = height, width

@@ -11,18 +11,11 @@ from pathlib import Path
 import msgspec
 
 from studio.capture.footage_source import FootageSource
+from studio.capture.naming import CameraMatch
 from studio.sessions.record_files import read_record, write_record
 
 SCHEMA_VERSION = 1
 FILE_NAME = "session.json"
-
-
-class CameraMatch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which calibrated camera a piece of footage was taken for. how : the reason, in words."""
-
-    footage: str
-    camera: str
-    how: str
 
 
 class SessionManifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -14,7 +14,7 @@ from studio.capture.cut_recordings import mend_recording
 from studio.capture.timestamps import read_timestamps
 from studio.errors import FootageError
 from studio.progress import Progress
-from studio.sessions.importers.catalogue import ImportReport, import_source
+from studio.sessions.importers.importing import ImportReport, import_source
 from studio.sessions.manifest import FILE_NAME as MANIFEST_NAME
 from studio.sessions.names import is_name
 from studio.sessions.session import CAMERAS_PATH, Session, described_anew

@@ -5,7 +5,6 @@ Folder: `session.json`, `videos/` or `pictures/<camera>/`, `masks/<camera>/`, `b
 `sigma.csv`, `thumbnail.jpg`, `bodies/*.toml` (bodies of this session's own), `runs/<run>/`.
 """
 
-import shutil
 from functools import cached_property
 from pathlib import Path
 
@@ -165,6 +164,14 @@ class Session:
             atomic_files.write_bytes(path, content)
         return path
 
+    def check_idle(self) -> None:
+        """Raise SessionError while a run is being tracked."""
+        for run in self.runs():
+            if run.summary().status == "tracking":
+                raise SessionError(
+                    f"Run '{run.name}' of session '{self.name}' is being tracked.", "Stop it, or wait for it."
+                )
+
     def runs(self) -> tuple[StoredRun, ...]:
         """The session's runs, oldest first."""
         folder = self.path / RUNS_NAME
@@ -190,26 +197,19 @@ class Session:
         Raises SessionError if the name is taken, or the disk is full.
         """
         place = self.path / RUNS_NAME / checked_name(record.name, "run")
-        with room_for("The run", place):
-            folder = atomic_files.new_folder_beside(place)
-            try:
-                atomic_files.copy_file(self.path / CAMERAS_PATH, folder / CAMERAS_NAME)
-                if body_text:
-                    (folder / BODY_FOLDER).mkdir()
-                    name = Path(record.body).stem
-                    atomic_files.write_text(folder / BODY_FOLDER / f"{name}.toml", body_text)
-                if behaviour is not None:
-                    atomic_files.copy_file(behaviour, folder / BEHAVIOUR_NAME)
-                create_store(folder)
-                write_run_record(folder, record)
-                note_files(folder)
-                atomic_files.move_into_place(folder, place)
-            except FileExistsError:
-                raise SessionError(
-                    f"Session '{self.name}' has a run '{record.name}'.", "Choose another name."
-                ) from None
-            finally:
-                shutil.rmtree(folder, ignore_errors=True)
+        if place.exists():
+            raise SessionError(f"Session '{self.name}' has a run '{record.name}'.", "Choose another name.")
+        with room_for("The run", place), atomic_files.made_whole(place) as folder:
+            atomic_files.copy_file(self.path / CAMERAS_PATH, folder / CAMERAS_NAME)
+            if body_text:
+                (folder / BODY_FOLDER).mkdir()
+                name = Path(record.body).stem
+                atomic_files.write_text(folder / BODY_FOLDER / f"{name}.toml", body_text)
+            if behaviour is not None:
+                atomic_files.copy_file(behaviour, folder / BEHAVIOUR_NAME)
+            create_store(folder)
+            write_run_record(folder, record)
+            note_files(folder)
         return StoredRun(place)
 
 

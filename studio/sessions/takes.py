@@ -146,8 +146,7 @@ def begin_take(
             )
     calibrated = {camera.name: camera for camera in base.cameras()}
     _check_backgrounds(base, [known[name] for name in cameras])
-    folder = atomic_files.new_folder_beside(into)
-    try:
+    with atomic_files.made_whole(into) as folder:
         _copy_known(base, folder, keep_start)
         write_calibration(tuple(calibrated[name] for name in cameras), folder / CAMERAS_PATH)
         sources = tuple(_source(base, folder, known[name], frame_count) for name in cameras)
@@ -167,11 +166,6 @@ def begin_take(
         )
         (folder / LIVE).mkdir()
         write_manifest(folder, manifest)
-        atomic_files.move_into_place(folder, into)
-    except FileExistsError:
-        raise SessionError(f"There is something at '{into.name}' already.", "Choose another name.") from None
-    finally:
-        atomic_files.discard(folder)
     return Session(into)
 
 

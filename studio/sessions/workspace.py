@@ -1,11 +1,13 @@
 """The folder in which a person's sessions live: listing, naming, copying, throwing away."""
 
+import contextlib
 import dataclasses
 import os
 import shutil
 import sqlite3
 import time
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,10 +17,10 @@ import platformdirs
 from studio.body.subject import DEFAULT_BODY
 from studio.errors import NotFoundError, SessionError, StudioError
 from studio.sessions import atomic_files
-from studio.sessions.catalogue import Catalogue, RunEntry, SessionEntry
-from studio.sessions.manifest import FILE_NAME, write_manifest
+from studio.sessions.manifest import FILE_NAME, read_manifest, write_manifest
 from studio.sessions.names import checked_name, free_name, inside, is_name
 from studio.sessions.results_reader import FILE_NAME as RESULTS_NAME
+from studio.sessions.run_record import FILE_NAME as RECORD_NAME
 from studio.sessions.run_record import read_run_record, write_run_record
 from studio.sessions.session import RUNS_NAME, THUMBNAIL_NAME, Session, described_anew
 from studio.sessions.stored_run import RunSummary, StoredRun
@@ -65,12 +67,10 @@ class Workspace:
 
     def __init__(self, root: Path | None = None) -> None:
         self.root = (root or workspace_root()).expanduser().absolute()
-        self.catalogue = Catalogue(self.root)
 
     def sessions(self) -> tuple[SessionSummary, ...]:
         """All sessions by name, with their runs; those that cannot be opened carry the reason."""
-        entries, runs = self.catalogue.read()
-        return tuple(self._summary(entry, runs) for entry in entries)
+        return tuple(_summary(folder) for folder in _named_folders(self.root, FILE_NAME))
 
     def usual_body(self) -> str:
         """The body that most of the sessions have, of several the newest session's; that of a new session where there
@@ -101,7 +101,7 @@ class Workspace:
             return self.session(text)
         if "\0" not in text and (Path(text).expanduser() / FILE_NAME).is_file():
             return Session(Path(text).expanduser())
-        known = ", ".join(f"'{entry.name}'" for entry in self.catalogue.read()[0]) or "none yet"
+        known = ", ".join(f"'{folder.name}'" for folder in _named_folders(self.root, FILE_NAME)) or "none yet"
         raise NotFoundError(
             f"There is no session '{text}', neither in '{self.root}' nor as a folder.",
             f"Give the folder that holds session.json, or a name of the workspace ({known}).",
@@ -119,9 +119,7 @@ class Workspace:
             path = path.expanduser().absolute()
             checked_name(path.name)
         if path.exists():
-            raise SessionError(
-                f"There is something at '{path}' already.", "Choose another name, or delete it first."
-            )
+            raise atomic_files.taken(path)
         return path
 
     def rename(self, name: str, new_name: str) -> Session:
@@ -150,16 +148,12 @@ class Workspace:
         session = self.session(name)
         wanted = new_name or free_name(name, {path.name for path in self.root.iterdir()})
         place = self._free(wanted)
-        folder = atomic_files.new_folder_beside(place)
-        try:
+        with atomic_files.made_whole(place) as folder:
             shutil.copytree(session.path, folder, symlinks=True, dirs_exist_ok=True, ignore=_transient)
             for store in session.path.glob(f"{RUNS_NAME}/*/{RESULTS_NAME}"):
                 _copy_database(store, folder / store.relative_to(session.path))
             title = f"{session.manifest.title} (copy)"
             write_manifest(folder, msgspec.structs.replace(session.manifest, name=wanted, title=title))
-            atomic_files.move_into_place(folder, place)
-        finally:
-            atomic_files.discard(folder)
         return Session(place)
 
     def trash(self, name: str) -> Path:
@@ -243,37 +237,49 @@ class Workspace:
             _check_idle(run)
         return session
 
-    def _summary(self, entry: SessionEntry, runs: tuple[RunEntry, ...]) -> SessionSummary:
-        manifest, path = entry.manifest, self.root / entry.name
-        if manifest is None:
-            return SessionSummary(
-                entry.name, entry.name, "", "", (), 0, 0.0, False, False, (), (), (), entry.problem
-            )
-        mine = [run for run in runs if run.session == entry.name and run.record is not None]
-        return SessionSummary(
-            name=entry.name,
-            title=manifest.title,
-            created=manifest.created,
-            body=manifest.body,
-            cameras=tuple(camera.name for camera in manifest.footage.cameras),
-            frames=manifest.frame_count,
-            fps=manifest.fps,
-            has_truth=any((path / "truth").glob("*.trc")),
-            thumbnail=(path / THUMBNAIL_NAME).exists(),
-            notes=manifest.notes,
-            warnings=manifest.warnings,
-            runs=tuple(_run_summary(path / RUNS_NAME / run.name, run) for run in mine),
-        )
 
-
-def _run_summary(folder: Path, entry: RunEntry) -> RunSummary:
-    """A run's line; one whose results are damaged says so as its status."""
-    assert entry.record is not None
+def _summary(folder: Path) -> SessionSummary:
     try:
-        return StoredRun(folder, entry.record).summary(blobs=False)
-    except StudioError:
-        empty = StoredRun(folder, entry.record).empty_summary()
-        return dataclasses.replace(empty, status="damaged")
+        manifest = read_manifest(folder)
+    except StudioError as error:
+        return SessionSummary(
+            folder.name, folder.name, "", "", (), 0, 0.0, False, False, (), (), (), str(error)
+        )
+    return SessionSummary(
+        name=folder.name,
+        title=manifest.title,
+        created=manifest.created,
+        body=manifest.body,
+        cameras=tuple(camera.name for camera in manifest.footage.cameras),
+        frames=manifest.frame_count,
+        fps=manifest.fps,
+        has_truth=any((folder / "truth").glob("*.trc")),
+        thumbnail=(folder / THUMBNAIL_NAME).exists(),
+        notes=manifest.notes,
+        warnings=manifest.warnings,
+        runs=_run_summaries(folder / RUNS_NAME),
+    )
+
+
+def _run_summaries(folder: Path) -> tuple[RunSummary, ...]:
+    """By time of making; a run whose results are damaged says so as its status, one without a record is left out."""
+    found: list[RunSummary] = []
+    for path in _named_folders(folder, RECORD_NAME):
+        with contextlib.suppress(StudioError):
+            run = StoredRun(path, read_run_record(path))
+            try:
+                found.append(run.summary(blobs=False))
+            except StudioError:
+                found.append(dataclasses.replace(run.empty_summary(), status="damaged"))
+    return tuple(sorted(found, key=lambda run: (run.created, run.name)))
+
+
+def _named_folders(parent: Path, marker: str) -> Iterator[Path]:
+    """The folders that have a lawful name and hold the file `marker`; links that lead out are left aside."""
+    for folder in sorted(parent.iterdir()) if parent.is_dir() else ():
+        inside = not folder.is_symlink() or folder.resolve().is_relative_to(parent.resolve())
+        if is_name(folder.name) and (folder / marker).is_file() and inside:
+            yield folder
 
 
 def _check_idle(run: StoredRun) -> None:

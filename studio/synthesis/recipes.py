@@ -19,7 +19,7 @@ from studio.motion_files.recorded_motion import RecordedMotion
 from studio.motion_files.trc import MarkerMotion, write_trc
 from studio.progress import Progress
 from studio.sessions.importers.bodytrack import RATE, read_numbers
-from studio.sessions.importers.catalogue import import_source
+from studio.sessions.importers.importing import import_source
 from studio.sessions.manifest import read_manifest, write_manifest
 from studio.sessions.named_rows import write_pose, write_sigma
 from studio.synthesis.arm_footage import render_arm

@@ -17,12 +17,12 @@ from studio.calibration.floor_clicks import Click, ClickedFloor, Clicks, clicked
 from studio.calibration.report import told_source
 from studio.calibration.verbs import Calibrated
 from studio.capture.calibration_files import AssumedCrop, Calibration, read_calibration
+from studio.capture.naming import CameraMatch
 from studio.capture.sanity import quarter_turns
 from studio.errors import CalibrationError, NotFoundError, StudioError
 from studio.geometry.camera import Camera
 from studio.sessions.calibration_changes import NewCalibration
 from studio.sessions.calibration_fit import fit_to_session
-from studio.sessions.manifest import CameraMatch
 from studio.sessions.session import CAMERAS_PATH, Session
 
 KEPT = 12

@@ -16,8 +16,7 @@ from fastapi import APIRouter, Query
 from studio.progress import Progress
 from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.archives import FOOTAGE_PARTS, only_archive, unpacked, unwrapped
-from studio.sessions.importers.adding import AddedFootage, FootageWish, add_footage
-from studio.sessions.importers.catalogue import ImportReport, import_source
+from studio.sessions.importers.importing import ImportOptions, ImportReport, add_footage, import_source
 from studio.sessions.inner_paths import PathRefused, relative_path
 from studio.web.background_jobs import Job
 from studio.web.doors import Door, Doors, let_go
@@ -40,7 +39,7 @@ from studio.web.upload_routes import forget, upload_folder
 router = APIRouter(prefix="/api", tags=["importing"])
 
 
-Taker = Callable[[Path, Progress, Callable[[], bool]], ImportReport | AddedFootage]
+Taker = Callable[[Path, Progress, Callable[[], bool]], ImportReport]
 """take(folder, progress, cancelled) reads a source into the workspace."""
 
 FOLDERS_SHOWN = 1000
@@ -61,9 +60,9 @@ async def begin_import(wish: ImportRequest, doors: Door) -> ImportState:
 async def begin_adding(session: OpenSession, wish: FootageAddition, doors: Door) -> ImportState:
     """Begin to add footage to a session that is there, like an import (`GET /api/imports/{identifier}`)."""
     let_go(doors, session.name)
-    asked = FootageWish(**_reading(wish), replaced=wish.replace)
+    asked = ImportOptions(**_reading(wish), replaced=wish.replace)
 
-    def take(folder: Path, progress: Progress, cancelled: Callable[[], bool]) -> AddedFootage:
+    def take(folder: Path, progress: Progress, cancelled: Callable[[], bool]) -> ImportReport:
         added = add_footage(session, folder, asked, progress=progress, cancelled=cancelled)
         forget_composers()
         return added

@@ -43,7 +43,7 @@ def test_the_calibrated_size_changes_nothing() -> None:
 def test_a_centred_crop_moves_the_principal_point() -> None:
     (pixel,), _ = project(CAMERA, POINT)
     cropped = spot(pixel)[:, 4:-4]
-    camera, crop = fit_camera(CAMERA, 1080, 1920, black_margins([cropped]))
+    camera, crop = fit_camera(CAMERA, 1080, 1920, black_margins(lambda _: cropped, 1))
     (moved,), _ = project(camera, POINT)
     np.testing.assert_allclose(moved, centre_of(cropped), atol=0.05)
     assert crop is not None
@@ -56,7 +56,7 @@ def test_a_picture_shrunk_between_bars_is_scaled() -> None:
     (pixel,), _ = project(CAMERA, POINT)
     shrunk = cv2.resize(spot(pixel), (1080, 1906), interpolation=cv2.INTER_AREA)
     footage = cv2.copyMakeBorder(shrunk, 7, 7, 0, 0, cv2.BORDER_CONSTANT)
-    bars = black_margins([footage])
+    bars = black_margins(lambda _: footage, 1)
     assert bars == (0, 7, 0, 7)
     camera, crop = fit_camera(CAMERA, 1080, 1920, bars)
     (moved,), _ = project(camera, POINT)
@@ -68,7 +68,7 @@ def test_a_picture_shrunk_between_bars_is_scaled() -> None:
 def test_a_dark_scene_is_no_bar() -> None:
     dark = np.full((200, 100, 3), 12, np.uint8)
     dark[90:110, 40:60] = 200
-    assert black_margins([dark]) == (0, 0, 0, 0)
+    assert black_margins(lambda _: dark, 1) == (0, 0, 0, 0)
 
 
 @pytest.mark.parametrize(

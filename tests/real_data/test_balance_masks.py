@@ -9,7 +9,7 @@ from studio.runs.background_setup import set_up_background
 from studio.runs.mask_quality import USABLE, mask_quality
 from studio.runs.session_settings import session_settings
 from studio.sessions.background_files import set_backgrounds
-from studio.sessions.importers.catalogue import import_source
+from studio.sessions.importers.importing import import_source
 from studio.sessions.session import Session
 
 FRAMES = (0, 30, 60, 99)

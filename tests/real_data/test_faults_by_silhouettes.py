@@ -14,7 +14,7 @@ from studio.geometry.camera import Camera
 from studio.runs.mask_quality import spread_frames
 from studio.runs.session_settings import session_settings
 from studio.runs.silhouette_doubts import person_alone, silhouette_doubts
-from studio.sessions.importers.catalogue import import_source
+from studio.sessions.importers.importing import import_source
 from studio.sessions.session import Session
 
 pytestmark = pytest.mark.real_data

@@ -17,7 +17,7 @@ from studio.motion_files.reading import read_recording
 from studio.motion_files.trc import read_trc
 from studio.runs.initialising import WEIGHTING, initialise
 from studio.runs.problem_source import ProblemSource
-from studio.sessions.importers.catalogue import import_source
+from studio.sessions.importers.importing import import_source
 from studio.sessions.session import Session
 from studio.settings import default_settings
 from studio.synthesis.recipe_file import Recipe, find_recipe, read_recipe

@@ -11,7 +11,7 @@ import pytest
 
 from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import search_space
-from studio.sessions.importers.catalogue import import_source
+from studio.sessions.importers.importing import import_source
 from studio.sessions.session import Session
 from studio.settings import changed_settings, default_settings
 from studio.tracking.catalogue import TRACKERS

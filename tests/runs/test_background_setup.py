@@ -23,7 +23,7 @@ from studio.sessions.background_files import (
     set_backgrounds,
     set_exclusion,
 )
-from studio.sessions.importers.catalogue import import_source
+from studio.sessions.importers.importing import import_source
 from studio.sessions.session import Session
 from studio.synthesis.cameras import placed_camera
 

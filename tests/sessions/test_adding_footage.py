@@ -10,7 +10,7 @@ from toy_session import FRAMES, make_session
 from studio.errors import CalibrationError, FootageError, SessionError, WorkCancelledError
 from studio.runs.way import way_of
 from studio.sessions.beginning import begin_session
-from studio.sessions.importers.adding import FootageWish, add_footage
+from studio.sessions.importers.importing import ImportOptions, add_footage
 from studio.sessions.session import Session
 
 
@@ -37,13 +37,13 @@ def empty(tmp_path: Path) -> Session:
 
 def test_an_archive_is_added_like_its_folder(tmp_path: Path, empty: Session, raw: Path) -> None:
     packed = Path(shutil.make_archive(str(tmp_path / "take"), "zip", raw))
-    added = add_footage(empty, packed, FootageWish(fps=60.0))
+    added = add_footage(empty, packed, ImportOptions(fps=60.0))
     assert added.session.manifest.frame_count == FRAMES
     assert not [path for path in empty.path.parent.iterdir() if path.name.startswith(".partial")]
 
 
 def test_an_empty_session_takes_bare_footage(empty, raw):
-    added = add_footage(empty, raw, FootageWish(fps=60.0))
+    added = add_footage(empty, raw, ImportOptions(fps=60.0))
     source = added.session.manifest.footage
     assert [(camera.name, camera.width, camera.height) for camera in source.cameras] == [("front", 160, 120)]
     assert (source.frame_count, source.fps) == (FRAMES, 60.0)
@@ -61,16 +61,16 @@ def test_an_empty_session_takes_bare_footage(empty, raw):
 
 def test_a_calibration_beside_the_footage_is_taken_over(empty, raw, made):
     shutil.copytree(made.path / "calibration", raw / "calibration")
-    added = add_footage(empty, raw, FootageWish(fps=60.0))
+    added = add_footage(empty, raw, ImportOptions(fps=60.0))
     assert added.calibrated
     assert [camera.name for camera in added.session.cameras()] == ["front"]
 
 
 def test_footage_is_replaced_and_old_files_are_gone(empty, raw, tmp_path):
-    first = add_footage(empty, raw, FootageWish(fps=60.0)).session
+    first = add_footage(empty, raw, ImportOptions(fps=60.0)).session
     for path in sorted((raw / "pictures" / "front").iterdir())[5:]:
         path.unlink()
-    second = add_footage(first, raw, FootageWish(fps=60.0)).session
+    second = add_footage(first, raw, ImportOptions(fps=60.0)).session
     source = second.manifest.footage
     assert source.frame_count == 5
     assert source.cameras[0].path == "take-2/pictures/front"
@@ -79,15 +79,15 @@ def test_footage_is_replaced_and_old_files_are_gone(empty, raw, tmp_path):
 
 
 def test_another_camera_joins_at_the_same_rate_only(empty, raw, tmp_path):
-    session = add_footage(empty, raw, FootageWish(fps=60.0)).session
+    session = add_footage(empty, raw, ImportOptions(fps=60.0)).session
     other = tmp_path / "other"
     shutil.copytree(raw / "pictures" / "front", other / "pictures" / "side")
-    with pytest.raises(FootageError, match="frames a second"):
-        add_footage(session, other, FootageWish(fps=30.0))
+    with pytest.raises(FootageError, match="frame rates differ"):
+        add_footage(session, other, ImportOptions(fps=30.0))
     assert [camera.name for camera in Session(session.path).manifest.footage.cameras] == ["front"]
-    joined = add_footage(session, other, FootageWish(fps=60.0)).session
+    joined = add_footage(session, other, ImportOptions(fps=60.0)).session
     assert [camera.name for camera in joined.manifest.footage.cameras] == ["front", "side"]
-    alone = add_footage(joined, other, FootageWish(fps=60.0, replaced=True)).session
+    alone = add_footage(joined, other, ImportOptions(fps=60.0, replaced=True)).session
     assert [camera.name for camera in alone.manifest.footage.cameras] == ["side"]
 
 
@@ -98,17 +98,17 @@ def test_a_calibrated_session_refuses_footage_of_another_size(made, raw, tmp_pat
         cv2.imwrite(str(path), cv2.resize(picture, (80, 60)))
     shutil.rmtree(raw / "masks")
     with pytest.raises((CalibrationError, FootageError)):
-        add_footage(made, raw, FootageWish(fps=60.0))
+        add_footage(made, raw, ImportOptions(fps=60.0))
     assert Session(made.path).manifest == made.manifest
 
 
 def test_a_cancelled_addition_leaves_nothing(empty, raw):
     with pytest.raises(WorkCancelledError):
-        add_footage(empty, raw, FootageWish(fps=60.0), cancelled=lambda: True)
+        add_footage(empty, raw, ImportOptions(fps=60.0), cancelled=lambda: True)
     assert sorted(path.name for path in empty.path.iterdir()) == ["session.json"]
 
 
 def test_references_stay_where_they_lie(empty, raw):
-    session = add_footage(empty, raw, FootageWish(fps=60.0, copy=False)).session
+    session = add_footage(empty, raw, ImportOptions(fps=60.0, copy=False)).session
     assert session.manifest.footage.cameras[0].path == str(raw / "pictures" / "front")
     assert not (session.path / "pictures").exists()

@@ -13,7 +13,7 @@ from toy_footage import number_of
 from studio.errors import FootageError
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.sessions.footage_changes import change_footage, stale_runs
-from studio.sessions.importers.catalogue import import_source
+from studio.sessions.importers.importing import import_source
 from studio.sessions.run_record import write_run_record
 from studio.sessions.session import Session
 

@@ -9,7 +9,7 @@ from sources import video_source
 from toy_footage import number_of, numbered_frame, write_video
 
 from studio.errors import CalibrationError, FootageError, StudioError
-from studio.sessions.importers.catalogue import import_source
+from studio.sessions.importers.importing import import_source
 
 
 def timed(folder: Path, offsets: dict[int, int], rates: tuple[float, float] = (60.0, 60.0)) -> Path:

@@ -10,7 +10,7 @@ from sources import everything_below
 
 from studio.body.forward_kinematics import limb_ends
 from studio.errors import BodyError
-from studio.sessions.importers.catalogue import import_source
+from studio.sessions.importers.importing import import_source
 
 PERSON_TOP = 1705.0
 

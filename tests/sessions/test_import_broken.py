@@ -11,7 +11,7 @@ from sources import everything_below, full_source, write_pose2sim
 from toy_footage import numbered_frame, rig, write_pictures
 
 from studio.errors import BodyError, CalibrationError, FootageError, StudioError, TruthError
-from studio.sessions.importers.catalogue import import_source
+from studio.sessions.importers.importing import import_source
 
 
 def cut_video(source: Path) -> None:

@@ -12,7 +12,7 @@ from toy_footage import rig
 from studio.capture.calibration_files import export_calibration
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
-from studio.sessions.importers.catalogue import import_source
+from studio.sessions.importers.importing import import_source
 
 CAMERAS = rig(2, "cam_")
 

@@ -12,7 +12,7 @@ from toy_footage import number_of, numbered_frame, rig, write_pictures, write_vi
 from studio.errors import CalibrationError, FootageError, SessionError, WorkCancelledError
 from studio.motion_files.trc import read_trc
 from studio.sessions.archives import ArchiveError
-from studio.sessions.importers.catalogue import import_source
+from studio.sessions.importers.importing import import_source
 
 
 def test_videos_become_a_session(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from sources import video_source, write_pose2sim
 from toy_footage import number_of
 
 from studio.errors import CalibrationError, FootageError
-from studio.sessions.importers.catalogue import import_source
+from studio.sessions.importers.importing import import_source
 
 
 @pytest.mark.parametrize(

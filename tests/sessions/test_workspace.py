@@ -169,3 +169,37 @@ def test_pictures_are_shrunk_to_even_sides(
     with av.open(str(path)) as opened:
         frame = next(opened.decode(video=0))
     assert (frame.height, frame.width) == shown
+
+@pytest.fixture
+def two_sessions(session_on_disk: Session) -> Workspace:
+    session_on_disk.new_run(record_of(session_on_disk, "first"))
+    session_on_disk.new_run(record_of(session_on_disk, "second"))
+    made = Workspace()
+    make_session(made.place_for("other"), frames=3)
+    return made
+
+
+def test_lists_follow_what_happens_to_the_folders(two_sessions: Workspace) -> None:
+    two_sessions.sessions()
+    two_sessions.retitle("toy", "Another title")
+    two_sessions.trash_run("toy", "first")
+    two_sessions.trash("other")
+    (found,) = two_sessions.sessions()
+    assert found.title == "Another title"
+    assert [run.name for run in found.runs] == ["second"]
+
+
+def test_a_broken_manifest_is_listed_with_its_reason(two_sessions: Workspace) -> None:
+    (two_sessions.root / "other" / "session.json").write_text("{")
+    entries = {entry.name: entry for entry in two_sessions.sessions()}
+    assert "cannot be read" in entries["other"].problem
+    assert entries["toy"].problem == ""
+
+
+def test_links_out_of_the_workspace_are_not_listed(
+    two_sessions: Workspace, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    outside = tmp_path_factory.mktemp("outside") / "secret"
+    make_session(outside, frames=3)
+    (two_sessions.root / "leak").symlink_to(outside)
+    assert [entry.name for entry in two_sessions.sessions()] == ["other", "toy"]

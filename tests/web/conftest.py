@@ -12,7 +12,7 @@ from web_doubles import TOKEN, RecordingControl, RecordingScenes, Studio, let_in
 from studio.capture.calibration_files import write_calibration
 from studio.geometry.camera import Camera
 from studio.runs.new_run import RunRequest, prepare_run
-from studio.sessions.importers.catalogue import import_source
+from studio.sessions.importers.importing import import_source
 from studio.sessions.named_rows import write_pose
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session

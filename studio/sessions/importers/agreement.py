@@ -1,6 +1,6 @@
 """Whether the cameras' footage agrees: sizes, frame counts, frame rates, missing pictures."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -99,7 +99,7 @@ def check_before_decoding(footage: Sequence[Path], fps: float | None) -> None:
     rates = {name: probe.fps for name, probe in probes.items() if probe.steady}
     known = sorted(rates.values())
     if fps is None and known and known[-1] / known[0] - 1.0 > ANNOUNCED_RATE:
-        raise _different_rates(rates)
+        raise different_rates(rates)
 
 
 def common_frame_count(
@@ -120,16 +120,23 @@ def common_frame_count(
         )
     if aligned:
         return shortest
-    if longest - shortest > max(1.0, TRIMMED_SHARE * longest):
-        raise FootageError(
-            f"The cameras' frame counts differ ({words}).",
-            "Give footage of the same take, cut to the same first and last frame, or the cameras' offsets.",
-        )
+    check_counts(counts, aligned)
     warnings.append(
         f"The cameras' frame counts differ ({words}): only the first {shortest} frames are used; check that"
         " all begin at the same moment."
     )
     return shortest
+
+
+def check_counts(counts: Mapping[str, int], aligned: bool) -> None:
+    """Raises FootageError where frame counts differ too much for one take. aligned : the offsets are known."""
+    longest = max(counts.values())
+    if not aligned and longest - min(counts.values()) > max(1.0, TRIMMED_SHARE * longest):
+        words = ", ".join(f"{name}: {count}" for name, count in counts.items())
+        raise FootageError(
+            f"The cameras' frame counts differ ({words}).",
+            "Give footage of the same take, cut to the same first and last frame, or the cameras' offsets.",
+        )
 
 
 def common_rate(
@@ -163,11 +170,12 @@ def common_rate(
             "The footage does not say how many frames a second it has.", "Give the frame rate with --fps."
         )
     if found[-1] / found[0] - 1.0 > SAME_RATE:
-        raise _different_rates(rates)
+        raise different_rates(rates)
     return found[0]
 
 
-def _different_rates(rates: dict[str, float]) -> FootageError:
+def different_rates(rates: Mapping[str, float]) -> FootageError:
+    """The error where footage was taken at several rates."""
     words = ", ".join(f"{name}: {rate:g}" for name, rate in rates.items())
     return FootageError(
         f"The videos' frame rates differ ({words}), so frames with one number were taken at different moments.",

@@ -25,6 +25,17 @@ def checked_turn(camera: str, degrees: int) -> Turn:
     )
 
 
+def in_step(offsets: Mapping[str, int]) -> dict[str, int]:
+    """Offsets by camera, the smallest 0. Raises FootageError for one that cannot be."""
+    for camera, offset in offsets.items():
+        if abs(offset) > MOST_OFFSET:
+            raise FootageError(
+                f"Camera {camera} cannot be {offset} frames off.", "Give its offset in frames."
+            )
+    least = min(offsets.values(), default=0)
+    return {name: offset - least for name, offset in offsets.items()}
+
+
 def turns_asked(plan: SourcePlan, footage: Mapping[str, Path]) -> dict[str, Turn]:
     """Turns by camera. footage : of every camera. Raises FootageError for names and angles that are none."""
     asked = _by_camera(plan.rotations, footage)
@@ -44,14 +55,7 @@ def with_offsets(
     if plan.timestamps is not None and not plan.offsets:
         offsets = _recorded(plan.timestamps, measured, known, notes, warnings)
     by_hand = _by_camera(plan.offsets, {entry.camera.name: entry.footage for entry in measured})
-    for camera, offset in by_hand.items():
-        if abs(offset) > MOST_OFFSET:
-            raise FootageError(
-                f"Camera {camera} cannot be {offset} frames off.", "Give its offset in frames."
-            )
-    offsets |= by_hand
-    least = min(offsets.values())
-    offsets = {name: offset - least for name, offset in offsets.items()}
+    offsets = in_step(offsets | by_hand)
     told = bool(by_hand) or plan.timestamps is not None
     if any(offsets.values()):
         words = ", ".join(f"{name}: {offset}" for name, offset in offsets.items())

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from studio.capture.calibration_files import Calibration
 from studio.capture.footage import background_turn, turned_picture
-from studio.capture.footage_fit import Margins, black_margins, fit_camera
+from studio.capture.footage_fit import NO_BARS, Margins, black_margins, fit_camera
 from studio.capture.footage_source import Turn
-from studio.capture.naming import NameMatch, listed, match_names
+from studio.capture.naming import CameraMatch, listed, match_names
 from studio.capture.pictures import (
     PictureReader,
     PicturesMeasure,
@@ -32,7 +32,6 @@ from studio.sessions.importers.agreement import (
 from studio.sessions.importers.alignment import turns_asked, with_offsets
 from studio.sessions.importers.plan import SourcePlan
 
-NO_BARS, BAR_FRAMES = (0, 0, 0, 0), 4
 CENTRAL = (0.35, 0.65)
 """Where a principal point lies, as a share of the picture, if a calibration without a size fits it."""
 
@@ -46,7 +45,7 @@ class MeasuredSource:
     cameras: tuple[MeasuredCamera, ...]
     fps: float
     frame_count: int
-    matching: tuple[NameMatch, ...]
+    matching: tuple[CameraMatch, ...]
     warnings: tuple[str, ...]
     notes: tuple[str, ...] = ()
 
@@ -131,12 +130,10 @@ def _measure(path: Path, step: str, progress: Progress) -> VideoMeasure | Pictur
 
 
 def _bars(entry: MeasuredCamera) -> Margins:
-    """The black margins of the turned footage, seen in a few frames spread over it."""
     footage, count = entry.footage, entry.found.frame_count
     reader = PictureReader(footage, count) if footage.is_dir() else VideoReader(footage, count)
     try:
-        pictures = [reader.read(count * k // BAR_FRAMES) for k in range(BAR_FRAMES)]
-        return black_margins([turned_picture(picture, entry.turned) for picture in pictures])
+        return black_margins(lambda frame: turned_picture(reader.read(frame), entry.turned), count)
     finally:
         reader.close()
 

@@ -1,7 +1,7 @@
 """What was found in a source, before anything of it is opened or copied."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from studio.arrays import Array
@@ -43,3 +43,17 @@ class SourcePlan:
     timestamps: Path | None = None
     offsets: Mapping[str, int] = field(default_factory=dict)
     rotations: Mapping[str, int] = field(default_factory=dict)
+
+    def without_person(self) -> "SourcePlan":
+        """The footage alone: start pose and truth belong to a calibration."""
+        return replace(
+            self,
+            truth=(),
+            bodies=(),
+            subject=None,
+            subject_file=None,
+            start_pose=None,
+            start_pose_file=None,
+            sigma=None,
+            sigma_file=None,
+        )

@@ -15,7 +15,7 @@ from studio.motion_files.trc import read_trc
 from studio.progress import Progress
 from studio.sessions.importers.measuring import MeasuredSource
 from studio.sessions.importers.plan import SourcePlan
-from studio.sessions.manifest import CameraMatch, SessionManifest, now, write_manifest
+from studio.sessions.manifest import SessionManifest, now, write_manifest
 from studio.sessions.named_rows import read_pose, read_sigma, write_pose, write_sigma
 from studio.sessions.names import free_name, name_from
 
@@ -96,7 +96,7 @@ def write_session(
         notes=(calibration.unit_note, *calibration.notes, *plan.notes, *measured.notes, *person.notes),
         layout=plan.layout,
         warnings=measured.warnings,
-        matching=tuple(CameraMatch(match.footage, match.camera, match.how) for match in measured.matching),
+        matching=measured.matching,
     )
     write_manifest(folder, manifest)
     return manifest

@@ -1,0 +1,360 @@
+"""Importing: any source that an importer knows, checked as a whole, becomes a session, is added to one, or nothing."""
+
+import datetime
+import math
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from studio.calibration.checks import blocking, check_calibration
+from studio.capture.calibration_files import Calibration, read_calibration
+from studio.capture.footage_source import CameraSource, FootageSource
+from studio.capture.naming import CameraMatch, listed
+from studio.capture.pictures import check_picture, list_pictures
+from studio.capture.video_probe import probe_video
+from studio.errors import CalibrationError, FootageError, SessionError
+from studio.geometry.camera import Camera
+from studio.progress import Progress, watched
+from studio.sessions.archives import FOOTAGE_PARTS, folder_of, is_archive
+from studio.sessions.atomic_files import discard, made_whole, new_folder_beside, taken
+from studio.sessions.file_checksums import note_files
+from studio.sessions.importers.agreement import SAME_RATE, check_counts, different_rates
+from studio.sessions.importers.bodytrack import is_bodytrack, plan_bodytrack
+from studio.sessions.importers.folder_layout import plan_folder
+from studio.sessions.importers.measuring import MeasuredSource, measure_source, part_name
+from studio.sessions.importers.plan import SourcePlan
+from studio.sessions.importers.writing import (
+    check_person,
+    check_room,
+    write_calibrations,
+    write_footage,
+    write_person,
+    write_session,
+)
+from studio.sessions.made_from import adopt
+from studio.sessions.manifest import SessionManifest
+from studio.sessions.names import free_name
+from studio.sessions.session import CAMERAS_PATH, THUMBNAIL_NAME, Session, described_anew
+
+FASTEST = 10_000.0
+OWN_PARTS = ("videos", "pictures", "masks", "background")
+PERSON_PARTS = ("calibration", "subject.toml", "start_pose.csv", "sigma.csv", "truth", "bodies")
+
+
+@dataclass(frozen=True, slots=True)
+class ImportOptions:
+    """How a source is read.
+
+    calibration : which one to take where there are several. fps : frame rate, before any other. copy : False refers to
+    the footage where it lies. trial : which one of several. offsets : by camera (or its footage's name), the file's
+    frame that was taken with the others' frame 0; rotations : degrees clockwise by which its pictures are turned; both
+    go before what the source says. unit, up : of the calibration, as in `read_calibration`. despite_findings : import
+    a calibration that would make results wrong (z not up, a wrong unit, …), with a warning. replaced : where footage is
+    added, forget all cameras that the source does not name.
+    """
+
+    calibration: Path | str | None = None
+    fps: float | None = None
+    copy: bool = True
+    trial: str | None = None
+    offsets: Mapping[str, int] = field(default_factory=dict)
+    rotations: Mapping[str, int] = field(default_factory=dict)
+    unit: str = ""
+    up: str = "z"
+    despite_findings: bool = False
+    replaced: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImportReport:
+    """What became of a source. session : as it is now. matching : footage to cameras, shown to the user. warnings :
+    what to check. layout : whose layout it was taken for. calibrated : whether its calibration was taken over.
+    """
+
+    session: Session
+    matching: tuple[CameraMatch, ...]
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+    layout: str = ""
+    calibrated: bool = True
+
+    @property
+    def matches(self) -> tuple[CameraMatch, ...]:
+        """The matching."""
+        return self.matching
+
+
+def import_source(
+    source: Path,
+    into: Path,
+    *,
+    calibration: Path | str | None = None,
+    fps: float | None = None,
+    copy: bool = True,
+    trial: str | None = None,
+    offsets: Mapping[str, int] | None = None,
+    rotations: Mapping[str, int] | None = None,
+    unit: str = "",
+    up: str = "z",
+    despite_findings: bool = False,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> ImportReport:
+    """Make a session at `into` from a source folder, or an archive of one; `known_layouts`, `folder_layout` and
+    `bodytrack` say what is understood, `ImportOptions` what may be asked for.
+
+    cancelled : asked often; True stops the import with WorkCancelledError. All is checked before anything is written;
+    whatever fails, nothing is left and nothing that was stored is touched. Raises StudioError.
+    """
+    options = ImportOptions(
+        calibration, fps, copy, trial, offsets or {}, rotations or {}, unit, up, despite_findings
+    )
+    report = watched(progress, cancelled, "The import")
+    _check_request(source, options)
+    if into.exists():
+        raise taken(into)
+    try:
+        with folder_of(source.resolve(), FOOTAGE_PARTS, into) as opened:
+            plan = _plan(opened, options)
+            assert plan.calibration is not None
+            read = read_calibration(plan.calibration, unit, up)
+            person = check_person(plan)
+            if copy:
+                check_room(plan, into)
+            measured = _checked_rig(measure_source(plan, read, fps, report), options)
+            with made_whole(into) as folder:
+                manifest = write_session(
+                    folder, into.name, plan, read, measured, person, copy=copy, progress=report
+                )
+                report("finishing", 1, 1)
+                note_files(folder)
+    except OSError as problem:
+        raise SessionError(
+            f"The import into '{into.name}' failed: {problem}.", "Check the disk's room and permissions."
+        ) from None
+    return ImportReport(Session(into), manifest.matching, manifest.notes, manifest.warnings, plan.layout)
+
+
+def add_footage(
+    session: Session,
+    source: Path,
+    options: ImportOptions | None = None,
+    *,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> ImportReport:
+    """Add the footage (with masks and backgrounds) of a folder, or of an archive of one, to a session.
+
+    A session that is calibrated keeps its calibration, which has to name every camera; else the source's is taken
+    over where it has one (and subject, start pose and truth, where the session has none). A camera that is there
+    already gets the new footage. All is read before anything changes; whatever fails, the session stays as it was.
+    Raises StudioError.
+    """
+    asked, report = options or ImportOptions(), watched(progress, cancelled, "The import")
+    _check_request(source, asked)
+    session.check_idle()
+    with folder_of(source.resolve(), FOOTAGE_PARTS, session.path / "take") as folder:
+        return _added(session, folder, asked, report)
+
+
+def _added(session: Session, source: Path, options: ImportOptions, report: Progress) -> ImportReport:
+    plan = _plan(source, options, bare=True)
+    takes_over = plan.calibration is not None and not session.is_calibrated
+    if not takes_over:
+        plan = plan.without_person()
+    person = check_person(plan)
+    if options.copy:
+        check_room(plan, session.path)
+    read = _cameras_of(session, plan, options)
+    measured = measure_source(plan, read, options.fps, report)
+    if takes_over:
+        measured = _checked_rig(measured, options)
+    staged = new_folder_beside(session.path / "take")
+    try:
+        footage = write_footage(staged, measured, options.copy, report)
+        stay = _cameras_that_stay(session, footage, plan, options.replaced)
+        if takes_over:
+            write_calibrations(staged, read, measured)
+            write_person(staged, plan, person)
+        report("finishing", 1, 1)
+        adopt(session)
+        placed = _moved_in(session, staged, footage, stay)
+    except OSError as problem:
+        raise SessionError(
+            f"The footage could not be added to '{session.name}': {problem}.",
+            "Check the disk's room and permissions.",
+        ) from None
+    finally:
+        discard(staged)
+    manifest = _described(session, plan, read, measured, placed, person.body if takes_over else "")
+    changed = described_anew(session, manifest)
+    _forget_old(changed, session.manifest.footage)
+    notes = (*plan.notes, *measured.notes, *(person.notes if takes_over else ()))
+    return ImportReport(changed, manifest.matching, notes, measured.warnings, plan.layout, takes_over)
+
+
+def _check_request(source: Path, options: ImportOptions) -> None:
+    """What can be refused before looking into the source. Raises FootageError."""
+    packed = source.is_file() and is_archive(source)
+    if not source.is_dir() and not packed:
+        raise FootageError(
+            f"There is no folder '{source}', nor an archive.",
+            "Give the folder that holds the footage and its calibration, or a zip or tar of it.",
+        )
+    if packed and not options.copy:
+        raise FootageError(
+            f"Footage in '{source.name}' cannot stay where it is.", "Unpack it, or let it be copied."
+        )
+    if options.fps is not None and not (math.isfinite(options.fps) and 0.0 < options.fps <= FASTEST):
+        raise FootageError(f"{options.fps:g} is no frame rate.", "Give frames per second, such as --fps 60.")
+
+
+def _plan(source: Path, options: ImportOptions, *, bare: bool = False) -> SourcePlan:
+    """The parts of the source, by the importer that knows its layout, with what was asked for."""
+    if is_bodytrack(source) and options.trial is None:
+        plan = plan_bodytrack(source, options.calibration)
+    else:
+        plan = plan_folder(source, options.calibration, options.trial, bare=bare)
+    return replace(
+        plan,
+        offsets={**plan.offsets, **options.offsets},
+        rotations={**plan.rotations, **options.rotations},
+    )
+
+
+def _checked_rig(measured: MeasuredSource, options: ImportOptions) -> MeasuredSource:
+    """With the doubts about its cameras as warnings: what a reprojection error cannot see of a calibration.
+
+    Raises CalibrationError with the first finding that would make results wrong, unless it is to be imported so.
+    """
+    findings = check_calibration(tuple(entry.camera for entry in measured.cameras))
+    wrong = blocking(findings)
+    if wrong and not options.despite_findings:
+        raise CalibrationError(
+            wrong[0].message, f"{wrong[0].remedy} To import it as it is: --despite-findings."
+        )
+    return replace(measured, warnings=(*measured.warnings, *map(str, findings)))
+
+
+def _cameras_of(session: Session, plan: SourcePlan, options: ImportOptions) -> Calibration:
+    """The session's calibration, else the source's, else stand-ins named after the footage."""
+    if session.is_calibrated:
+        known = read_calibration(session.path / CAMERAS_PATH)
+        return replace(known, label=session.manifest.calibration_source or known.label)
+    if plan.calibration is not None:
+        return read_calibration(plan.calibration, options.unit, options.up)
+    names = [part_name(path) for path in plan.footage]
+    twice = sorted(name for name in names if names.count(name) > 1)
+    if twice:
+        raise FootageError(
+            f"There are two cameras '{twice[0]}'.", "Give each camera's footage a name of its own."
+        )
+    cameras = tuple(_stand_in(name, path) for name, path in zip(names, plan.footage, strict=True))
+    return Calibration("", cameras, "", (), sizes_known=False)
+
+
+def _stand_in(name: str, footage: Path) -> Camera:
+    """A camera of which only name and size are known; the footage is not decoded for it."""
+    if footage.is_dir():
+        width, height = check_picture(list_pictures(footage)[0])
+    else:
+        probe = probe_video(footage)
+        width, height = probe.width, probe.height
+    matrix = np.array(
+        [[float(width), 0.0, (width - 1) / 2], [0.0, float(width), (height - 1) / 2], [0.0, 0.0, 1.0]]
+    )
+    return Camera(name, width, height, matrix, np.zeros(5), np.eye(3), np.zeros(3))
+
+
+def _cameras_that_stay(
+    session: Session, added: FootageSource, plan: SourcePlan, replaced: bool
+) -> tuple[CameraSource, ...]:
+    """Cameras that stay as they are beside the added ones. Raises FootageError where the two do not fit together."""
+    names = {camera.name for camera in added.cameras}
+    before = session.manifest.footage
+    stay = () if replaced else tuple(camera for camera in before.cameras if camera.name not in names)
+    if stay:
+        if abs(before.fps / added.fps - 1.0) > SAME_RATE:
+            raise different_rates({"the session": before.fps, listed(names): added.fps})
+        known = bool(plan.offsets) or any(camera.offset for camera in stay)
+        check_counts({camera.name: camera.last for camera in (*stay, *added.cameras)}, known)
+    return stay
+
+
+def _moved_in(
+    session: Session, staged: Path, added: FootageSource, stay: tuple[CameraSource, ...]
+) -> FootageSource:
+    """Move what was written beside the session into it; returns the footage as it is then."""
+    prefix = ""
+    if any((session.path / part).exists() for part in OWN_PARTS):
+        prefix = free_name("take-2", {path.name for path in session.path.iterdir()})
+    place = session.path / prefix if prefix else session.path
+    place.mkdir(exist_ok=True)
+    for parts, target in ((OWN_PARTS, place), (PERSON_PARTS, session.path)):
+        for part in parts:
+            if (staged / part).exists() and not (target / part).exists():
+                (staged / part).rename(target / part)
+    cameras = (*stay, *(_placed(camera, prefix) for camera in added.cameras))
+    names = [camera.name for camera in session.manifest.footage.cameras]
+    ranked = sorted(
+        cameras, key=lambda camera: names.index(camera.name) if camera.name in names else len(names)
+    )
+    return FootageSource(added.fps, min(camera.last for camera in ranked), tuple(ranked))
+
+
+def _placed(camera: CameraSource, prefix: str) -> CameraSource:
+    """A camera's source where it lies in the session; places elsewhere stay."""
+    if not prefix:
+        return camera
+    moved = {
+        name: f"{prefix}/{path}"
+        for name in ("path", "masks", "background")
+        if (path := getattr(camera, name)) and not Path(path).is_absolute()
+    }
+    return replace(camera, **moved)
+
+
+def _forget_old(session: Session, before: FootageSource) -> None:
+    """Remove files of the session's own that no camera refers to any more, and the small picture."""
+    (session.path / THUMBNAIL_NAME).unlink(missing_ok=True)
+    used = {path for camera in session.manifest.footage.cameras for path in camera.places}
+    for path in (path for camera in before.cameras for path in camera.places):
+        if path and path not in used and not Path(path).is_absolute():
+            place = session.path / path
+            if place.is_dir():
+                shutil.rmtree(place, ignore_errors=True)
+            else:
+                place.unlink(missing_ok=True)
+
+
+def _described(
+    session: Session,
+    plan: SourcePlan,
+    read: Calibration,
+    measured: MeasuredSource,
+    footage: FootageSource,
+    body: str,
+) -> SessionManifest:
+    """The manifest with the new footage. body : that of the person who was taken over, "" for none."""
+    before = session.manifest
+    names = {camera.name for camera in footage.cameras}
+    known = session.is_calibrated or plan.calibration is not None
+    fresh = measured.matching if known else ()
+    kept = names - {match.camera for match in fresh}
+    return msgspec.structs.replace(
+        before,
+        body=body or before.body,
+        footage=footage,
+        footage_changed=datetime.datetime.now(datetime.UTC).isoformat() if session.has_footage else "",
+        calibration_source=before.calibration_source or (read.label if known else ""),
+        imported_from=str(plan.source),
+        assumptions=before.assumptions or ((read.unit_note,) if read.unit_note else ()),
+        notes=(*before.notes, *plan.notes, *measured.notes),
+        warnings=measured.warnings,
+        matching=(*(match for match in before.matching if match.camera in kept), *fresh),
+        layout=plan.layout,
+    )
