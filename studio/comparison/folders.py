@@ -8,6 +8,7 @@ from typing import Any
 
 from studio.comparison.kept_comparison import (
     BEHAVIOUR_NAME,
+    RECORD,
     RECORD_NAME,
     ComparisonRecord,
     KeptComparison,
@@ -19,7 +20,6 @@ from studio.runs.new_run import software_version
 from studio.sessions import atomic_files
 from studio.sessions.manifest import now
 from studio.sessions.names import checked_name, free_name, inside, is_name
-from studio.sessions.record_files import write_record
 from studio.sessions.session import Session
 from studio.sessions.workspace import TRASH_NAME, Workspace
 
@@ -33,7 +33,7 @@ def new_comparison(folder: Path, plan: Plan) -> KeptComparison:
     try:
         if plan.behaviour_path:
             atomic_files.copy_file(Path(plan.behaviour_path), made / BEHAVIOUR_NAME)
-        write_record(made / RECORD_NAME, record)
+        RECORD.write(made / RECORD_NAME, record)
         atomic_files.move_into_place(made, folder)
     except FileExistsError:
         raise SessionError(

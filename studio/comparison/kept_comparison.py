@@ -22,7 +22,7 @@ from studio.comparison.trials import Scale, Trial
 from studio.sessions import atomic_files
 from studio.sessions.manifest import now
 from studio.sessions.process_lock import ProcessLock
-from studio.sessions.record_files import read_record, write_record
+from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session
 from studio.typed_decoding import decode_json
 
@@ -47,6 +47,15 @@ class ComparisonRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, 
     problem: str = ""
 
 
+RECORD = RecordFile(
+    ComparisonRecord,
+    "a comparison's record",
+    "Start a new one.",
+    ("There is no comparison '{name}'.", "Start one with 'studio compare'."),
+    SCHEMA_VERSION,
+)
+
+
 @dataclass(frozen=True, slots=True)
 class KeptComparison:
     """A comparison's folder, whatever became of it."""
@@ -65,14 +74,7 @@ class KeptComparison:
 
     def record(self) -> ComparisonRecord:
         """What was asked. Raises NotFoundError where there is nothing, SessionError where it cannot be read."""
-        return read_record(
-            self.folder / RECORD_NAME,
-            ComparisonRecord,
-            SCHEMA_VERSION,
-            missing=(f"There is no comparison '{self.name}'.", "Start one with 'studio compare'."),
-            what="a comparison's record",
-            remedy="Start a new one.",
-        )
+        return RECORD.read(self.folder / RECORD_NAME)
 
     def plan(self, session: Session | None = None) -> Plan:
         """What was asked; of the session where it lies now, if one is given."""
@@ -102,7 +104,7 @@ class KeptComparison:
     def end(self, how: str, problem: str = "") -> None:
         """Write down that it was broken off ("cancelled", "failed") or goes on ("")."""
         ended = msgspec.structs.replace(self.record(), ended=how, problem=problem)
-        write_record(self.folder / RECORD_NAME, ended)
+        RECORD.write(self.folder / RECORD_NAME, ended)
 
     def finish(self, comparison: Comparison) -> None:
         """Write the result, the frames first, so that whoever sees a result finds both."""

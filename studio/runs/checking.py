@@ -27,7 +27,7 @@ from studio.runs.overlay_drawing import projected_silhouette
 from studio.runs.refining import jitter
 from studio.runs.run_footage import footage_of
 from studio.runs.tracks import BEST, Track, read_track, track_stamp
-from studio.sessions.record_files import read_record, write_record
+from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.settings import RunSettings, settings_from_values
@@ -126,6 +126,15 @@ class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
         return ", ".join([*parts, f"jitter {self.jitter_mm:.1f} mm"])
 
 
+_RECORD = RecordFile(
+    RunCheck,
+    "what was measured of a track",
+    "Check the run again.",
+    ("The track was not checked.", "Check it."),
+    SCHEMA_VERSION,
+)
+
+
 def check_run(
     session: Session,
     run: StoredRun,
@@ -174,7 +183,7 @@ def check_run(
         denied=tuple(denied),
     )
     (run.folder / FOLDER).mkdir(exist_ok=True)
-    write_record(_path(run, chosen.name), check)
+    _RECORD.write(_path(run, chosen.name), check)
     return check
 
 
@@ -183,14 +192,7 @@ def kept_check(run: StoredRun, track: str) -> RunCheck | None:
     path = _path(run, track)
     if not path.is_file():
         return None
-    check = read_record(
-        path,
-        RunCheck,
-        SCHEMA_VERSION,
-        missing=(f"Run '{run.name}' was not checked.", "Check it."),
-        what="what was measured of a track",
-        remedy="Check the run again.",
-    )
+    check = _RECORD.read(path)
     found = read_track(run, track)
     same = (check.stamp, check.count) == (track_stamp(run, track), len(found.frames))
     return check if same and check.denied is not None else None

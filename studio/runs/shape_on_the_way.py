@@ -33,7 +33,7 @@ from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import search_space, session_sigma
 from studio.runs.subject_frames import varied_frames
 from studio.sessions.made_from import digests
-from studio.sessions.record_files import read_record, write_record
+from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session
 from studio.settings import RunSettings, default_settings
 from studio.tracking.catalogue import TRACKERS
@@ -84,6 +84,11 @@ class _Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     words: str
 
 
+_RECORD = RecordFile(
+    _Kept, "a fitted shape", "Delete it.", ("There is no such shape.", "Fit it."), SCHEMA_VERSION
+)
+
+
 def session_shape(
     session: Session,
     body: BodyModel,
@@ -103,18 +108,11 @@ def session_shape(
         return body, start, ""
     path = session.path / FOLDER / f"{_key(session, body, settings, start, frames)}.json"
     try:
-        kept = read_record(
-            path,
-            _Kept,
-            SCHEMA_VERSION,
-            missing=("There is no such shape.", "Fit it."),
-            what="a fitted shape",
-            remedy="Delete it.",
-        )
+        kept = _RECORD.read(path)
     except (NotFoundError, SessionError):
         kept = _fitted_now(session, body, settings, start, frames, progress)
         path.parent.mkdir(exist_ok=True)
-        write_record(path, kept)
+        _RECORD.write(path, kept)
     if not kept.dimensions:
         return body, start, kept.words
     return with_dimensions(body, kept.dimensions), np.array(kept.start), kept.words

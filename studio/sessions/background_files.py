@@ -22,7 +22,7 @@ from studio.capture.video import measure_video
 from studio.errors import FootageError, NotFoundError
 from studio.evidence.backgrounds import check_plate_size
 from studio.sessions import atomic_files
-from studio.sessions.record_files import read_record, write_record
+from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session, described_anew
 
 EVIDENCE_NAME, BACKGROUND_NAME = "evidence.json", "background"
@@ -39,18 +39,18 @@ class SessionEvidence(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
     given: dict[str, str] = {}
 
 
+_RECORD = RecordFile(
+    SessionEvidence,
+    "how a session's masks are made",
+    "Remove it, and set the background again.",
+    ("Session '{name}' has no background.", "Set it again."),
+    SCHEMA_VERSION,
+)
+
+
 def read_evidence(session: Session) -> SessionEvidence:
-    """How masks of a session are made; nothing special where nobody said. Raises SessionError for a damaged file."""
-    if not (session.path / EVIDENCE_NAME).exists():
-        return SessionEvidence()
-    return read_record(
-        session.path / EVIDENCE_NAME,
-        SessionEvidence,
-        SCHEMA_VERSION,
-        missing=(f"Session '{session.name}' has no {EVIDENCE_NAME}.", "Set its background again."),
-        what="how a session's masks are made",
-        remedy="Remove it, and set the background again.",
-    )
+    """How masks of a session are made; nothing special where that was not set. Raises SessionError."""
+    return _RECORD.read(session.path / EVIDENCE_NAME, SessionEvidence())
 
 
 def given_backgrounds(session: Session) -> Session:
@@ -80,7 +80,7 @@ def use_cleaned(session: Session, contents: Mapping[str, Bytes]) -> Session:
 
 def write_evidence(session: Session, evidence: SessionEvidence) -> None:
     """Keep how masks of a session are made."""
-    write_record(session.path / EVIDENCE_NAME, evidence)
+    _RECORD.write(session.path / EVIDENCE_NAME, evidence)
 
 
 def set_backgrounds(session: Session, files: Mapping[str, Path]) -> Session:

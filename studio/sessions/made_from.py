@@ -13,7 +13,7 @@ import msgspec
 
 from studio.capture.footage import EXCLUSIONS
 from studio.sessions.background_files import EVIDENCE_NAME
-from studio.sessions.record_files import read_record, write_record
+from studio.sessions.record_files import RecordFile
 from studio.sessions.session import CAMERAS_PATH, START_POSE_NAME, SUBJECT_NAME, Session
 
 FILE_NAME = "made_from.json"
@@ -150,19 +150,18 @@ def _file_digest(path: Path) -> str:
     return _digest(path.read_bytes())
 
 
+_RECORD = RecordFile(
+    MadeFrom,
+    "what a session's parts were made from",
+    "Remove it; the parts then count as given.",
+    (f"There is no '{FILE_NAME}'.", "Make the parts again."),
+    SCHEMA_VERSION,
+)
+
+
 def _read(session: Session) -> MadeFrom:
-    path = session.path / FILE_NAME
-    if not path.exists():
-        return MadeFrom()
-    return read_record(
-        path,
-        MadeFrom,
-        SCHEMA_VERSION,
-        missing=(f"There is no '{FILE_NAME}'.", "Make the parts again."),
-        what="what a session's parts were made from",
-        remedy="Remove it; the parts then count as given.",
-    )
+    return _RECORD.read(session.path / FILE_NAME, MadeFrom())
 
 
 def _write(session: Session, parts: dict[str, Origin]) -> None:
-    write_record(session.path / FILE_NAME, MadeFrom(parts=parts))
+    _RECORD.write(session.path / FILE_NAME, MadeFrom(parts=parts))

@@ -12,7 +12,7 @@ import msgspec
 
 from studio.capture.footage_source import FootageSource
 from studio.capture.naming import CameraMatch
-from studio.sessions.record_files import read_record, write_record
+from studio.sessions.record_files import RecordFile
 
 SCHEMA_VERSION = 1
 FILE_NAME = "session.json"
@@ -65,24 +65,20 @@ def now() -> str:
     return datetime.datetime.now(datetime.UTC).replace(microsecond=0).isoformat()
 
 
-def read_manifest(session_folder: Path) -> SessionManifest:
-    """The manifest of the session in `session_folder`.
+_RECORD = RecordFile(
+    SessionManifest,
+    "a session's manifest",
+    "Import the session again, or correct the entry.",
+    ("There is no session in '{folder}'.", "Make one with 'studio import SOURCE --into SESSION'."),
+    SCHEMA_VERSION,
+)
 
-    Raises NotFoundError where there is none, SessionError where it cannot be understood.
-    """
-    return read_record(
-        session_folder / FILE_NAME,
-        SessionManifest,
-        SCHEMA_VERSION,
-        missing=(
-            f"There is no session in '{session_folder}'.",
-            "Make one with 'studio import SOURCE --into SESSION'.",
-        ),
-        what="a session's manifest",
-        remedy="Import the session again, or correct the entry.",
-    )
+
+def read_manifest(session_folder: Path) -> SessionManifest:
+    """The manifest of a session. Raises NotFoundError where there is none, SessionError for what is no manifest."""
+    return _RECORD.read(session_folder / FILE_NAME)
 
 
 def write_manifest(session_folder: Path, manifest: SessionManifest) -> None:
     """Write `session.json` in one step."""
-    write_record(session_folder / FILE_NAME, manifest)
+    _RECORD.write(session_folder / FILE_NAME, manifest)

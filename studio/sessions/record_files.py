@@ -1,9 +1,11 @@
 """The JSON files that describe a session, a run or a comparison: read whole or refused with the reason, written in one
-step.
+step. Each kind has a version, and files of older versions are brought to today's when they are read.
 """
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, Generic, TypeVar
 
 import msgspec
 
@@ -13,49 +15,70 @@ from studio.sessions.atomic_files import write_bytes
 from studio.typed_decoding import decode_json
 
 Record = TypeVar("Record", bound=msgspec.Struct)
+Entries = dict[str, Any]
 
 
-def read_record(
-    path: Path, record_type: type[Record], schema: int, *, missing: tuple[str, str], what: str, remedy: str
-) -> Record:
-    """The record in a file.
+class _Head(msgspec.Struct):
+    schema: int = 1
 
-    schema : the newest version that this studio knows. missing : cause and remedy where there is no file; what,
-    remedy : what the file should be, and what to do where it is not. Raises NotFoundError, SessionError.
+
+@dataclass(frozen=True, slots=True)
+class RecordFile(Generic[Record]):
+    """One kind of record.
+
+    type : with the entry `schema`, the version. what, remedy : what the file should be, and what to do where it is not.
+    missing : cause and remedy where there is no file; {folder} and {name} stand for its folder. version : the newest,
+    which is written; files without one are of version 1. migrations : version to what makes a file's entries those of
+    the next version.
     """
-    check_regular(path, SessionError)
-    try:
-        content = path.read_bytes()
-    except (FileNotFoundError, NotADirectoryError):
-        raise NotFoundError(*missing) from None
-    except OSError as error:
-        raise SessionError(
-            f"'{path}' cannot be read ({error.strerror}).", "Check the folder's permissions."
-        ) from None
-    _check_schema(content, path, schema, remedy)
-    try:
-        return decode_json(content, record_type)
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise SessionError(f"'{path}' is not {what}: {error}.", remedy) from None
+
+    type: type[Record]
+    what: str
+    remedy: str
+    missing: tuple[str, str]
+    version: int = 1
+    migrations: Mapping[int, Callable[[Entries], Entries]] = field(default_factory=dict)
+
+    def read(self, path: Path, default: Record | None = None) -> Record:
+        """The record in a file, `default` where there is none. Raises NotFoundError without one, SessionError."""
+        check_regular(path, SessionError)
+        try:
+            content = path.read_bytes()
+        except (FileNotFoundError, NotADirectoryError):
+            if default is not None:
+                return default
+            named = {"folder": path.parent, "name": path.parent.name}
+            raise NotFoundError(*(text.format(**named) for text in self.missing)) from None
+        except OSError as error:
+            raise SessionError(
+                f"'{path}' cannot be read ({error.strerror}).", "Check the folder's permissions."
+            ) from None
+        try:
+            written = decode_json(content, _Head).schema
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            raise SessionError(f"'{path}' cannot be read: {error}.", self.remedy) from None
+        if written > self.version:
+            raise SessionError(
+                f"'{path}' has schema version {written}, this studio knows versions up to {self.version}.",
+                "Open it with a newer studio.",
+            )
+        try:
+            if written == self.version:
+                return decode_json(content, self.type)
+            return msgspec.convert(self._migrated(decode_json(content, Entries), written), self.type)
+        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+            raise SessionError(f"'{path}' is not {self.what}: {error}.", self.remedy) from None
+
+    def write(self, path: Path, record: Record) -> None:
+        """Write a record as indented JSON that ends with a line break, in one step."""
+        write_bytes(path, msgspec.json.format(msgspec.json.encode(record), indent=2) + b"\n")
+
+    def _migrated(self, entries: Entries, written: int) -> Entries:
+        for version in range(max(written, 1), self.version):
+            entries = self.migrations[version](entries)
+        return entries | {"schema": self.version}
 
 
-def write_record(path: Path, record: msgspec.Struct) -> None:
-    """Write a record as indented JSON that ends with a line break, in one step."""
-    write_bytes(path, msgspec.json.format(msgspec.json.encode(record), indent=2) + b"\n")
-
-
-class _SchemaOnly(msgspec.Struct):
-    schema: int = 0
-
-
-def _check_schema(content: bytes, path: Path, known: int, remedy: str) -> None:
-    """Raises SessionError if the record was written by a newer studio, or is none."""
-    try:
-        found = decode_json(content, _SchemaOnly).schema
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise SessionError(f"'{path}' cannot be read: {error}.", remedy) from None
-    if found > known:
-        raise SessionError(
-            f"'{path}' has schema version {found}, this studio knows versions up to {known}.",
-            "Open it with a newer studio.",
-        )
+def renamed(**names: str) -> Callable[[Entries], Entries]:
+    """A migration that gives entries other names: renamed(old="new")."""
+    return lambda entries: {names.get(name, name): value for name, value in entries.items()}

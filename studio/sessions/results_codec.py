@@ -7,6 +7,7 @@ few entries.
 
 import io
 import math
+from typing import Any
 
 import numpy as np
 import zstandard
@@ -48,34 +49,23 @@ def kept_rows(log_weights: Array, wanted: int) -> Indices:
     return np.sort(np.argsort(-log_weights, kind="stable")[:wanted])
 
 
+LAYER_COUNTS = ("frame", "layer", "settings_version")
+LAYER_NUMBERS = (
+    *LAYER_COUNTS, "beta", "alpha_wanted", "alpha_reached", "best_log_weight", "milliseconds", "model_free_share",
+)  # fmt: skip
+LAYER_VECTORS = ("variance_weighed", "variance_resampled", "variance_diffused", "best", "mean")
+"""Fields of a layer's record in the order in which they are stored; layers that were stored before there were behaviour
+models have one number less.
+"""
+
+
 def pack_layer(record: LayerRecord, particles: int | None = None) -> bytes:
     """A layer's record with at most `particles` of its set (None: all)."""
     rows = kept_rows(record.log_weights, len(record.poses) if particles is None else particles)
     return pack(
         {
-            "numbers": np.array(
-                [
-                    record.frame,
-                    record.layer,
-                    record.settings_version,
-                    record.beta,
-                    record.alpha_wanted,
-                    record.alpha_reached,
-                    record.best_log_weight,
-                    record.milliseconds,
-                    record.model_free_share,
-                ],
-                dtype=np.float64,
-            ),
-            "vectors": np.stack(
-                [
-                    record.variance_weighed,
-                    record.variance_resampled,
-                    record.variance_diffused,
-                    record.best,
-                    record.mean,
-                ]
-            ),
+            "numbers": np.array([getattr(record, name) for name in LAYER_NUMBERS], dtype=np.float64),
+            "vectors": np.stack([getattr(record, name) for name in LAYER_VECTORS]),
             "poses": record.poses[rows],
             "log_weights": record.log_weights[rows],
         }
@@ -85,46 +75,20 @@ def pack_layer(record: LayerRecord, particles: int | None = None) -> bytes:
 def unpack_layer(blob: bytes) -> LayerRecord:
     """The inverse of `pack_layer`."""
     arrays = unpack(blob)
-    numbers, vectors = arrays["numbers"], arrays["vectors"]
-    return LayerRecord(
-        frame=int(numbers[0]),
-        layer=int(numbers[1]),
-        settings_version=int(numbers[2]),
-        beta=float(numbers[3]),
-        alpha_wanted=float(numbers[4]),
-        alpha_reached=float(numbers[5]),
-        variance_weighed=vectors[0],
-        variance_resampled=vectors[1],
-        variance_diffused=vectors[2],
-        best=vectors[3],
-        best_log_weight=float(numbers[6]),
-        mean=vectors[4],
-        poses=arrays["poses"],
-        log_weights=arrays["log_weights"],
-        milliseconds=float(numbers[7]),
-        # Layers stored before there were behaviour models end here.
-        model_free_share=float(numbers[8]) if len(numbers) > 8 else math.nan,
-    )
+    numbers: dict[str, Any] = dict(zip(LAYER_NUMBERS, arrays["numbers"].tolist(), strict=False))
+    numbers |= {name: int(numbers[name]) for name in LAYER_COUNTS}
+    vectors = dict(zip(LAYER_VECTORS, arrays["vectors"], strict=True))
+    sets = {name: arrays[name] for name in ("poses", "log_weights")}
+    return LayerRecord(**{"model_free_share": math.nan, **numbers, **vectors, **sets})
 
 
 def pack_result(result: FrameResult) -> bytes:
     """A frame's result with everything that the next frame starts from, whole."""
     estimate = result.estimate
     arrays = carried_arrays(result.carried)
-    arrays["numbers"] = np.array(
-        [
-            result.frame,
-            result.layers,
-            result.evaluations,
-            result.settings_version,
-            result.milliseconds,
-            estimate.log_weight,
-            TRACKING_STATES.index(result.tracking),
-            result.overlap,
-            result.doubts,
-        ],
-        dtype=np.float64,
-    )
+    numbers = [result.frame, result.layers, result.evaluations, result.settings_version, result.milliseconds]
+    numbers += [estimate.log_weight, TRACKING_STATES.index(result.tracking), result.overlap, result.doubts]
+    arrays["numbers"] = np.array(numbers, dtype=np.float64)
     if result.disagreement:
         arrays["limbs"] = np.array(list(result.disagreement))
         arrays["disagreement"] = np.array(list(result.disagreement.values()))
@@ -134,23 +98,24 @@ def pack_result(result: FrameResult) -> bytes:
 
 
 def unpack_result(blob: bytes) -> FrameResult:
-    """The inverse of `pack_result`."""
+    """The inverse of `pack_result`; frames that were stored before a loss could be noticed have six numbers."""
     arrays = unpack(blob)
-    numbers, vectors = arrays["numbers"], arrays["vectors"]
+    numbers, vectors = arrays["numbers"].tolist(), arrays["vectors"]
+    state, overlap, doubts = (*numbers[6:], *(0.0, math.nan, 0.0)[len(numbers) - 6 :])
+    frame, layers, evaluations, settings_version = map(int, numbers[:4])
     return FrameResult(
-        frame=int(numbers[0]),
+        frame=frame,
         estimate=Estimate(
-            vectors[0], vectors[1], vectors[2], float(numbers[5]), vectors[3] if len(vectors) > 3 else None
+            vectors[0], vectors[1], vectors[2], numbers[5], vectors[3] if len(vectors) > 3 else None
         ),
-        layers=int(numbers[1]),
-        evaluations=int(numbers[2]),
-        settings_version=int(numbers[3]),
-        milliseconds=float(numbers[4]),
+        layers=layers,
+        evaluations=evaluations,
+        settings_version=settings_version,
+        milliseconds=numbers[4],
         carried=carried_from(arrays),
-        # Numbers of frames stored before a loss could be noticed end here.
-        tracking=TRACKING_STATES[int(numbers[6]) if len(numbers) > 6 else 0],
-        overlap=float(numbers[7]) if len(numbers) > 7 else math.nan,
-        doubts=int(numbers[8]) if len(numbers) > 8 else 0,
+        tracking=TRACKING_STATES[int(state)],
+        overlap=overlap,
+        doubts=int(doubts),
         disagreement=dict(zip(map(str, arrays["limbs"]), map(float, arrays["disagreement"]), strict=True))
         if "limbs" in arrays
         else {},

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import msgspec
 
-from studio.sessions.record_files import read_record, write_record
+from studio.sessions.record_files import RecordFile
 
 Value = bool | int | float | str
 
@@ -79,21 +79,20 @@ class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
         return self.last - self.first
 
 
-def read_run_record(run_folder: Path) -> RunRecord:
-    """The record of the run in `run_folder`.
+_RECORD = RecordFile(
+    RunRecord,
+    "a run's record",
+    "Start a new run.",
+    ("There is no run '{name}'.", "List the runs with 'studio runs'."),
+    SCHEMA_VERSION,
+)
 
-    Raises NotFoundError where there is none, SessionError where it cannot be understood.
-    """
-    return read_record(
-        run_folder / FILE_NAME,
-        RunRecord,
-        SCHEMA_VERSION,
-        missing=(f"There is no run '{run_folder.name}'.", "List the runs with 'studio runs'."),
-        what="a run's record",
-        remedy="Start a new run.",
-    )
+
+def read_run_record(run_folder: Path) -> RunRecord:
+    """The record of a run. Raises NotFoundError where there is none, SessionError for what is no record."""
+    return _RECORD.read(run_folder / FILE_NAME)
 
 
 def write_run_record(run_folder: Path, record: RunRecord) -> None:
     """Write `run.json` in one step."""
-    write_record(run_folder / FILE_NAME, record)
+    _RECORD.write(run_folder / FILE_NAME, record)
