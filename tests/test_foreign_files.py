@@ -16,7 +16,7 @@ import pytest
 from studio.behaviour.model_file import read_model
 from studio.body.reader import read_body
 from studio.body.subject import read_subject
-from studio.calibration.floor_clicks import read_clicks
+from studio.calibration.floor import read_clicks
 from studio.capture.calibration_files import find_calibrations, read_calibration, read_intrinsics
 from studio.errors import CalibrationError, FootageError, StudioError
 from studio.foreign_files import foreign_file
@@ -135,14 +135,14 @@ from pathlib import Path
 from studio.behaviour.model_file import read_model
 from studio.body.reader import read_body
 from studio.body.subject import read_subject
-from studio.calibration.floor_clicks import read_clicks
+from studio.calibration.floor import read_clicks
 from studio.capture.calibration_files import find_calibrations, read_calibration
-from studio.capture.cut_recordings import mend_recording
+from studio.capture.stream_files import mend_recording
 from studio.capture.pictures import check_picture, read_picture
 from studio.capture.timestamps import read_timestamps
 from studio.motion_files.trc import read_trc
 from studio.capture.video import measure_video
-from studio.capture.video_probe import probe_video
+from studio.capture.video import probe_video
 from studio.errors import StudioError
 from studio.sessions.archives import unpack
 from studio.sessions.importers.importing import import_source

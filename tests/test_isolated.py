@@ -96,7 +96,7 @@ def test_native_parsers_of_foreign_files_run_there(tmp_path: Path, monkeypatch: 
         cv2.imwrite(str(tmp_path / "pictures" / f"{number}.png"), picture)
     write_c3d(tmp_path / "a.c3d", ["A"], np.ones((5, 1, 3)), 60.0)
     for module, name in (
-        ("studio.capture.video_probe.av", "open"),
+        ("studio.capture.video.av", "open"),
         ("studio.capture.pictures.cv2", "imdecode"),
         ("studio.motion_files.c3d.ezc3d", "c3d"),
     ):

@@ -15,8 +15,7 @@ from studio.benchmarks.made_scene import camera_towards, filled
 from studio.benchmarks.timing import quickest
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_frames
-from studio.body.model import BodyModel
-from studio.body.tables import kinematic_tables
+from studio.body.model import BodyModel, kinematic_tables
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.evidence.yuv_background import learn_background
 from studio.geometry.camera import Camera

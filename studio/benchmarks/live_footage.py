@@ -15,7 +15,7 @@ from studio.behaviour.model_file import write_model
 from studio.behaviour.model_learning import learn_model
 from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import load_body
-from studio.capture.to_and_fro import folded
+from studio.capture.footage import folded
 from studio.progress import Progress
 from studio.sessions.manifest import write_manifest
 from studio.sessions.session import Session

@@ -12,8 +12,7 @@ import numpy as np
 
 from studio.arrays import Array
 from studio.body.forward_kinematics import joint_frames, marker_points
-from studio.body.model import TURN, BodyModel, Joint
-from studio.body.tables import kinematic_tables
+from studio.body.model import TURN, BodyModel, Joint, kinematic_tables
 
 # How far (mm; and share of a limb's cross-section) a rewritten body may differ: rounding and nothing else.
 SAME = 1e-6

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from studio.body.assembly import assemble
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
+from studio.body.reader import assemble
 from studio.errors import BodyError
 
 FOOT = "foot"

@@ -13,10 +13,9 @@ from scipy.optimize import least_squares
 
 from studio.arrays import Array, Indices
 from studio.body.branches import within_limits
-from studio.body.extremities import extremities
 from studio.body.forward_kinematics import joint_frames, limb_ends
 from studio.body.inverse_kinematics import MM_PER_RADIAN
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, extremities
 from studio.errors import BodyError
 from studio.geometry.reach import within_reach
 

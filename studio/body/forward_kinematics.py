@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from studio.arrays import Array
-from studio.body.model import MOVE, BodyModel
-from studio.body.tables import kinematic_tables
+from studio.body.model import MOVE, BodyModel, kinematic_tables
 from studio.errors import BodyError
 from studio.numba_in_threads import numba
 

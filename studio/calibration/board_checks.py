@@ -8,13 +8,12 @@ import numpy as np
 
 from studio.arrays import Array, Indices
 from studio.calibration.board_poses import pair_pose, view_of
-from studio.calibration.boards import Board
+from studio.calibration.boards import Board, Sighting
 from studio.calibration.extrinsics import Rig
 from studio.calibration.fault_hypotheses import explained
 from studio.calibration.findings import Finding
 from studio.calibration.intrinsics import Lens
-from studio.calibration.scale_checks import scale_finding
-from studio.calibration.sightings import Sighting
+from studio.calibration.rig_checks import scale_finding
 from studio.geometry.camera import Camera
 
 GOOD_PX = 3.0

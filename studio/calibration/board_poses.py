@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.arrays import Array
-from studio.calibration.boards import Board
+from studio.calibration.boards import Board, Sighting
 from studio.calibration.intrinsics import Lens
-from studio.calibration.sightings import Sighting
 from studio.geometry.rigid import compose, inverse, rigid
 
 NEAR_ANGLE, NEAR_SHARE = np.radians(6.0), 0.06

@@ -5,6 +5,7 @@ printed page), z = x × y into the board, away from who looks at it; mm. Corners
 """
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -12,8 +13,9 @@ import cv2
 import cv2.aruco
 import numpy as np
 
-from studio.arrays import Array
+from studio.arrays import Array, Indices
 from studio.errors import CalibrationError
+from studio.geometry.camera import Camera
 
 DEFAULT_DICTIONARY = "DICT_4X4_250"
 SPELLING = (
@@ -146,3 +148,35 @@ def board_from_text(text: str, thickness_mm: float = 0.0) -> Board:
         return Board("chessboard", columns, rows, lengths[0], thickness_mm=thickness_mm)
     dictionary = parts[wanted] if named else DEFAULT_DICTIONARY
     return Board("charuco", columns, rows, lengths[0], lengths[1], dictionary, legacy, thickness_mm)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sighting:
+    """One board in one picture.
+
+    camera : whose. frame : equal numbers are the same moment in all cameras. picture : what to call it in messages.
+    size : width and height of the picture, pixels. ids : (K,) corners seen, indices into `Board.points`.
+    pixels : (K, 2) where. mirrored : the board was found only in the mirrored picture (pixels are those of the
+    mirrored one).
+    """
+
+    camera: str
+    frame: int
+    picture: str
+    size: tuple[int, int]
+    ids: Indices
+    pixels: Array
+    mirrored: bool = False
+
+
+def of_camera(sightings: Iterable[Sighting], camera: str) -> tuple[Sighting, ...]:
+    """Those of one camera, by frame."""
+    found = [sighting for sighting in sightings if sighting.camera == camera]
+    return tuple(sorted(found, key=lambda sighting: sighting.frame))
+
+
+def rays_of(camera: Camera, pixels: Array) -> Array:
+    """(K, 3) unit directions in the world from the camera's centre through (K, 2) pixels."""
+    flat = cv2.undistortPoints(pixels[:, None], camera.matrix, camera.distortion)[:, 0]
+    ahead = np.column_stack([flat, np.ones(len(flat))]) @ camera.rotation
+    return ahead / np.linalg.norm(ahead, axis=1, keepdims=True)

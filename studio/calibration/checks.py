@@ -3,11 +3,9 @@
 from collections.abc import Mapping, Sequence
 
 from studio.calibration.board_checks import board_findings
-from studio.calibration.boards import Board
+from studio.calibration.boards import Board, Sighting
 from studio.calibration.findings import Finding, Severity, blocking
-from studio.calibration.rig_checks import rig_findings, size_findings
-from studio.calibration.scale_checks import distance_findings
-from studio.calibration.sightings import Sighting
+from studio.calibration.rig_checks import distance_findings, rig_findings, size_findings
 from studio.calibration.silhouette_checks import Masks, silhouette_findings
 from studio.geometry.camera import Camera
 

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from studio.arrays import Bytes, Indices
-from studio.calibration.sightings import Sighting
+from studio.calibration.boards import Sighting
 
 CELLS_ACROSS = 10
 ENOUGH = 8

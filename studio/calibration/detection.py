@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.arrays import Array, Bytes, Indices
-from studio.calibration.boards import Board
-from studio.calibration.sightings import Sighting
+from studio.calibration.boards import Board, Sighting
 
 FEWEST_CORNERS = 6
 SUBPIXEL_REACH = (2, 5)

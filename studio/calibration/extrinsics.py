@@ -12,10 +12,9 @@ import numpy as np
 
 from studio.arrays import Array
 from studio.calibration.board_poses import BoardView, PairPose, pair_pose, views_by_camera
-from studio.calibration.boards import Board
+from studio.calibration.boards import Board, Sighting
 from studio.calibration.bundle import Bundle, Observations, adjusted, errors_of, kept_inliers
 from studio.calibration.intrinsics import Lens
-from studio.calibration.sightings import Sighting
 from studio.capture.naming import listed, natural_key
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera

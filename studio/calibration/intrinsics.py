@@ -2,14 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 import numpy as np
 
 from studio.arrays import Array
-from studio.calibration.boards import Board
+from studio.calibration.boards import Board, Sighting
 from studio.calibration.coverage import Coverage, coverage_of
-from studio.calibration.sightings import Sighting
+from studio.capture.calibration_files import read_intrinsics
+from studio.capture.naming import match_names
 from studio.errors import CalibrationError
 
 FEWEST_PICTURES = 3
@@ -231,3 +233,26 @@ def _solved(
         np.ravel(of_picture).astype(np.float64),
         np.array([np.ravel(turn) for turn in turns], dtype=np.float64),
     )
+
+
+def lenses_of_file(path: Path, names: Sequence[str]) -> dict[str, Lens]:
+    """Camera → lens, matched by name; pictures, residuals and coverage are unknown. Raises CalibrationError."""
+    read = {entry.name: entry for entry in read_intrinsics(path)}
+    matches = match_names(list(names), list(read), "recordings", CalibrationError)
+    found: dict[str, Lens] = {}
+    for match in matches:
+        entry = read[match.camera]
+        size = (entry.width, entry.height)
+        found[match.footage] = Lens(
+            match.footage,
+            size,
+            entry.matrix,
+            entry.distortion,
+            float("nan"),
+            0.0,
+            0.0,
+            f"read from {path.name}",
+            (),
+            coverage_of((), size),
+        )
+    return found

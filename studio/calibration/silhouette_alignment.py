@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from studio.arrays import Array, Indices
-from studio.calibration.rays import rays_of
+from studio.calibration.boards import rays_of
 from studio.calibration.silhouette_checks import WIDEST
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera

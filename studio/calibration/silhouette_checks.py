@@ -12,11 +12,10 @@ import cv2
 import numpy as np
 
 from studio.arrays import Array, Bytes
-from studio.calibration.boards import Board
+from studio.calibration.boards import Board, rays_of
 from studio.calibration.fault_hypotheses import explained
 from studio.calibration.findings import Finding
-from studio.calibration.rays import rays_of
-from studio.calibration.scale_checks import height_finding, unit_finding
+from studio.calibration.rig_checks import height_finding, unit_finding
 from studio.calibration.standing import Posture, postures, standing_height
 from studio.geometry.camera import Camera
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.arrays import Array, Bytes
-from studio.calibration.rays import rays_of
+from studio.calibration.boards import rays_of
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 

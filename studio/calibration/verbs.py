@@ -17,17 +17,14 @@ from studio.calibration.board_footage_reading import (
     look_together,
     plain_names,
 )
-from studio.calibration.boards import Board
+from studio.calibration.boards import Board, Sighting, of_camera
 from studio.calibration.checks import check_calibration
 from studio.calibration.detection import BoardFinder
 from studio.calibration.extrinsics import Rig, moved, solve_rig
 from studio.calibration.findings import Finding, blocking
-from studio.calibration.floor import board_on_floor, floor_from_board
-from studio.calibration.floor_clicks import clicked_floor, read_clicks
-from studio.calibration.intrinsics import FEWEST_PICTURES, Lens, solve_lens
-from studio.calibration.lens_files import lenses_of_file
+from studio.calibration.floor import board_on_floor, clicked_floor, floor_from_board, read_clicks
+from studio.calibration.intrinsics import FEWEST_PICTURES, Lens, lenses_of_file, solve_lens
 from studio.calibration.lens_verdict import lens_findings
-from studio.calibration.sightings import Sighting, of_camera
 from studio.capture.naming import listed, natural_key
 from studio.capture.sanity import common_target, quarter_turns
 from studio.errors import CalibrationError

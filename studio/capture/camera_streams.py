@@ -21,7 +21,7 @@ from studio.arrays import Bytes
 from studio.capture.camera_addresses import CameraAddress
 from studio.capture.mjpeg_over_http import mjpeg_parts
 from studio.capture.rtsp_relay import relayed
-from studio.capture.video_probe import MAX_PIXELS, open_video, reason
+from studio.capture.video import MAX_PIXELS, open_video, reason
 from studio.errors import FootageError
 
 SECONDS_TO_OPEN, SECONDS_TO_READ = 5.0, 2.0

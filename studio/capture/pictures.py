@@ -1,4 +1,10 @@
-"""Folders of pictures, one file a frame, in natural order."""
+"""Folders of pictures, one file a frame, in natural order.
+
+Pictures of a live camera, a file a frame, named by its number: `000041.jpg`.
+
+The folder may still grow while it is read. A number may be missing because its camera gave no picture then, or because
+no set of pictures was complete; in its place stands the last picture before it.
+"""
 
 import re
 from collections.abc import Callable
@@ -10,9 +16,9 @@ import av.error
 import cv2
 import numpy as np
 
-from studio.arrays import Bytes
+from studio.arrays import Array, Bytes
 from studio.capture.naming import natural_key
-from studio.capture.video_probe import MAX_PIXELS
+from studio.capture.video import MAX_PIXELS
 from studio.errors import FootageError
 from studio.foreign_files import check_regular
 from studio.isolated import isolated, silent
@@ -165,3 +171,78 @@ def _damaged(path: Path) -> FootageError:
     return FootageError(
         f"'{path.parent.name}/{path.name}' is damaged or no picture.", "Copy or export the picture again."
     )
+
+
+SUFFIX = ".jpg"
+DIGITS = 6
+FURTHEST = 600
+"""Numbers that are looked back for a picture."""
+
+
+def picture_path(folder: Path, number: int) -> Path:
+    """Where the picture of a frame lies, or would."""
+    return folder / f"{number:0{DIGITS}d}{SUFFIX}"
+
+
+def has_picture(folder: Path, number: int) -> bool:
+    """Whether the camera gave one."""
+    return picture_path(folder, number).exists()
+
+
+class NumberedReader:
+    """The pictures of a folder by their numbers; knows of new ones at once."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def read(self, index: int) -> Bytes:
+        """(H, W, 3) uint8 BGR of frame `index`, else of the nearest before it, else of the nearest after it.
+
+        Raises FootageError where there is none near, or it is damaged.
+        """
+        for number in (*range(index, max(-1, index - FURTHEST), -1), *range(index + 1, index + FURTHEST)):
+            path = picture_path(self._folder, number)
+            if path.exists():
+                return read_picture(path)
+        raise FootageError(
+            f"Camera folder '{self._folder.name}' has no picture near frame {index}.",
+            "Record again, or choose frames in which the camera ran.",
+        )
+
+    def close(self) -> None:
+        """Nothing is kept open."""
+
+
+MOST_BYTES = 40_000_000
+
+
+def painted_picture(content: bytes) -> Bytes:
+    """(H, W) uint8, 255 where a picture file (PNG or other) is painted: opaque where it has holes, else bright.
+
+    Raises FootageError for what is no picture.
+    """
+    picture = None
+    if 0 < len(content) <= MOST_BYTES:
+        picture = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
+    if picture is None:
+        raise FootageError(
+            "The exclusion is no picture that can be read.", "Give a PNG of the footage's size."
+        )
+    if picture.ndim == 3 and picture.shape[2] == 4:
+        alpha = picture[..., 3]
+        level = alpha if (alpha < 255).any() else picture[..., :3].max(axis=2)
+    else:
+        level = picture.max(axis=2) if picture.ndim == 3 else picture
+    return np.where(level > (127 if picture.dtype == np.uint8 else 32767), np.uint8(255), np.uint8(0))
+
+
+def with_polygon(painted: Bytes, corners: Array) -> Bytes:
+    """The picture (H, W) with a polygon (K, 2) of pixels painted too."""
+    out = painted.copy()
+    cv2.fillPoly(out, [np.rint(corners).astype(np.int32)], 255)
+    return out
+
+
+def png_of(picture: Bytes) -> bytes:
+    """A picture (H, W) or (H, W, 3) BGR as the content of a PNG file."""
+    return cv2.imencode(".png", picture)[1].tobytes()

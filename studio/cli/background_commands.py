@@ -7,8 +7,8 @@ import click
 import msgspec
 import numpy as np
 
-from studio.capture.exclusions import painted_picture, png_of
 from studio.capture.naming import match_names
+from studio.capture.pictures import painted_picture, png_of
 from studio.cli.arguments import frame_numbers
 from studio.cli.knob_options import chosen_changes
 from studio.cli.output import command, note, progress

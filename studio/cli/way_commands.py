@@ -9,9 +9,8 @@ from studio.cli.output import command, note, progress
 from studio.export.kept_exports import exported_files
 from studio.runs.way import way_of
 from studio.runs.way_results import newest_run
-from studio.sessions.beginning import begin_session
 from studio.sessions.importers.importing import ImportOptions, add_footage
-from studio.sessions.workspace import Workspace
+from studio.sessions.workspace import Workspace, begin_session
 
 MARKS = {"done": "✓", "ready": "·", "blocked": " ", "stale": "!", "running": "…"}
 

@@ -11,8 +11,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from studio.arrays import Array
-from studio.export.axes import Axes
 from studio.export.naming import joint_names
+from studio.export.options import Axes
 from studio.export.skeleton import Skeleton, follow, skeleton_of
 from studio.export.task import ExportTask, Written, agreed, apart, turned_apart
 from studio.motion_files.bvh import read_bvh_file

@@ -8,9 +8,8 @@ from pathlib import Path
 
 from studio.errors import ExportError
 from studio.export.bvh_writing import write_bvh
-from studio.export.calibration_file import write_cameras
 from studio.export.glb_writing import write_glb
-from studio.export.marker_files import write_c3d_file, write_trc_file
+from studio.export.marker_files import write_c3d_file, write_cameras, write_trc_file
 from studio.export.mot_file import write_mot
 from studio.export.options import ExportOptions
 from studio.export.overlay_video import write_videos

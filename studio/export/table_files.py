@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from studio.arrays import Array, read_archive
 from studio.body.forward_kinematics import joint_frames
 from studio.errors import ExportError
-from studio.export.axes import Axes
 from studio.export.marker_files import marked_points
+from studio.export.options import Axes
 from studio.export.task import ExportTask, Written, agreed, apart
 
 DEGREE_SIGNS = {"degrees": "deg", "radians": "rad"}

@@ -8,9 +8,8 @@ import numpy as np
 
 from studio.arrays import Array
 from studio.errors import ExportError
-from studio.export.axes import Axes
 from studio.export.motion import Motion
-from studio.export.options import ExportOptions
+from studio.export.options import Axes, ExportOptions
 from studio.progress import Progress
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun

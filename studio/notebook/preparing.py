@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from studio.body.model import BodyModel
 from studio.body.subject import Subject
-from studio.capture.exclusions import painted_picture, png_of
+from studio.capture.pictures import painted_picture, png_of
 from studio.footage_recipes import synthesize as synthesize_recipe
 from studio.notebook.opening import SessionName, open_session
 from studio.notebook.progress import Told, told

@@ -14,9 +14,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.capture.exclusions import png_of
 from studio.capture.footage import Footage
-from studio.capture.pictures import is_picture
+from studio.capture.pictures import is_picture, png_of
 from studio.errors import FootageError
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.masks import PackedMask, reduced, uncleaned

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.capture.footage import Footage
-from studio.capture.freed_memory import give_back_freed_memory
+from studio.capture.video import give_back_freed_memory
 from studio.errors import NotFoundError, StudioError
 from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.frame_evidence import ViewEvidence

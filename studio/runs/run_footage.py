@@ -1,7 +1,6 @@
 """The footage of a run, whose frame numbers are not always the files' own."""
 
-from studio.capture.footage import Footage
-from studio.capture.to_and_fro import ToAndFro
+from studio.capture.footage import Footage, ToAndFro
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 

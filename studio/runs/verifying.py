@@ -1,7 +1,7 @@
 """Everything that a session stores compared with its checksums; damaged frames tracked again as they were.
 
 Files have theirs in `.checksums.json` (`sessions.file_checksums`), frames, layers and settings in the results store
-(`sessions.results_checksums`). What was stored before there were checksums is unpacked, and counted as unchecked.
+(`sessions.results_codec`). What was stored before there were checksums is unpacked, and counted as unchecked.
 """
 
 import contextlib

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from numpy import float64
 from numpy.typing import NDArray
 
-from studio.capture.freed_memory import give_back_freed_memory
+from studio.capture.video import give_back_freed_memory
 from studio.errors import StudioError
 from studio.numba_in_threads import numba
 from studio.runs.problem_source import ProblemSource

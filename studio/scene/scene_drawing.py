@@ -6,8 +6,8 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from studio.body.extremities import extremities
 from studio.body.forward_kinematics import limb_ends
+from studio.body.model import extremities
 from studio.runs.colour_tokens import colour_tokens
 from studio.runs.tracks import RAW
 from studio.scene.body_view import BodyView

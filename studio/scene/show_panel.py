@@ -7,8 +7,7 @@ from typing import Any
 
 import viser
 
-from studio.body.extremities import extremities
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, extremities
 from studio.runs.colour_tokens import ColourTokens
 from studio.runs.overlay_drawing import OVERLAYS
 from studio.runs.tracks import RAW

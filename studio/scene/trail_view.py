@@ -6,9 +6,8 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from studio.body.extremities import extremities
 from studio.body.forward_kinematics import marker_points
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, extremities
 from studio.runs.colour_tokens import ColourTokens
 from studio.runs.marker_lines import marker_sides
 from studio.scene.stick_figure import trail_segments

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
-from studio.capture.freed_memory import give_back_freed_memory
+from studio.capture.video import give_back_freed_memory
 from studio.errors import StudioError
 from studio.scene.recording import record_scene
 from studio.scene.stage import SceneStage

@@ -18,7 +18,7 @@ from typing import IO
 from studio.errors import StudioError
 from studio.foreign_files import foreign_file
 from studio.sessions.atomic_files import discard, new_folder_beside
-from studio.sessions.inner_paths import place_in, relative_path
+from studio.sessions.names import place_in, relative_path
 
 CHUNK = 1 << 20
 GIGABYTE = 1 << 30

@@ -14,10 +14,9 @@ import msgspec
 import numpy as np
 
 from studio.arrays import Array, Bytes
-from studio.capture.exclusions import painted_picture, png_of, with_polygon
 from studio.capture.footage import EXCLUSIONS, background_turn
 from studio.capture.footage_source import CameraSource
-from studio.capture.pictures import check_picture, is_picture
+from studio.capture.pictures import check_picture, is_picture, painted_picture, png_of, with_polygon
 from studio.capture.video import measure_video
 from studio.errors import FootageError, NotFoundError
 from studio.evidence.backgrounds import check_plate_size

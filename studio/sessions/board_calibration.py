@@ -4,16 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from studio.calibration.board_folders import find_board_footage
-from studio.calibration.board_footage_reading import HowTaken
+from studio.calibration.board_footage_reading import HowTaken, find_board_footage
 from studio.calibration.boards import Board
 from studio.calibration.findings import Finding, blocking
 from studio.calibration.report import told_source, write_calibrated
 from studio.calibration.verbs import Calibrated, calibrate
 from studio.errors import CalibrationError, NotFoundError
 from studio.progress import Progress
-from studio.sessions.calibration_changes import NewCalibration, replace_calibration
-from studio.sessions.calibration_fit import fit_to_session
+from studio.sessions.calibration_changes import NewCalibration, fit_to_session, replace_calibration
 from studio.sessions.session import CAMERAS_PATH, Session
 from studio.sessions.workspace import Workspace
 

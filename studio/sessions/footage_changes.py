@@ -19,10 +19,10 @@ from studio.capture.naming import listed, match_names
 from studio.capture.pictures import list_pictures
 from studio.capture.synchrony import MOST_SECONDS, Synchrony, estimate_synchrony
 from studio.capture.timestamps import TimedOffsets, offsets_from_times, read_timestamps
-from studio.capture.video_probe import probe_video
+from studio.capture.video import probe_video
 from studio.errors import FootageError, SessionError
 from studio.progress import Progress
-from studio.sessions.importers.alignment import checked_turn, in_step
+from studio.sessions.importers.plan import checked_turn, in_step
 from studio.sessions.made_from import adopt
 from studio.sessions.run_record import FILE_NAME as RUN_FILE_NAME
 from studio.sessions.session import START_POSE_NAME, THUMBNAIL_NAME, Session, described_anew

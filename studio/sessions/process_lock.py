@@ -4,7 +4,7 @@ import sqlite3
 from dataclasses import dataclass
 from pathlib import Path
 
-from studio.sessions.unwritable import unwritable
+from studio.sessions.atomic_files import unwritable
 
 HELD = frozenset((sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED))
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from studio.arrays import Array
 from studio.capture.calibration_files import read_calibration
-from studio.capture.camera_sets import APART, SpreadFigures, furthest, spread_figures
-from studio.capture.cut_recordings import mend_recording
+from studio.capture.live_cameras import APART, SpreadFigures, furthest, spread_figures
+from studio.capture.stream_files import mend_recording
 from studio.capture.timestamps import read_timestamps
 from studio.errors import FootageError
 from studio.progress import Progress

@@ -13,8 +13,17 @@ import numpy as np
 
 from studio.arrays import Array, Indices
 from studio.errors import DamagedError, NotFoundError, SessionError
-from studio.sessions.results_checksums import FRAME, GIVEN_UP, PARTIAL, SETTINGS, VERIFIED, Sums
-from studio.sessions.results_codec import unpack, unpack_layer, unpack_result
+from studio.sessions.results_codec import (
+    FRAME,
+    GIVEN_UP,
+    PARTIAL,
+    SETTINGS,
+    VERIFIED,
+    Sums,
+    unpack,
+    unpack_layer,
+    unpack_result,
+)
 from studio.settings import SettingsEntry
 from studio.tracking.tracker import TRACKED, FrameResult, LayerRecord
 

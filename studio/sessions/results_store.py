@@ -18,11 +18,19 @@ import numpy as np
 
 from studio.arrays import Array
 from studio.errors import RunError, SessionError
+from studio.sessions.atomic_files import unwritable
 from studio.sessions.process_lock import ProcessLock
-from studio.sessions.results_checksums import FRAME, GIVEN_UP, PARTIAL, SETTINGS, sums_text
-from studio.sessions.results_codec import pack, pack_layer, pack_result
+from studio.sessions.results_codec import (
+    FRAME,
+    GIVEN_UP,
+    PARTIAL,
+    SETTINGS,
+    pack,
+    pack_layer,
+    pack_result,
+    sums_text,
+)
 from studio.sessions.results_reader import FILE_NAME, ResultsReader
-from studio.sessions.unwritable import unwritable
 from studio.tracking.tracker import FrameResult, LayerRecord
 
 Value = bool | int | float | str

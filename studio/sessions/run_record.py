@@ -31,7 +31,7 @@ class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     rad and mm. software : the studio's version. notes : what a reader of the results should know. behaviour : name of
     the behaviour model whose copy the run keeps, "" without one. live : frames came on a clock and those that came too
     fast were dropped; which were tracked, the results store says. to_and_fro : the footage goes forth and back without
-    an end (`capture.to_and_fro`), so that `last` may lie behind its end. made_from : the run that was corrected, "" if
+    an end (`capture.footage`), so that `last` may lie behind its end. made_from : the run that was corrected, "" if
     none: other frames are that run's. corrected : the frame that begins anew at corrected_pose. backwards_to : None
     where the frames after it follow from it; else these are the old ones, and from it down to this frame each was
     tracked from the one after it. subject_dimensions : the subject's, where the first frames gave the body another

@@ -6,11 +6,11 @@ import sqlite3
 from pathlib import Path
 
 from studio.errors import RunError, SessionError
+from studio.sessions.atomic_files import unwritable
 from studio.sessions.process_lock import ProcessLock
-from studio.sessions.results_checksums import FRAME, GIVEN_UP
+from studio.sessions.results_codec import FRAME, GIVEN_UP
 from studio.sessions.results_reader import FILE_NAME
 from studio.sessions.results_store import LOCK_NAME, SCHEMA
-from studio.sessions.unwritable import unwritable
 
 WHOLE = ("meta", "settings")
 OF_A_FRAME = ("frames", "layers", "tracking", "arrivals")

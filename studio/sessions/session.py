@@ -7,6 +7,10 @@ Folder: `session.json`, `videos/` or `pictures/<camera>/`, `masks/<camera>/`, `b
 
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import av
+import numpy as np
 
 from studio.body.branches import within_limits
 from studio.body.catalogue import load_body
@@ -14,9 +18,10 @@ from studio.body.model import BodyModel
 from studio.body.subject import Subject, fit_subject, read_subject
 from studio.capture.calibration_files import read_calibration
 from studio.capture.footage import Footage, open_footage
-from studio.errors import NotFoundError, SessionError
+from studio.errors import NotFoundError, SessionError, StudioError
 from studio.geometry.camera import Camera
 from studio.sessions import atomic_files
+from studio.sessions.atomic_files import room_for
 from studio.sessions.file_checksums import note_files
 from studio.sessions.manifest import SessionManifest, read_manifest, write_manifest
 from studio.sessions.named_rows import Array, pose_frame, read_pose, read_sigma
@@ -24,8 +29,45 @@ from studio.sessions.names import checked_name, free_name, inside
 from studio.sessions.results_store import create_store
 from studio.sessions.run_record import BEHAVIOUR_NAME, CAMERAS_NAME, RunRecord, write_run_record
 from studio.sessions.stored_run import BODY_FOLDER, StoredRun
-from studio.sessions.thumbnails import thumbnail_of
-from studio.sessions.unwritable import room_for
+
+if TYPE_CHECKING:
+    from studio.sessions.session import Session
+
+WIDTH = 320
+QUALITY = 5
+
+
+def thumbnail_of(session: "Session") -> bytes | None:
+    """JPEG bytes, at most 320 pixels on the longer side; None if the footage or a calibration cannot be
+    read."""
+    try:
+        turns = session.cameras()[0].quarter_turns if session.is_calibrated else 0
+        footage = session.footage()
+        try:
+            picture = footage.picture(footage.cameras[0], footage.frame_count // 2)
+        finally:
+            footage.close()
+    except (StudioError, IndexError):
+        return None
+    return jpeg(np.rot90(picture, -turns))
+
+
+def jpeg(picture: np.ndarray, longest: int = WIDTH) -> bytes:
+    """A BGR picture (H, W, 3) uint8 as JPEG bytes, its longer side shrunk to `longest` pixels."""
+    height, width = picture.shape[:2]
+    scale = min(1.0, longest / max(height, width))
+    # JPEG's halved colour planes want even sides.
+    size = (max(2, round(width * scale / 2) * 2), max(2, round(height * scale / 2) * 2))
+    frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="bgr24")
+    small = frame.reformat(width=size[0], height=size[1], format="yuvj420p", interpolation="AREA")
+    encoder = av.CodecContext.create("mjpeg", "w")
+    encoder.width, encoder.height = size
+    encoder.pix_fmt = "yuvj420p"
+    encoder.time_base = 1  # pyright: ignore[reportAttributeAccessIssue]
+    encoder.options = {"qmin": str(QUALITY), "qmax": str(QUALITY)}
+    packets = [*encoder.encode(small), *encoder.encode(None)]
+    return b"".join(bytes(packet) for packet in packets)
+
 
 CAMERAS_PATH = Path("calibration") / "cameras.toml"
 SUBJECT_NAME, START_POSE_NAME, SIGMA_NAME = "subject.toml", "start_pose.csv", "sigma.csv"

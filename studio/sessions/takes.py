@@ -21,9 +21,9 @@ import msgspec
 import numpy as np
 
 from studio.capture.calibration_files import write_calibration
-from studio.capture.camera_sets import PictureSet, SpreadFigures, spread_figures
 from studio.capture.footage_source import CameraSource, FootageSource
-from studio.capture.numbered_pictures import picture_path
+from studio.capture.live_cameras import PictureSet, SpreadFigures, spread_figures
+from studio.capture.pictures import picture_path
 from studio.capture.stream_files import jpeg_of
 from studio.errors import FootageError, SessionError
 from studio.sessions import atomic_files

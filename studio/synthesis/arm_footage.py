@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_frames, marker_points
-from studio.body.model import BodyModel
-from studio.body.tables import kinematic_tables
+from studio.body.model import BodyModel, kinematic_tables
 from studio.geometry.camera import Camera
 from studio.geometry.cones import limb_outlines
 from studio.geometry.projection import project

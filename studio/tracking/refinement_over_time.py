@@ -23,8 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import limb_frames
-from studio.body.model import BodyModel
-from studio.body.tables import kinematic_tables
+from studio.body.model import BodyModel, kinematic_tables
 from studio.tracking.banded_solving import solve_banded
 from studio.tracking.refinement import (
     DAMPING,

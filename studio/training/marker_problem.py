@@ -4,8 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.inverse_kinematics import pose_from_markers
-from studio.body.model import BodyModel, Marker
-from studio.body.tables import kinematic_tables
+from studio.body.model import BodyModel, Marker, kinematic_tables
 from studio.errors import StudioError
 from studio.training.marker_kernels import place_points
 from studio.training.targets import Targets, pointers_of

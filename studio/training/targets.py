@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import joint_frames, marker_points
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, kinematic_tables
 from studio.body.person import MARKERS, SIDES, PersonMotion, Skeleton, marker_motion
-from studio.body.tables import kinematic_tables
 from studio.errors import BodyError
 
 Array = NDArray[np.float64]

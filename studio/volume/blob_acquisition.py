@@ -25,8 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import limb_frames
-from studio.body.model import BodyModel
-from studio.body.tables import kinematic_tables
+from studio.body.model import BodyModel, kinematic_tables
 from studio.volume.blob_fitting import LEAST_COLOUR_VARIANCE, Voxels, nearest_blobs
 from studio.volume.blob_model import SMALLEST_VARIANCE, BlobModel, cone_blobs, cone_moments
 from studio.volume.hull import Hull

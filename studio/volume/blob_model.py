@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import limb_frames
-from studio.body.model import BodyModel
-from studio.body.tables import kinematic_tables
+from studio.body.model import BodyModel, kinematic_tables
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -26,8 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import joint_frames
-from studio.body.model import BodyModel
-from studio.body.tables import kinematic_tables
+from studio.body.model import BodyModel, kinematic_tables
 from studio.numba_in_threads import numba
 from studio.volume.blob_model import BlobMixture, BlobModel
 

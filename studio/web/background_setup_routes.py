@@ -17,8 +17,8 @@ from studio.runs.mask_quality import MaskQuality, measure_masks
 from studio.runs.overlay_pictures import forget_composers
 from studio.runs.session_settings import session_settings
 from studio.sessions.background_files import exclusion_path, read_evidence, set_backgrounds
-from studio.sessions.inner_paths import place_in, relative_path
 from studio.sessions.made_from import origin_of
+from studio.sessions.names import place_in, relative_path
 from studio.sessions.session import Session
 from studio.settings import values
 from studio.web.background_jobs import Job

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 
 from studio.behaviour.generation import generate
 from studio.behaviour.model import BehaviourModel, automaton_of
-from studio.body.extremities import extremities
 from studio.body.forward_kinematics import limb_ends
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, extremities
 from studio.training.model_shelf import ModelSummary
 from studio.web.behaviour_schemas import (
     BehaviourDetail,

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from studio.errors import CalibrationError, NotFoundError
 from studio.sessions.archives import is_litter, unpacked, unwrapped
-from studio.sessions.inner_paths import PathRefused, place_in, relative_path
+from studio.sessions.names import PathRefused, place_in, relative_path
 from studio.web.calibration_schemas import FootagePlace
 from studio.web.doors import Doors
 from studio.web.safe_paths import folder_to_import

@@ -13,7 +13,7 @@ from studio.calibration.board_footage_reading import HowTaken, by_camera, footag
 from studio.calibration.checks import check_calibration
 from studio.calibration.extrinsics import moved, moved_cameras
 from studio.calibration.findings import Finding, blocking
-from studio.calibration.floor_clicks import Click, ClickedFloor, Clicks, clicked_floor
+from studio.calibration.floor import Click, ClickedFloor, Clicks, clicked_floor
 from studio.calibration.report import told_source
 from studio.calibration.verbs import Calibrated
 from studio.capture.calibration_files import AssumedCrop, Calibration, read_calibration
@@ -21,8 +21,7 @@ from studio.capture.naming import CameraMatch
 from studio.capture.sanity import quarter_turns
 from studio.errors import CalibrationError, NotFoundError, StudioError
 from studio.geometry.camera import Camera
-from studio.sessions.calibration_changes import NewCalibration
-from studio.sessions.calibration_fit import fit_to_session
+from studio.sessions.calibration_changes import NewCalibration, fit_to_session
 from studio.sessions.session import CAMERAS_PATH, Session
 
 KEPT = 12

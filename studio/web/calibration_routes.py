@@ -17,7 +17,7 @@ from fastapi import APIRouter, Query, Response
 from studio.calibration.board_pdf import usual_board, write_board_pdf
 from studio.calibration.boards import board_from_text
 from studio.calibration.coverage import coverage_picture
-from studio.calibration.floor_clicks import Click
+from studio.calibration.floor import Click
 from studio.calibration.world_picture import world_picture
 from studio.capture.calibration_files import (
     CALIBRATION_FORMATS,

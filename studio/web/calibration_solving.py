@@ -6,8 +6,7 @@ from pathlib import Path
 
 from fastapi import APIRouter
 
-from studio.calibration.board_folders import find_board_footage
-from studio.calibration.board_footage_reading import list_footage
+from studio.calibration.board_footage_reading import find_board_footage, list_footage
 from studio.calibration.boards import Board, board_from_text
 from studio.calibration.verbs import calibrate
 from studio.sessions.board_calibration import footage_sizes, how_taken

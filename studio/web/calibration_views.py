@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import msgspec
 import numpy as np
 
-from studio.calibration.board_folders import find_board_footage
+from studio.calibration.board_footage_reading import find_board_footage
 from studio.calibration.findings import blocking
 from studio.calibration.report import report_of
 from studio.capture.calibration_files import CALIBRATION_FORMATS

@@ -15,7 +15,7 @@ from studio.capture.camera_addresses import CameraAddress, camera_address, witho
 from studio.capture.stream_files import preview_jpeg
 from studio.errors import NotFoundError
 from studio.runs.new_run import RunRequest
-from studio.sessions.inner_paths import PathRefused
+from studio.sessions.names import PathRefused
 from studio.sessions.recordings import calibration_given
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun

@@ -17,7 +17,7 @@ from studio.progress import Progress
 from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.archives import FOOTAGE_PARTS, only_archive, unpacked, unwrapped
 from studio.sessions.importers.importing import ImportOptions, ImportReport, add_footage, import_source
-from studio.sessions.inner_paths import PathRefused, relative_path
+from studio.sessions.names import PathRefused, relative_path
 from studio.web.background_jobs import Job
 from studio.web.doors import Door, Doors, let_go
 from studio.web.import_schemas import (

@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 from studio.errors import NotFoundError
-from studio.sessions.inner_paths import PathRefused
+from studio.sessions.names import PathRefused
 
 MOUNTS = ("/mnt", "/media", "/run/media", "/Volumes", "/data", "/srv")
 ROOTS_VARIABLE = "STUDIO_FOOTAGE_ROOTS"

@@ -8,10 +8,9 @@ from studio.comparison.folders import comparison_count
 from studio.errors import StudioError
 from studio.geometry.camera import Camera
 from studio.runs.silhouette_doubts import standing_doubts
-from studio.sessions.beginning import next_step
 from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session
-from studio.sessions.workspace import SessionSummary
+from studio.sessions.workspace import SessionSummary, next_step
 from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING
 from studio.tracking.catalogue import size_in_words
 from studio.web.run_errors import mean_error

@@ -15,8 +15,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request
 
 from studio.errors import NotFoundError, SessionError, StudioError
-from studio.sessions.inner_paths import place_in, relative_path
-from studio.sessions.names import inside
+from studio.sessions.names import inside, place_in, relative_path
 from studio.web.doors import Door, Doors
 from studio.web.error_responses import TooLargeError
 from studio.web.import_schemas import FileState, UploadState

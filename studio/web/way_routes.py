@@ -9,8 +9,8 @@ from starlette.responses import Response
 from studio.export.kept_exports import exported_files
 from studio.runs.way import Way, way_of
 from studio.runs.way_results import newest_run
-from studio.sessions.beginning import begin_session
 from studio.sessions.session import Session
+from studio.sessions.workspace import begin_session
 from studio.tracking.catalogue import knobs_for_evaluations
 from studio.web.doors import Door, Doors
 from studio.web.job_kinds import BACKGROUND, EXPORT, START_POSE, SUBJECT, TRACK

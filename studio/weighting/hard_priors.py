@@ -21,8 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import checked_poses, limb_frames
-from studio.body.model import BodyModel
-from studio.body.tables import kinematic_tables
+from studio.body.model import BodyModel, kinematic_tables
 from studio.errors import BodyError
 from studio.weighting.block_threads import run_blocks
 from studio.weighting.hard_prior_kernels import all_ratios, chunk_ratios

@@ -5,8 +5,7 @@ import copy
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.body.model import BodyModel, KinematicTables
-from studio.body.tables import kinematic_tables
+from studio.body.model import BodyModel, KinematicTables, kinematic_tables
 from studio.errors import BodyError
 from studio.geometry.camera import Camera
 from studio.weighting.block_threads import run_blocks

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import limb_frames
-from studio.body.model import BodyModel
-from studio.body.tables import kinematic_tables
+from studio.body.model import BodyModel, kinematic_tables
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.weighting.bodytrack import BodytrackSettings

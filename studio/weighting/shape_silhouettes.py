@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.body.dimensions import with_dimensions
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, kinematic_tables
 from studio.body.shape_space import ShapeSpace
-from studio.body.tables import kinematic_tables
 from studio.errors import BodyError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from studio.capture.camera_addresses import CameraAddress
-from studio.capture.camera_sets import SpreadFigures
 from studio.capture.camera_streams import Shot
-from studio.capture.live_cameras import CameraStanding
+from studio.capture.live_cameras import CameraStanding, SpreadFigures
 from studio.errors import NotFoundError, RunError, StudioError
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.sessions.recordings import check_cameras, import_recording

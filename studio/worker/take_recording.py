@@ -10,8 +10,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from studio.capture.camera_sets import PictureSet, SpreadFigures
-from studio.capture.live_cameras import CameraStanding
+from studio.capture.live_cameras import CameraStanding, PictureSet, SpreadFigures
 from studio.errors import FootageError, StudioError
 from studio.sessions.session import Session
 from studio.sessions.takes import TakeWriter, finish_take

@@ -7,8 +7,8 @@ import pytest
 
 from studio.benchmarks.live_footage import lengthen
 from studio.benchmarks.live_stages import STAGES, StageClock
+from studio.capture.footage import folded
 from studio.capture.footage_source import CameraSource, FootageSource
-from studio.capture.to_and_fro import folded
 from studio.sessions.manifest import SessionManifest, now, write_manifest
 from studio.sessions.session import Session
 from studio.synthesis.clips import ClipWriter

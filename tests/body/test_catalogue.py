@@ -7,8 +7,8 @@ import pytest
 from studio.body.catalogue import list_bodies, load_body
 from studio.body.definition import WORLD
 from studio.body.forward_kinematics import limb_ends, marker_points
+from studio.body.model import kinematic_tables
 from studio.body.reader import parse_body
-from studio.body.tables import kinematic_tables
 from studio.errors import BodyError
 
 # Parameters and drawn limbs of each body.

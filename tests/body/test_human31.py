@@ -10,8 +10,8 @@ import pytest
 from studio.body.branches import within_limits
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends, limb_frames, marker_points
+from studio.body.model import kinematic_tables
 from studio.body.subject import fit_subject, subject_from_shape
-from studio.body.tables import kinematic_tables
 from studio.geometry.camera import Camera
 from studio.geometry.cones import limb_outlines
 from studio.geometry.projection import project

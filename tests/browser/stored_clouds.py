@@ -3,8 +3,8 @@
 import numpy as np
 from studio_page import StudioPage
 
-from studio.body.extremities import extremities
 from studio.body.forward_kinematics import limb_ends
+from studio.body.model import extremities
 from studio.sessions.workspace import Workspace
 
 

@@ -4,10 +4,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.calibration.boards import Board
+from studio.calibration.boards import Board, Sighting
 from studio.calibration.coverage import coverage_of
 from studio.calibration.intrinsics import Lens
-from studio.calibration.sightings import Sighting
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.geometry.rigid import transform

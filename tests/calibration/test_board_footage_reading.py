@@ -7,11 +7,11 @@ import pytest
 from calibrated_scenes import CHARUCO, ring, seen
 from toy_footage import write_video
 
-from studio.calibration.board_folders import find_board_footage
 from studio.calibration.board_footage_reading import (
     Seen,
     by_camera,
     chosen_for_lens,
+    find_board_footage,
     frames_in_step,
     list_footage,
     look_together,

@@ -9,8 +9,14 @@ from calibrated_scenes import CHARUCO, ring, seen, true_lens, waved
 
 from studio.calibration.boards import Board
 from studio.calibration.extrinsics import Rig, moved, solve_rig
-from studio.calibration.floor import board_on_floor, floor_from_board, floor_from_points, triangulated
-from studio.calibration.floor_clicks import clicked_floor, read_clicks
+from studio.calibration.floor import (
+    board_on_floor,
+    clicked_floor,
+    floor_from_board,
+    floor_from_points,
+    read_clicks,
+    triangulated,
+)
 from studio.errors import CalibrationError
 from studio.geometry.projection import project
 from studio.geometry.rigid import transform

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 from calibrated_scenes import CHARUCO, SIZE, ring
 
-from studio.calibration.boards import Board, board_from_text
+from studio.calibration.boards import Board, Sighting, board_from_text
 from studio.calibration.coverage import coverage_of, coverage_picture
 from studio.calibration.detection import BoardFinder
 from studio.calibration.findings import blocking
 from studio.calibration.intrinsics import solve_lens
 from studio.calibration.lens_verdict import lens_findings, verdict
-from studio.calibration.sightings import Sighting
 from studio.capture.pictures import list_pictures, read_picture
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera

@@ -8,10 +8,9 @@ import pytest
 from calibrated_scenes import CHARUCO, CHESS, person_masks, ring, seen, true_lens, waved
 
 from studio.calibration.board_checks import mirrored_cameras
-from studio.calibration.boards import Board
+from studio.calibration.boards import Board, Sighting
 from studio.calibration.checks import Finding, check_calibration
 from studio.calibration.fault_hypotheses import inverted, rescaled, transposed
-from studio.calibration.sightings import Sighting
 from studio.calibration.silhouette_checks import Masks
 from studio.geometry.camera import Camera
 from studio.geometry.rotations import rotation_from_vector

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from studio.capture.footage import ToAndFro, folded
 from studio.capture.frame_clock import PATIENCE_SECONDS, ReplayClock
-from studio.capture.to_and_fro import ToAndFro, folded
 from studio.errors import NotFoundError
 from studio.sessions.session import Session
 

@@ -9,7 +9,7 @@ import pytest
 from toy_session import make_session
 
 from studio.capture import footage
-from studio.capture.freed_memory import give_back_freed_memory
+from studio.capture.video import give_back_freed_memory
 from studio.runs.overlay_pictures import compose_view, forget_composers, let_composers_rest
 
 MEASURED = """

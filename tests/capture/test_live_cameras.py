@@ -6,9 +6,16 @@ import numpy as np
 import pytest
 
 from studio.capture.camera_addresses import CameraAddress, camera_address
-from studio.capture.camera_sets import furthest, paired, spread_figures
 from studio.capture.camera_streams import Shot, Wait
-from studio.capture.live_cameras import BEHIND_SECONDS, SILENCE_SECONDS, LiveCamera, LiveCameras
+from studio.capture.live_cameras import (
+    BEHIND_SECONDS,
+    SILENCE_SECONDS,
+    LiveCamera,
+    LiveCameras,
+    furthest,
+    paired,
+    spread_figures,
+)
 from studio.errors import FootageError
 
 PIXELS = np.zeros((4, 6, 3), np.uint8)

@@ -8,9 +8,15 @@ import pytest
 from toy_footage import number_of, numbered_frame
 
 from studio.capture.camera_streams import Shot
-from studio.capture.cut_recordings import mend_recording, whole_boxes
-from studio.capture.numbered_pictures import NumberedReader, has_picture, picture_path
-from studio.capture.stream_files import Cadence, StreamWriter, TimesFile, jpeg_of_pixels
+from studio.capture.pictures import NumberedReader, has_picture, picture_path
+from studio.capture.stream_files import (
+    Cadence,
+    StreamWriter,
+    TimesFile,
+    jpeg_of_pixels,
+    mend_recording,
+    whole_boxes,
+)
 from studio.capture.timestamps import read_timestamps
 from studio.capture.video import VideoReader, measure_video
 from studio.errors import FootageError

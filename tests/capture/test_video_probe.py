@@ -9,8 +9,7 @@ import pytest
 from toy_footage import HEIGHT, WIDTH, number_of, numbered_frame, write_video
 
 from studio.capture import video, video_probe
-from studio.capture.video import VideoReader, measure_video
-from studio.capture.video_probe import probe_video
+from studio.capture.video import VideoReader, measure_video, probe_video
 from studio.errors import FootageError
 from studio.isolated import silent
 

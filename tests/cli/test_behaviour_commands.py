@@ -12,8 +12,7 @@ from moving_bodies import c3d_of, swinging
 from studio.body.catalogue import load_body
 from studio.cli import behaviour_commands
 from studio.cli.main import main
-from studio.sessions.beginning import begin_session
-from studio.sessions.workspace import Workspace, workspace_root
+from studio.sessions.workspace import Workspace, begin_session, workspace_root
 
 BODY = load_body("human25")
 QUICK = (

@@ -6,7 +6,7 @@ from scipy.optimize import least_squares
 from scipy.spatial import procrustes
 from scipy.spatial.transform import Rotation
 
-from studio.evaluation.alignment import moved_to_root, similarity_aligned
+from studio.evaluation.errors import moved_to_root, similarity_aligned
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])

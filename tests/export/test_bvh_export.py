@@ -11,10 +11,10 @@ from export_runs import FRAMES, MADE, moving_poses, track_of
 
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import joint_frames
-from studio.export.axes import Axes
 from studio.export.bvh_writing import smooth_angles
 from studio.export.exporting import export_run
 from studio.export.formats import FORMATS
+from studio.export.options import Axes
 from studio.export.skeleton import Skeleton, follow, skeleton_of
 from studio.motion_files.bvh import read_bvh
 

@@ -9,8 +9,7 @@ from export_runs import moving_poses
 from studio.body.catalogue import list_bodies, load_body
 from studio.body.forward_kinematics import joint_frames, marker_points
 from studio.body.model import MOVE, TURN, Joint, Step
-from studio.export.joint_tree import joint_tree
-from studio.export.skeleton import follow, skeleton_of
+from studio.export.skeleton import follow, joint_tree, skeleton_of
 
 
 @pytest.mark.parametrize("name", list_bodies())

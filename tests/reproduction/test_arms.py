@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from studio.body.forward_kinematics import limb_ends
-from studio.body.tables import kinematic_tables
+from studio.body.model import kinematic_tables
 from studio.geometry.projection import project
 from studio.reproduction.deutscher_reid.arms import (
     TRUE_PART,

@@ -9,10 +9,9 @@ from studio.body.subject import Subject, write_subject
 from studio.errors import SessionError
 from studio.runs.way import way_of
 from studio.runs.way_setup import subject_step
-from studio.sessions.beginning import begin_session
 from studio.sessions.made_from import note
 from studio.sessions.session import SUBJECT_NAME
-from studio.sessions.workspace import Workspace
+from studio.sessions.workspace import Workspace, begin_session
 
 STEPS = ["footage", "calibration", "background", "subject", "start-pose", "track", "check", "export"]
 

@@ -17,9 +17,8 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
-from studio.body.extremities import extremities
 from studio.body.forward_kinematics import limb_ends, limb_frames
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, extremities
 from studio.errors import SettingsError
 from studio.scene.stage import SceneStage
 from studio.scene.view_options import Shown

@@ -7,9 +7,8 @@ from swaying_session import LAYERS, PARTICLES, cloud_record, swaying_pose
 
 from studio.body.catalogue import load_body
 from studio.body.dimensions import with_dimensions
-from studio.body.extremities import extremities
 from studio.body.forward_kinematics import limb_ends, limb_frames, marker_points
-from studio.body.model import BodyModel
+from studio.body.model import BodyModel, extremities
 from studio.geometry.camera import Camera
 from studio.runs.colour_tokens import colour_tokens
 from studio.scene import particle_view

@@ -9,9 +9,9 @@ from toy_session import FRAMES, make_session
 
 from studio.errors import CalibrationError, FootageError, SessionError, WorkCancelledError
 from studio.runs.way import way_of
-from studio.sessions.beginning import begin_session
 from studio.sessions.importers.importing import ImportOptions, add_footage
 from studio.sessions.session import Session
+from studio.sessions.workspace import begin_session
 
 
 @pytest.fixture

@@ -5,10 +5,9 @@ from pathlib import Path
 import pytest
 
 from studio.errors import FootageError
-from studio.sessions.beginning import begin_session
 from studio.sessions.recordings import calibration_given
 from studio.sessions.session import CAMERAS_PATH, Session
-from studio.sessions.workspace import Workspace
+from studio.sessions.workspace import Workspace, begin_session
 
 
 def test_a_session_goes_by_name_or_folder_and_a_calibration_by_file_or_folder(

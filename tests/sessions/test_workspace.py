@@ -10,8 +10,7 @@ from toy_session import make_session
 
 from studio.errors import NotFoundError, SessionError
 from studio.sessions.results_store import ResultsWriter
-from studio.sessions.session import Session, free_run_name
-from studio.sessions.thumbnails import jpeg
+from studio.sessions.session import Session, free_run_name, jpeg
 from studio.sessions.workspace import Workspace, workspace_root
 
 

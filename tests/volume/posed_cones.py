@@ -4,8 +4,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from studio.body.forward_kinematics import limb_frames
-from studio.body.model import BodyModel
-from studio.body.tables import kinematic_tables
+from studio.body.model import BodyModel, kinematic_tables
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project

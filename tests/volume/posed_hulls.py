@@ -6,8 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from studio.body.forward_kinematics import limb_frames
-from studio.body.model import BodyModel
-from studio.body.tables import kinematic_tables
+from studio.body.model import BodyModel, kinematic_tables
 from studio.volume.hull import Hull
 from studio.volume.tracking_space import Box
 

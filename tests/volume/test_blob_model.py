@@ -6,7 +6,7 @@ from posed_hulls import near
 
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_frames
-from studio.body.tables import kinematic_tables
+from studio.body.model import kinematic_tables
 from studio.errors import BodyError
 from studio.volume.blob_model import BlobModel, cone_blobs, cone_moments
 

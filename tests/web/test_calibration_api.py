@@ -14,9 +14,9 @@ from web_doubles import Studio
 
 from studio.capture.calibration_files import export_calibration, read_calibration, write_calibration
 from studio.geometry.projection import project
-from studio.sessions.beginning import begin_session
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
+from studio.sessions.workspace import begin_session
 from studio.web import calibration_solving
 
 TAKE = "/api/sessions/take1/calibration"

@@ -13,7 +13,7 @@ from web_doubles import Studio
 
 from studio.body.forward_kinematics import marker_points
 from studio.motion_files.trc import MarkerMotion, write_trc
-from studio.sessions.results_checksums import VERIFIED
+from studio.sessions.results_codec import VERIFIED
 from studio.sessions.results_reader import FILE_NAME
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun

@@ -8,7 +8,7 @@ import pytest
 from web_doubles import Studio, cookie_header
 
 from studio.errors import NotFoundError
-from studio.sessions.inner_paths import PathRefused, place_in, relative_path
+from studio.sessions.names import PathRefused, place_in, relative_path
 from studio.web.safe_paths import default_footage_roots, folder_to_import
 
 WRONG_NAMES = [

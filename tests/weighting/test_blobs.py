@@ -8,8 +8,7 @@ import pytest
 from studio.benchmarks.kernels import made_evidence, ring_of_cameras
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_frames
-from studio.body.model import BodyModel
-from studio.body.tables import kinematic_tables
+from studio.body.model import BodyModel, kinematic_tables
 from studio.errors import BodyError, FootageError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.volume.relative_entropy import kept_divergence

@@ -5,7 +5,7 @@ import pytest
 from weighting_scene import CENTRE, looking_at, plain_evidence, scattered
 
 from studio.body.forward_kinematics import limb_frames
-from studio.body.tables import kinematic_tables
+from studio.body.model import kinematic_tables
 from studio.geometry.projection import project
 from studio.weighting.bodytrack import BodytrackSettings, BodytrackWeigher
 from studio.weighting.edge_region import EdgeRegionSettings, EdgeRegionWeigher

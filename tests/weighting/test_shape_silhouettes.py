@@ -3,8 +3,8 @@
 import numpy as np
 
 from studio.body.catalogue import load_body
+from studio.body.model import kinematic_tables
 from studio.body.shape_space import shape_space
-from studio.body.tables import kinematic_tables
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.synthesis.cameras import placed_camera
 from studio.weighting.kinematic_program import compile_program

@@ -11,9 +11,9 @@ from toy_session import facing_camera
 
 from studio.capture.calibration_files import write_calibration
 from studio.capture.camera_addresses import camera_address
-from studio.capture.camera_sets import PictureSet
 from studio.capture.camera_streams import Shot
 from studio.capture.footage_source import CameraSource, FootageSource
+from studio.capture.live_cameras import PictureSet
 from studio.capture.stream_files import StreamWriter
 from studio.errors import FootageError, SessionError
 from studio.runs.take_following import TakeFollower
@@ -149,7 +149,7 @@ def test_a_killed_recorder_leaves_a_take_that_can_be_finished(base: Session, tmp
 def test_what_a_take_needs_is_asked_for_first(base: Session, tmp_path: Path) -> None:
     with pytest.raises(FootageError, match="no camera 'left'"):
         begin_take(base, tmp_path / "take", ("left",), 25.0, 10)
-    with pytest.raises(SessionError, match="something at '.*base' already"):
+    with pytest.raises(SessionError, match=r"something at '.*base' already"):
         begin_take(base, base.path, ("front",), 25.0, 10)
     (base.path / "evidence.json").write_text('{"schema": 1, "knobs": {"background_model": "median"}}')
     with pytest.raises(FootageError, match="made with 'median'"):

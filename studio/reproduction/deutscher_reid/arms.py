@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from studio.benchmarks.made_scene import filled
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends, limb_frames
-from studio.body.model import BodyModel
-from studio.body.tables import kinematic_tables
+from studio.body.model import BodyModel, kinematic_tables
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
 from studio.geometry.cones import limb_outlines

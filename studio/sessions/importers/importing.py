@@ -15,17 +15,23 @@ from studio.capture.calibration_files import Calibration, read_calibration
 from studio.capture.footage_source import CameraSource, FootageSource
 from studio.capture.naming import CameraMatch, listed
 from studio.capture.pictures import check_picture, list_pictures
-from studio.capture.video_probe import probe_video
+from studio.capture.video import probe_video
 from studio.errors import CalibrationError, FootageError, SessionError
 from studio.geometry.camera import Camera
 from studio.progress import Progress, watched
 from studio.sessions.archives import FOOTAGE_PARTS, folder_of, is_archive
 from studio.sessions.atomic_files import discard, made_whole, new_folder_beside, taken
 from studio.sessions.file_checksums import note_files
-from studio.sessions.importers.agreement import SAME_RATE, check_counts, different_rates
 from studio.sessions.importers.bodytrack import is_bodytrack, plan_bodytrack
 from studio.sessions.importers.folder_layout import plan_folder
-from studio.sessions.importers.measuring import MeasuredSource, measure_source, part_name
+from studio.sessions.importers.measuring import (
+    SAME_RATE,
+    MeasuredSource,
+    check_counts,
+    different_rates,
+    measure_source,
+    part_name,
+)
 from studio.sessions.importers.plan import SourcePlan
 from studio.sessions.importers.writing import (
     check_person,
