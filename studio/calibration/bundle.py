@@ -8,6 +8,7 @@ from scipy.optimize import least_squares
 from scipy.sparse import csr_matrix, lil_matrix
 
 from studio.arrays import Array, Indices
+from studio.geometry.projection import distorted
 
 LOSS_PX = 1.0
 POSE, LENS = 6, 4
@@ -63,11 +64,8 @@ def predicted(bundle: Bundle, seen: Observations) -> Array:
     local = rotated(camera[:, :3], world) + camera[:, 3:]
     depth = np.maximum(local[:, 2], 1.0)
     x, y = local[:, 0] / depth, local[:, 1] / depth
-    fx, fy, cx, cy, k1, k2, p1, p2, k3 = bundle.lenses[seen.camera].T
-    r2 = x * x + y * y
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    across = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
-    down = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+    fx, fy, cx, cy, *coefficients = bundle.lenses[seen.camera].T
+    across, down = distorted(x, y, coefficients)
     return np.column_stack([fx * across + cx, fy * down + cy])
 
 

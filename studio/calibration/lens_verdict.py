@@ -1,5 +1,7 @@
 """Whether the pictures are enough for a lens, in words: what is missing and what to photograph."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from studio.calibration.findings import Finding
@@ -20,9 +22,7 @@ UNLIKE_FOCAL = (0.35, 6.0)
 
 def lens_findings(lens: Lens) -> tuple[Finding, ...]:
     """What speaks against a lens; none for one that can be trusted, or that was read from a file."""
-    if not lens.residuals:
-        return ()
-    found = [*_amount(lens), *_tilt(lens), *_precision(lens)]
+    found = _doubts(lens) if lens.residuals else ()
     return tuple(sorted(found, key=lambda finding: finding.severity != "blocks"))
 
 
@@ -38,83 +38,60 @@ def verdict(lens: Lens) -> str:
     )
 
 
-def _amount(lens: Lens) -> list[Finding]:
-    found: list[Finding] = []
-    count, share, about = len(lens.used), lens.coverage.share, (lens.camera,)
+def _doubts(lens: Lens) -> Iterator[Finding]:
+    camera = f"camera {lens.camera}"
+
+    def doubt(code: str, blocks: bool, message: str, remedy: str) -> Finding:
+        return Finding(code, "blocks" if blocks else "warns", message, remedy, (lens.camera,))
+
+    count, share = len(lens.used), lens.coverage.share
     if count < FEW:
-        found.append(
-            Finding(
-                "few-pictures",
-                "blocks" if count < TOO_FEW else "warns",
-                f"Camera {lens.camera} was calibrated from {count} pictures.",
-                f"Take {FEW} to 30 pictures, or a minute of video, with the board in other places and tilts.",
-                about,
-            )
+        yield doubt(
+            "few-pictures",
+            count < TOO_FEW,
+            f"Camera {lens.camera} was calibrated from {count} pictures.",
+            f"Take {FEW} to 30 pictures, or a minute of video, with the board in other places and tilts.",
         )
     if share < GOOD_COVERAGE:
         empty = ", ".join(lens.coverage.empty_parts) or "the edges"
-        found.append(
-            Finding(
-                "coverage",
-                "blocks" if share < POOR_COVERAGE else "warns",
-                f"The board was seen in {share:.0%} of the picture of camera {lens.camera} only; hardly in: {empty}.",
-                "Hold the board there too: distortion is not known where no corner was seen.",
-                about,
-            )
+        yield doubt(
+            "coverage",
+            share < POOR_COVERAGE,
+            f"The board was seen in {share:.0%} of the picture of {camera} only; hardly in: {empty}.",
+            "Hold the board there too: distortion is not known where no corner was seen.",
         )
-    return found
-
-
-def _tilt(lens: Lens) -> list[Finding]:
     tilts = np.array([residual.tilt for residual in lens.used])
-    if np.count_nonzero(tilts >= ENOUGH_TILT) >= min(TILTED_BOARDS, len(tilts)):
-        return []
-    return [
-        Finding(
+    tilted = np.count_nonzero(tilts >= ENOUGH_TILT)
+    if tilted < min(TILTED_BOARDS, len(tilts)):
+        yield doubt(
             "little-tilt",
-            "warns",
-            f"Only {np.count_nonzero(tilts >= ENOUGH_TILT)} of {len(tilts)} boards before camera {lens.camera} were"
-            f" tilted by {ENOUGH_TILT:.0f}° or more (the most: {tilts.max():.0f}°).",
+            False,
+            f"Only {tilted} of {len(tilts)} boards before {camera} were tilted by {ENOUGH_TILT:.0f}° or more (the most:"
+            f" {tilts.max():.0f}°).",
             "Tilt the board by 30° to 45° to either side: a board that faces the camera does not tell focal length"
             " from distance.",
-            (lens.camera,),
         )
-    ]
-
-
-def _precision(lens: Lens) -> list[Finding]:
-    found: list[Finding] = []
     focal = float(np.mean(np.diag(lens.matrix)[:2]))
-    doubt = 2.0 * lens.focal_deviation / focal
-    if doubt > SURE:
-        found.append(
-            Finding(
-                "uncertain-focal",
-                "blocks" if doubt > UNSURE else "warns",
-                f"The focal length of camera {lens.camera} is {focal:.0f} px give or take {doubt:.1%}.",
-                "Take more pictures, tilted and at unlike distances.",
-                (lens.camera,),
-            )
+    unsure = 2.0 * lens.focal_deviation / focal
+    if unsure > SURE:
+        yield doubt(
+            "uncertain-focal",
+            unsure > UNSURE,
+            f"The focal length of {camera} is {focal:.0f} px give or take {unsure:.1%}.",
+            "Take more pictures, tilted and at unlike distances.",
         )
     relative = lens.rms * 1000.0 / lens.size[0]
     if relative > SHARP:
-        found.append(
-            Finding(
-                "residual",
-                "blocks" if relative > 5.0 * SHARP else "warns",
-                f"The corners of camera {lens.camera} miss the model by {lens.rms:.2f} px.",
-                "Use a flat, stiff board and pictures without motion blur; check the board's numbers of squares.",
-                (lens.camera,),
-            )
+        yield doubt(
+            "residual",
+            relative > 5.0 * SHARP,
+            f"The corners of {camera} miss the model by {lens.rms:.2f} px.",
+            "Use a flat, stiff board and pictures without motion blur; check the board's numbers of squares.",
         )
     if not UNLIKE_FOCAL[0] < focal / max(lens.size) < UNLIKE_FOCAL[1]:
-        found.append(
-            Finding(
-                "unlikely-focal",
-                "blocks",
-                f"The focal length of camera {lens.camera}, {focal:.0f} px, is unlike any usual lens.",
-                "Check the board's numbers and take more pictures with the board tilted.",
-                (lens.camera,),
-            )
+        yield doubt(
+            "unlikely-focal",
+            True,
+            f"The focal length of {camera}, {focal:.0f} px, is unlike any usual lens.",
+            "Check the board's numbers and take more pictures with the board tilted.",
         )
-    return found

@@ -1,6 +1,6 @@
 """What the cameras' own numbers tell: up axis, floor, unit, place, resolution."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -27,20 +27,22 @@ ASPECT_TOLERANCE = 0.01
 
 def rig_findings(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
     """Doubts that need nothing but the cameras."""
-    wrong = _rotations(cameras)
+    wrong = tuple(_rotations(cameras))
     if wrong:
         return wrong
-    turned = _transposed(cameras)
-    if turned:
-        return (*turned, *_principal(cameras))
-    return (*_up_axis(cameras), *_floor(cameras), *_unit(cameras), *_place(cameras), *_principal(cameras))
+    turned = tuple(_transposed(cameras))
+    checks = () if turned else (_up_axis, _floor, _unit, _place)
+    return (*turned, *(finding for check in (*checks, _principal) for finding in check(cameras)))
 
 
 def size_findings(
     cameras: Sequence[Camera], footage_sizes: Mapping[str, tuple[int, int]]
 ) -> tuple[Finding, ...]:
     """Footage that was not recorded at the size its camera was calibrated for."""
-    found: list[Finding] = []
+    return tuple(_sizes(cameras, footage_sizes))
+
+
+def _sizes(cameras: Sequence[Camera], footage_sizes: Mapping[str, tuple[int, int]]) -> Iterator[Finding]:
     for camera in cameras:
         size = footage_sizes.get(camera.name, (camera.width, camera.height))
         across, down = size[0] / camera.width, size[1] / camera.height
@@ -57,8 +59,7 @@ def size_findings(
         else:
             message = f"{told}: the shape of the picture differs, so part of it was cut off."
             remedy = "Record with the same mode of the camera as for the calibration, or calibrate again."
-        found.append(Finding("resolution", "blocks", message, remedy, (camera.name,)))
-    return tuple(found)
+        yield Finding("resolution", "blocks", message, remedy, (camera.name,))
 
 
 def looks_at_one_place(cameras: Sequence[Camera]) -> tuple[str, ...]:
@@ -81,18 +82,16 @@ def upright_about(cameras: Sequence[Camera], axis: Array) -> bool:
     return bool(np.sqrt(np.mean(rows**2)) < LEVEL and ups.min() > UPRIGHT)
 
 
-def _rotations(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
-    found: list[Finding] = []
+def _rotations(cameras: Sequence[Camera]) -> Iterator[Finding]:
     for camera in cameras:
         if np.isfinite(camera.rotation).all() and np.linalg.det(camera.rotation) < 0.0:
             message = f"The rotation of camera {camera.name} mirrors the world (its determinant is -1)."
             remedy = "The axes were taken for left-handed ones: flip one axis where the calibration was made."
-            found.append(Finding("handedness", "blocks", message, remedy, (camera.name,)))
+            yield Finding("handedness", "blocks", message, remedy, (camera.name,))
         elif orthonormality_error(camera.rotation) > ROTATION_TOLERANCE:
             message = f"The rotation matrix of camera {camera.name} is no rotation."
             remedy = "Check that the nine numbers are complete, or export the calibration again."
-            found.append(Finding("rotation", "blocks", message, remedy, (camera.name,)))
-    return tuple(found)
+            yield Finding("rotation", "blocks", message, remedy, (camera.name,))
 
 
 def _sound(cameras: Sequence[Camera]) -> bool:
@@ -105,10 +104,10 @@ def _sound(cameras: Sequence[Camera]) -> bool:
     )
 
 
-def _transposed(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
+def _transposed(cameras: Sequence[Camera]) -> Iterator[Finding]:
     """Rotations that make a sound rig only once rows and columns are exchanged, or the pose is inverted."""
     if len(cameras) < 2 or _sound(cameras):
-        return ()
+        return
     for change, remedy in (
         (transposed, "Export the rotation in row order, or transpose it."),
         (inverted, "The poses are world from camera: export camera from world, or invert them."),
@@ -124,13 +123,13 @@ def _transposed(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
                     f"The rotation of camera {', '.join(names)} is transposed: the cameras look at one place, upright"
                     " and above the floor, only once it is read the other way."
                 )
-                return (Finding("transposed-rotation", "blocks", message, remedy, names),)
-    return ()
+                yield Finding("transposed-rotation", "blocks", message, remedy, names)
+                return
 
 
-def _up_axis(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
+def _up_axis(cameras: Sequence[Camera]) -> Iterator[Finding]:
     if upright_about(cameras, np.array(AXES["Z"])):
-        return ()
+        return
     for name, direction in AXES.items():
         for sign, word in ((1.0, ""), (-1.0, "minus ")):
             if upright_about(cameras, sign * np.array(direction)):
@@ -138,14 +137,14 @@ def _up_axis(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
                 remedy = (
                     f"Turn the world so that {word}{name} becomes Z, or export the calibration with Z up."
                 )
-                return (Finding("up-axis", "blocks", message, remedy),)
-    return ()
+                yield Finding("up-axis", "blocks", message, remedy)
+                return
 
 
-def _floor(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
+def _floor(cameras: Sequence[Camera]) -> Iterator[Finding]:
     low = tuple(camera.name for camera in cameras if camera.centre[2] < 0.0)
     if not low:
-        return ()
+        return
     most = 2 * len(low) > len(cameras)
     message = f"Camera {', '.join(low)} lies under the floor (z < 0)."
     remedy = (
@@ -153,16 +152,16 @@ def _floor(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
         if most
         else "Check that the floor is at z = 0 and that this camera's calibration is its own."
     )
-    return (Finding("below-floor", "blocks" if most else "warns", message, remedy, low),)
+    yield Finding("below-floor", "blocks" if most else "warns", message, remedy, low)
 
 
-def _unit(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
+def _unit(cameras: Sequence[Camera]) -> Iterator[Finding]:
     if len(cameras) < 2:
-        return ()
+        return
     centres = np.array([camera.centre for camera in cameras])
     spread = float(np.linalg.norm(centres - centres.mean(axis=0), axis=1).max())
     if SMALLEST_RIG_MM < spread < LARGEST_RIG_MM:
-        return ()
+        return
     message = f"The cameras lie within {spread:.3g} mm of their middle"
     if 0.5 < spread <= SMALLEST_RIG_MM:
         message = f"{message}: metres were taken for millimetres, it seems."
@@ -172,20 +171,18 @@ def _unit(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
         remedy = "Divide the translations by 1000, or name the unit when importing."
     else:
         message, remedy = f"{message}: they are all in one place.", "Calibrate where the cameras stand."
-    return (Finding("scale", "blocks", message, remedy),)
+    yield Finding("scale", "blocks", message, remedy)
 
 
-def _place(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
+def _place(cameras: Sequence[Camera]) -> Iterator[Finding]:
     away = looks_at_one_place(cameras)
-    if not away:
-        return ()
-    message = f"Camera {', '.join(away)} does not look where the others look."
-    remedy = "Check that each calibration belongs to its footage and was not exchanged."
-    return (Finding("no-common-view", "warns", message, remedy, away),)
+    if away:
+        message = f"Camera {', '.join(away)} does not look where the others look."
+        remedy = "Check that each calibration belongs to its footage and was not exchanged."
+        yield Finding("no-common-view", "warns", message, remedy, away)
 
 
-def _principal(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
-    found: list[Finding] = []
+def _principal(cameras: Sequence[Camera]) -> Iterator[Finding]:
     for camera in cameras:
         cx, cy = camera.matrix[0, 2] / camera.width, camera.matrix[1, 2] / camera.height
         if CENTRED[0] < cx < CENTRED[1] and CENTRED[0] < cy < CENTRED[1]:
@@ -200,8 +197,7 @@ def _principal(cameras: Sequence[Camera]) -> tuple[Finding, ...]:
         if scaled:
             remedy = f"The calibration seems made at {factor:.2g} times this resolution: scale it."
         code = "resolution" if scaled else "principal-point"
-        found.append(Finding(code, "blocks" if scaled else "warns", message, remedy, (camera.name,)))
-    return tuple(found)
+        yield Finding(code, "blocks" if scaled else "warns", message, remedy, (camera.name,))
 
 
 TOLERANCE = 0.05

@@ -22,7 +22,7 @@ from studio.capture.timestamps import TimedOffsets, offsets_from_times, read_tim
 from studio.capture.video import probe_video
 from studio.errors import FootageError, SessionError
 from studio.progress import Progress
-from studio.sessions.importers.plan import checked_turn, in_step
+from studio.sessions.importers.measuring import checked_turn, in_step
 from studio.sessions.made_from import adopt
 from studio.sessions.run_record import FILE_NAME as RUN_FILE_NAME
 from studio.sessions.session import START_POSE_NAME, THUMBNAIL_NAME, Session, described_anew
