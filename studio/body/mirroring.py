@@ -82,7 +82,6 @@ class Mirror:
         return self._placed(rest, wanted, whole=True)
 
     def _exchanged(self, pose: Array) -> Array:
-        """The limbs mirrored, the root as it is."""
         rest = self.body.neutral
         swapped = rest + self._sign * (np.asarray(pose) - rest)[self._twin]
         swapped[self._root] = np.asarray(pose)[self._root]

@@ -186,7 +186,6 @@ def _profiled_deviation(
 
 
 def _inside(solution: _Solution, size: tuple[int, int]) -> bool:
-    """Whether the principal point lies in the middle half of the picture."""
     share = solution.matrix[:2, 2] / np.array(size)
     return bool(np.all((share > 0.25) & (share < 0.75)))
 

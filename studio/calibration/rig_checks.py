@@ -95,7 +95,6 @@ def _rotations(cameras: Sequence[Camera]) -> Iterator[Finding]:
 
 
 def _sound(cameras: Sequence[Camera]) -> bool:
-    """Whether cameras look at one place, stand upright and stay above the floor, as a room's do."""
     return (
         common_target(tuple(cameras)) is not None
         and not looks_at_one_place(cameras)

@@ -102,7 +102,6 @@ def posture(cameras: Sequence[Camera], views: Mapping[str, Bytes]) -> Posture | 
 
 
 def _cut(mask: Bytes) -> bool:
-    """Whether the person reaches the picture's edge."""
     return any(np.any(edge) for edge in (mask[0], mask[-1], mask[:, 0], mask[:, -1]))
 
 

@@ -268,7 +268,6 @@ def _guessed_floor(rig: Rig) -> np.ndarray:
 
 
 def _sorted(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """What blocks first, each once."""
     unique = list(dict.fromkeys(findings))
     stops = blocking(unique)
     return (*stops, *(finding for finding in unique if finding.severity != "blocks"))

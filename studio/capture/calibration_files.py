@@ -118,7 +118,6 @@ def read_calibration(path: Path, unit: str = "", up: str = "z") -> Calibration:
 
 
 def _calibration(path: Path, unit: str, up: str) -> Calibration:
-    """`read_calibration` itself."""
     found = _read(path)
     if not found.cameras:
         raise CalibrationError(
@@ -190,7 +189,6 @@ def _of_other_tools(folder: Path) -> list[Path]:
 
 
 def _read(path: Path) -> FoundCameras:
-    """What a file or folder holds, by the reader of its format."""
     if path.is_dir():
         return _read_folder(path)
     if not path.is_file():
@@ -222,7 +220,6 @@ def _read(path: Path) -> FoundCameras:
 
 
 def _read_folder(folder: Path) -> FoundCameras:
-    """Files that are one calibration together."""
     if bouguet_files(folder):
         return read_bouguet(folder)
     if is_easymocap(folder):

@@ -60,7 +60,6 @@ def _is_camera(path: Path) -> bool:
 
 
 def _read_file(path: Path) -> FoundCameras:
-    """One file."""
     storage = Storage(path)
     if storage.first("M1") and storage.first("M2"):
         return _stereo(path, storage)

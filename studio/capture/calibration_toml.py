@@ -118,7 +118,6 @@ def _name(section: str, table: dict[str, object]) -> str:
 
 
 def _lens(where: str, name: str, table: dict[str, object]) -> Intrinsics:
-    """A camera's lens from its table."""
     if table.get("fisheye") is True:
         raise CalibrationError(
             f"{where} is a fisheye camera, whose distortion the pinhole model cannot describe.",
@@ -162,7 +161,6 @@ def _numbers(where: str, table: dict[str, object], entry: str, shape: tuple[int,
 
 
 def _crop(where: str, table: dict[str, object]) -> AssumedCrop:
-    """The assumption of an earlier import."""
     left, top, right, bottom = (
         float(_numbers(where, table, side, ())) for side in ("left", "top", "right", "bottom")
     )

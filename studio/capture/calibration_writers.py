@@ -144,7 +144,6 @@ def without_k3(camera: Camera) -> tuple[Array, float]:
 
 
 def _table(camera: Camera, distortion: Array, translation: Array) -> dict[str, object]:
-    """A camera's section, as both TOML formats have it."""
     return {
         "name": camera.name,
         "size": [float(camera.width), float(camera.height)],
@@ -156,7 +155,6 @@ def _table(camera: Camera, distortion: Array, translation: Array) -> dict[str, o
 
 
 def _skew_notes(camera: Camera, tool: str) -> list[str]:
-    """A word where the tool's projection passes over the matrix's skew."""
     skew = abs(float(camera.matrix[0, 1])) * camera.height / (2.0 * camera.matrix[1, 1])
     return (
         [f"Camera {camera.name}: {tool} passes over the skew of its axes, up to {skew:.2f} px."]
@@ -173,12 +171,10 @@ def _checked(cameras: tuple[Camera, ...]) -> tuple[Camera, ...]:
 
 
 def _plain(name: str) -> str:
-    """A camera's name as part of a file's."""
     return "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in name)
 
 
 def _check(form: CalibrationFormat) -> None:
-    """Raise CalibrationError where half of what reading takes is lacking."""
     if (form.recognises is None) != (form.read is None):
         raise CalibrationError("it brings one of 'recognises' and 'read' without the other")
 

@@ -94,6 +94,5 @@ class ReplayClock:
         return after >= self._last - 1
 
     def _due(self, frame: int) -> float:
-        """The clock's seconds at which a frame comes."""
         assert self._began is not None
         return self._began + (max(frame, self._first) - self._first) / self._fps

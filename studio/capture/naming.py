@@ -92,5 +92,4 @@ def _contains(long: tuple[str, ...], short: tuple[str, ...]) -> bool:
 
 
 def _numbers(name: str) -> tuple[str, ...]:
-    """The numbers of a name."""
     return tuple(word for word in words(name) if word.isdigit())

@@ -82,7 +82,6 @@ def check_picture(path: Path) -> tuple[int, int]:
 
 
 def _size_of(path: Path) -> tuple[int, int]:
-    """`check_picture` itself."""
     check_regular(path, FootageError)
     if path.suffix.lower() in STRICTLY_DECODED:
         try:
@@ -112,7 +111,6 @@ def measure_pictures(folder: Path, on_frame: Callable[[int, int], None] | None =
 
 
 def _measured(folder: Path, on_frame: Callable[[int, int], None]) -> PicturesMeasure:
-    """`measure_pictures` itself."""
     paths = list_pictures(folder)
     if not paths:
         raise FootageError(f"'{folder.name}' holds no pictures.", "Put the frames in it as PNG, JPEG or BMP.")

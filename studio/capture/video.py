@@ -74,7 +74,6 @@ def probe_video(path: Path) -> VideoProbe:
 
 
 def _probed(path: Path) -> VideoProbe:
-    """`probe_video` itself."""
     with (
         foreign_file(path, FootageError, "a video", "Copy or export it again."),
         open_video(path) as container,
@@ -222,7 +221,6 @@ def measure_video(path: Path, on_frame: Callable[[int, int], None] | None = None
 
 
 def _measured(path: Path, on_frame: Callable[[int, int], None]) -> VideoMeasure:
-    """`measure_video` itself."""
     times: list[float] = []
     width = height = 0
     with open_video(path) as container:

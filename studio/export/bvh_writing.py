@@ -72,7 +72,6 @@ def smooth_angles(turns: Array, order: str) -> Array:
 
 
 def _hierarchy(skeleton: Skeleton, names: tuple[str, ...], axes: Axes, order: str) -> list[str]:
-    """The upper half of the file, a line each."""
     children: dict[int, list[int]] = {}
     for joint, parent in enumerate(skeleton.tree.parents):
         children.setdefault(parent, []).append(joint)
@@ -110,7 +109,6 @@ def _channels(skeleton: Skeleton, joint: int, order: str) -> str:
 
 
 def _depth_first(parents: tuple[int, ...]) -> list[int]:
-    """The joints in the order of the file."""
     ordered: list[int] = []
     stack = [joint for joint, parent in reversed(list(enumerate(parents))) if parent < 0]
     while stack:
@@ -121,7 +119,6 @@ def _depth_first(parents: tuple[int, ...]) -> list[int]:
 
 
 def _row(ordered: list[int], still: list[bool], places: Array, angles: Array, decimals: int) -> str:
-    """One frame's numbers: of each joint in the file's order its positions, if it moves, and its angles."""
     words: list[str] = []
     for joint, stays in zip(ordered, still, strict=True):
         if not stays:
@@ -131,7 +128,6 @@ def _row(ordered: list[int], still: list[bool], places: Array, angles: Array, de
 
 
 def _read_back(task: ExportTask, skeleton: Skeleton, wanted: tuple[Array, Array]) -> str:
-    """Compare the file's joints with those that were meant."""
     read = read_bvh_file(task.place)
     order = [_depth_first(skeleton.tree.parents).index(joint) for joint in range(len(skeleton.names))]
     places, turns = read.followed()
@@ -141,7 +137,6 @@ def _read_back(task: ExportTask, skeleton: Skeleton, wanted: tuple[Array, Array]
 
 
 def _made_up(task: ExportTask) -> list[str]:
-    """What the format cannot say."""
     count = int((~task.motion.known).sum())
     if not count:
         return []

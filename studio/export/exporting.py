@@ -155,7 +155,6 @@ def _packed(written: Written, place: Path) -> tuple[Path, ...]:
 
 
 def _in_place(path: Path, folder: Path) -> Path:
-    """Move a finished file to where it was wanted, in one step."""
     place = folder / path.name
     os.replace(path, place)
     return place

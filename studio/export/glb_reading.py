@@ -83,7 +83,6 @@ def read_glb(path: Path) -> GlbFile:
 
 
 def _values(document: gltf.GLTF2, blob: bytes, index: int | None) -> Array:
-    """An accessor's rows of 32-bit floats."""
     accessor = document.accessors[index]  # pyright: ignore[reportArgumentType, reportCallIssue]
     view = document.bufferViews[accessor.bufferView]  # pyright: ignore[reportArgumentType, reportCallIssue]
     width = WIDTHS[accessor.type]  # pyright: ignore[reportArgumentType]

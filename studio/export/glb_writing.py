@@ -219,7 +219,6 @@ def _add_animation(
 
 
 def _read_back(task: ExportTask, skeleton: Skeleton, wanted: tuple[Array, Array]) -> str:
-    """Compare the file's joints at its own times with those that were meant."""
     read = read_glb(task.place)
     # glTF's times are 32-bit: in a long motion a key lies a little beside its frame's exact time.
     places, turns = read.followed(task.motion.times.astype(np.float32).astype(np.float64))

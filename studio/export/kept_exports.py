@@ -151,7 +151,6 @@ def _stem(
 
 
 def _content(run: StoredRun, track: str) -> str:
-    """A digest of a track's frames and poses."""
     return track_digest(read_track(run, track))
 
 

@@ -45,7 +45,6 @@ def write_videos(task: ExportTask) -> Written:
 
 
 def _write_video(task: ExportTask, place: Path, camera: str, done: int, total: int) -> tuple[int, int]:
-    """Encode one camera's frames; returns width and height."""
     motion, size = task.motion, (0, 0)
     with av.open(str(place), "w", format="mp4", options={"movflags": "faststart"}) as container:
         rate = Fraction(motion.fps).limit_denominator(1001)

@@ -123,7 +123,6 @@ def write_npz(task: ExportTask) -> Written:
 
 
 def _turned_frames(axes: Axes, turns: Array) -> Array:
-    """The joints' axes, written in the file's world."""
     return axes.turn @ turns
 
 
@@ -134,7 +133,6 @@ def _cell(value: float) -> str:
 def _read_csv_back(
     task: ExportTask, heads: list[str], places: Array, poses: Array, angle: NDArray[np.bool_]
 ) -> str:
-    """Compare points and angles of the file with those that were meant."""
     with task.place.open(newline="", encoding="utf-8") as stream:
         rows = list(csv.reader(stream))
     if rows[0] != heads or len(rows) != len(places) + 1:

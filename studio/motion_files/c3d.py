@@ -32,7 +32,6 @@ def read_c3d(path: Path) -> MarkerMotion:
 
 
 def _read(path: Path) -> MarkerMotion:
-    """`read_c3d` itself."""
     with foreign_file(path, StudioError, "a C3D file that can be read", REMEDY):
         content = ezc3d.c3d(str(path))
         settings = content["parameters"]["POINT"]

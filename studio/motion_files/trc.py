@@ -62,7 +62,6 @@ def read_trc(path: Path) -> MarkerMotion:
 
 
 def _read(path: Path) -> MarkerMotion:
-    """`read_trc` itself."""
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except OSError as problem:
@@ -128,7 +127,6 @@ def write_trc(path: Path, motion: MarkerMotion) -> None:
 
 
 def _header(path: Path, lines: list[str]) -> _Header:
-    """Rates, unit and marker names of the first five lines."""
     if len(lines) < HEADER_LINES or not lines[0].startswith("PathFileType"):
         raise TruthError(
             f"'{path.name}' does not start with the five header lines of a TRC file.",
@@ -157,7 +155,6 @@ def _header(path: Path, lines: list[str]) -> _Header:
 
 
 def _header_number(path: Path, fields: dict[str, str], name: str) -> float:
-    """One number of the third line."""
     try:
         value = float(fields[name])
     except (KeyError, ValueError):
@@ -171,7 +168,6 @@ def _header_number(path: Path, fields: dict[str, str], name: str) -> float:
 
 
 def _row(path: Path, number: int, line: str, names: tuple[str, ...]) -> list[float]:
-    """Time and 3 M coordinates of one line, NaN for blank cells."""
     cells = [cell.strip() for cell in line.split("\t")]
     wanted = FIRST_COLUMNS + 3 * len(names)
     while len(cells) > wanted and not cells[-1]:
@@ -197,7 +193,6 @@ def _row(path: Path, number: int, line: str, names: tuple[str, ...]) -> list[flo
 
 
 def _cell(path: Path, number: int, column: int, labels: list[str], text: str) -> float:
-    """One finite number."""
     try:
         value = float(text)
     except ValueError:

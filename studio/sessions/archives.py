@@ -205,7 +205,6 @@ def _checked(found: Iterator[_Entry], limits: ArchiveLimits) -> list[_Entry]:
 
 
 def _unpack_one(entry: _Entry, place: Path, most: int) -> int:
-    """Write one file, refusing to go beyond `most` bytes."""
     written = 0
     with entry.open() as source, place.open("xb") as target:
         while chunk := source.read(CHUNK):

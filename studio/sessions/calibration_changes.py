@@ -202,7 +202,6 @@ def _correct_report(path: Path, new: NewCalibration) -> None:
 
 
 def _own_parts(folder: Path) -> list[Path]:
-    """What belongs to the calibration in use: not board footage that lies beside it, nor earlier ones."""
     return [path for path in folder.iterdir() if path.name.startswith(OWN_PARTS)]
 
 
@@ -220,7 +219,6 @@ def _described(manifest: SessionManifest, new: NewCalibration) -> SessionManifes
 def _consequences(
     session: Session, before: Sequence[Camera], after: Sequence[Camera], stale: tuple[str, ...]
 ) -> list[str]:
-    """What the change means for what is there."""
     notes: list[str] = []
     if stale:
         notes.append(

@@ -170,7 +170,6 @@ def _turned(camera: CameraSource, degrees: int, calibrated: tuple[int, int] | No
 def _consequences(
     session: Session, before: FootageSource, after: FootageSource, stale: tuple[str, ...]
 ) -> list[str]:
-    """What the change means for what is there."""
     notes = [f"{after.frame_count} frames are in all cameras (there were {before.frame_count})."]
     moved = any(a.offset != b.offset for a, b in zip(before.cameras, after.cameras, strict=True))
     if stale:

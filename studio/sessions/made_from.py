@@ -115,7 +115,6 @@ def _subject_digest(session: Session) -> str:
 
 
 def _masks_digest(session: Session) -> str:
-    """Of all that masks are made from: given masks, backgrounds, exclusions, knobs."""
     sources = session.manifest.footage.cameras
     parts = [msgspec.json.encode([[source.name, source.masks, source.background] for source in sources])]
     files = [session.path / source.background for source in sources if source.background]

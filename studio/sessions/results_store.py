@@ -307,7 +307,6 @@ class ResultsWriter:
             raise
 
     def _transaction(self, statements: list[tuple[str, tuple[object, ...]]]) -> None:
-        """All statements or none."""
         with self.together():
             for sql, values in statements:
                 self._connection.execute(sql, values)

@@ -258,7 +258,6 @@ def _check_backgrounds(base: Session, sources: list[CameraSource]) -> None:
 
 
 def _copy_known(base: Session, folder: Path, keep_start: bool) -> None:
-    """Calibration, person, exclusions and knobs."""
     for entry in (*COPIED, *((START_POSE_NAME,) if keep_start else ())):
         path = base.path / entry
         if path.is_dir():
@@ -268,7 +267,6 @@ def _copy_known(base: Session, folder: Path, keep_start: bool) -> None:
 
 
 def _source(base: Session, folder: Path, source: CameraSource, frame_count: int) -> CameraSource:
-    """A camera of the take, with a copy of its empty room."""
     place = f"pictures/{source.name}"
     (folder / place).mkdir(parents=True)
     background = base.path / source.background

@@ -298,7 +298,6 @@ def _transient(folder: str, names: list[str]) -> set[str]:
 
 
 def _copy_database(source: Path, target: Path) -> None:
-    """A consistent copy of a database that may be in use."""
     reading, writing = sqlite3.connect(source), sqlite3.connect(target)
     try:
         reading.backup(writing)

@@ -55,7 +55,6 @@ def plan_bodytrack(source: Path, calibration: Path | str | None) -> SourcePlan:
 
 
 def _folders(source: Path, prefix: str) -> tuple[Path, ...]:
-    """CAM1, CAM2, ... in natural order."""
     found = [
         path
         for path in source.iterdir()

@@ -195,7 +195,6 @@ def _is_trial(folder: Path) -> bool:
 
 
 def _folders_below(source: Path, depth: int) -> list[Path]:
-    """Folders that may be trials, parents first, in natural order."""
     found: list[Path] = []
     level = [source]
     for _ in range(depth):
@@ -213,7 +212,6 @@ def _folders_below(source: Path, depth: int) -> list[Path]:
 
 
 def _up_to(folder: Path, source: Path) -> list[Path]:
-    """The folders above a trial up to the source, nearest first."""
     return [place for place in folder.parents if place.is_relative_to(source)]
 
 
@@ -334,7 +332,6 @@ def _calibration(source: Path, places: tuple[Path, ...], wish: Path | str | None
 
 
 def _backgrounds(folder: Path) -> tuple[Path, ...]:
-    """Pictures and clips."""
     if not folder.is_dir():
         return ()
     found = [

@@ -220,7 +220,6 @@ def _check_request(source: Path, options: ImportOptions) -> None:
 
 
 def _plan(source: Path, options: ImportOptions, *, bare: bool = False) -> SourcePlan:
-    """The parts of the source, by the importer that knows its layout, with what was asked for."""
     if is_bodytrack(source) and options.trial is None:
         plan = plan_bodytrack(source, options.calibration)
     else:
@@ -247,7 +246,6 @@ def _checked_rig(measured: MeasuredSource, options: ImportOptions) -> MeasuredSo
 
 
 def _cameras_of(session: Session, plan: SourcePlan, options: ImportOptions) -> Calibration:
-    """The session's calibration, else the source's, else stand-ins named after the footage."""
     if session.is_calibrated:
         known = read_calibration(session.path / CAMERAS_PATH)
         return replace(known, label=session.manifest.calibration_source or known.label)

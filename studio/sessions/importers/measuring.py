@@ -275,7 +275,6 @@ def _measure_camera(
     background: Path | None,
     progress: Progress,
 ) -> MeasuredCamera:
-    """Decode one camera's footage and fit its calibration to it."""
     found = _measure(footage, f"reading {footage.name}", progress)
     entry = MeasuredCamera(camera, footage, found, None, masks, background, turned)
     if not calibration.sizes_known:
@@ -337,7 +336,6 @@ def _without_background(measured: tuple[MeasuredCamera, ...]) -> list[str]:
 
 
 def _check_masks(entry: MeasuredCamera, masks: Path, count: int, progress: Progress) -> None:
-    """Masks of the footage's size, one for every frame in use."""
     found = _measure(masks, f"reading masks {masks.name}", progress)
     if (found.width, found.height) != (entry.found.width, entry.found.height):
         raise FootageError(
@@ -353,7 +351,6 @@ def _check_masks(entry: MeasuredCamera, masks: Path, count: int, progress: Progr
 
 
 def _check_background(entry: MeasuredCamera, background: Path) -> None:
-    """A background that can be cut to the footage's size."""
     if is_picture(background):
         width, height = check_picture(background)
     else:

@@ -135,7 +135,6 @@ def write_footage(folder: Path, measured: MeasuredSource, copy: bool, progress: 
 
 
 def _put(source: Path, folder: Path, place: str, copy: bool, progress: Progress) -> str:
-    """Copy a file or a folder's pictures to `place`; returns where the session finds it."""
     if not copy:
         return str(source.resolve())
     target = folder / place
@@ -157,7 +156,6 @@ def _put(source: Path, folder: Path, place: str, copy: bool, progress: Progress)
 
 
 def _file_name(video: Path, plain: str) -> str:
-    """The video's own name where it is plain, so that other tools still find it."""
     return video.name if name_from(video.stem) == video.stem else f"{plain}{video.suffix.lower()}"
 
 
