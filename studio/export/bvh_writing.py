@@ -13,9 +13,10 @@ from scipy.spatial.transform import Rotation
 from studio.arrays import Array
 from studio.export.naming import joint_names
 from studio.export.options import Axes
-from studio.export.skeleton import Skeleton, follow, skeleton_of
-from studio.export.task import ExportTask, Written, agreed, apart, turned_apart
+from studio.export.skeleton import Skeleton, skeleton_of
+from studio.export.task import INTERPOLATED, ExportTask, Written, agreed, apart, turned_apart
 from studio.motion_files.bvh import read_bvh_file
+from studio.motion_files.recorded_motion import followed
 
 DECIMALS = {"mm": 4, "cm": 5, "m": 7}
 END_SITE = "End Site"
@@ -40,10 +41,10 @@ def write_bvh(task: ExportTask) -> Written:
                 task.step("writing", row, len(moves))
             stream.write(_row(ordered, still, places, angles[row], DECIMALS[axes.unit]) + "\n")
     task.step("reading back", len(moves), len(moves))
-    checked = _read_back(task, skeleton, follow(skeleton, moves, turns))
+    checked = _read_back(task, skeleton, followed(skeleton.tree.parents, moves, turns))
     notes = [
         f"Rest pose: {skeleton.kind}; lengths in {axes.unit}, {axes.up.upper()} up, rotations {order}.",
-        *_made_up(task),
+        *task.gaps_in_words(INTERPOLATED),
         *([note] if note else []),
     ]
     return Written((task.place,), checked, tuple(notes))
@@ -134,10 +135,3 @@ def _read_back(task: ExportTask, skeleton: Skeleton, wanted: tuple[Array, Array]
     points = task.axes.points_back(places[:, order])
     turned = task.axes.turns_back(turns[:, order])
     return agreed(task.place, apart(points, wanted[0]), turned_apart(turned, wanted[1]))
-
-
-def _made_up(task: ExportTask) -> list[str]:
-    count = int((~task.motion.known).sum())
-    if not count:
-        return []
-    return [f"{count} of {len(task.motion.known)} frames are interpolated: this format cannot say 'missing'."]

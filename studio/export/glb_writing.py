@@ -14,8 +14,9 @@ from studio.body.model import Limb
 from studio.export.glb_reading import Packing, read_glb
 from studio.export.naming import joint_names
 from studio.export.options import Axes
-from studio.export.skeleton import Skeleton, follow, skeleton_of
-from studio.export.task import ExportTask, Written, agreed, apart, turned_apart
+from studio.export.skeleton import Skeleton, skeleton_of
+from studio.export.task import INTERPOLATED, ExportTask, Written, agreed, apart, turned_apart
+from studio.motion_files.recorded_motion import followed
 from studio.runs.colour_tokens import colour_tokens
 
 SECTIONS = 24
@@ -88,12 +89,9 @@ def write_glb(task: ExportTask) -> Written:
     document.set_binary_blob(bytes(packing.content))
     document.save_binary(str(task.place))
     task.step("reading back", 2, 3)
-    checked = _read_back(task, skeleton, follow(skeleton, moves, turns))
+    checked = _read_back(task, skeleton, followed(skeleton.tree.parents, moves, turns))
     notes = [f"Rest pose: {skeleton.kind}; metres, Y up."]
-    made_up = int((~motion.known).sum())
-    if made_up:
-        notes.append(f"{made_up} of {len(moves)} frames are interpolated: this format cannot say 'missing'.")
-    return Written((task.place,), checked, (*notes, *([note] if note else [])))
+    return Written((task.place,), checked, (*notes, *task.gaps_in_words(INTERPOLATED), *filter(None, [note])))
 
 
 def smooth_quaternions(turns: Array) -> Array:

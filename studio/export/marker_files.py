@@ -70,14 +70,14 @@ def write_c3d_file(task: ExportTask) -> Written:
 
 
 def _notes(points: Points, task: ExportTask, how: str) -> tuple[str, ...]:
-    count = int((~task.motion.known).sum())
-    notes = [f"{len(points.names)} points in {task.options.unit}, {task.options.up.upper()} up."]
-    if count:
-        notes.append(f"{count} frames are missing in it, as {how}.")
-    return (*notes, *([points.note] if points.note else []))
+    lengths = f"{len(points.names)} points in {task.options.unit}, {task.options.up.upper()} up."
+    return (lengths, *point_notes(task, points, how))
 
 
-USUAL = {".toml": "pose2sim", ".yml": "opencv"}
+def point_notes(task: ExportTask, points: Points, how: str) -> tuple[str, ...]:
+    """What whoever reads a file of points should know. how : gaps look in it, "as {how}"."""
+    gaps = task.gaps_in_words(f"{{count}} frames are missing in it, as {how}.")
+    return (*gaps, *filter(None, [points.note]))
 
 
 def write_cameras(task: ExportTask) -> Written:

@@ -56,14 +56,12 @@ def write_mot(task: ExportTask) -> Written:
         float(off[:, ~angle].max(initial=0.0)) * MM_PER_M,
         float(off[:, angle].max(initial=0.0)),
     )
-    missing = int((~motion.known).sum())
-    notes = [
+    notes = (
         f"Coordinates of body '{motion.body.name}', angles in degrees, lengths in m, world z up: an OpenSim model of"
-        " other coordinates needs them renamed, or inverse kinematics on the TRC."
-    ]
-    if missing:
-        notes.append(f"{missing} frames have no pose of their own and hold the one in between.")
-    return Written((task.place,), checked, tuple(notes))
+        " other coordinates needs them renamed, or inverse kinematics on the TRC.",
+        *task.gaps_in_words("{count} frames have no pose of their own and hold the one in between."),
+    )
+    return Written((task.place,), checked, notes)
 
 
 def read_mot(path: Path) -> MotFile:

@@ -178,22 +178,6 @@ def skeleton_of(body: BodyModel, rest: str = "tpose") -> Skeleton:
     return Skeleton(body, tree, offsets, turns, _ends(body, tree, turns, offsets), kind)
 
 
-def follow(skeleton: Skeleton, moves: Array, turns: Array) -> tuple[Array, Array]:
-    """World places (N, J, 3) and turns (N, J, 3, 3) of joints that are moved and turned in their parents.
-
-    It is what every reader of such a file does; here it checks the files that were written.
-    """
-    places, turned = np.zeros_like(moves), np.zeros_like(turns)
-    for joint, parent in enumerate(skeleton.tree.parents):
-        if parent < 0:
-            places[:, joint], turned[:, joint] = moves[:, joint], turns[:, joint]
-        else:
-            step = (turned[:, parent] @ moves[:, joint][..., None])[..., 0]
-            places[:, joint] = places[:, parent] + step
-            turned[:, joint] = turned[:, parent] @ turns[:, joint]
-    return places, turned
-
-
 def _aims(body: BodyModel) -> dict[int, tuple[Array, Array]]:
     """For the joints of arms and legs: the bone's direction in the neutral pose and in the T-pose (world)."""
     index = {marker.name: at for at, marker in enumerate(body.markers)}

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from studio.arrays import Array, read_archive
 from studio.body.forward_kinematics import joint_frames
 from studio.errors import ExportError
-from studio.export.marker_files import marked_points
-from studio.export.options import Axes
+from studio.export.marker_files import marked_points, point_notes
 from studio.export.task import ExportTask, Written, agreed, apart
 
 DEGREE_SIGNS = {"degrees": "deg", "radians": "rad"}
@@ -50,7 +49,7 @@ def write_csv(task: ExportTask) -> Written:
     notes = [f"Angles in {options.angles}, lengths in {options.unit}, {options.up.upper()} up."]
     if options.up == "y":
         notes.append("The pose's entries stay those of the world, z up; the points are turned.")
-    return Written((task.place,), checked, (*notes, *_point_notes(task, points.note, "empty cells")))
+    return Written((task.place,), checked, (*notes, *point_notes(task, points, "empty cells")))
 
 
 def write_parquet(task: ExportTask) -> Written:
@@ -79,7 +78,7 @@ def write_parquet(task: ExportTask) -> Written:
     read = pq.read_table(task.place)
     values = np.stack([read.column(axis).to_numpy() for axis in "xyz"], axis=-1).reshape(places.shape)
     checked = agreed(task.place, apart(task.axes.points_back(values), places))
-    return Written((task.place,), checked, _point_notes(task, points.note, "null"))
+    return Written((task.place,), checked, point_notes(task, points, "null"))
 
 
 def write_npz(task: ExportTask) -> Written:
@@ -99,7 +98,7 @@ def write_npz(task: ExportTask) -> Written:
         "markers": axes.points(places),
         "marker_names": np.array(points.names),
         "joints": axes.points(frames[..., 3]),
-        "joint_rotations": _turned_frames(axes, frames[..., :3]),
+        "joint_rotations": axes.turn @ frames[..., :3],
         "joint_names": np.array([joint.name for joint in motion.body.joints]),
         "joint_parents": np.array([joint.parent for joint in motion.body.joints]),
     }
@@ -119,11 +118,7 @@ def write_npz(task: ExportTask) -> Written:
         np.array_equal(read[name], value, equal_nan=value.dtype.kind == "f") for name, value in arrays.items()
     )
     difference = apart(axes.points_back(read["markers"]), places) if same else math.inf
-    return Written((task.place,), agreed(task.place, difference), _point_notes(task, points.note, "NaN"))
-
-
-def _turned_frames(axes: Axes, turns: Array) -> Array:
-    return axes.turn @ turns
+    return Written((task.place,), agreed(task.place, difference), point_notes(task, points, "NaN"))
 
 
 def _cell(value: float) -> str:
@@ -144,8 +139,3 @@ def _read_csv_back(
     angles = angles if task.options.angles == "degrees" else np.degrees(angles)
     turned = np.nan_to_num(np.abs(angles - np.degrees(poses[:, angle]))).max(initial=0.0)
     return agreed(task.place, apart(read, places), float(turned))
-
-
-def _point_notes(task: ExportTask, note: str, how: str) -> tuple[str, ...]:
-    count = int((~task.motion.known).sum())
-    return (*([f"{count} frames are missing in it, as {how}."] if count else []), *([note] if note else []))

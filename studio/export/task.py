@@ -15,6 +15,7 @@ from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
 LEAST_MM, LEAST_DEGREES = 0.1, 0.01
+INTERPOLATED = "{count} of {all} frames are interpolated: this format cannot say 'missing'."
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,6 +47,11 @@ class ExportTask:
             "track": self.options.track,
             "body": self.motion.body.name,
         }
+
+    def gaps_in_words(self, words: str) -> tuple[str, ...]:
+        """What became of frames without a pose, if there are any. words : a sentence with {count} of {all} in it."""
+        count = int((~self.motion.known).sum())
+        return (words.format(count=count, all=len(self.motion.known)),) if count else ()
 
 
 @dataclass(frozen=True, slots=True)

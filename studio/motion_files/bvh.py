@@ -18,6 +18,7 @@ from studio.motion_files.recorded_motion import (
     UP_FROM_Y_UP,
     RecordedMotion,
     at_line,
+    followed,
     moved_skeleton,
     numbers,
     text_lines,
@@ -50,12 +51,8 @@ class BvhFile:
         """Places (F, J, 3) and turns (F, J, 3, 3) of the joints in the file's world, without end sites. A position
         channel stands in the offset's place, as Blender reads it.
         """
-        places, turned = np.where(self.moved, self.moves, self.offsets), self.turns.copy()
-        for joint, parent in enumerate(self.parents):
-            if parent >= 0:
-                turned[:, joint] = turned[:, parent] @ self.turns[:, joint]
-                step = (turned[:, parent] @ places[:, joint][..., None])[..., 0]
-                places[:, joint] = places[:, parent] + step
+        moves = np.where(self.moved, self.moves, self.offsets)
+        places, turned = followed(self.parents, moves, self.turns)
         return places[:, ~self.is_end], turned[:, ~self.is_end]
 
 

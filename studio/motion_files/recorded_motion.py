@@ -1,6 +1,7 @@
 """Motion as it was recorded from a person: a tree of joints moving over time, whatever file it came from."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -83,6 +84,21 @@ def moved_skeleton(
         fps=fps,
         source=source,
     )
+
+
+def followed(parents: Sequence[int], moves: Array, turns: Array) -> tuple[Array, Array]:
+    """World places (N, J, 3) and turns (N, J, 3, 3) of joints that are moved and turned in their parents' frames, as
+    every reader of a file of joints does it. parents : before their children, -1 at a root.
+    """
+    places, turned = np.zeros_like(moves), np.zeros_like(turns)
+    for joint, parent in enumerate(parents):
+        if parent < 0:
+            places[:, joint], turned[:, joint] = moves[:, joint], turns[:, joint]
+        else:
+            step = (turned[:, parent] @ moves[:, joint][..., None])[..., 0]
+            places[:, joint] = places[:, parent] + step
+            turned[:, joint] = turned[:, parent] @ turns[:, joint]
+    return places, turned
 
 
 def at_line(path: Path, line: int, what: str, remedy: str) -> StudioError:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from toy_footage import HEIGHT, WIDTH, number_of, numbered_frame, write_video
 
-from studio.capture import video, video_probe
+from studio.capture import video
 from studio.capture.video import VideoReader, measure_video, probe_video
 from studio.errors import FootageError
 from studio.isolated import silent
@@ -92,8 +92,8 @@ def test_limits_hold_before_anything_is_decoded(plain: Path, monkeypatch: pytest
         ("CODECS", frozenset(("vp9",)), "is encoded with 'h264', which is not decoded here"),
     ):
         with monkeypatch.context() as patch:
-            patch.setattr(video_probe, name, limit)
-            for look in (video_probe._probed, _measured_here):
+            patch.setattr(video, name, limit)
+            for look in (video._probed, _measured_here):
                 with pytest.raises(FootageError, match=said):
                     look(plain)
     assert probe_video(plain).frame_count == COUNT

@@ -12,7 +12,8 @@ from export_runs import FRAMES, MADE, moving_poses, track_of
 from studio.body.catalogue import load_body
 from studio.export.exporting import export_run
 from studio.export.formats import FORMATS
-from studio.export.skeleton import follow, skeleton_of
+from studio.export.skeleton import skeleton_of
+from studio.motion_files.recorded_motion import followed
 
 pytestmark = pytest.mark.slow
 
@@ -62,7 +63,7 @@ def test_the_same_joints_in_every_frame(
     seen = opened(blender, report.files[0])
     body = load_body(name)
     skeleton = skeleton_of(body)
-    places, turns = follow(skeleton, *skeleton.animated(moving_poses(body)))
+    places, turns = followed(skeleton.tree.parents, *skeleton.animated(moving_poses(body)))
     assert set(seen["bones"]) == set(skeleton.names)
     assert len(seen["heads"]) == FRAMES
     heads = 1000.0 * np.array([[frame[bone] for bone in skeleton.names] for frame in seen["heads"]])

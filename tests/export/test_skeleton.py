@@ -9,7 +9,8 @@ from export_runs import moving_poses
 from studio.body.catalogue import list_bodies, load_body
 from studio.body.forward_kinematics import joint_frames, marker_points
 from studio.body.model import MOVE, TURN, Joint, Step
-from studio.export.skeleton import follow, joint_tree, skeleton_of
+from studio.export.skeleton import joint_tree, skeleton_of
+from studio.motion_files.recorded_motion import followed
 
 
 @pytest.mark.parametrize("name", list_bodies())
@@ -20,7 +21,7 @@ def test_every_marker_rides_on_its_joint(name: str, rest: str) -> None:
     body = load_body(name)
     skeleton = skeleton_of(body, rest)
     poses = moving_poses(body, 40)
-    places, turns = follow(skeleton, *skeleton.animated(poses))
+    places, turns = followed(skeleton.tree.parents, *skeleton.animated(poses))
     frames, wanted = joint_frames(body, poses), marker_points(body, poses)
     for at, marker in enumerate(body.markers):
         joint = skeleton.tree.whole[marker.joint]
@@ -73,7 +74,7 @@ def test_a_joint_that_turns_moves_and_turns_again_is_cut() -> None:
     assert tree.moving == (True, False, False, True)
     poses = np.random.default_rng(3).normal(size=(20, 4)) * [1.0, 1.0, 1.0, 50.0]
     skeleton = skeleton_of(odd)
-    places, turns = follow(skeleton, *skeleton.animated(poses))
+    places, turns = followed(skeleton.tree.parents, *skeleton.animated(poses))
     wanted = joint_frames(odd, poses)[:, 1]
     np.testing.assert_allclose(places[:, 3], wanted[..., 3], atol=1e-9)
     np.testing.assert_allclose(turns[:, 3] @ skeleton.turns[3], wanted[..., :3], atol=1e-12)
