@@ -84,10 +84,9 @@ def write_cameras(task: ExportTask) -> Written:
     """Write the run's cameras with `options.calibration`, or the ending's usual writer. Raises ExportError for a writer
     that there is not, or that writes another kind of file.
     """
-    name = task.options.calibration or USUAL[task.place.suffix]
-    writer = CALIBRATION_FORMATS.get(name)
-    if writer is None or writer.suffix != task.place.suffix:
-        fitting = [known for known, entry in CALIBRATION_FORMATS.items() if entry.suffix == task.place.suffix]
+    fitting = [known for known, entry in CALIBRATION_FORMATS.items() if entry.suffix == task.place.suffix]
+    name = task.options.calibration or fitting[0]
+    if name not in fitting:
         raise ExportError(
             f"No calibration '{name[:40]}' is written as '{task.place.suffix}'.",
             f"Choose {' or '.join(fitting)}.",
