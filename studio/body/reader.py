@@ -318,12 +318,7 @@ def read_body(path: Path) -> BodyModel:
     Raises BodyError when the file cannot be read, is no TOML, or does not describe a body.
     """
     with foreign_file(path, BodyError, "a body file", "Check that it is a text file, or correct it."):
-        try:
-            text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as problem:
-            hint = "Check the path and that it is a text file."
-            raise BodyError(f"Body file {path} cannot be read ({problem}).", hint) from None
-        return parse_body(text, path.stem, path.name)
+        return parse_body(path.read_text(encoding="utf-8"), path.stem, path.name)
 
 
 def parse_body(text: str, name: str, file: str) -> BodyModel:

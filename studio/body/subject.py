@@ -41,7 +41,7 @@ from studio.body.dimensions import with_dimensions
 from studio.body.marker_distances import MarkerDistances
 from studio.body.model import BodyModel
 from studio.errors import BodyError
-from studio.foreign_files import check_regular
+from studio.foreign_files import foreign_file
 from studio.typed_decoding import decode_toml
 
 DEFAULT_BODY = "human31"
@@ -82,17 +82,9 @@ class _SubjectFile(msgspec.Struct, forbid_unknown_fields=True):
 
 def read_subject(path: Path) -> Subject:
     """The subject of a TOML file. Raises BodyError naming the file, the entry and the remedy."""
-    check_regular(path, BodyError)
-    try:
+    hint = "It holds body, height_mm, [lengths_mm], [dimensions_mm] and [ratios], numbers in mm."
+    with foreign_file(path, BodyError, "a subject file", hint):
         entries = decode_toml(path.read_bytes(), _SubjectFile)
-    except OSError as problem:
-        raise BodyError(
-            f"Subject file {path} cannot be read ({problem.strerror}).", "Check the path."
-        ) from None
-    except (msgspec.DecodeError, UnicodeDecodeError) as problem:
-        cause = f"Subject file {path.name}: {str(problem).replace('`$.', '`').replace('`', chr(39))}."
-        hint = "It holds body, height_mm, [lengths_mm], [dimensions_mm] and [ratios], numbers in mm."
-        raise BodyError(cause, hint) from None
     subject = Subject(**{key: getattr(entries, key) for key in _SubjectFile.__struct_fields__})
     _check(subject, f"Subject file {path.name}")
     return subject

@@ -20,7 +20,7 @@ from studio.arrays import Array, Bytes
 from studio.capture.naming import natural_key
 from studio.capture.video import MAX_PIXELS
 from studio.errors import FootageError
-from studio.foreign_files import check_regular
+from studio.foreign_files import check_regular, foreign_file
 from studio.isolated import isolated, silent
 
 PICTURE_SUFFIXES = frozenset((".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp", ".pgm", ".ppm"))
@@ -55,13 +55,8 @@ def is_picture(path: Path) -> bool:
 
 def read_picture(path: Path) -> Bytes:
     """(H, W, 3) uint8 BGR; grey pictures become three equal channels. Raises FootageError naming the file."""
-    check_regular(path, FootageError)
-    try:
+    with foreign_file(path, FootageError, "a picture that can be read", "Put the file back."):
         content = np.frombuffer(path.read_bytes(), np.uint8)
-    except OSError as problem:
-        raise FootageError(
-            f"'{path.name}' cannot be read ({problem.strerror}).", "Put the file back."
-        ) from None
     picture = None
     if content.size:
         try:

@@ -15,7 +15,7 @@ import numpy as np
 from studio.arrays import Array
 from studio.capture.naming import listed, natural_key
 from studio.errors import FootageError
-from studio.foreign_files import check_regular
+from studio.foreign_files import foreign_file
 
 OLDER_NAME = "frame_time_history.csv"
 TIMESTAMP_NAMES = ("timestamps.csv", "frame_timestamps.csv", OLDER_NAME)
@@ -49,8 +49,7 @@ def read_timestamps(path: Path) -> dict[str, Array]:
 
     Raises FootageError naming file and line.
     """
-    check_regular(path, FootageError)
-    try:
+    with foreign_file(path, FootageError, "a table of times", "Copy it again."):
         if path.stat().st_size > LARGEST_FILE:
             raise FootageError(
                 f"'{path.name}' is larger than {LARGEST_FILE // 1_000_000} MB.", "Check the file."
@@ -69,8 +68,6 @@ def read_timestamps(path: Path) -> dict[str, Array]:
                 moment = _number(path, number, row[columns[1]])
                 index = round(_number(path, number, row[index_column])) if index_column else -1
                 found.setdefault(camera, []).append((index, moment))
-    except (OSError, UnicodeDecodeError, csv.Error) as problem:
-        raise FootageError(f"'{path.name}' cannot be read ({problem}).", "Copy it again.") from None
     if not found:
         raise FootageError(f"'{path.name}' holds no times.", "Copy it again, or give the offsets by hand.")
     return {name: _times(path, name, found[name]) for name in sorted(found, key=natural_key)}

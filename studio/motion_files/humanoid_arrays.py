@@ -5,15 +5,15 @@ Entries: `rotation_local_xyzw` (F, J, 4), `root_translation_m` (F, 3), `local_tr
 The clips hold every frame twice (30 recorded frames a second announced as 60): repetitions are left out.
 """
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from studio.arrays import Array
+from studio.arrays import Array, read_archive
 from studio.errors import StudioError
+from studio.foreign_files import foreign_file
 from studio.motion_files.recorded_motion import RecordedMotion, moved_skeleton
 
 ENTRIES = (
@@ -77,17 +77,13 @@ def _repetitions(turns: Array, root: Array) -> int:
 
 
 def _entries(path: Path) -> dict[str, NDArray[np.generic]]:
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            missing = sorted(set(ENTRIES) - set(archive.files))
-            if missing:
-                raise _wrong(path, missing[0], "is missing")
-            return {name: archive[name] for name in ENTRIES}
-    except (OSError, ValueError, EOFError, AttributeError, TypeError, zipfile.BadZipFile):
-        raise StudioError(
-            f"'{path.name}' is not an .npz file of plain arrays.",
-            "Give the arrays as numpy.savez writes them.",
-        ) from None
+    remedy = "Give the arrays as numpy.savez writes them."
+    with foreign_file(path, StudioError, "an .npz file of plain arrays", remedy):
+        found = read_archive(path)
+    for name in ENTRIES:
+        if name not in found:
+            raise _wrong(path, name, "is missing")
+    return found
 
 
 def _wrong(path: Path, entry: str, what: str) -> StudioError:

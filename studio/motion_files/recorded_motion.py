@@ -9,7 +9,7 @@ import numpy as np
 
 from studio.arrays import Array
 from studio.errors import StudioError
-from studio.foreign_files import check_regular
+from studio.foreign_files import foreign_file
 
 UP_FROM_Y_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Files with y up and people facing z become z up, facing x: (x, y, z) -> (z, x, y), a proper rotation."""
@@ -108,13 +108,8 @@ def at_line(path: Path, line: int, what: str, remedy: str) -> StudioError:
 
 def text_lines(path: Path) -> list[str]:
     """The lines of a motion file. Raises StudioError where it cannot be read or is no text."""
-    check_regular(path, StudioError)
-    try:
+    with foreign_file(path, StudioError, "a text file", "Give a motion file as text."):
         return path.read_text(encoding="utf-8").splitlines()
-    except OSError as problem:
-        raise StudioError(f"'{path}' cannot be read ({problem.strerror}).", "Check the path.") from None
-    except UnicodeDecodeError:
-        raise StudioError(f"'{path.name}' is not a text file.", "Give a motion file as text.") from None
 
 
 def numbers(path: Path, line: int, words: list[str]) -> list[float]:

@@ -58,16 +58,10 @@ def read_trc(path: Path) -> MarkerMotion:
     Raises TruthError naming file, line and column for anything that is not a complete, finite table.
     """
     with foreign_file(path, TruthError, "a TRC file", "Export it again."):
-        return _read(path)
+        return _motion(path, path.read_text(encoding="utf-8-sig").splitlines())
 
 
-def _read(path: Path) -> MarkerMotion:
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except OSError as problem:
-        raise TruthError(f"'{path}' cannot be read ({problem.strerror}).", "Check the path.") from None
-    except UnicodeDecodeError as problem:
-        raise TruthError(f"'{path.name}' cannot be read as text ({problem}).", "Give a TRC file.") from None
+def _motion(path: Path, lines: list[str]) -> MarkerMotion:
     header = _header(path, lines)
     rows = [
         _row(path, number, line, header.names)

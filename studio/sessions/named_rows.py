@@ -15,7 +15,7 @@ import numpy as np
 
 from studio.arrays import Array, Indices
 from studio.errors import BodyError
-from studio.foreign_files import check_regular
+from studio.foreign_files import foreign_file
 from studio.geometry.reach import REACH_HINT, within_reach
 from studio.sessions.atomic_files import write_text
 
@@ -96,15 +96,8 @@ def _as_csv(rows: list[list[str]]) -> str:
 
 def _read(path: Path) -> tuple[list[str], list[list[float]]]:
     """Header and rows of numbers; at least one row."""
-    check_regular(path, BodyError)
-    try:
+    with foreign_file(path, BodyError, "a CSV file", "Save it as comma-separated text in UTF-8."):
         lines = [line for line in csv.reader(path.read_text(encoding="utf-8-sig").splitlines()) if any(line)]
-    except OSError as error:
-        raise BodyError(f"'{path}' cannot be read ({error.strerror}).", "Check the path.") from None
-    except (UnicodeDecodeError, csv.Error):
-        raise BodyError(
-            f"'{path.name}' is not a CSV file.", "Save it as comma-separated text in UTF-8."
-        ) from None
     header = [entry.strip() for entry in lines[0]] if lines else []
     if len(lines) < 2:
         raise BodyError(f"'{path.name}' has no row under its header.", "Give one row of numbers.")

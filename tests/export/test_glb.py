@@ -13,7 +13,8 @@ from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_frames
 from studio.export.exporting import export_run
 from studio.export.formats import FORMATS
-from studio.export.skeleton import follow, skeleton_of
+from studio.export.skeleton import skeleton_of
+from studio.motion_files.recorded_motion import followed
 
 GLB = FORMATS["glb"]
 LEAST_MM, LEAST_DEGREES = 0.1, 0.01
@@ -112,7 +113,7 @@ def test_the_joints_are_where_they_are_meant_in_every_ninth_frame(
     read = Gltf(report.files[0])
     body = load_body(name)
     skeleton = skeleton_of(body)
-    places, turns = follow(skeleton, *skeleton.animated(moving_poses(body)))
+    places, turns = followed(skeleton.tree.parents, *skeleton.animated(moving_poses(body)))
     index = {node["name"]: at for at, node in enumerate(read.told["nodes"])}
     far = turned = 0.0
     for row in range(0, FRAMES, 9):
