@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 
 import cv2
@@ -10,13 +11,11 @@ import numpy as np
 import tomli_w
 
 from studio.calibration.coverage import coverage_picture
-from studio.calibration.findings import Finding, blocking
+from studio.calibration.findings import blocking
 from studio.calibration.intrinsics import Lens
 from studio.calibration.lens_verdict import verdict
 from studio.calibration.verbs import Calibrated
 from studio.capture.calibration_files import write_calibration
-
-Plain = Mapping[str, object]
 
 
 def report_of(calibrated: Calibrated) -> dict[str, object]:
@@ -27,7 +26,7 @@ def report_of(calibrated: Calibrated) -> dict[str, object]:
         "board": calibrated.board.spelling,
         "floor": calibrated.floor,
         "usable": not blocking(calibrated.findings),
-        "findings": [_finding(finding) for finding in calibrated.findings],
+        "findings": [asdict(finding) | {"cameras": list(finding.cameras)} for finding in calibrated.findings],
         "cameras": [
             {
                 **_lens(lens),
@@ -128,16 +127,6 @@ def _lens_tables(lenses: Mapping[str, Lens]) -> dict[str, object]:
             "fisheye": False,
         }
         for name, lens in lenses.items()
-    }
-
-
-def _finding(finding: Finding) -> Plain:
-    return {
-        "code": finding.code,
-        "severity": finding.severity,
-        "message": finding.message,
-        "remedy": finding.remedy,
-        "cameras": list(finding.cameras),
     }
 
 

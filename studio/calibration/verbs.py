@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from studio.arrays import Array
 from studio.calibration.board_checks import mirrored_cameras, mirrored_sightings, pair_findings
 from studio.calibration.board_footage_reading import (
     AS_IT_IS,
@@ -78,22 +79,22 @@ def calibrate(
             "Lenses of a file alone give no cameras.", "Give footage of all cameras at once."
         )
     names = tuple(names) or _names(extrinsics or intrinsics)
-    together = _together(board, extrinsics, names, _floor_frame(floor), taken, progress)
+    solving = _Solving(board, names, floor, taken, progress or (lambda step, done, total: None))
+    together = solving.together(extrinsics) if extrinsics is not None else []
     used: dict[str, tuple[Sighting, ...]] = {}
     if lenses is None and intrinsics is not None and intrinsics.is_file():
         lenses = lenses_of_file(intrinsics, names)
     if lenses is None:
-        used = _lens_sightings(board, intrinsics, names, together, taken, progress)
-        lenses = _lenses(board, used, progress)
+        used = solving.lens_sightings(intrinsics, together)
+        lenses = solving.lenses(used)
     findings = [finding for lens in lenses.values() for finding in lens_findings(lens)]
-    everything = [*together, *(sighting for group in used.values() for sighting in group)]
-    findings += mirrored_sightings(everything)
+    findings += mirrored_sightings([*together, *(sighting for group in used.values() for sighting in group)])
     if extrinsics is None:
         return Calibrated(board, lenses, None, used, _sorted(findings))
     missing = [name for name in names if name not in lenses]
     if missing:
         raise CalibrationError(f"Camera {listed(missing)} has no lens.", "Add its pictures of the board.")
-    solved, floor_words, more = _placed(board, together, lenses, floor, refine_lenses, taken, progress)
+    solved, floor_words, more = solving.placed(together, lenses, refine_lenses)
     findings += more
     findings += check_calibration(
         solved.cameras, footage_sizes=footage_sizes, distances_mm=distances_mm, board=board
@@ -107,155 +108,126 @@ def _names(folder: Path | None) -> tuple[str, ...]:
     return tuple(sorted(plain_names([entry.name for entry in list_footage(folder)]), key=natural_key))
 
 
-def _floor_frame(floor: str | None) -> int | None:
-    """The N of "frame:N", None for other ways to set the floor. Raises CalibrationError if N is no number."""
-    if floor is None or not floor.startswith("frame:"):
-        return None
-    number = floor.removeprefix("frame:")
-    if not number.isdigit():
-        raise CalibrationError(
-            f"The floor's frame '{number}' is no number.", "Write frame:120, counted from 0."
-        )
-    return int(number)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Solving:
+    """What all steps are given; as of `calibrate`."""
 
+    board: Board
+    names: Sequence[str]
+    floor: str | None
+    taken: HowTaken
+    progress: Progress
 
-def _together(
-    board: Board,
-    folder: Path | None,
-    names: Sequence[str],
-    floor: int | None,
-    taken: HowTaken,
-    progress: Progress | None,
-) -> list[Sighting]:
-    if folder is None:
-        return []
-    footage = by_camera(list_footage(folder), names)
-    pictures = all(entry.video is None for entry in footage.values())
-    finder = BoardFinder(board, thorough=pictures)
-    seen = look_together(finder, footage, progress, () if floor is None else (floor,), taken)
-    return [entry.sighting for entry in seen]
-
-
-def _lens_sightings(
-    board: Board,
-    folder: Path | None,
-    names: Sequence[str],
-    together: Sequence[Sighting],
-    taken: HowTaken,
-    progress: Progress | None,
-) -> dict[str, tuple[Sighting, ...]]:
-    """Camera → what its lens is solved from; cameras without any are left out only if their footage is missing."""
-    if folder is None:
-        return {name: of_camera(together, name) for name in names}
-    found: dict[str, tuple[Sighting, ...]] = {}
-    for name, entry in by_camera(list_footage(folder), names).items():
-        finder = BoardFinder(board, thorough=entry.video is None)
-        seen = look_for_lens(finder, name, entry, progress, taken)
-        if len(seen) < FEWEST_PICTURES:
+    @property
+    def floor_frame(self) -> int | None:
+        """The N of "frame:N", None for other ways to set the floor. Raises CalibrationError if N is no number."""
+        if self.floor is None or not self.floor.startswith("frame:"):
+            return None
+        number = self.floor.removeprefix("frame:")
+        if not number.isdigit():
             raise CalibrationError(
-                f"The board {board.spelling} is found in {len(seen)} pictures of camera {name}.",
-                "Check the board's kind and numbers (inner corners for a chessboard), light and sharpness.",
+                f"The floor's frame '{number}' is no number.", "Write frame:120, counted from 0."
             )
-        found[name] = tuple(chosen_for_lens(seen)[0])
-    return found
+        return int(number)
 
+    def together(self, folder: Path) -> list[Sighting]:
+        footage = by_camera(list_footage(folder), self.names)
+        finder = BoardFinder(self.board, thorough=all(entry.video is None for entry in footage.values()))
+        also = () if self.floor_frame is None else (self.floor_frame,)
+        return [entry.sighting for entry in look_together(finder, footage, self.progress, also, self.taken)]
 
-def _lenses(
-    board: Board, used: Mapping[str, tuple[Sighting, ...]], progress: Progress | None
-) -> dict[str, Lens]:
-    found: dict[str, Lens] = {}
-    for number, (name, sightings) in enumerate(used.items()):
-        if progress is not None:
-            progress(f"Solving the lens of camera {name}", number, len(used))
-        if not sightings:
+    def lens_sightings(
+        self, folder: Path | None, together: Sequence[Sighting]
+    ) -> dict[str, tuple[Sighting, ...]]:
+        """Camera → what its lens is solved from; cameras without any are left out only if their footage is missing."""
+        if folder is None:
+            return {name: of_camera(together, name) for name in self.names}
+        found: dict[str, tuple[Sighting, ...]] = {}
+        for name, entry in by_camera(list_footage(folder), self.names).items():
+            finder = BoardFinder(self.board, thorough=entry.video is None)
+            seen = look_for_lens(finder, name, entry, self.progress, self.taken)
+            if len(seen) < FEWEST_PICTURES:
+                raise CalibrationError(
+                    f"The board {self.board.spelling} is found in {len(seen)} pictures of camera {name}.",
+                    "Check the board's kind and numbers (inner corners for a chessboard), light and sharpness.",
+                )
+            found[name] = tuple(chosen_for_lens(seen)[0])
+        return found
+
+    def lenses(self, used: Mapping[str, tuple[Sighting, ...]]) -> dict[str, Lens]:
+        found: dict[str, Lens] = {}
+        for number, (name, sightings) in enumerate(used.items()):
+            self.progress(f"Solving the lens of camera {name}", number, len(used))
+            if not sightings:
+                raise CalibrationError(
+                    f"The board {self.board.spelling} is found in no picture of camera {name}.",
+                    "Check the board's kind and numbers, or show it to this camera.",
+                )
+            found[name] = solve_lens(self.board, sightings)
+        return found
+
+    def placed(
+        self, together: Sequence[Sighting], lenses: Mapping[str, Lens], refine: bool
+    ) -> tuple[Rig, str, list[Finding]]:
+        """The rig on its floor, how that was set, and what the pairs say. Raises CalibrationError for mirrored ones."""
+        names = sorted({sighting.camera for sighting in together}, key=natural_key)
+        silent = [name for name in lenses if name not in names]
+        if silent:
             raise CalibrationError(
-                f"The board {board.spelling} is found in no picture of camera {name}.",
-                "Check the board's kind and numbers, or show it to this camera.",
+                f"The board is found in no picture of camera {listed(silent)} in the common footage.",
+                "Carry the board through what this camera sees.",
             )
-        found[name] = solve_lens(board, sightings)
-    return found
+        for sighting in together:
+            if sighting.size != lenses[sighting.camera].size:
+                (a, b), (c, d) = sighting.size, lenses[sighting.camera].size
+                raise CalibrationError(
+                    f"Camera {sighting.camera} recorded {a}x{b} pixels, its lens was calibrated at {c}x{d}.",
+                    "Record both with one mode of the camera.",
+                )
+        chessboard = self.board.kind == "chessboard"
+        backwards = mirrored_cameras(self.board, together, lenses, names) if chessboard else ()
+        if backwards:
+            raise CalibrationError(backwards[0].message, backwards[0].remedy)
+        rig = solve_rig(self.board, together, lenses, refine_lenses=refine, progress=self.progress)
+        findings = list(pair_findings(rig))
+        new_from_old, words = self._floor(rig, together, lenses)
+        rig = moved(rig, new_from_old)
+        upright = tuple(replace(camera, quarter_turns=quarter_turns(camera)) for camera in rig.cameras)
+        if not words:
+            message = "The floor was not set: up is what the cameras' pictures call up, and z = 0 is a guess."
+            remedy = "Lay the board on the floor in one frame and name it (--floor frame:N), or click points of the floor."
+            findings.append(Finding("no-floor", "warns", message, remedy))
+        return replace(rig, cameras=upright), words, findings
+
+    def _floor(self, rig: Rig, together: Sequence[Sighting], lenses: Mapping[str, Lens]) -> tuple[Array, str]:
+        number = self.floor_frame
+        if self.floor is None:
+            return _guessed_floor(rig), ""
+        path = Path(self.floor)
+        if number is not None:
+            lying = [sighting for sighting in together if sighting.frame == number]
+            if not lying:
+                raise CalibrationError(
+                    f"No camera sees the board in frame {number}.", "Name a frame in which one does."
+                )
+            known = rig.boards.get(number)
+            pose = board_on_floor(rig, self.board, lying, lenses) if known is None else known
+            words = f"board on the floor in frame {number}"
+        elif path.suffix.lower() == ".json":
+            return clicked_floor(read_clicks(path), rig.cameras).new_from_old, f"points of {path.name}"
+        else:
+            seen = []
+            finder = BoardFinder(self.board)
+            footage = by_camera(list_footage(path), [camera.name for camera in rig.cameras])
+            for name, entry in footage.items():
+                found = look_for_lens(finder, name, entry, self.progress, self.taken)
+                seen += [max(found, key=lambda each: each.sharpness).sighting] if found else []
+            pose = board_on_floor(rig, self.board, seen, lenses)
+            words = f"board on the floor in '{path.name}', {len(seen)} cameras"
+        return floor_from_board(pose, self.board.thickness_mm), words
 
 
-def _placed(
-    board: Board,
-    together: Sequence[Sighting],
-    lenses: Mapping[str, Lens],
-    floor: str | None,
-    refine: bool,
-    taken: HowTaken,
-    progress: Progress | None,
-) -> tuple[Rig, str, list[Finding]]:
-    """The rig on its floor, how that was set, and what the pairs say. Raises CalibrationError for mirrored ones."""
-    names = sorted({sighting.camera for sighting in together}, key=natural_key)
-    silent = [name for name in lenses if name not in names]
-    if silent:
-        raise CalibrationError(
-            f"The board is found in no picture of camera {listed(silent)} in the common footage.",
-            "Carry the board through what this camera sees.",
-        )
-    for sighting in together:
-        if sighting.size != lenses[sighting.camera].size:
-            (a, b), (c, d) = sighting.size, lenses[sighting.camera].size
-            raise CalibrationError(
-                f"Camera {sighting.camera} recorded {a}x{b} pixels, its lens was calibrated at {c}x{d}.",
-                "Record both with one mode of the camera.",
-            )
-    backwards = mirrored_cameras(board, together, lenses, names) if board.kind == "chessboard" else ()
-    if backwards:
-        raise CalibrationError(backwards[0].message, backwards[0].remedy)
-    rig = solve_rig(board, together, lenses, refine_lenses=refine, progress=progress)
-    findings = list(pair_findings(rig))
-    new_from_old, words = _floor(board, rig, together, lenses, floor, taken, progress)
-    rig = moved(rig, new_from_old)
-    upright = tuple(replace(camera, quarter_turns=quarter_turns(camera)) for camera in rig.cameras)
-    if not words:
-        findings.append(
-            Finding(
-                "no-floor",
-                "warns",
-                "The floor was not set: up is what the cameras' pictures call up, and z = 0 is a guess.",
-                "Lay the board on the floor in one frame and name it (--floor frame:N), or click points of the floor.",
-            )
-        )
-    return replace(rig, cameras=upright), words, findings
-
-
-def _floor(
-    board: Board,
-    rig: Rig,
-    together: Sequence[Sighting],
-    lenses: Mapping[str, Lens],
-    floor: str | None,
-    taken: HowTaken,
-    progress: Progress | None,
-) -> tuple[np.ndarray, str]:
-    number = _floor_frame(floor)
-    if floor is None:
-        return _guessed_floor(rig), ""
-    if number is not None:
-        lying = [sighting for sighting in together if sighting.frame == number]
-        if not lying:
-            raise CalibrationError(
-                f"No camera sees the board in frame {number}.", "Name a frame in which one does."
-            )
-        pose = rig.boards[number] if number in rig.boards else board_on_floor(rig, board, lying, lenses)
-        return floor_from_board(pose, board.thickness_mm), f"board on the floor in frame {number}"
-    path = Path(floor)
-    if path.suffix.lower() == ".json":
-        return clicked_floor(read_clicks(path), rig.cameras).new_from_old, f"points of {path.name}"
-    footage = by_camera(list_footage(path), [camera.name for camera in rig.cameras])
-    finder = BoardFinder(board)
-    seen = []
-    for name, entry in footage.items():
-        found = look_for_lens(finder, name, entry, progress, taken)
-        seen += [max(found, key=lambda each: each.sharpness).sighting] if found else []
-    pose = board_on_floor(rig, board, seen, lenses)
-    return floor_from_board(
-        pose, board.thickness_mm
-    ), f"board on the floor in '{path.name}', {len(seen)} cameras"
-
-
-def _guessed_floor(rig: Rig) -> np.ndarray:
+def _guessed_floor(rig: Rig) -> Array:
     """Up as the pictures have it, the floor 1 m under what the cameras look at."""
     up = -np.mean([camera.rotation[1] for camera in rig.cameras], axis=0)
     up = up / np.linalg.norm(up)

@@ -7,6 +7,7 @@ distortion numbers they write, and in where the camera's name is. The canonical 
 """
 
 import tomllib
+from dataclasses import asdict
 from pathlib import Path
 
 import cv2
@@ -73,14 +74,7 @@ def write_toml(cameras: tuple[Camera, ...], path: Path, crops: dict[str, Assumed
         }
         crop = (crops or {}).get(camera.name)
         if crop is not None:
-            table["assumed_crop"] = {
-                "left": crop.left,
-                "top": crop.top,
-                "right": crop.right,
-                "bottom": crop.bottom,
-                "calibrated": list(crop.calibrated),
-                "scale": crop.scale,
-            }
+            table["assumed_crop"] = asdict(crop) | {"calibrated": list(crop.calibrated)}
         document[f"cam_{index:02d}"] = table
     document["metadata"] = {"format": CANONICAL, "unit": "mm"}
     path.write_text(tomli_w.dumps(document), encoding="utf-8")

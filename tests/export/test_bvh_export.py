@@ -15,8 +15,9 @@ from studio.export.bvh_writing import smooth_angles
 from studio.export.exporting import export_run
 from studio.export.formats import FORMATS
 from studio.export.options import Axes
-from studio.export.skeleton import Skeleton, follow, skeleton_of
+from studio.export.skeleton import Skeleton, skeleton_of
 from studio.motion_files.bvh import read_bvh
+from studio.motion_files.recorded_motion import followed
 
 BVH = FORMATS["bvh"]
 LEAST_MM, LEAST_DEGREES = 0.1, 0.01
@@ -27,7 +28,7 @@ def meant(body_name: str, rest: str = "tpose") -> tuple[Skeleton, np.ndarray, np
     """The skeleton and where its joints are meant to be, mm, z up, of the fixture's motion."""
     body = load_body(body_name)
     skeleton = skeleton_of(body, rest)
-    return skeleton, *follow(skeleton, *skeleton.animated(moving_poses(body)))
+    return skeleton, *followed(skeleton.tree.parents, *skeleton.animated(moving_poses(body)))
 
 
 def angle_between(one: np.ndarray, other: np.ndarray) -> float:
