@@ -195,7 +195,7 @@ class _Solving:
         upright = tuple(replace(camera, quarter_turns=quarter_turns(camera)) for camera in rig.cameras)
         if not words:
             message = "The floor was not set: up is what the cameras' pictures call up, and z = 0 is a guess."
-            remedy = "Lay the board on the floor in one frame and name it (--floor frame:N), or click points of the floor."
+            remedy = "Lay the board on the floor in one frame and name it (--floor frame:N), or click floor points."
             findings.append(Finding("no-floor", "warns", message, remedy))
         return replace(rig, cameras=upright), words, findings
 
