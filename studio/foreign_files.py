@@ -56,6 +56,7 @@ def check_regular(path: Path, wrong: type[StudioError]) -> None:
 
 
 def _no_such(path: Path, wrong: type[StudioError], what: str, remedy: str, problem: Exception) -> StudioError:
-    text = " ".join(str(problem).split()) or type(problem).__name__
+    # Typed decoding names an entry as `$.entry`.
+    text = " ".join(str(problem).replace("`$.", "`").replace("`", "'").split()) or type(problem).__name__
     shown = text if len(text) <= LONGEST_REASON else f"{text[:LONGEST_REASON]}…"
     return wrong(f"'{path.name}' is not {what}, or is damaged ({shown}).", remedy)

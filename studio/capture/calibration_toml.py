@@ -21,7 +21,7 @@ from studio.errors import CalibrationError
 from studio.foreign_files import foreign_file
 from studio.geometry.camera import Camera
 
-CANONICAL = "capture-studio"
+CANONICAL, VERSION = "capture-studio", 1
 
 
 def looks_like_calibration(path: Path) -> bool:
@@ -39,6 +39,12 @@ def read_toml(path: Path) -> FoundCameras:
     document = _document(path)
     metadata = document.get("metadata")
     metadata = metadata if isinstance(metadata, dict) else {}
+    version = metadata.get("version", VERSION) if metadata.get("format") == CANONICAL else VERSION
+    if not isinstance(version, int) or version > VERSION:
+        raise CalibrationError(
+            f"'{path.name}' has version {version}, this studio knows versions up to {VERSION}.",
+            "Open it with a newer studio.",
+        )
     cameras: list[Camera] = []
     crops: dict[str, AssumedCrop] = {}
     unposed: list[Intrinsics] = []
@@ -76,7 +82,7 @@ def write_toml(cameras: tuple[Camera, ...], path: Path, crops: dict[str, Assumed
         if crop is not None:
             table["assumed_crop"] = asdict(crop) | {"calibrated": list(crop.calibrated)}
         document[f"cam_{index:02d}"] = table
-    document["metadata"] = {"format": CANONICAL, "unit": "mm"}
+    document["metadata"] = {"format": CANONICAL, "version": VERSION, "unit": "mm"}
     path.write_text(tomli_w.dumps(document), encoding="utf-8")
 
 

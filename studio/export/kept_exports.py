@@ -6,7 +6,7 @@ from pathlib import Path
 
 import msgspec
 
-from studio.errors import NotFoundError
+from studio.errors import NotFoundError, SessionError
 from studio.export.exporting import ExportReport, export_run
 from studio.export.formats import ExportFormat
 from studio.export.options import ExportOptions
@@ -14,10 +14,9 @@ from studio.export.task import Writer
 from studio.progress import Progress
 from studio.runs.tracks import BEST, RAW, best_track, read_track, track_digest, track_names
 from studio.runs.way_results import ExportedFile
-from studio.sessions.atomic_files import write_bytes
+from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.typed_decoding import decode_json
 
 FOLDER = "exports"
 SAID = ".said.json"
@@ -40,6 +39,12 @@ class KeptExport(msgspec.Struct, frozen=True):
     options: dict[str, str | int | float | bool]
     track: str = ""
     content: str = ""
+    schema: int = 1
+
+
+_RECORD = RecordFile(
+    KeptExport, "what is known of an export", "Export it again.", ("There is no such export.", "Export it.")
+)
 
 
 def export_into_run(
@@ -71,7 +76,7 @@ def export_into_run(
     )
     content = _content(run, report.track) if report.track else ""
     kept = msgspec.structs.replace(_said(report, asked), track=report.track, content=content)
-    write_bytes(folder / f"{kept.file}{SAID}", msgspec.json.encode(kept))
+    _RECORD.write(folder / f"{kept.file}{SAID}", kept)
     return kept
 
 
@@ -80,8 +85,8 @@ def kept_exports(run: StoredRun) -> tuple[KeptExport, ...]:
     found = []
     for path in (run.folder / FOLDER).glob(f"*{SAID}"):
         try:
-            kept = decode_json(path.read_bytes(), KeptExport)
-        except (OSError, msgspec.DecodeError, UnicodeDecodeError):
+            kept = _RECORD.read(path)
+        except SessionError:
             continue
         if f"{kept.file}{SAID}" == path.name and (path.parent / kept.file).is_file():
             found.append(kept)

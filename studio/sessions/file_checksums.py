@@ -12,7 +12,8 @@ from pathlib import Path
 
 import msgspec
 
-from studio.sessions.atomic_files import write_bytes
+from studio.errors import SessionError
+from studio.sessions.record_files import RecordFile
 
 NAME = ".checksums.json"
 RUNS = "runs"
@@ -35,6 +36,23 @@ class Noted(msgspec.Struct, frozen=True, array_like=True):
     size: int
     time: int
     digest: str
+
+
+class NotedFiles(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The file. files : by path in the folder. Version 1 was these alone."""
+
+    schema: int = 2
+    files: dict[str, Noted] = {}
+
+
+_RECORD = RecordFile(
+    NotedFiles,
+    "checksums of files",
+    "Remove it; the files are then noted anew.",
+    (f"There is no '{NAME}'.", "Note the files."),
+    version=2,
+    migrations={1: lambda entries: {"files": entries}},
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,12 +123,10 @@ def _noted(path: Path) -> Noted:
 def _read(folder: Path) -> tuple[dict[str, Noted], bool]:
     """What was noted, and whether that can be read; nothing where nothing was noted."""
     try:
-        return msgspec.json.decode((folder / NAME).read_bytes(), type=dict[str, Noted]), True
-    except FileNotFoundError:
-        return {}, True
-    except (OSError, ValueError):
+        return _RECORD.read(folder / NAME, NotedFiles()).files, True
+    except SessionError:
         return {}, False
 
 
 def _write(folder: Path, noted: dict[str, Noted]) -> None:
-    write_bytes(folder / NAME, msgspec.json.encode(noted))
+    _RECORD.write(folder / NAME, NotedFiles(files=noted))

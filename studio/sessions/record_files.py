@@ -66,7 +66,7 @@ class RecordFile(Generic[Record]):
             if written == self.version:
                 return decode_json(content, self.type)
             return msgspec.convert(self._migrated(decode_json(content, Entries), written), self.type)
-        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        except (msgspec.DecodeError, LookupError, TypeError, ValueError) as error:
             raise SessionError(f"'{path}' is not {self.what}: {error}.", self.remedy) from None
 
     def write(self, path: Path, record: Record) -> None:

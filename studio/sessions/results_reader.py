@@ -28,6 +28,8 @@ from studio.settings import SettingsEntry
 from studio.tracking.tracker import TRACKED, FrameResult, LayerRecord
 
 FILE_NAME = "results.sqlite"
+SCHEMA_VERSION = 1
+"""A store of this version may lack tables that came later; these are made when it is written to."""
 UNWATCHED = (TRACKED, None, 0)
 """State, overlap and doubts of a frame that was stored before a loss could be noticed."""
 ROWS = "SELECT frames.frame, log_weight, milliseconds, evaluations, layers, settings_version, pose"
@@ -419,6 +421,19 @@ def _open_to_read(path: Path) -> sqlite3.Connection:
         connection = sqlite3.connect(
             f"{address}?immutable=1", uri=True, timeout=10.0, isolation_level=None, check_same_thread=False
         )
+    check_version(connection, path)
     # A blob that a flipped bit made a text fits no checksum, and is no reason not to read the others.
     connection.text_factory = lambda content: content.decode("utf-8", "replace")
     return connection
+
+
+def check_version(connection: sqlite3.Connection, path: Path) -> None:
+    """Raises SessionError for a store that a newer studio wrote; one that cannot be read is told of elsewhere."""
+    with suppress(sqlite3.DatabaseError):
+        row = connection.execute("SELECT value FROM meta WHERE key = 'schema'").fetchone()
+        if row is not None and str(row[0]).isdigit() and int(row[0]) > SCHEMA_VERSION:
+            connection.close()
+            raise SessionError(
+                f"'{path}' has schema version {row[0]}, this studio knows versions up to {SCHEMA_VERSION}.",
+                "Open it with a newer studio.",
+            )

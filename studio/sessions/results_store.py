@@ -30,7 +30,7 @@ from studio.sessions.results_codec import (
     pack_result,
     sums_text,
 )
-from studio.sessions.results_reader import FILE_NAME, ResultsReader
+from studio.sessions.results_reader import FILE_NAME, SCHEMA_VERSION, ResultsReader, check_version
 from studio.tracking.tracker import FrameResult, LayerRecord
 
 Value = bool | int | float | str
@@ -39,7 +39,6 @@ __all__ = ["FILE_NAME", "ResultsReader", "ResultsWriter", "is_being_written"]
 
 LOCK_NAME = "results.lock"
 RESULTS = "The results in"
-SCHEMA_VERSION = "1"
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS settings (
@@ -74,7 +73,7 @@ def create_store(run_folder: Path) -> None:
         with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as connection:
             connection.execute("PRAGMA journal_mode = WAL")
             connection.executescript(SCHEMA)
-            connection.execute("INSERT OR IGNORE INTO meta VALUES ('schema', ?)", (SCHEMA_VERSION,))
+            connection.execute("INSERT OR IGNORE INTO meta VALUES ('schema', ?)", (str(SCHEMA_VERSION),))
     except sqlite3.DatabaseError as error:
         raise unwritable(RESULTS, path, error) from None
 
@@ -141,6 +140,7 @@ class ResultsWriter:
                 self._path, timeout=30.0, isolation_level=None, check_same_thread=False
             )
             try:
+                check_version(connection, self._path)
                 connection.execute("PRAGMA journal_mode = WAL")
                 connection.execute("PRAGMA synchronous = NORMAL")
                 connection.executescript(SCHEMA)

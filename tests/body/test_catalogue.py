@@ -210,5 +210,5 @@ def test_an_unknown_body_is_named_with_those_at_hand(name: str) -> None:
 
 
 def test_a_missing_file_is_named() -> None:
-    with pytest.raises(BodyError, match=r"nowhere\.toml cannot be read"):
+    with pytest.raises(BodyError, match=r"nowhere\.toml' cannot be read"):
         load_body("nowhere.toml")

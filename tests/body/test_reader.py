@@ -194,5 +194,5 @@ def test_a_rest_value_is_a_sum_of_numbers_and_dimensions() -> None:
 def test_a_binary_file_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "crane.toml"
     path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(BodyError, match="cannot be read"):
+    with pytest.raises(BodyError, match="is not a body file"):
         read_body(path)

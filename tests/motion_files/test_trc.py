@@ -95,5 +95,5 @@ def test_a_broken_header_is_named(tmp_path: Path, change: tuple[str, str], said:
 
 def test_binary_rubbish_is_no_trc(tmp_path: Path) -> None:
     (tmp_path / "x.trc").write_bytes(bytes(range(256)))
-    with pytest.raises(TruthError, match="cannot be read as text"):
+    with pytest.raises(TruthError, match="is not a TRC file"):
         read_trc(tmp_path / "x.trc")

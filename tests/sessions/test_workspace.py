@@ -169,6 +169,7 @@ def test_pictures_are_shrunk_to_even_sides(
         frame = next(opened.decode(video=0))
     assert (frame.height, frame.width) == shown
 
+
 @pytest.fixture
 def two_sessions(session_on_disk: Session) -> Workspace:
     session_on_disk.new_run(record_of(session_on_disk, "first"))
