@@ -6,6 +6,9 @@ tells. Boards that look the same after half a turn (`Board.turn_symmetric`) keep
 furthest to the top left; who compares views settles the rest.
 """
 
+from collections.abc import Callable
+from functools import partial
+
 import cv2
 import cv2.aruco
 import numpy as np
@@ -109,10 +112,7 @@ def _chessboard_corners(board: Board, grey: NDArray, thorough: bool) -> Array | 
     lie on one plane.
     """
     across, down = board.corners
-    searches = [_sector_search, _exhaustive_search, _classic_search]
-    if max(grey.shape) > FIRST_LOOK:
-        searches = [_small_search, _small_exhaustive_search, *searches]
-    for search in searches if thorough else searches[:1]:
+    for search in (_SEARCHES if max(grey.shape) > FIRST_LOOK else _SEARCHES[2:])[: None if thorough else 1]:
         corners = search(grey, (across, down))
         if corners is None:
             continue
@@ -134,29 +134,18 @@ def on_a_plane(board: Board, pixels: Array) -> bool:
     return bool(np.sqrt((off**2).sum(axis=1).mean()) < OFF_PLANE * spacing)
 
 
-def _small_search(grey: NDArray, size: tuple[int, int], flags: int = 0) -> NDArray | None:
+def _small_search(grey: NDArray, size: tuple[int, int], flags: int) -> NDArray | None:
     scale = FIRST_LOOK / max(grey.shape)
     small = cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    seen, corners = cv2.findChessboardCornersSB(small, size, flags=cv2.CALIB_CB_NORMALIZE_IMAGE | flags)
-    if not seen:
+    corners = _search(small, size, flags)
+    if corners is None:
         return None
     # Pixels are counted from the middle of the first one, so shrinking happens about the corner at -0.5.
     return _refined(grey, (np.asarray(corners, dtype=np.float32).reshape(-1, 1, 2) + 0.5) / scale - 0.5, size)
 
 
-def _small_exhaustive_search(grey: NDArray, size: tuple[int, int]) -> NDArray | None:
-    return _small_search(grey, size, cv2.CALIB_CB_EXHAUSTIVE)
-
-
-def _sector_search(grey: NDArray, size: tuple[int, int]) -> NDArray | None:
-    flags = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE
-    seen, corners = cv2.findChessboardCornersSB(grey, size, flags=flags)
-    return corners if seen else None
-
-
-def _exhaustive_search(grey: NDArray, size: tuple[int, int]) -> NDArray | None:
-    flags = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE
-    seen, corners = cv2.findChessboardCornersSB(grey, size, flags=flags)
+def _search(grey: NDArray, size: tuple[int, int], flags: int) -> NDArray | None:
+    seen, corners = cv2.findChessboardCornersSB(grey, size, flags=cv2.CALIB_CB_NORMALIZE_IMAGE | flags)
     return corners if seen else None
 
 
@@ -164,6 +153,16 @@ def _classic_search(grey: NDArray, size: tuple[int, int]) -> NDArray | None:
     flags = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_FAST_CHECK
     seen, corners = cv2.findChessboardCorners(grey, size, flags=flags)
     return _refined(grey, np.asarray(corners, dtype=np.float32).reshape(-1, 1, 2), size) if seen else None
+
+
+_SEARCHES: tuple[Callable[[NDArray, tuple[int, int]], NDArray | None], ...] = (
+    partial(_small_search, flags=0),
+    partial(_small_search, flags=cv2.CALIB_CB_EXHAUSTIVE),
+    partial(_search, flags=cv2.CALIB_CB_ACCURACY),
+    partial(_search, flags=cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY),
+    _classic_search,
+)
+"""Quickest first; the first two are for large pictures."""
 
 
 def _refined(grey: NDArray, corners: NDArray, size: tuple[int, int]) -> NDArray:

@@ -22,7 +22,7 @@ from studio.capture.calibration_opencv import opencv_files, read_opencv
 from studio.capture.calibration_parts import AssumedCrop, FoundCameras, Intrinsics
 from studio.capture.calibration_qualisys import is_qualisys, read_qualisys
 from studio.capture.calibration_storage import STORAGE_SUFFIXES
-from studio.capture.calibration_toml import is_canonical, looks_like_calibration, read_toml, write_toml
+from studio.capture.calibration_toml import is_canonical, looks_like_calibration, read_toml, write_calibration
 from studio.capture.calibration_writers import (
     CALIBRATION_FORMATS,
     CalibrationFormat,
@@ -164,13 +164,6 @@ def read_intrinsics(path: Path) -> tuple[Intrinsics, ...]:
     if not lenses:
         raise CalibrationError(f"'{path.name}' holds no camera.", "Export the calibration again.")
     return tuple(lenses)
-
-
-def write_calibration(
-    cameras: tuple[Camera, ...], path: Path, crops: dict[str, AssumedCrop] | None = None
-) -> None:
-    """Write the canonical TOML: mm, sizes, quarter turns for display, and the crops that were assumed."""
-    write_toml(cameras, path, crops)
 
 
 def export_calibration(cameras: tuple[Camera, ...], path: Path, writer: str) -> WrittenCalibration:

@@ -65,7 +65,9 @@ def read_toml(path: Path) -> FoundCameras:
     return FoundCameras(tuple(cameras), _unit(metadata), (path,), tuple(unposed), crops=crops)
 
 
-def write_toml(cameras: tuple[Camera, ...], path: Path, crops: dict[str, AssumedCrop] | None = None) -> None:
+def write_calibration(
+    cameras: tuple[Camera, ...], path: Path, crops: dict[str, AssumedCrop] | None = None
+) -> None:
     """Write the canonical file: mm, rotation as matrix rows, names as sections' `name`."""
     document: dict[str, object] = {}
     for index, camera in enumerate(cameras):

@@ -1,43 +1,8 @@
-"""Evaluations in words and as one JSON object, several runs (seeds) together."""
+"""An evaluation in words and as one JSON object."""
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-
-import numpy as np
+from dataclasses import asdict
 
 from studio.evaluation.errors import LOST_MM, Evaluation
-
-
-@dataclass(frozen=True, slots=True)
-class SeedsSummary:
-    """Several runs of one setting.
-
-    mean_mm, worst_mm : means over the runs of their means and of their worst frames; spread_mm : standard
-    deviation of the runs' means (0 for one run). lost_limbs : limbs lost, summed over the runs.
-    runs_without_loss : runs in which no limb was lost in any frame.
-    """
-
-    runs: int
-    mean_mm: float
-    spread_mm: float
-    highest_mean_mm: float
-    worst_mm: float
-    lost_limbs: int
-    runs_without_loss: int
-
-
-def summarize(evaluations: Sequence[Evaluation]) -> SeedsSummary:
-    """The summary of one or more evaluations (an empty sequence is an error of the caller)."""
-    means = np.array([one.mean_mm for one in evaluations])
-    return SeedsSummary(
-        runs=len(evaluations),
-        mean_mm=float(means.mean()),
-        spread_mm=float(means.std(ddof=1)) if len(means) > 1 else 0.0,
-        highest_mean_mm=float(means.max()),
-        worst_mm=float(np.mean([one.worst_mm for one in evaluations])),
-        lost_limbs=sum(len(one.lost_limbs) for one in evaluations),
-        runs_without_loss=sum(not one.lost_limbs for one in evaluations),
-    )
 
 
 def as_document(evaluation: Evaluation) -> dict[str, object]:

@@ -139,15 +139,8 @@ def _stem(
         chosen["track"] = best_track(run).name
     for name, value in sorted(chosen.items()):
         if name != "last" and getattr(usual, name, value) != value:
-            parts.append(
-                ""
-                if value is False
-                else name
-                if value is True
-                else f"{name}{value}"
-                if _counts(value)
-                else str(value)
-            )
+            word = value if isinstance(value, str) else f"{name}{value}"
+            parts.append({True: name, False: ""}[value] if isinstance(value, bool) else word)
     if asked.get("last"):
         parts.append(f"to{asked['last']}")
     return "-".join(
@@ -157,10 +150,6 @@ def _stem(
 
 def _content(run: StoredRun, track: str) -> str:
     return track_digest(read_track(run, track))
-
-
-def _counts(value: str | float) -> bool:
-    return not isinstance(value, str)
 
 
 def _said(report: ExportReport, asked: Mapping[str, str | int | float | bool]) -> KeptExport:

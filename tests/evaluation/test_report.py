@@ -1,12 +1,9 @@
-"""Evaluations of several seeds in one line, in words and as JSON."""
+"""Evaluations in words and as JSON."""
 
 import json
 
-import numpy as np
-import pytest
-
 from studio.evaluation.errors import Evaluation
-from studio.evaluation.report import as_document, in_words, summarize
+from studio.evaluation.report import as_document, in_words
 
 
 def evaluation(mean: float, lost: tuple[str, ...] = ()) -> Evaluation:
@@ -25,17 +22,6 @@ def evaluation(mean: float, lost: tuple[str, ...] = ()) -> Evaluation:
         procrustes_mm=None,
         unmatched_markers=("Nose",),
     )
-
-
-def test_seeds_are_summed_up() -> None:
-    summary = summarize([evaluation(20.0), evaluation(26.0, ("left arm", "right leg")), evaluation(23.0)])
-    assert summary.runs == 3
-    assert summary.mean_mm == pytest.approx(23.0)
-    assert summary.spread_mm == pytest.approx(np.std([20.0, 26.0, 23.0], ddof=1))
-    assert summary.highest_mean_mm == 26.0
-    assert summary.worst_mm == pytest.approx(28.0)
-    assert (summary.lost_limbs, summary.runs_without_loss) == (2, 2)
-    assert summarize([evaluation(20.0)]).spread_mm == 0.0
 
 
 def test_the_document_is_strict_json_and_the_words_say_threshold_and_alignment() -> None:
