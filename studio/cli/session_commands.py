@@ -71,13 +71,13 @@ def import_command(
     return {
         "session": str(place),
         "layout": told.layout,
-        "cameras": [f"{match.footage} → {match.camera} ({match.how})" for match in told.matches],
+        "cameras": [f"{match.footage} → {match.camera} ({match.how})" for match in told.matching],
         "notes": list(told.notes),
         "warnings": list(told.warnings),
         "text": "\n".join(
             [
                 f"Session {place.name} in {place}",
-                *(f"  {match.footage} → {match.camera}" for match in told.matches),
+                *(f"  {match.footage} → {match.camera}" for match in told.matching),
             ]
         ),
     }

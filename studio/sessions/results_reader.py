@@ -4,10 +4,11 @@ import json
 import math
 import sqlite3
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -30,6 +31,8 @@ from studio.tracking.tracker import TRACKED, FrameResult, LayerRecord
 FILE_NAME = "results.sqlite"
 SCHEMA_VERSION = 1
 """A store of this version may lack tables that came later; these are made when it is written to."""
+Unpacked = TypeVar("Unpacked")
+LATER_TABLES = (("tracking", ("state", "overlap", "doubts")), ("arrivals", ("arrived", "ready")))
 UNWATCHED = (TRACKED, None, 0)
 """State, overlap and doubts of a frame that was stored before a loss could be noticed."""
 ROWS = "SELECT frames.frame, log_weight, milliseconds, evaluations, layers, settings_version, pose"
@@ -149,10 +152,7 @@ class ResultsReader:
             raise self._missing(f"frame {frame}")
         if not rows or (text is not None and not Sums(text).fits("result", rows[0][0])):
             raise self._is_damaged(frame, RESULT if rows else LOST)
-        try:
-            return unpack_result(rows[0][0])
-        except Exception:
-            raise self._is_damaged(frame, RESULT) from None
+        return self._unpacked(frame, RESULT, unpack_result, rows[0][0])
 
     def layers(self, frame: int) -> list[LayerRecord]:
         """The layers of a frame in the order they ran; of the unfinished frame those that are done. Raises DamagedError
@@ -161,14 +161,14 @@ class ResultsReader:
         blobs = self._layer_blobs(frame)
         if not blobs:
             raise self._missing(f"layers of frame {frame}")
-        return [self._unpacked(frame, layer, blob) for layer, blob in blobs.items()]
+        return [self._layer(frame, layer, blob) for layer, blob in blobs.items()]
 
     def layer(self, frame: int, layer: int) -> LayerRecord:
         """One layer of a frame, finished or not. Raises DamagedError as `layers`."""
         blobs = self._layer_blobs(frame)
         if layer not in blobs:
             raise self._missing(f"layer {layer} of frame {frame}")
-        return self._unpacked(frame, layer, blobs[layer])
+        return self._layer(frame, layer, blobs[layer])
 
     def poses(self) -> tuple[Indices, Array]:
         """The finished frames (K,) that are whole and their estimates (K, D), radians and mm."""
@@ -226,23 +226,20 @@ class ResultsReader:
         return ""
 
     def _rows(self) -> list[tuple]:
-        """Every finished frame's numbers and pose, without its blobs."""
-        how = "state, overlap, doubts" if self._has_table("tracking") else "NULL, NULL, NULL"
-        came = "arrived, ready" if self._has_table("arrivals") else "NULL, NULL"
-        joined = "".join(
-            f" LEFT JOIN {table} USING (frame)"
-            for table, columns in (("tracking", how), ("arrivals", came))
-            if not columns.startswith("NULL")
-        )
-        return self._query(f"{ROWS}, {how}, {came} FROM frames{joined} ORDER BY frames.frame")
+        """Every finished frame's numbers and pose, without its blobs; what older stores have no table for is NULL."""
+        columns, joined = ROWS, ""
+        for table, names in LATER_TABLES:
+            known = self._has_table(table)
+            columns += "".join(f", {name if known else 'NULL'}" for name in names)
+            joined += f" LEFT JOIN {table} USING (frame)" if known else ""
+        return self._query(f"{columns} FROM frames{joined} ORDER BY frames.frame")
 
     def _sums(self, what: str, number: int | None = None) -> dict[int, str]:
         """The stored checksums; nothing in stores that are older than these."""
         if not self._has_table("checksums"):
             return {}
         one = "" if number is None else f" AND number = {int(number)}"
-        rows = self._query(f"SELECT number, sums FROM checksums WHERE what = '{what}'{one}")
-        return dict(rows)
+        return dict(self._query(f"SELECT number, sums FROM checksums WHERE what = '{what}'{one}"))
 
     def _damaged_blobs(self, frame: int, text: str) -> str:
         """What of a frame's blobs does not fit its checksums, in words; "" where all do."""
@@ -254,35 +251,31 @@ class ResultsReader:
             return LOST
         if not blob or not sums.fits("result", blob[0][0]):
             return RESULT if blob else LOST
-        wrong = sums.wrong_layers(layers)
-        return ", ".join(f"layer {layer}" for layer in wrong)
+        return _named(sums.wrong_layers(layers))
 
     def _layer_blobs(self, frame: int) -> dict[int, bytes]:
         """The layers of a frame, each as it was written. Raises DamagedError."""
         with self._snapshot():
-            rows = dict(
-                self._query("SELECT layer, blob FROM layers WHERE frame = ? ORDER BY layer", (frame,))
-            )
+            rows = self._query("SELECT layer, blob FROM layers WHERE frame = ? ORDER BY layer", (frame,))
             text = self._sums(FRAME, frame).get(frame)
             if not rows and text is None:
-                rows = dict(
-                    self._query(
-                        "SELECT layer, blob FROM partial_layers WHERE (SELECT frame FROM partial) = ? "
-                        "ORDER BY layer",
-                        (frame,),
-                    )
-                )
+                of_it = "WHERE (SELECT frame FROM partial) = ? ORDER BY layer"
+                rows = self._query(f"SELECT layer, blob FROM partial_layers {of_it}", (frame,))
                 text = self._sums(PARTIAL).get(0)
-        wrong = Sums(text).wrong_layers(rows) if text is not None and rows else []
+        blobs = dict(rows)
+        wrong = Sums(text).wrong_layers(blobs) if text is not None and blobs else []
         if wrong:
-            raise self._is_damaged(frame, ", ".join(f"layer {layer}" for layer in wrong))
-        return rows
+            raise self._is_damaged(frame, _named(wrong))
+        return blobs
 
-    def _unpacked(self, frame: int, layer: int, blob: bytes) -> LayerRecord:
+    def _layer(self, frame: int, layer: int, blob: bytes) -> LayerRecord:
+        return self._unpacked(frame, f"layer {layer}", unpack_layer, blob)
+
+    def _unpacked(self, frame: int, part: str, unpack: Callable[[bytes], Unpacked], blob: bytes) -> Unpacked:
         try:
-            return unpack_layer(blob)
+            return unpack(blob)
         except Exception:
-            raise self._is_damaged(frame, f"layer {layer}") from None
+            raise self._is_damaged(frame, part) from None
 
     def _is_damaged(self, frame: int, part: str) -> DamagedError:
         VERIFIED.forget(self._folder)
@@ -297,8 +290,7 @@ class ResultsReader:
 
     def _has_table(self, name: str) -> bool:
         """Whether the store has a table; older ones have fewer."""
-        rows = self._query(f"SELECT name FROM sqlite_master WHERE type = 'table' AND name = '{name}'")
-        return bool(rows)
+        return bool(self._query(f"SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = '{name}'"))
 
     def settings_history(self) -> list[SettingsEntry]:
         """Every version of the settings that was in use, oldest first. Raises SessionError where one is not what was
@@ -337,9 +329,8 @@ class ResultsReader:
             return None
         frame, next_layer, blob = rows[0]
         sums = Sums(text) if text is not None else None
-        if sums is not None and not (sums.row_fits((frame, next_layer)) and sums.fits("state", blob)):
-            return None
-        if sums is not None and sums.wrong_layers(layers):
+        whole = sums is None or (sums.row_fits((frame, next_layer)) and sums.fits("state", blob))
+        if not whole or (sums is not None and sums.wrong_layers(layers)):
             return None
         try:
             return PartialFrame(frame, next_layer, unpack(blob))
@@ -348,7 +339,7 @@ class ResultsReader:
 
     def done(self) -> int:
         """How many frames are finished."""
-        return len(self._whole_rows())
+        return len(self.frames())
 
     def last_before(self, frame: int) -> int | None:
         """The last finished frame before one; None where there is none."""
@@ -406,6 +397,10 @@ class ResultsReader:
                     f"The results in '{self._folder / FILE_NAME}' cannot be read ({error}).",
                     "Put back a copy of the file, or start the run again.",
                 ) from None
+
+
+def _named(layers: Iterable[int]) -> str:
+    return ", ".join(f"layer {layer}" for layer in layers)
 
 
 def _open_to_read(path: Path) -> sqlite3.Connection:

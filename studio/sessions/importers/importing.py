@@ -88,11 +88,6 @@ class ImportReport:
     layout: str = ""
     calibrated: bool = True
 
-    @property
-    def matches(self) -> tuple[CameraMatch, ...]:
-        """The matching."""
-        return self.matching
-
 
 def import_source(
     source: Path,
