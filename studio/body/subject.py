@@ -26,9 +26,7 @@ than
    dimensions imply; without lengths either, the body keeps its own dimensions.
 """
 
-import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import msgspec
@@ -57,8 +55,7 @@ LONGEST_MM = 10_000.0
 """Of a limb or a distance of markers; a ratio is far below it."""
 
 
-@dataclass(frozen=True, slots=True)
-class Subject:
+class Subject(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What is known of a subject.
 
     body : a body's name. height_mm : None where unknown. lengths_mm : "MarkerA_MarkerB" to mm.
@@ -67,32 +64,25 @@ class Subject:
 
     body: str = DEFAULT_BODY
     height_mm: float | None = None
-    lengths_mm: Mapping[str, float] = field(default_factory=dict)
-    dimensions_mm: Mapping[str, float] = field(default_factory=dict)
-    ratios: Mapping[str, float] = field(default_factory=dict)
-
-
-class _SubjectFile(msgspec.Struct, forbid_unknown_fields=True):
-    body: str = DEFAULT_BODY
-    height_mm: float | None = None
-    lengths_mm: dict[str, float] = {}
-    dimensions_mm: dict[str, float] = {}
-    ratios: dict[str, float] = {}
+    lengths_mm: Mapping[str, float] = {}
+    dimensions_mm: Mapping[str, float] = {}
+    ratios: Mapping[str, float] = {}
 
 
 def read_subject(path: Path) -> Subject:
     """The subject of a TOML file. Raises BodyError naming the file, the entry and the remedy."""
     hint = "It holds body, height_mm, [lengths_mm], [dimensions_mm] and [ratios], numbers in mm."
     with foreign_file(path, BodyError, "a subject file", hint):
-        entries = decode_toml(path.read_bytes(), _SubjectFile)
-    subject = Subject(**{key: getattr(entries, key) for key in _SubjectFile.__struct_fields__})
+        subject = decode_toml(path.read_bytes(), Subject)
     _check(subject, f"Subject file {path.name}")
     return subject
 
 
 def write_subject(subject: Subject, path: Path) -> None:
     """Write a file that `read_subject` reads back; what is unknown is left out."""
-    entries = {key: value for key, value in dataclasses.asdict(subject).items() if value not in (None, {})}
+    entries = {
+        key: value for key, value in msgspec.structs.asdict(subject).items() if value not in (None, {})
+    }
     path.write_text(tomli_w.dumps(entries), encoding="utf-8")
 
 
@@ -150,7 +140,7 @@ def in_lengths(subject: Subject, own_body: BodyModel) -> Subject:
 
     own_body : the body that `subject.dimensions_mm` belong to.
     """
-    sized, _ = fit_subject(own_body, dataclasses.replace(subject, body=own_body.name))
+    sized, _ = fit_subject(own_body, msgspec.structs.replace(subject, body=own_body.name))
     lengths = {**MarkerDistances(sized).rigid(), **subject.lengths_mm}
     return Subject(subject.body, subject.height_mm, lengths)
 
