@@ -5,19 +5,19 @@ footage is the Lee-walk twin (for cameras a rendered walk with eight of them). O
 that each row begins with what the tracker reaches undamaged.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from studio.comparison.findings import Chart, Table
+from studio.comparison.findings import Table
 from studio.comparison.footage_shelf import FootageShelf
-from studio.comparison.tracked import Attempt, Tracked, track
+from studio.comparison.tracked import Attempt, track
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.reproduction.drawing import heat_chart
-from studio.reproduction.experiment import Experiment, concluding
+from studio.reproduction.experiment import Experiment, Part, each_seed
 from studio.reproduction.fleischmann.setting import EQ13, EVALUATIONS, IMPROVED, SWARM, TWIN
 from studio.reproduction.open_questions.damage import DAMAGES
 from studio.reproduction.tracking import Contender, by_group
@@ -27,9 +27,8 @@ FRAMES, QUICK_FRAMES = 90, 30
 ALL_TERMS = "edge-region-silhouette"
 MOST_SEEDS = 5
 """A cell of a heat map is a colour: more seeds than this change no colour, and there are 140 cells."""
-STANDS_MM, STANDS_LOST = 60.0, 0.05
-"""A tracker stands a degree if the mean over seeds stays below this error, and this share of frames with "
-"a loss."""
+STANDS_MM, STANDS_LOST = 60.0, 5.0
+"""A tracker stands a degree if the mean over seeds stays below this error, and this share of frames (%) with a loss."""
 
 CONTENDERS = (
     replace(IMPROVED, name="annealed, all terms", weighting=ALL_TERMS),
@@ -111,25 +110,26 @@ QUESTIONS = (
 )
 
 
-def group(contender: Contender, question: Question, degree: float) -> str:
-    """The words for a cell."""
-    return f"{contender.name}, {question.shown(degree)}"
-
-
 def _trials(question: Question, scale: Scale) -> tuple[Trial, ...]:
     """Every contender at every degree with every seed."""
-    found: list[Trial] = []
     last = QUICK_FRAMES if scale.quick else FRAMES
-    for contender in CONTENDERS:
-        for degree in question.degrees:
-            damage = {"damage": question.damage, "degree": degree if question.damage != "none" else 0.0}
-            for seed in scale.seeds[:MOST_SEEDS]:
-                attempt = contender.attempt(
-                    question.footage, seed, EVALUATIONS, last=last, **question.fields(degree)
-                )
-                label = f"{group(contender, question, degree)}, seed {seed}"
-                found.append(Trial(label, {"attempt": attempt.plain(), **damage}))
-    return tuple(found)
+
+    def arguments(contender: Contender, degree: float, seed: int) -> dict[str, Any]:
+        wanted = {"last": last, **question.fields(degree)}
+        attempt = contender.attempt(question.footage, seed, EVALUATIONS, **wanted)
+        damaged = degree if question.damage != "none" else 0.0
+        return {"attempt": attempt.plain(), "damage": question.damage, "degree": damaged}
+
+    return tuple(
+        trial
+        for contender in CONTENDERS
+        for degree in question.degrees
+        for trial in each_seed(
+            f"{contender.name}, {question.shown(degree)}",
+            scale.seeds[:MOST_SEEDS],
+            partial(arguments, contender, degree),
+        )
+    )
 
 
 @kept_as("open_questions.robustness.measure")
@@ -140,89 +140,48 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
     return asdict(track(attempt, shelf, spoilt=spoilt))
 
 
-@dataclass(frozen=True, slots=True)
-class Cells:
-    """What every contender (a row) reached at every degree (a column): mean error, mm, and frames with a loss, %."""
-
-    errors: Mapping[str, list[float]]
-    losses: Mapping[str, list[float]]
-
-
-def _cells(question: Question, outcomes: Sequence[Outcome]) -> Cells:
-    runs = by_group(outcomes)
-
-    def means(of: Callable[[Tracked], float], factor: float = 1.0) -> dict[str, list[float]]:
-        return {
-            entry.name: [
-                factor * float(np.mean([of(run) for run in runs[group(entry, question, degree)]]))
-                for degree in question.degrees
-            ]
-            for entry in CONTENDERS
-        }
-
-    return Cells(means(lambda run: run.mean_mm), means(lambda run: run.lost_frames / len(run.frames), 100.0))
-
-
-def _words(question: Question, cells: Cells) -> str:
-    last = question.shown(question.degrees[-1])
-    best = min(cells.errors, key=lambda name: cells.errors[name][-1])
-    stood = " ".join(f"{name} stands {_standing(question, cells, name)}." for name in cells.errors)
-    return (
-        f"{stood} At the last degree ({last} {question.axis}) {best} is the nearest: "
-        f"{cells.errors[best][-1]:.0f} mm. To stand: a mean below {STANDS_MM:.0f} mm and a limb lost in fewer "
-        f"than {100 * STANDS_LOST:.0f} % of the frames."
+def _shown(question: Question, outcomes: Sequence[Outcome]) -> Iterator[Part]:
+    """Mean error (mm) and frames with a limb lost (%) of every contender at every degree; what each stands."""
+    runs, columns = by_group(outcomes), tuple(map(question.shown, question.degrees))
+    errors: dict[str, list[float]] = {}
+    losses: dict[str, list[float]] = {}
+    for entry in CONTENDERS:
+        cells = [runs[f"{entry.name}, {degree}"] for degree in columns]
+        errors[entry.name] = [float(np.mean([run.mean_mm for run in cell])) for cell in cells]
+        losses[entry.name] = [
+            100.0 * float(np.mean([run.lost_frames / len(run.frames) for run in cell])) for cell in cells
+        ]
+    stood = []
+    for name in errors:
+        stands = [error <= STANDS_MM and loss <= STANDS_LOST for error, loss in zip(errors[name], losses[name], strict=True)]
+        count = [*stands, False].index(False)
+        stood.append(f"{name} stands {f'up to {columns[count - 1]}' if count else 'none of it'}.")
+    yield (
+        f"{' '.join(stood)} In {question.axis}; to stand: a mean below {STANDS_MM:.0f} mm and a limb lost in fewer than "
+        f"{STANDS_LOST:.0f} % of the frames."
     )
-
-
-def _standing(question: Question, cells: Cells, name: str) -> str:
-    """Up to which degree errors and losses stay small, in words."""
-    stood = ""
-    for degree, error, loss in zip(question.degrees, cells.errors[name], cells.losses[name], strict=True):
-        if error > STANDS_MM or loss > 100.0 * STANDS_LOST:
-            break
-        stood = question.shown(degree)
-    return f"up to {stood} {question.axis}" if stood else "none of it"
-
-
-def _table(question: Question, cells: Cells) -> Table:
     rows = tuple(
-        (name, *(f"{error:.1f} / {loss:.0f}" for error, loss in zip(errors, cells.losses[name], strict=True)))
-        for name, errors in cells.errors.items()
+        (name, *(f"{error:.1f} / {loss:.0f}" for error, loss in zip(errors[name], losses[name], strict=True)))
+        for name in errors
     )
-    heads = (f"{question.shown(degree)} {question.axis}" for degree in question.degrees)
-    return Table("Mean error over seeds (mm), frames with a limb lost (%)", ("tracker", *heads), rows)
+    heads = (f"{degree} {question.axis}" for degree in columns)
+    yield Table("Mean error over seeds (mm), frames with a limb lost (%)", ("tracker", *heads), rows)
+    for words, values in (("mean error (mm)", errors), ("frames with a limb lost (%)", losses)):
+        yield heat_chart(f"{question.title}: {words}", question.axis, "tracker", columns, values)
+    frames = outcomes[0].trial.arguments["attempt"]["last"]
+    yield {"footage": question.footage, "frames": frames, "evaluations": EVALUATIONS}
 
 
-def _heat(title: str, question: Question, values: Mapping[str, list[float]]) -> Chart:
-    columns = map(question.shown, question.degrees)
-    return heat_chart(f"{question.title}: {title}", question.axis, "tracker", columns, values)
-
-
-def _experiment(question: Question) -> Experiment:
-    return Experiment(
+EXPERIMENTS = tuple(
+    Experiment(
         name=f"robustness-{question.name}",
         title=question.title,
         source="an open question",
         claim=question.claim,
         trials=partial(_trials, question),
         measure=measure,
-        conclude=concluding(
-            partial(_cells, question),
-            claims=(),
-            words=lambda cells, numbers: _words(question, cells),
-            tables=(partial(_table, question),),
-            charts=(
-                lambda cells: _heat("mean error (mm)", question, cells.errors),
-                lambda cells: _heat("frames with a limb lost (%)", question, cells.losses),
-            ),
-            settings=lambda outcomes: {
-                "footage": question.footage,
-                "frames": outcomes[0].trial.arguments["attempt"]["last"],
-                "evaluations": EVALUATIONS,
-            },
-        ),
+        shown=partial(_shown, question),
         footage=(question.footage,),
     )
-
-
-EXPERIMENTS = tuple(_experiment(question) for question in QUESTIONS)
+    for question in QUESTIONS
+)
