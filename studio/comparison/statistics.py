@@ -6,7 +6,7 @@ wholly on the better side of it (better), or does not (not reproduced). It is fi
 
 import math
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -33,7 +33,7 @@ class SignTest(NamedTuple):
 
 
 def bootstrap_interval(
-    values: Sequence[float], statistic: Statistic = np.mean, level: float = 0.95
+    values: Iterable[float], statistic: Statistic = np.mean, level: float = 0.95
 ) -> tuple[float, float]:
     """Low and high end of a statistic's bootstrap interval (bias-corrected and accelerated; percentiles where
     that is not defined), always the same for the same values. One value, or equal ones: that value twice; none:
@@ -44,7 +44,7 @@ def bootstrap_interval(
 
 
 def ratio_interval(
-    ours: Sequence[float], theirs: Sequence[float], statistic: Statistic = np.mean, level: float = 0.95
+    ours: ArrayLike, theirs: ArrayLike, statistic: Statistic = np.mean, level: float = 0.95
 ) -> tuple[float, float]:
     """The interval of statistic(ours) / statistic(theirs), both of the same seeds in the same order.
 
@@ -54,7 +54,7 @@ def ratio_interval(
     return _interval((first, second), _ratio_of(statistic), level)
 
 
-def sign_test(ours: Sequence[float], theirs: Sequence[float]) -> SignTest:
+def sign_test(ours: ArrayLike, theirs: ArrayLike) -> SignTest:
     """Whether ours is smaller than theirs, pair by pair (two-sided sign test).
 
     Raises ValueError where they are not equally many.
@@ -67,7 +67,7 @@ def sign_test(ours: Sequence[float], theirs: Sequence[float]) -> SignTest:
 
 def number(
     name: str,
-    values: Sequence[float],
+    values: Iterable[float],
     unit: str = "",
     paper: float | None = None,
     better: str = "",
@@ -85,8 +85,8 @@ def number(
 
 def ratio_number(
     name: str,
-    ours: Sequence[float],
-    theirs: Sequence[float],
+    ours: ArrayLike,
+    theirs: ArrayLike,
     unit: str = "",
     paper: float | None = None,
     better: str = "",
@@ -174,7 +174,7 @@ def _ratio_of(statistic: Statistic) -> Callable[..., Array]:
     return ratio
 
 
-def _pairs(ours: Sequence[float], theirs: Sequence[float]) -> tuple[Array, Array]:
+def _pairs(ours: ArrayLike, theirs: ArrayLike) -> tuple[Array, Array]:
     first, second = np.asarray(ours, dtype=np.float64), np.asarray(theirs, dtype=np.float64)
     if first.shape != second.shape:
         raise ValueError(f"{len(first)} values cannot be paired with {len(second)}.")

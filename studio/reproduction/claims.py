@@ -39,14 +39,24 @@ def geometric_mean(values: Any, axis: int = -1) -> Any:  # noqa: ANN401 - what N
     return np.exp(np.mean(np.log(values), axis=axis))
 
 
-def sign_tests(of: Callable[[str], tuple[Sequence[float], Sequence[float]]], pairs: Iterable[tuple[str, str]]) -> Table:
+def sign_tests(
+    of: Callable[[str], tuple[Sequence[float], Sequence[float]]], pairs: Iterable[tuple[str, str]]
+) -> Table:
     """Who has the smaller error in more seeds and in more frames, a line a pair. of : a setting's errors of seeds, and
     of all their frames. Frames of one run follow from each other, so that their p flatters.
     """
     rows = []
     for first, second in pairs:
         tests = [sign_test(ours, theirs) for ours, theirs in zip(of(first), of(second), strict=True)]
-        counts = [cell for test in tests for cell in (f"{test.better} : {test.worse}", float(f"{test.p:.2g}"))]
+        counts = [
+            cell for test in tests for cell in (f"{test.better} : {test.worse}", float(f"{test.p:.2g}"))
+        ]
         rows.append((f"{first} against {second}", *counts))
-    columns = ("pair", "nearer in seeds", "p over seeds", "nearer in frames", "p over frames, which are not independent")
+    columns = (
+        "pair",
+        "nearer in seeds",
+        "p over seeds",
+        "nearer in frames",
+        "p over frames, which are not independent",
+    )
     return Table("Sign tests", columns, tuple(rows))

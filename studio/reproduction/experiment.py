@@ -28,6 +28,9 @@ def verdict_on(*parts: str) -> Verdict:
     )
 
 
+ON_ALL = verdict_on()
+
+
 @dataclass(frozen=True, slots=True)
 class Experiment(Heading):
     """A figure, a table or a claim.
@@ -43,7 +46,7 @@ class Experiment(Heading):
     trials: Callable[[Scale], tuple[Trial, ...]]
     measure: Measure
     shown: Callable[[Sequence[Outcome]], Iterable[Part]]
-    verdict: Verdict = verdict_on()
+    verdict: Verdict = ON_ALL
     footage: tuple[str, ...] = ()
     alone: bool = False
 
@@ -71,7 +74,9 @@ class Experiment(Heading):
         )
 
 
-def each_seed(label: str, seeds: Iterable[int], arguments: Callable[[int], Mapping[str, Any]]) -> Iterator[Trial]:
+def each_seed(
+    label: str, seeds: Iterable[int], arguments: Callable[[int], Mapping[str, Any]]
+) -> Iterator[Trial]:
     """A trial a seed. label : contender and setting in words, the same for all. arguments : of a seed's trial."""
     return (Trial(f"{label}, seed {seed}", arguments(seed)) for seed in seeds)
 

@@ -18,7 +18,7 @@ from studio.comparison.tracking_trials import measure_tracking, tracking_trial
 from studio.comparison.trials import Outcome, Scale, Trial
 from studio.reproduction.claims import ratio, sign_tests
 from studio.reproduction.drawing import seeds_and_mean, table_over
-from studio.reproduction.experiment import Experiment, Part, Verdict, grouped, verdict_on
+from studio.reproduction.experiment import ON_ALL, Experiment, Part, Verdict, grouped
 from studio.tracking.catalogue import knobs_for_evaluations
 
 Array = NDArray[np.float64]
@@ -70,7 +70,7 @@ def tracked_experiment(
     *,
     lines: Callable[[bool], Iterable[Line]],
     shown: Callable[[dict[str, list[Tracked]]], Iterable[Part]],
-    verdict: Verdict = verdict_on(),
+    verdict: Verdict = ON_ALL,
 ) -> Experiment:
     """An experiment of tracked footage. lines : the settings, for a quick look or in full. shown : what the runs by
     line say.
@@ -81,7 +81,15 @@ def tracked_experiment(
 
     footage = tuple(dict.fromkeys(line.footage for line in lines(False)))
     return Experiment(
-        name, title, source, claim, trials, measure_tracking, lambda found: shown(by_group(found)), verdict, footage
+        name,
+        title,
+        source,
+        claim,
+        trials,
+        measure_tracking,
+        lambda found: shown(by_group(found)),
+        verdict,
+        footage,
     )
 
 
@@ -122,7 +130,9 @@ def error_rows(runs: Runs) -> Array:
 
 def error_tests(groups: Groups, pairs: Iterable[tuple[str, str]]) -> Table:
     """`sign_tests` of lines' errors."""
-    return sign_tests(lambda name: (mean_errors(groups[name]), error_rows(groups[name]).ravel().tolist()), pairs)
+    return sign_tests(
+        lambda name: (mean_errors(groups[name]), error_rows(groups[name]).ravel().tolist()), pairs
+    )
 
 
 def curves(
@@ -133,7 +143,9 @@ def curves(
     """
     series: list[Series] = []
     for group, runs in groups.items():
-        series += seeds_and_mean(group, tuple(frame * 60.0 / fps for frame in runs[0].frames), error_rows(runs))
+        series += seeds_and_mean(
+            group, tuple(frame * 60.0 / fps for frame in runs[0].frames), error_rows(runs)
+        )
     return Chart(title, "lines", "frame (at 60 Hz)", "mean error (mm)", tuple(series), bands=bands)
 
 

@@ -137,7 +137,9 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     for memory, paper in PAPER_STATES.items():
         yield number(f"states with memory {memory}", cells("states", memory), paper=paper)
     states = np.array([cells("states", memory) for memory in MEMORIES])
-    yield share("a longer memory has more states, up to 30 frames", np.all(np.diff(states, axis=0) > 0, axis=0))
+    yield share(
+        "a longer memory has more states, up to 30 frames", np.all(np.diff(states, axis=0) > 0, axis=0)
+    )
     yield number("clusters of pointing, oversampled as the dance", [entry["clusters"] for entry in many])
     for name in SETS:
         inside = [100.0 * entry["inside"][name] for entry in dance]
@@ -148,9 +150,9 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield number("frames learnt from", [entry["frames"] for entry in dance])
     yield (
         "The numbers belong to the material: our exercises are other dances, and clusters are found in principal "
-        f"components that keep {np.mean([entry['kept'] for entry in dance]):.0%} of the variance. Pointing is learnt from "
-        "one recording as it is; oversampled, copies that differ little count as so many independent frames when the "
-        "number of clusters is chosen."
+        f"components that keep {np.mean([entry['kept'] for entry in dance]):.0%} of the variance. Pointing is learnt "
+        "from one recording as it is; oversampled, copies that differ little count as so many independent frames when "
+        "the number of clusters is chosen."
     )
     columns = ("states", *SETS)
     rows = tuple(
@@ -169,7 +171,9 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     printed = Series("paper", tuple(map(float, PAPER_STATES)), tuple(PAPER_STATES.values()), dashed=True)
     yield line_chart("States over memory", axis, "states", (over_memory("states", "ours"), printed))
     for name in (TRAIN, TEST_SET):
-        heat = {f"ε {epsilon:g}": [mean(name, memory, epsilon) for memory in MEMORIES] for epsilon in EPSILONS}
+        heat = {
+            f"ε {epsilon:g}": [mean(name, memory, epsilon) for memory in MEMORIES] for epsilon in EPSILONS
+        }
         title = f"Entropy, {name} (nats a frame)"
         yield heat_chart(title, axis, "ε", map(str, MEMORIES), heat, digits=3)
     taught = Training.of_plain(outcomes[0].trial.arguments["training"])

@@ -191,8 +191,8 @@ STRANGE_CLAIMS: tuple[Comparison, ...] = (
 )
 """Name, ours, theirs, claim and measure of each ratio."""
 REASON = (
-    "Particles that no model moves are spread once by σ0, as Condensation's are, and the best of them is the pose; five "
-    "layers that narrow down to the peak place the body better. Where the model predicts for the annealed filter "
+    "Particles that no model moves are spread once by σ0, as Condensation's are, and the best of them is the pose; "
+    "five layers that narrow down to the peak place the body better. Where the model predicts for the annealed filter "
     "(behaviour first) both are had."
 )
 

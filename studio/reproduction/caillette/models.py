@@ -17,7 +17,7 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from scipy.stats import spearmanr
+from scipy.stats import rankdata
 
 from studio.body.catalogue import load_body
 from studio.comparison.findings import Series, Table
@@ -114,13 +114,14 @@ def _fig_13(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         name = f"memory {memory} over memory 1{what}"
         yield ratio(name, groups[_group(memory)], groups[_group(1)], claim, of)
     by_seed = zip(*groups.values(), strict=True)
-    falling = [float(spearmanr(MEMORIES, [run.limb_rms for run in runs]).statistic) for runs in by_seed]
+    ranks = (rankdata([run.limb_rms for run in runs]) for runs in by_seed)
+    falling = [np.corrcoef(rankdata(MEMORIES), row)[0, 1] for row in ranks]
     yield number("rank correlation of error and memory", falling)
     yield from errors("limb direction, RMS", groups)
     yield (
-        f"From frame to frame the test stays in its cluster {automata[0]['stays']:.0%} of the time, so a memory of some "
-        "frames often is one cluster again and again; where the automaton's entropy of the test does not fall, what long "
-        "histories add is the training's own, which another performance does not repeat."
+        f"From frame to frame the test stays in its cluster {automata[0]['stays']:.0%} of the time, so a memory of "
+        "some frames often is one cluster again and again; where the automaton's entropy of the test does not fall, "
+        "what long histories add is the training's own, which another performance does not repeat."
     )
     yield summary_table("200 guided particles", groups)
     heads = {"states": "states", "train": "entropy, training", "test": "entropy, test performance"}

@@ -223,9 +223,9 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     for name, label in LABELS.items():
         yield number(label, of[name], "ms", PAPER[name], "lower")
     yield (
-        f"On {int(np.mean([run['threads'] for run in runs]))} threads of this machine. Our fit is from one prediction; a "
-        "run fits from several. Reading and decoding pictures is not in the times. The verdict is on what the paper says "
-        "of its table: depth matters, views hardly, particles count in proportion, 30 frames a second."
+        f"On {int(np.mean([run['threads'] for run in runs]))} threads of this machine. Our fit is from one prediction; "
+        "a run fits from several. Reading and decoding pictures is not in the times. The verdict is on what the paper "
+        "says of its table: depth matters, views hardly, particles count in proportion, 30 frames a second."
     )
     yield _table("320 × 240 pictures", runs)
     if large:
@@ -233,7 +233,9 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     names = ("hull 7 5", "fit 7", "particles 500", "particles 1000")
     series = (
         Series("ours", places(len(names)), tuple(float(of[name].mean()) for name in names)),
-        Series("paper (2 GHz Pentium 4)", places(len(names)), tuple(PAPER[name] for name in names), dashed=True),
+        Series(
+            "paper (2 GHz Pentium 4)", places(len(names)), tuple(PAPER[name] for name in names), dashed=True
+        ),
     )
     yield bar_chart("Time of a frame's parts", "part", "time (ms)", series, (LABELS[name] for name in names))
     yield {"footage": TEST, "memory": MEMORY, "rounds": "quickest of several"}

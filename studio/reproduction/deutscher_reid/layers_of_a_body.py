@@ -221,7 +221,12 @@ def fig_19(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield number("mean error of the tracked frames", measured(outcomes, "mean_mm"), "mm")
     yield f"The paper calls the pattern more complicated than the arm's and prints no figures. {EQ18_WORDS}"
     rows = (
-        (label, RANKS[rank[index]], round(float(rates[:, index].mean()), 3), f"{shares[:, -1, index].mean():.2g}")
+        (
+            label,
+            RANKS[rank[index]],
+            round(float(rates[:, index].mean()), 3),
+            f"{shares[:, -1, index].mean():.2g}",
+        )
         for index, label in enumerate(labels)
     )
     heads = ("parameter", "part", "mean share", "after the last layer")

@@ -26,7 +26,7 @@ from studio.comparison.findings import Chart, Number, Series, Table
 from studio.comparison.footage_shelf import FootageShelf
 from studio.comparison.statistics import number, ratio_number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
-from studio.reproduction.claims import share, sign_tests
+from studio.reproduction.claims import share
 from studio.reproduction.deutscher_reid.arms import TemplateArm, localise, template_arm
 from studio.reproduction.deutscher_reid.setting import EQ18_WORDS, SOURCE
 from studio.reproduction.drawing import (
@@ -88,7 +88,8 @@ def trials_of(body: str, *kinds: str) -> Callable[[Scale], tuple[Trial, ...]]:
     def trials(scale: Scale) -> tuple[Trial, ...]:
         return tuple(
             Trial(
-                f"{kind}, {body}, seed {seed}", {"body": body, "seed": seed, "knobs": {**SETTINGS, **KINDS[kind]}}
+                f"{kind}, {body}, seed {seed}",
+                {"body": body, "seed": seed, "knobs": {**SETTINGS, **KINDS[kind]}},
             )
             for kind in kinds
             for seed in scale.seeds
@@ -179,7 +180,9 @@ def fig_12(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     adaptive, planned = groups[WITH], groups[WITHOUT]
     first = adaptive.drawn[:, 0]
     yield share("x1 has the smallest variance after drawing", first < adaptive.drawn[:, 1:].min(axis=1))
-    yield share("planned noise makes that of x1 half as large again", planned.noisy[:, 0] > 1.5 * planned.drawn[:, 0])
+    yield share(
+        "planned noise makes that of x1 half as large again", planned.noisy[:, 0] > 1.5 * planned.drawn[:, 0]
+    )
     yield share("adaptive noise leaves it as it is, within 10 %", adaptive.noisy[:, 0] < 1.1 * first)
     steps = {
         "after drawing": ("b, e: drawn", adaptive.drawn),
@@ -209,8 +212,8 @@ def fig_13(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield from _crossing_numbers(found, CHAIN_JOINTS)
     yield _error("mean error of the reported pose", found)
     yield (
-        f"{NEVER} {EQ18_WORDS} The paper prints no survival rate for the arm; with {SETTINGS['survival']} the last joint "
-        "falls within its six layers, with 0.5 it does not."
+        f"{NEVER} {EQ18_WORDS} The paper prints no survival rate for the arm; with {SETTINGS['survival']} the last "
+        "joint falls within its six layers, with 0.5 it does not."
     )
     yield _reduction_chart("Variance reduction with adaptive diffusion", found, CHAIN_JOINTS)
     yield _crossing_table({WITH: found}, CHAIN_JOINTS)
@@ -322,7 +325,9 @@ def fig_16(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     percent = tuple(100.0 * crossed for crossed in SHARES)
     for owner, panel in ((CHAIN, "a: no branches"), (BRANCHED, "b: branched")):
         series = [
-            intervals(cut, percent, rows.T.tolist(), group=cut) for (body, cut), rows in ssd.items() if body == owner
+            intervals(cut, percent, rows.T.tolist(), group=cut)
+            for (body, cut), rows in ssd.items()
+            if body == owner
         ]
         yield line_chart(f"Match over crossover ({panel})", "crossover (%)", "SSD", series)
     yield {**SETTINGS_16, "pictures a seed": len(outcomes[0].trial.arguments["pictures"])}
@@ -331,7 +336,8 @@ def fig_16(outcomes: Sequence[Outcome]) -> Iterator[Part]:
 def verdict_fig_16(numbers: Sequence[Number]) -> str:
     """On Eq. 19 with the diffusion of section 6."""
     chain, branched = (
-        next(entry for entry in numbers if entry.name == _ratio_name(body, EQ19)) for body in (CHAIN, BRANCHED)
+        next(entry for entry in numbers if entry.name == _ratio_name(body, EQ19))
+        for body in (CHAIN, BRANCHED)
     )
     return "reproduced" if chain.low <= NO_HARM and branched.high < 1.0 else "not reproduced"
 
@@ -372,7 +378,9 @@ def trials_fig_18(scale: Scale) -> tuple[Trial, ...]:
     """One search a seed, of eight layers."""
     return tuple(
         each_seed(
-            "branched arms", scale.seeds, lambda seed: {"body": BRANCHED, "seed": seed, "knobs": dict(SETTINGS_18)}
+            "branched arms",
+            scale.seeds,
+            lambda seed: {"body": BRANCHED, "seed": seed, "knobs": dict(SETTINGS_18)},
         )
     )
 
@@ -396,8 +404,8 @@ def measure_fig_18(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[st
 
 
 def fig_18(outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    """Ends nearer the hinge gather in earlier layers; the particles' ends in the plane of the arms, every other layer of
-    the drawn seed.
+    """Ends nearer the hinge gather in earlier layers; the particles' ends in the plane of the arms, every other layer
+    of the drawn seed.
     """
     spreads = measured(outcomes, "spreads")
     rising = _rises(crossing_layers(spreads, GATHERED_MM))
@@ -412,7 +420,9 @@ def fig_18(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     for layer, cloud in enumerate(drawn.measured["clouds"] if drawn else ()):
         if drawn is None or (layer % 2 and layer != LAYERS_18 - 1):
             continue
-        series = [line(name, *points.T) for name, points in zip(ENDS, np.array(cloud).swapaxes(0, 1), strict=True)]
+        series = [
+            line(name, *points.T) for name, points in zip(ENDS, np.array(cloud).swapaxes(0, 1), strict=True)
+        ]
         series.append(line("truth", *np.array(drawn.measured["truth"]).T, dashed=True))
         title = f"Ends of the links, layer {layer + 1} of {LAYERS_18}, seed {drawn.trial.arguments['seed']}"
         yield Chart(title, "points", "x (mm)", "z (mm)", tuple(series))

@@ -321,10 +321,10 @@ DIFFUSION = Experiment(
     verdict=verdict_on(_diffusion_label(*CASES[0])),
 )
 
-# Section 6.2: crossover. 6.2.1 makes every particle from two, so the share is 100 %. What it saves depends on what it is
-# added to and on how fast the filter anneals, neither of which the paper says of this test: measured are the filter with
-# the diffusion of section 6.1 ("noise is then added … as detailed in Section 6.1") and the one of Eq. 13, each with both
-# survival rates.
+# Section 6.2: crossover. 6.2.1 makes every particle from two, so the share is 100 %. What it saves depends on what it
+# is added to and on how fast the filter anneals, neither of which the paper says of this test: measured are the filter
+# with the diffusion of section 6.1 ("noise is then added … as detailed in Section 6.1") and the one of Eq. 13, each
+# with both survival rates.
 
 SAVED_BY_CROSSING = {BRANCHED: 2.0, CHAIN: 1.0}
 SHARE = 1.0
@@ -348,7 +348,9 @@ def _crossover_trials(scale: Scale) -> tuple[Trial, ...]:
         filters: dict[str, Knobs] = {}
         for base, knobs in list(ADDED_TO.items())[: 1 if scale.quick else None]:
             filters[base] = knobs
-            filters |= {_crossed(base, cut): {**knobs, "crossover": SHARE, "crossover_by": cut} for cut in cuts}
+            filters |= {
+                _crossed(base, cut): {**knobs, "crossover": SHARE, "crossover_by": cut} for cut in cuts
+            }
         found += arm_trials(scale, filters, body, RATE)
     return tuple(found)
 
@@ -363,8 +365,8 @@ def _crossover(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     for base in ADDED_TO:
         for body, cuts in CUTS.items():
             for cut in cuts if group(base, body, RATE) in groups else ():
-                pair = (groups[group(name, body, RATE)] for name in (base, _crossed(base, cut)))
-                yield saving(_crossing_label(base, body, cut), *pair, SAVED_BY_CROSSING[body])
+                slow, fast = (groups[group(name, body, RATE)] for name in (base, _crossed(base, cut)))
+                yield saving(_crossing_label(base, body, cut), slow, fast, SAVED_BY_CROSSING[body])
     yield (
         f"The verdict is on Eq. 19 (cut by parameters) added to {next(iter(ADDED_TO))}. With a survival rate of "
         f"{SURVIVALS[1]:g} six layers anneal as much as the paper's ten of {SURVIVALS[0]:g}. {EQ18_WORDS}"
@@ -404,7 +406,9 @@ def body_frames(seed: int, quick: bool = False) -> dict[str, int]:
 def body_trials(scale: Scale, filters: Mapping[str, Knobs]) -> tuple[Trial, ...]:
     """One bisection a filter and seed."""
     return tuple(
-        bisections(scale, BODY_SIZES, filters, lambda seed: {"footage": CIRCLE, **body_frames(seed, scale.quick)})
+        bisections(
+            scale, BODY_SIZES, filters, lambda seed: {"footage": CIRCLE, **body_frames(seed, scale.quick)}
+        )
     )
 
 

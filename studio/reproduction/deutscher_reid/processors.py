@@ -98,10 +98,10 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
             name, paper = f"{PER_PROCESSOR}, {label}, {count} processors", PAPER if count == 2 else None
             yield number(name, speed[what][:, place] / count, "", paper, "higher")
     yield (
-        "The verdict is on the weighing, which is what the paper farms out and what its frames spend their time on; here "
-        "it takes milliseconds, so that drawing and noise, done by one, are a larger part. With 200 particles a layer "
-        "there is too little to share and one thread does it all. Threads of one machine in turn, the quickest of the "
-        "rounds; other programs on the machine lower the figures."
+        "The verdict is on the weighing, which is what the paper farms out and what its frames spend their time on; "
+        "here it takes milliseconds, so that drawing and noise, done by one, are a larger part. With 200 particles a "
+        "layer there is too little to share and one thread does it all. Threads of one machine in turn, the quickest "
+        "of the rounds; other programs on the machine lower the figures."
     )
     axis = tuple(map(float, counts))
     series = (

@@ -132,9 +132,9 @@ def _fig_8(groups: Groups) -> Iterator[Part]:
         yield number(f"{name}: mean error", mean_errors(runs), "mm")
     yield (
         f"{SUCCESS_WORDS} The verdict is on who tracks and who does not. A run that ends well counts with its whole "
-        "length as the time to its failure. The studio's choice (all three terms, Eq. 18, crossover by limbs, limbs kept "
-        "apart) is not in the paper; it says what the footage allows. The paper names no frame rate (60 a second here), "
-        f"and its Condensation has a likelihood of its own. {EQ17_WORDS}"
+        "length as the time to its failure. The studio's choice (all three terms, Eq. 18, crossover by limbs, limbs "
+        "kept apart) is not in the paper; it says what the footage allows. The paper names no frame rate (60 a second "
+        f"here), and its Condensation has a likelihood of its own. {EQ17_WORDS}"
     )
     if LARGE not in groups:
         yield "40 000 particles are left out of a quick look."
@@ -210,8 +210,8 @@ def _figure_claims(figure: Figure, groups: Groups) -> Iterator[Part]:
             counts = ", ".join(f"{limb} in {limbs.count(limb)}" for limb in sorted(set(limbs)))
             yield f"Lost by {name}, in seeds: {counts}."
     yield (
-        f"{SUCCESS_WORDS} The verdict is on the paper's filter ({figure.filter}). The person is rendered, at 60 frames a "
-        f"second; the paper names no frame rate and has a real one. {EQ17_WORDS}"
+        f"{SUCCESS_WORDS} The verdict is on the paper's filter ({figure.filter}). The person is rendered, at 60 frames "
+        f"a second; the paper names no frame rate and has a real one. {EQ17_WORDS}"
     )
     if figure.filter == SECTION_6:
         yield EQ18_WORDS
@@ -261,7 +261,9 @@ def _sizes(groups: Groups) -> Iterator[Part]:
     series = []
     for name in (EQ13, SECTION_6):
         of_size = {size: groups.get(_size_name(name, size)) for size in PARTICLES}
-        held = {float(size): [float(succeeded(run)) for run in runs] for size, runs in of_size.items() if runs}
+        held = {
+            float(size): [float(succeeded(run)) for run in runs] for size, runs in of_size.items() if runs
+        }
         series.append(intervals(name, tuple(held), held.values(), group=name))
     title = "Seeds that track, by particles in each of ten layers"
     yield Chart(title, "lines", "particles", "share of the seeds", tuple(series), log_x=True)

@@ -80,7 +80,11 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
     for name, knobs in TERMS.items():
         weigher = weighting.prepare(body, cameras, changed_settings(settings, knobs).weighting)
         curves[name] = weigher.problem(seen).weigh(poses).tolist()
-    return {"angles": np.rad2deg(angles).tolist(), "truth": float(np.rad2deg(pose[column])), "log_weights": curves}
+    return {
+        "angles": np.rad2deg(angles).tolist(),
+        "truth": float(np.rad2deg(pose[column])),
+        "log_weights": curves,
+    }
 
 
 def true_poses(session: Session, body: BodyModel, frames: list[int]) -> Array:
@@ -189,7 +193,9 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         )
         for index, (frame, outcome) in enumerate(zip(frames, outcomes, strict=True))
     )
-    yield line_chart("Edges and region together, every frame", "knee from its true angle (°)", "weight", shifted)
+    yield line_chart(
+        "Edges and region together, every frame", "knee from its true angle (°)", "weight", shifted
+    )
     yield {"footage": CIRCLE, "body": BODY, "parameter": KNEE, "angles": STEPS}
 
 

@@ -190,7 +190,9 @@ def _fig_6(groups: Groups) -> Iterator[Part]:
             yield mean_number(f"mean error, {name}, {fps} Hz", runs)
         yield curves(f"Error at {fps} frames a second", own, fps)
     yield summary_table("1000 evaluations a frame, same body, fitness, Σ and constraints", groups)
-    pairs = [(f"{SWARM.name}, {fps} Hz", f"{other.name}, {fps} Hz") for fps in (20, 60) for other in TRACKERS[1:]]
+    pairs = [
+        (f"{SWARM.name}, {fps} Hz", f"{other.name}, {fps} Hz") for fps in (20, 60) for other in TRACKERS[1:]
+    ]
     yield error_tests(groups, pairs)
     yield {**SETTINGS, "Eq. 13": dict(EQ13.changes)}
 
@@ -286,7 +288,9 @@ def _partition_claims(groups: Groups) -> Iterator[Part]:
             yield error_ratio(f"soft over {other}, {fps} Hz", own[SOFT], own[other], claim)
     yield summary_table("1000 evaluations a frame", groups)
     others = ("hard, two stages", "global, then local", "global")
-    yield error_tests(groups, [(f"{SOFT}, {fps} Hz", f"{other}, {fps} Hz") for fps in RATES for other in others])
+    yield error_tests(
+        groups, [(f"{SOFT}, {fps} Hz", f"{other}, {fps} Hz") for fps in RATES for other in others]
+    )
     rows = {f"{fps} frames a second": own.values() for fps, own in rates.items()}
     yield _bars("Mean error by partition", "partition", PARTITIONS, rows)
     for fps, own in rates.items():
@@ -328,7 +332,12 @@ def _prior_claims(groups: Groups) -> Iterator[Part]:
     yield error_tests(groups, [(f"{name}, {WITH}", f"{name}, {WITHOUT}") for name in names])
     rows = {WITH: runs[WITH], "without": runs[WITHOUT]}
     yield _bars("Mean error with and without hard priors", "tracker", names, rows)
-    yield {"weighting": SWARM.weighting, "evaluations": EVALUATIONS, "with": dict(SWARM.changes), "without": FREE}
+    yield {
+        "weighting": SWARM.weighting,
+        "evaluations": EVALUATIONS,
+        "with": dict(SWARM.changes),
+        "without": FREE,
+    }
 
 
 PRIOR_EXPERIMENT = tracked_experiment(
@@ -374,7 +383,9 @@ def _best_figure(groups: Groups) -> Iterator[Part]:
     # The first two, and the best.
     shown = dict.fromkeys((*list(CHOICES)[:2], best))
     yield curves("Error over the walk", {name: groups[name] for name in shown})
-    yield {words: {"evaluations": count, **contender.changes} for words, (contender, count, _) in CHOICES.items()}
+    yield {
+        words: {"evaluations": count, **contender.changes} for words, (contender, count, _) in CHOICES.items()
+    }
 
 
 BEST_FIGURE = tracked_experiment(

@@ -151,18 +151,18 @@ def _shown(question: Question, outcomes: Sequence[Outcome]) -> Iterator[Part]:
         losses[entry.name] = [
             100.0 * float(np.mean([run.lost_frames / len(run.frames) for run in cell])) for cell in cells
         ]
+    pairs = {name: list(zip(errors[name], losses[name], strict=True)) for name in errors}
     stood = []
-    for name in errors:
-        stands = [error <= STANDS_MM and loss <= STANDS_LOST for error, loss in zip(errors[name], losses[name], strict=True)]
+    for name, cells in pairs.items():
+        stands = [error <= STANDS_MM and loss <= STANDS_LOST for error, loss in cells]
         count = [*stands, False].index(False)
         stood.append(f"{name} stands {f'up to {columns[count - 1]}' if count else 'none of it'}.")
     yield (
-        f"{' '.join(stood)} In {question.axis}; to stand: a mean below {STANDS_MM:.0f} mm and a limb lost in fewer than "
-        f"{STANDS_LOST:.0f} % of the frames."
+        f"{' '.join(stood)} In {question.axis}; to stand: a mean below {STANDS_MM:.0f} mm and a limb lost in fewer "
+        f"than {STANDS_LOST:.0f} % of the frames."
     )
     rows = tuple(
-        (name, *(f"{error:.1f} / {loss:.0f}" for error, loss in zip(errors[name], losses[name], strict=True)))
-        for name in errors
+        (name, *(f"{error:.1f} / {loss:.0f}" for error, loss in cells)) for name, cells in pairs.items()
     )
     heads = (f"{degree} {question.axis}" for degree in columns)
     yield Table("Mean error over seeds (mm), frames with a limb lost (%)", ("tracker", *heads), rows)
