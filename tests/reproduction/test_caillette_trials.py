@@ -17,9 +17,8 @@ from studio.motion_files.trc import read_trc, write_trc
 from studio.reproduction.caillette import learnt_files
 from studio.reproduction.caillette.following import Follow, Followed, measure
 from studio.reproduction.caillette.learnt_files import made_once
-from studio.reproduction.caillette.pointing import POINTING, pointing_poses
 from studio.reproduction.caillette.problems import Known, known_problems, problems
-from studio.reproduction.caillette.training_set import Training, learnt, recorded
+from studio.reproduction.caillette.training_set import POINTING, Training, learnt, pointing_poses, recorded
 from studio.reproduction.caillette.true_motion import joint_errors, true_motion
 from studio.sessions.process_lock import ProcessLock
 from studio.settings import changed_settings, default_settings

@@ -12,10 +12,9 @@ from studio.comparison.tracking_trials import group_of, tracking_trial
 from studio.comparison.trials import Outcome, Scale, Trial
 from studio.reproduction.catalogue import EXPERIMENTS
 from studio.reproduction.experiment import Experiment
-from studio.reproduction.lost_limbs import spells
 from studio.reproduction.open_questions.generalisation import ENTRIES
 from studio.reproduction.plan import frames_of
-from studio.reproduction.tracking import by_group, curves
+from studio.reproduction.tracking import by_group, curves, spells
 from studio.synthesis.drawn_recipes import KINDS
 
 TRACKED = (
@@ -81,7 +80,6 @@ def test_trials_are_plain_distinct_and_fewer_or_shorter_when_quick(name: str) ->
 def test_findings_are_plain_and_name_their_settings(name: str) -> None:
     findings = concluded(name, lambda label: 40.0)
     assert findings.verdict in VERDICTS
-    assert findings.words
     assert findings.charts
     assert findings.tables
     assert findings.settings
@@ -136,7 +134,7 @@ def test_partitions_ask_that_soft_is_better_than_all_but_three_stages() -> None:
 def test_spells_are_rows_of_frames_with_a_limb_lost() -> None:
     (trial, *_) = EXPERIMENTS["fleischmann-fig-3"].trials(SCALE)
     run = Tracked(**made(trial, 40.0, lost=(3, 4, 5, 9, 448, 449)).measured)
-    found = spells(run.lost)
+    found = list(spells(run))
     assert [(spell.limb, spell.frames, spell.found_again) for spell in found] == [
         ("left arm", 3, True),
         ("left arm", 1, True),

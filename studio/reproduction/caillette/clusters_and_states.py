@@ -20,7 +20,6 @@ from studio.comparison.findings import Series, Table
 from studio.comparison.footage_shelf import FootageShelf
 from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
-from studio.reproduction.caillette.pointing import POINTING
 from studio.reproduction.caillette.setting import (
     SOURCE,
     TEST,
@@ -29,7 +28,7 @@ from studio.reproduction.caillette.setting import (
     training,
     training_words,
 )
-from studio.reproduction.caillette.training_set import Training, learnt, recorded
+from studio.reproduction.caillette.training_set import POINTING, Training, learnt, recorded
 from studio.reproduction.claims import share
 from studio.reproduction.drawing import heat_chart, line_chart
 from studio.reproduction.experiment import Experiment, Part, each_seed

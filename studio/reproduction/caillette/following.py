@@ -1,6 +1,5 @@
 """A tracker on the dance, with or without a behaviour model: the trial that most of these experiments are made of."""
 
-import dataclasses
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -18,13 +17,11 @@ from studio.reproduction.caillette.training_set import Training, learnt
 from studio.reproduction.caillette.true_motion import TrueMotion, joint_errors, true_motion
 from studio.reproduction.tracking import Contender
 from studio.runs.behaviour_models import fitting
-from studio.runs.run_behaviour import learner_of
+from studio.runs.following import Following
 from studio.runs.search_space import search_space, session_sigma
 from studio.sessions.session import Session
 from studio.settings import RunSettings, changed_settings, default_settings
-from studio.tracking.catalogue import TRACKERS
-from studio.tracking.frame_loop import search_frame
-from studio.tracking.tracker import LayerRecord, SearchSpace, start_of
+from studio.tracking.tracker import LayerRecord, start_of
 
 Array = NDArray[np.float64]
 
@@ -81,17 +78,17 @@ class Followed:
     @property
     def angle_rms(self) -> float:
         """RMS over frames and joint angles, degrees."""
-        return float(np.sqrt(np.mean(np.square(self.angle_deg))))
+        return _rms(self.angle_deg)
 
     @property
     def limb_rms(self) -> float:
         """RMS over frames and limbs of the angle between found and true axis, degrees."""
-        return float(np.sqrt(np.mean(np.square(self.limb_deg))))
+        return _rms(self.limb_deg)
 
     @property
     def position_rms(self) -> float:
         """RMS over frames and markers, mm."""
-        return float(np.sqrt(np.mean(np.square(self.position_mm))))
+        return _rms(self.position_mm)
 
     @property
     def lost_share(self) -> float:
@@ -138,47 +135,31 @@ def way_of(
     shelf: FootageShelf, session: Session, truth: TrueMotion, wanted: Follow, model: BehaviourModel | None
 ) -> Way:
     """Track the footage from the true pose of its first frame."""
-    settings, space = wanted.settings(), _space(session, model)
+    settings, body, fps = wanted.settings(), session.body(), session.manifest.fps
+    problem_of = problems(shelf, session, settings, wanted.last)
     if wanted.from_truth:
         problem_of = known_problems(shelf, session, settings, truth.poses)
-    else:
-        problem_of = problems(shelf, session, settings, wanted.last)
-    learner = learner_of(space.behaviour, settings, wanted.seed)
-    carried = start_of(tuple(float(value) for value in truth.poses[0]))
-    poses, log_weights = np.zeros((wanted.last, len(space.names))), np.zeros(wanted.last)
     free: list[float] = []
-    seconds, evaluations = 0.0, 0
-
-    def tracked(count: int) -> tuple[Array, Array]:
-        return poses[:count], log_weights[:count]
 
     def note(record: LayerRecord) -> None:
         if np.isfinite(record.model_free_share):
             free.append(float(record.model_free_share))
 
+    fitted = None if model is None else fitting(model, body, fps)
+    following = Following(
+        settings,
+        search_space(body, session_sigma(session, body, fps), fitted),
+        start_of(tuple(float(value) for value in truth.poses[0])),
+        wanted.seed,
+        on_layer=note,
+    )
+    seconds, evaluations = 0.0, 0
     for frame in range(wanted.last):
         problem = problem_of(frame)
         began = time.perf_counter()
-        if learner is not None:
-            space = dataclasses.replace(space, behaviour=learner.model_in(frame, tracked))
-            carried = learner.carried_into(frame, carried, tracked)
-        result = search_frame(
-            TRACKERS[wanted.tracker],
-            problem,
-            carried,
-            space,
-            seed=wanted.seed,
-            frame=frame,
-            settings_source=lambda: (1, settings.tracker),
-            repeats=settings.tracker.start_repeats if frame == 0 else 1,
-            on_layer=note,
-        )
-        if frame:
-            seconds += time.perf_counter() - began
-        carried, evaluations = result.carried, result.evaluations
-        poses[frame], log_weights[frame] = result.estimate.pose, result.estimate.log_weight
-    known = learner.model_in(wanted.last, tracked) if learner is not None else space.behaviour
-    return Way(poses, free, evaluations, seconds, known)
+        evaluations = following.step(frame, problem).evaluations
+        seconds += time.perf_counter() - began if frame else 0.0
+    return Way(np.array(following.poses), free, evaluations, seconds, following.model)
 
 
 def followed(session: Session, truth: TrueMotion, way: Way) -> Followed:
@@ -189,7 +170,7 @@ def followed(session: Session, truth: TrueMotion, way: Way) -> Followed:
         _rounded(found.angle_deg),
         _rounded(found.limb_deg),
         _rounded(found.position_mm),
-        [bool(value) for value in found.lost],
+        found.lost.tolist(),
         [round(value, 4) for value in way.free],
         round(float(found.mean_mm.mean()), 4),
         way.evaluations,
@@ -197,10 +178,8 @@ def followed(session: Session, truth: TrueMotion, way: Way) -> Followed:
     )
 
 
-def _space(session: Session, model: BehaviourModel | None) -> SearchSpace:
-    body, fps = session.body(), session.manifest.fps
-    fitted = None if model is None else fitting(model, body, fps)
-    return search_space(body, session_sigma(session, body, fps), fitted)
+def _rms(values: Sequence[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def _rounded(values: Sequence[float] | Array) -> list[float]:

@@ -26,7 +26,6 @@ from studio.body.model import BodyModel
 from studio.body.person import first_frames, sampled
 from studio.comparison.footage_shelf import FootageShelf
 from studio.reproduction.caillette.learnt_files import made_once
-from studio.reproduction.caillette.pointing import POINTING, pointing_poses
 from studio.synthesis.recipe_file import JOINED, find_recipe, read_recipe
 from studio.synthesis.recipes import recipe_motion
 from studio.training.learning import learn
@@ -38,6 +37,7 @@ from studio.training.targets import skeleton_of_body
 Array = NDArray[np.float64]
 
 USUAL_MEMORY, USUAL_EPSILON = 10, 0.05
+POINTING = "pointing"
 MODEL, NUMBERS, POSES = "model.behaviour", "learnt.json", "poses.npy"
 
 
@@ -197,3 +197,42 @@ def _write(folder: Path, lesson: Lesson) -> None:
 def _read(folder: Path) -> Lesson:
     numbers = json.loads((folder / NUMBERS).read_text(encoding="utf-8"))
     return Lesson(read_model(folder / MODEL), int(numbers["frames"]), float(numbers["seconds"]))
+
+
+# A simple sequence to learn clusters from: somebody stands and points with one arm, here and there. The paper's
+# clustering found 5 clusters in "a simpler arms pointing sequence" of which it says no more (section 7.1). Ours: the
+# right arm goes from hanging to one of two places and back, each way as an arm reaches (minimum jerk), with a rest at
+# both ends.
+
+TARGETS: tuple[dict[str, float], ...] = (
+    {"right_shoulder_swing": 85.0, "right_shoulder_spread": 10.0, "right_elbow": 5.0},
+    {"right_shoulder_swing": 20.0, "right_shoulder_spread": 85.0, "right_elbow": 5.0},
+)
+"""Degrees."""
+ROUNDS = 4
+MOVE_S, REST_S = 0.8, 0.7
+
+
+def pointing_poses(body: BodyModel, fps: float) -> Array:
+    """(F, D) the body pointing at each target in turn, ROUNDS times over."""
+    names = [entry.name for entry in body.parameters]
+    resting = body.neutral
+    found = [resting[None]]
+    for _ in range(ROUNDS):
+        for target in TARGETS:
+            pointed = resting.copy()
+            for name, degrees in target.items():
+                pointed[names.index(name)] = np.radians(degrees)
+            found += [_reach(resting, pointed, fps), _held(pointed, fps)]
+            found += [_reach(pointed, resting, fps), _held(resting, fps)]
+    return np.concatenate(found)
+
+
+def _reach(start: Array, end: Array, fps: float) -> Array:
+    """A movement of minimum jerk (Flash & Hogan 1985)."""
+    share = (np.arange(round(MOVE_S * fps)) + 1.0)[:, None] / round(MOVE_S * fps)
+    return start + (end - start) * (10.0 * share**3 - 15.0 * share**4 + 6.0 * share**5)
+
+
+def _held(pose: Array, fps: float) -> Array:
+    return np.repeat(pose[None], round(REST_S * fps), axis=0)
