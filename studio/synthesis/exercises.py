@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from studio.body.person import SIDES, PersonMotion, Skeleton
 from studio.geometry.rotations import axis_turn
-from studio.synthesis.gait import eased, leg_to_ankle
-from studio.synthesis.posture import add_arm, frame_rate, trunk
+from studio.synthesis.gait import eased
+from studio.synthesis.posture import add_arm, add_leg, frame_rate, trunk
 from studio.synthesis.room import GRAIN, Block
 
 Array = NDArray[np.float64]
@@ -110,9 +110,7 @@ def _on_both_feet(skeleton: Skeleton, times: Array, options: Options, held: _Car
     for index, side in enumerate(SIDES):
         sign = 1.0 if side == "left" else -1.0
         toes_out = axis_turn(2, heading + sign * 0.22)
-        hip = root + sign * skeleton.hip_half_width[index] * turns["pelvis"][:, :, 1]
         ankle = sign * stance * outward + np.array([*_place(options), skeleton.ankle_height])
-        thigh, shin = leg_to_ankle(hip, ankle, toes_out[:, :, 0], skeleton.thigh[index], skeleton.shin[index])
-        turns |= {f"{side}_thigh": thigh, f"{side}_shin": shin, f"{side}_foot": toes_out}
+        add_leg(turns, skeleton, side, root, (ankle, toes_out), toes_out[:, :, 0])
         add_arm(turns, side, held.arm[index], held.out, held.bend[index])
     return PersonMotion(skeleton, frame_rate(times), root, turns)

@@ -19,6 +19,9 @@ Array = NDArray[np.float64]
 Path = Callable[[Array], tuple[Array, Array]]
 Obstacle = Callable[[Array, Array, Array], Array]
 
+BALL, HEEL = 0.66, -0.20
+"""Where a foot rolls, as shares of its length before the ankle."""
+
 
 @dataclass(frozen=True, slots=True)
 class Gait:
@@ -122,7 +125,6 @@ def foot_track(
     times : (F,) seconds. obstacle : extra height (F,) mm that the ankle must keep above points (F, 2) on its way from
     one footprint (F, 2) to the next (F, 2).
     """
-    ankle_height, foot_length = skeleton.ankle_height, skeleton.foot
     phase = times / gait.cycle + (0.0 if left else 0.5)
     count, share = np.floor(phase), phase - np.floor(phase)
     swing = np.clip((share - gait.duty) / (1.0 - gait.duty), 0.0, 1.0)
@@ -134,17 +136,25 @@ def foot_track(
         swing == 0.0
     )
     pitch = gait.heel_rise * push - 0.28 * land
-    ball = np.array([0.66 * foot_length, 0.0, -ankle_height])
-    heel = np.array([-0.20 * foot_length, 0.0, -ankle_height])
-    level, tilted = axis_turn(2, heading), axis_turn(2, heading) @ axis_turn(1, pitch)
-    pivot = np.where((pitch > 0.0)[:, None], ball, heel)
-    ground = np.concatenate([flat, np.full((len(times), 1), ankle_height)], axis=1)
-    ankle = ground + (level @ pivot[..., None])[..., 0] - (tilted @ pivot[..., None])[..., 0]
+    ankle, tilted = rolled(flat, heading, pitch, skeleton)
     ankle[:, 2] += gait.lift * eased(swing / 0.5) * eased((1.0 - swing) / 0.5)
     if obstacle is not None:
         ends = [_footprint(gait, path, count + step, left)[0] for step in (0.0, 1.0)]
         ankle[:, 2] += eased(swing / 0.3) * eased((1.0 - swing) / 0.45) * obstacle(flat, *ends)
     return FootTrack(ankle, tilted, swing)
+
+
+def rolled(ground: Array, heading: Array, pitch: Array, skeleton: Skeleton) -> tuple[Array, Array]:
+    """Ankle (F, 3) and world_from_foot (F, 3, 3) of a foot over `ground` (F, 2) that is turned by `pitch` about its
+    ball (up) or heel (down), which stay where they are.
+    """
+    ball = np.array([BALL * skeleton.foot, 0.0, -skeleton.ankle_height])
+    heel = np.array([HEEL * skeleton.foot, 0.0, -skeleton.ankle_height])
+    level = axis_turn(2, heading)
+    tilted = level @ axis_turn(1, pitch)
+    pivot = np.where((pitch > 0.0)[:, None], ball, heel)
+    flat = np.concatenate([ground, np.full((len(ground), 1), skeleton.ankle_height)], axis=1)
+    return flat + (level @ pivot[..., None])[..., 0] - (tilted @ pivot[..., None])[..., 0], tilted
 
 
 def _footprint(gait: Gait, path: Path, count: Array, left: bool) -> tuple[Array, Array]:

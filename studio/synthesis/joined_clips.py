@@ -16,7 +16,7 @@ from studio.geometry.rotations import axis_turn
 from studio.motion_files.recorded_motion import RecordedMotion
 from studio.synthesis.gait import eased
 from studio.synthesis.performances import Variation, from_local, performance, to_local
-from studio.synthesis.recorded_clip import placed
+from studio.synthesis.recorded_clip import placed, with_defaults
 
 Array = NDArray[np.float64]
 
@@ -160,12 +160,7 @@ def _parts(
 
 
 def _checked(options: dict[str, float]) -> dict[str, float]:
-    unknown = sorted(set(options) - set(JOINED_OPTIONS))
-    if unknown:
-        raise StudioError(
-            f"Joined clips have no option '{unknown[0]}'.", f"They have {', '.join(JOINED_OPTIONS)}."
-        )
-    wanted = JOINED_OPTIONS | options
+    wanted = with_defaults(options, JOINED_OPTIONS)
     if wanted["performance"] < 0.0 or wanted["performance"] != int(wanted["performance"]):
         raise StudioError(
             f"options.performance is {wanted['performance']:g}, not a whole number from 0 on.",

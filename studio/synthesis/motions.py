@@ -21,13 +21,12 @@ from studio.synthesis.gait import (
     Path,
     circle_path,
     foot_track,
-    leg_to_ankle,
     line_path,
     winding_path,
 )
 from studio.synthesis.handstand import handstand
 from studio.synthesis.journeys import Journey, Stretch
-from studio.synthesis.posture import add_arm, allowed_height, frame_rate, trunk
+from studio.synthesis.posture import add_arm, add_leg, allowed_height, frame_rate, trunk
 
 Array = NDArray[np.float64]
 Options = dict[str, float]
@@ -122,14 +121,10 @@ def stand(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
     root[:, 2] = skeleton.standing_hip_height - 9.0
     turns = trunk(heading, zero, 0.02 * np.sin(1.3 * times), zero)
     forward = turns["pelvis"][:, :, 0]
-    for index, side in enumerate(SIDES):
-        sign = 1.0 if side == "left" else -1.0
-        outward = np.stack([-np.sin(heading), np.cos(heading), zero], axis=-1)
-        hip = root + sign * skeleton.hip_half_width[index] * turns["pelvis"][:, :, 1]
+    outward = np.stack([-np.sin(heading), np.cos(heading), zero], axis=-1)
+    for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
         ankle = sign * 0.065 * skeleton.height * outward + np.array([0.0, 0.0, skeleton.ankle_height])
-        thigh, shin = leg_to_ankle(hip, ankle, forward, skeleton.thigh[index], skeleton.shin[index])
-        turns |= {f"{side}_thigh": thigh, f"{side}_shin": shin}
-        turns[f"{side}_foot"] = axis_turn(2, heading + sign * 0.15)
+        add_leg(turns, skeleton, side, root, (ankle, axis_turn(2, heading + sign * 0.15)), forward)
         add_arm(turns, side, 0.04 * np.sin(1.5 * times), np.full(count, 0.2), np.full(count, 0.35))
     return PersonMotion(skeleton, frame_rate(times), root, turns)
 
@@ -185,11 +180,9 @@ def _along(
     if isinstance(path, Journey):
         root[:, 2] = _risen(root[:, 2], allowed, frame_rate(times))
     for side, track in zip(SIDES, feet, strict=True):
-        sign, index = (1.0, 0) if side == "left" else (-1.0, 1)
-        hip = root + sign * skeleton.hip_half_width[index] * turns["pelvis"][:, :, 1]
+        sign = 1.0 if side == "left" else -1.0
         ahead = turns["pelvis"][:, :, 0] + track.turn[:, :, 0]
-        thigh, shin = leg_to_ankle(hip, track.ankle, ahead, skeleton.thigh[index], skeleton.shin[index])
-        turns |= {f"{side}_thigh": thigh, f"{side}_shin": shin, f"{side}_foot": track.turn}
+        add_leg(turns, skeleton, side, root, (track.ankle, track.turn), ahead)
         forward = 0.05 - sign * swing * stride
         bend = elbow + 0.45 * swing * (1.0 - sign * np.cos(phase - 0.3))
         add_arm(turns, side, forward, np.full(len(times), 0.24), bend)

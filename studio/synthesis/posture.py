@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from studio.body.person import Skeleton
 from studio.geometry.rotations import axis_turn
-from studio.synthesis.gait import FootTrack
+from studio.synthesis.gait import FootTrack, leg_to_ankle
 from studio.synthesis.person import yaw_pitch_roll
 
 Array = NDArray[np.float64]
@@ -55,6 +55,24 @@ def add_arm(turns: dict[str, Array], side: str, forward: Array, outward: Array, 
     turns[f"{side}_hand"] = (
         forearm @ axis_turn(2, -sign * 0.5 + 0.0 * bend) @ axis_turn(1, -0.15 + 0.0 * bend)
     )
+
+
+def add_leg(
+    turns: dict[str, Array],
+    skeleton: Skeleton,
+    side: str,
+    root: Array,
+    foot: tuple[Array, Array],
+    ahead: Array,
+) -> None:
+    """A leg from the pelvis at `root` (F, 3) to a foot, the knee pointing `ahead`. foot : ankle (F, 3), turn (F, 3, 3).
+
+    Adds thigh, shin and foot.
+    """
+    sign, index = (1.0, 0) if side == "left" else (-1.0, 1)
+    hip = root + sign * skeleton.hip_half_width[index] * turns["pelvis"][:, :, 1]
+    thigh, shin = leg_to_ankle(hip, foot[0], ahead, skeleton.thigh[index], skeleton.shin[index])
+    turns |= {f"{side}_thigh": thigh, f"{side}_shin": shin, f"{side}_foot": foot[1]}
 
 
 def frame_rate(times: Array) -> float:

@@ -81,6 +81,14 @@ def placed(motion: PersonMotion, turn: float, middle: tuple[float, float]) -> Pe
     )
 
 
+def with_defaults(options: dict[str, float], known: dict[str, float]) -> dict[str, float]:
+    """All known options, as asked for or as usual. Raises StudioError for one that is not known."""
+    unknown = sorted(set(options) - set(known))
+    if unknown:
+        raise StudioError(f"The motion has no option '{unknown[0]}'.", f"It has {', '.join(known)}.")
+    return known | options
+
+
 def _cycle(recorded: RecordedMotion, whole: PersonMotion, wanted: dict[str, float]) -> PersonMotion:
     """One cycle whose last frame has the pose of its first: what they differ by is spread over the cycle."""
     count = max(2, round(wanted["cycle_s"] * whole.fps) + 1)
@@ -107,12 +115,7 @@ def _repeated(cycle: PersonMotion, times: Array, fps: float) -> PersonMotion:
 
 
 def _checked(options: dict[str, float]) -> dict[str, float]:
-    unknown = sorted(set(options) - set(CLIP_OPTIONS))
-    if unknown:
-        raise StudioError(
-            f"A recorded motion has no option '{unknown[0]}'.", f"It has {', '.join(CLIP_OPTIONS)}."
-        )
-    wanted = CLIP_OPTIONS | options
+    wanted = with_defaults(options, CLIP_OPTIONS)
     if not 0.01 <= wanted["speed"] <= 100.0:
         raise StudioError(f"options.speed is {wanted['speed']:g}, not 0.01 to 100.", "Correct the entry.")
     if wanted["start_s"] < 0.0 or not 0.0 <= wanted["bank"] <= 1.0:
