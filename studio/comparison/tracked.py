@@ -15,6 +15,7 @@ from studio.body.inverse_kinematics import known_markers, pose_from_markers
 from studio.body.model import BodyModel
 from studio.body.subject import read_subject
 from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.trials import Trial, kept_as
 from studio.errors import NotFoundError, TruthError
 from studio.evaluation.errors import evaluate, rows_of_frames
 from studio.evidence.frame_evidence import FrameEvidence
@@ -244,3 +245,17 @@ def _pose_on_truth(session: Session, body: BodyModel, frame: int, fps: float, ne
     kept, names = known_markers(body, truth.names)
     points = truth.positions[rows[frame], kept]
     return pose_from_markers(body, names, points, body.neutral if near is None else near)[0]
+
+
+# The trial that experiments on tracked footage and comparisons share: the same attempt is the same trial, whoever asks.
+
+
+def tracking_trial(group: str, attempt: Attempt) -> Trial:
+    """The trial of an attempt. group : contender and setting in words, the same for all its seeds."""
+    return Trial(f"{group}, seed {attempt.seed}", attempt.plain())
+
+
+@kept_as("tracking_trials.measure_tracking")
+def measure_tracking(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
+    """Track; the fields of `Tracked`."""
+    return asdict(track(Attempt.of_plain(arguments), shelf))

@@ -34,6 +34,7 @@ LISTED: tuple[Experiment, ...] = (
     tracked_people.ENOUGH_PARTICLES,
     *localisation.EXPERIMENTS,
     particles_needed.DIFFUSION,
+    localisation.FIG_16,
     *localisation.EXPERIMENTS_ON_BRANCHES,
     particles_needed.CROSSOVER,
     layers_of_a_body.FIG_19,

@@ -81,13 +81,18 @@ def each_seed(
     return (Trial(f"{label}, seed {seed}", arguments(seed)) for seed in seeds)
 
 
+def group_of(trial: Trial) -> str:
+    """The contender and setting of a trial of `each_seed`."""
+    return trial.label.rpartition(", seed ")[0]
+
+
 def grouped(outcomes: Iterable[Outcome], made: Callable[..., T] = dict) -> dict[str, list[T]]:
     """What was measured, by the label of `each_seed` in the order of the trials, seeds in order. made : from the
     measured fields.
     """
     found: dict[str, list[T]] = {}
     for outcome in outcomes:
-        found.setdefault(outcome.trial.label.rpartition(", seed ")[0], []).append(made(**outcome.measured))
+        found.setdefault(group_of(outcome.trial), []).append(made(**outcome.measured))
     return found
 
 

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from studio.comparison.findings import Chart, Number, Series, Table
 from studio.comparison.statistics import number
-from studio.comparison.tracked import Attempt, Tracked
-from studio.comparison.tracking_trials import measure_tracking, tracking_trial
+from studio.comparison.tracked import Attempt, Tracked, measure_tracking, tracking_trial
 from studio.comparison.trials import Outcome, Scale, Trial
 from studio.reproduction.claims import ratio, sign_tests
 from studio.reproduction.drawing import seeds_and_mean, table_over

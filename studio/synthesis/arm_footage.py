@@ -82,6 +82,14 @@ def coverage(outlines: Array, width: int, height: int, samples: int) -> NDArray[
     return blocks.mean(axis=(1, 3)).astype(np.float32)
 
 
+def filled(outlines: Array, width: int, height: int) -> Bytes:
+    """(H, W) 255 where a pixel's centre lies in any of the convex outlines (L, 4, 2); those not in front of the camera,
+    which are not finite, cover nothing.
+    """
+    finite = outlines[np.isfinite(outlines).all(axis=(1, 2))]
+    return np.where(coverage(finite, width, height, 1) > 0.0, 255, 0).astype(np.uint8)
+
+
 def render_arm(recipe: Recipe, camera: Camera, source: Path, progress: Progress | None) -> MarkerMotion:
     """Write videos/ and masks/ of the recipe's body and truth/poses.csv; returns the markers' motion."""
     body = load_body(recipe.body)
@@ -97,7 +105,7 @@ def render_arm(recipe: Recipe, camera: Camera, source: Path, progress: Progress 
             share = coverage(outlines[frame], *size, SAMPLES)
             stream = recipe.seed * 1_000_003 + frame
             footage.add(_picture(share, recipe.picture.noise, stream))
-            masks.add(np.where(coverage(outlines[frame], *size, 1) > 0.0, 255, 0).astype(np.uint8))
+            masks.add(filled(outlines[frame], *size))
             if progress is not None:
                 progress("rendering", frame + 1, recipe.frames)
     names = tuple(entry.name for entry in body.parameters)

@@ -12,7 +12,6 @@ from studio.comparison.findings import VERDICTS, Findings
 from studio.comparison.footage_shelf import FootageShelf
 from studio.comparison.kept_trials import plain
 from studio.comparison.tracked import Tracked
-from studio.comparison.tracking_trials import group_of
 from studio.comparison.trials import Outcome, Scale, Trial
 from studio.motion_files.trc import read_trc
 from studio.reproduction.catalogue import EXPERIMENTS
@@ -34,6 +33,7 @@ from studio.reproduction.deutscher_reid.tracked_people import (
     terminal_failure,
 )
 from studio.reproduction.deutscher_reid.weight_of_a_knee import true_poses
+from studio.reproduction.experiment import group_of
 from studio.reproduction.plan import frames_of
 
 SAMPLES = Path(__file__).parents[2] / "sample_sessions"

@@ -2,13 +2,13 @@
 
 import json
 import math
+from dataclasses import asdict
 
 import numpy as np
 import pytest
 
 from studio.comparison.findings import Findings
 from studio.comparison.footage_shelf import FootageShelf
-from studio.comparison.tracking_trials import group_of
 from studio.comparison.trials import Outcome, Scale
 from studio.reproduction.deutscher_reid import particles_needed
 from studio.reproduction.deutscher_reid.particles_needed import (
@@ -27,7 +27,7 @@ from studio.reproduction.deutscher_reid.particles_needed import (
     successes,
 )
 from studio.reproduction.deutscher_reid.setting import annealing_as_ten
-from studio.reproduction.experiment import Experiment
+from studio.reproduction.experiment import Experiment, group_of
 from studio.tracking.settings import AnnealedSettings
 
 SEEDS = Scale(tuple(range(10)))
@@ -130,7 +130,7 @@ def concluded(experiment: Experiment, needed: dict[str, float]) -> Findings:
     outcomes = []
     for trial in experiment.trials(SEEDS):
         particles = needed[group_of(trial)] * 2.0 ** (((7 * trial.arguments["seed"]) % 5 - 2) / 8)
-        measured = Fewest(particles, "", [[int(particles), 2, 3]]).plain()
+        measured = asdict(Fewest(particles, "", [[int(particles), 2, 3]]))
         outcomes.append(Outcome(trial, json.loads(json.dumps(measured))))
     return experiment.conclude(outcomes)
 

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from studio.comparison.findings import VERDICTS, Findings
-from studio.comparison.tracked import Attempt, Tracked
-from studio.comparison.tracking_trials import group_of, tracking_trial
+from studio.comparison.tracked import Attempt, Tracked, tracking_trial
 from studio.comparison.trials import Outcome, Scale, Trial
 from studio.reproduction.catalogue import EXPERIMENTS
-from studio.reproduction.experiment import Experiment
+from studio.reproduction.experiment import Experiment, group_of
 from studio.reproduction.open_questions.generalisation import ENTRIES
 from studio.reproduction.plan import frames_of
 from studio.reproduction.tracking import by_group, curves, spells

@@ -17,7 +17,6 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from scipy.stats import rankdata
 
 from studio.body.catalogue import load_body
 from studio.comparison.findings import Series, Table
@@ -114,8 +113,8 @@ def _fig_13(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         name = f"memory {memory} over memory 1{what}"
         yield ratio(name, groups[_group(memory)], groups[_group(1)], claim, of)
     by_seed = zip(*groups.values(), strict=True)
-    ranks = (rankdata([run.limb_rms for run in runs]) for runs in by_seed)
-    falling = [np.corrcoef(rankdata(MEMORIES), row)[0, 1] for row in ranks]
+    ranks = (np.argsort(np.argsort([run.limb_rms for run in runs])) for runs in by_seed)
+    falling = [np.corrcoef(np.arange(len(MEMORIES)), row)[0, 1] for row in ranks]
     yield number("rank correlation of error and memory", falling)
     yield from errors("limb direction, RMS", groups)
     yield (

@@ -11,7 +11,6 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.benchmarks.made_scene import filled
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends, limb_frames
 from studio.body.model import BodyModel
@@ -21,6 +20,7 @@ from studio.geometry.camera import Camera
 from studio.geometry.cones import limb_outlines
 from studio.geometry.projection import project
 from studio.runs.search_space import search_space
+from studio.synthesis.arm_footage import filled
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.frame_loop import search_frame
 from studio.tracking.tracker import Carried, FrameProblem, FrameResult, LayerRecord, SearchSpace

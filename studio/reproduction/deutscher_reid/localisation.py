@@ -461,18 +461,18 @@ EXPERIMENTS = (
         shown=fig_14,
     ),
 )
+FIG_16 = Experiment(
+    name="deutscher-fig-16",
+    title="Crossover on the arm and on the branched arms",
+    source=f"{SOURCE}, Fig. 16",
+    claim="The match does not get worse with the share of crossover on an arm without branches, and gets steadily "
+    "better on branched arms.",
+    trials=trials_fig_16,
+    measure=measure_fig_16,
+    shown=fig_16,
+    verdict=verdict_fig_16,
+)
 EXPERIMENTS_ON_BRANCHES = (
-    Experiment(
-        name="deutscher-fig-16",
-        title="Crossover on the arm and on the branched arms",
-        source=f"{SOURCE}, Fig. 16",
-        claim="The match does not get worse with the share of crossover on an arm without branches, and gets steadily "
-        "better on branched arms.",
-        trials=trials_fig_16,
-        measure=measure_fig_16,
-        shown=fig_16,
-        verdict=verdict_fig_16,
-    ),
     Experiment(
         name="deutscher-fig-17",
         title="Variance reduction of the branched arms",
