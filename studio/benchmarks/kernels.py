@@ -108,9 +108,7 @@ def ring_of_cameras(body: BodyModel) -> tuple[Camera, ...]:
 def made_evidence(
     body: BodyModel, cameras: tuple[Camera, ...], rng: np.random.Generator
 ) -> dict[str, FrameEvidence]:
-    """A frame of the body in its neutral pose as its cones, brighter than a noisy ground, by kind of edge
-    map.
-    """
+    """A frame of the body in its neutral pose as its cones, brighter than a noisy ground, by kind of edge map."""
     corners, _ = OutlineProjector.of_body(body, cameras).corners(body.neutral[None])
     frames: dict[str, list[ViewEvidence]] = {"proximity": [], "bodytrack": []}
     for camera, outlines in zip(cameras, corners[0], strict=True):

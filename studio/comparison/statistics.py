@@ -35,9 +35,8 @@ class SignTest(NamedTuple):
 def bootstrap_interval(
     values: Iterable[float], statistic: Statistic = np.mean, level: float = 0.95
 ) -> tuple[float, float]:
-    """Low and high end of a statistic's bootstrap interval (bias-corrected and accelerated; percentiles where
-    that is not defined), always the same for the same values. One value, or equal ones: that value twice; none:
-    NaN twice.
+    """Low and high end of a statistic's bootstrap interval (bias-corrected and accelerated; percentiles where that is
+    not defined), always the same for the same values. One value, or equal ones: that value twice; none: NaN twice.
     """
     sample = np.asarray(values, dtype=np.float64)
     return _interval((sample,), statistic, level)

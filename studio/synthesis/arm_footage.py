@@ -1,9 +1,7 @@
-"""Footage of planar arms: one camera facing the plane, the picture being the tracker's own body, moving
-smoothly.
+"""Footage of planar arms: one camera facing the plane, the picture being the tracker's own body, moving smoothly.
 
-Deutscher & Reid 6.1 and 6.2.2: the arms are the model itself, and what is studied is the search, not the
-fit of a model to a person. The mask is exact: a pixel is arm when its centre lies in the outline of a drawn
-limb.
+Deutscher & Reid 6.1 and 6.2.2: the arms are the model itself, and what is studied is the search, not the fit of a model
+to a person. The mask is exact: a pixel is arm when its centre lies in the outline of a drawn limb.
 """
 
 from pathlib import Path
@@ -62,8 +60,7 @@ def arm_outlines(body: BodyModel, poses: Array, camera: Camera) -> Array:
 
 
 def coverage(outlines: Array, width: int, height: int, samples: int) -> NDArray[np.float32]:
-    """(height, width) share, 0...1, of samples × samples points a pixel that lie in any of the
-    quadrilaterals.
+    """(height, width) share, 0...1, of samples × samples points a pixel that lie in any of the quadrilaterals.
 
     outlines : (L, 4, 2) pixels, convex. One sample is the pixel's centre.
     """

@@ -81,9 +81,7 @@ def ring_camera(
 
 
 def corner_rig(size: tuple[int, int], rng: np.random.Generator) -> tuple[Camera, ...]:
-    """Four cameras under the ceiling of the room's corners, slightly rolled, with barrel distortion as
-    webcams have.
-    """
+    """Four cameras under the ceiling of the room's corners, slightly rolled, with barrel distortion as webcams have."""
     return _webcams(CORNERS, CORNER_TARGET, CORNER_FOCAL, size, rng)
 
 
@@ -130,8 +128,7 @@ def _webcams(
 
 
 def pixel_rays(camera: Camera, samples: int) -> NDArray[np.float32]:
-    """(H * samples, W * samples, 3) unit directions in the world through a regular grid of points in every
-    pixel.
+    """(H * samples, W * samples, 3) unit directions in the world through a regular grid of points in every pixel.
 
     The lens model is inverted by fixed-point iteration (as OpenCV's undistortPoints does, to convergence).
     """

@@ -1,10 +1,9 @@
 """The clothed person: rounded pieces laid around the skeleton, their cloth, skin and hair.
 
-Each piece is a sphere swept along a line in one segment's frame, its radius running from one end to the
-other with a muscle's bulge between, its cross-section elliptical, its surface folded where it is cloth. The
-pieces of a group (trunk and head, each arm, each leg) melt into each other; groups barely do, so that an
-arm beside the trunk stays apart. Nothing here is a truncated cone, and no number comes from a tracker's
-body file.
+Each piece is a sphere swept along a line in one segment's frame, its radius running from one end to the other with a
+muscle's bulge between, its cross-section elliptical, its surface folded where it is cloth. The pieces of a group (trunk
+and head, each arm, each leg) melt into each other; groups barely do, so that an arm beside the trunk stays apart.
+Nothing here is a truncated cone, and no number comes from a tracker's body file.
 """
 
 from dataclasses import dataclass, replace
@@ -63,9 +62,7 @@ def clothed_pieces(bones: Skeleton, girth: float = 1.0) -> tuple[Piece, ...]:
 
 
 def piece_tables(motion: PersonMotion, pieces: tuple[Piece, ...]) -> tuple[Array, IntArray]:
-    """The pieces in the world: (F, P, COLUMNS) floats as the column names above say, and (P, 2) material
-    and group.
-    """
+    """The pieces in the world: (F, P, COLUMNS) floats as the column names above say, and (P, 2) material and group."""
     joints = joint_points(motion)
     tables = np.zeros((motion.frame_count, len(pieces), COLUMNS))
     for index, piece in enumerate(pieces):

@@ -1,9 +1,8 @@
 """Steps along a path: where the feet stand, how they swing, and legs that reach them.
 
-A gait is written as smooth parametric curves: the pelvis follows a path at its speed and bobs; each foot
-stands still for a share of the step cycle (`duty`) and travels to its next footprint along an eased arc for
-the rest, the ankle turning about the ball of the foot at the end of the stance. Hips and knees then follow
-from the ankles.
+A gait is written as smooth parametric curves: the pelvis follows a path at its speed and bobs; each foot stands still
+for a share of the step cycle (`duty`) and travels to its next footprint along an eased arc for the rest, the ankle
+turning about the ball of the foot at the end of the stance. Hips and knees then follow from the ankles.
 """
 
 from collections.abc import Callable
@@ -27,10 +26,9 @@ BALL, HEEL = 0.66, -0.20
 class Gait:
     """The numbers of a way of walking or running.
 
-    speed : mm/s. cadence : steps per second (of both feet together). duty : share of a foot's cycle on the
-    floor (> 0.5 walking, < 0.5 running). foot_spacing : lateral distance between footprints, mm. lift :
-    height of the ankle's arc in swing, mm. heel_rise : turn of the foot about its ball at push-off,
-    radians.
+    speed : mm/s. cadence : steps per second (of both feet together). duty : share of a foot's cycle on the floor (> 0.5
+    walking, < 0.5 running). foot_spacing : lateral distance between footprints, mm. lift : height of the ankle's arc in
+    swing, mm. heel_rise : turn of the foot about its ball at push-off, radians.
     """
 
     speed: float
@@ -53,17 +51,13 @@ def eased(share: Array) -> Array:
 
 
 def swung(share: Array) -> Array:
-    """Progress of a foot in the air: 0 to 1, at rest at both ends, without the haste of a minimum-jerk
-    curve.
-    """
+    """Progress of a foot in the air: 0 to 1, at rest at both ends, without the haste of a minimum-jerk curve."""
     s = np.clip(share, 0.0, 1.0)
     return s * s * (3.0 - 2.0 * s)
 
 
 def circle_path(radius: float, start_angle: float = 0.0, turn: float = 1.0) -> Path:
-    """A circle about the origin: distance (mm) to position (F, 2) and heading (F,). turn : 1 left, -1
-    right.
-    """
+    """A circle about the origin: distance (mm) to position (F, 2) and heading (F,). turn : 1 left, -1 right."""
 
     def at(distance: Array) -> tuple[Array, Array]:
         angle = start_angle + turn * distance / radius
@@ -168,11 +162,10 @@ def _footprint(gait: Gait, path: Path, count: Array, left: bool) -> tuple[Array,
 
 
 def leg_to_ankle(hip: Array, ankle: Array, forward: Array, thigh: float, shin: float) -> tuple[Array, Array]:
-    """Rotations of thigh and shin, (F, 3, 3) each, that put the ankle where it is wanted, the knee pointing
-    forward.
+    """Rotations of thigh and shin, (F, 3, 3) each, that put the ankle where it is wanted, the knee pointing forward.
 
-    hip, ankle : (F, 3) mm. forward : (F, 3) the direction in which the knee bends. An ankle out of reach
-    (0.2 % of the leg is always kept bent) is approached as far as the leg goes.
+    hip, ankle : (F, 3) mm. forward : (F, 3) the direction in which the knee bends. An ankle out of reach (0.2 % of the
+    leg is always kept bent) is approached as far as the leg goes.
     """
     reach = ankle - hip
     distance = np.minimum(np.linalg.norm(reach, axis=1), 0.998 * (thigh + shin))

@@ -59,9 +59,7 @@ def handstand(skeleton: Skeleton, times: Array, options: dict[str, float]) -> Pe
 def _add_supporting_arm(
     turns: dict[str, Array], skeleton: Skeleton, side: str, heading: Array, lean: Array, half_apart: float
 ) -> None:
-    """An arm that stands on its palm: nearly straight, spread so that the wrists are `half_apart` from the
-    middle.
-    """
+    """An arm that stands on its palm: nearly straight, spread so that the wrists are `half_apart` from the middle."""
     sign, index = (1.0, 0) if side == "left" else (-1.0, 1)
     turns[f"{side}_clavicle"] = turns["thorax"] @ axis_turn(0, np.full(len(lean), sign * 0.25))
     length = skeleton.upper_arm[index] + skeleton.forearm[index]

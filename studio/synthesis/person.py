@@ -22,9 +22,7 @@ SOLE = 0.045
 
 
 def skeleton_of_height(height_mm: float, rng: np.random.Generator) -> Skeleton:
-    """A skeleton with published proportions and the small left-right differences that real people have (0.5
-    %).
-    """
+    """A skeleton with published proportions and the small left-right differences that real people have (0.5 %)."""
     pair = np.exp(rng.normal(0.0, 0.005, (4, 2)))
     shoulder = (0.0, SHOULDER_OUT * height_mm, -SHOULDER_DOWN * height_mm)
     thigh, shin, upper_arm, forearm = (
@@ -94,9 +92,7 @@ def proportioned(bones: Skeleton, factors: Proportions) -> Skeleton:
 
 
 def marker_lengths(motion: PersonMotion) -> dict[str, float]:
-    """The subject's limb lengths as a tape measure gives them: marker pair to mm (they do not change over
-    time).
-    """
+    """The subject's limb lengths as a tape measure gives them: marker pair to mm (they do not change over time)."""
     markers = marker_motion(motion)
     index = {name: position for position, name in enumerate(markers.names)}
     pairs = [("Hip", "Neck"), ("Neck", "Head")]
@@ -112,7 +108,5 @@ def marker_lengths(motion: PersonMotion) -> dict[str, float]:
 
 
 def yaw_pitch_roll(yaw: Array, pitch: Array, roll: Array) -> Array:
-    """(..., 3, 3): heading about z, then leaning forward about y (positive), then to the right about x
-    (positive).
-    """
+    """(..., 3, 3): heading about z, then leaning forward about y (positive), then to the right about x (positive)."""
     return axis_turn(2, yaw) @ axis_turn(1, pitch) @ axis_turn(0, roll)

@@ -28,9 +28,7 @@ def allowed_height(skeleton: Skeleton, root: Array, pelvis: Array, feet: list[Fo
 def trunk(
     heading: Array, pitch: Array | float, twist: Array | float, roll: Array | float
 ) -> dict[str, Array]:
-    """Pelvis, thorax (twisted against the pelvis about its own axis) and head, which looks where the person
-    goes.
-    """
+    """Pelvis, thorax (twisted against the pelvis about its own axis) and head, which looks where the person goes."""
     level = np.zeros_like(heading)
     pelvis = yaw_pitch_roll(heading, level + 0.6 * pitch, level + roll)
     thorax = pelvis @ axis_turn(1, level + 0.4 * pitch) @ axis_turn(2, level + twist)

@@ -1,6 +1,4 @@
-"""What footage is to be made: the entries of a recipe file (TOML), checked, and the recipes that come
-along.
-"""
+"""What footage is to be made: the entries of a recipe file (TOML), checked, and the recipes that come along."""
 
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -29,9 +27,8 @@ LIKE, LONGEST_CHAIN = "like", 5
 
 
 class Picture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Pictures. noise : standard deviation of the sensor's noise at mid grey, levels. samples : rays along
-    a pixel's side. quality : x264's constant rate factor of the footage. empty_frames : length of the
-    empty clip.
+    """Pictures. noise : standard deviation of the sensor's noise at mid grey, levels. samples : rays along a pixel's
+    side. quality : x264's constant rate factor of the footage. empty_frames : length of the empty clip.
     """
 
     width: int = 640
@@ -84,18 +81,17 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     `body` itself, seen by one camera, as in Deutscher & Reid 6.1; or "recorded", the motion of `motion_file` (.amc,
     .bvh, .npz; `skeleton_file` for an .amc whose ASF is not beside it); or "joined", several `clips` of such motion one
     after the other (`joined_clips.py`). options : numbers of the motion. weighting : what runs of the session use by
-    default. An entry `like` in the file names another recipe, bundled or beside it, whose entries count where this
-    one has none of its own.
+    default. An entry `like` in the file names another recipe, bundled or beside it, whose entries count where this one
+    has none of its own.
 
     height_mm : of a person with published proportions. shape : instead, a file of `body`'s dimensions, whose lengths
-    the person's bones have; the session's subject has these dimensions, radii included, and those of the rendered
-    hands and shoes; `subject_shape.toml` beside it has the file's dimensions alone. girth : how much stouter than
-    usual the flesh is. proportions : of the bones, where they differ from the published ones. wardrobe : "striped" or
-    "plain" clothes, which hardly stand out in the "office". colours : other ones for some of what is worn, RGB 0...1.
-    room : "office", "furnished", "hall", or "drawn-" and a number, which furnishes a room by chance. damage : what went
-    wrong with the take.
-    sigma : a file whose first numbers are the session's σ0, one for each parameter of `body`, from frame to frame at
-    60 Hz. Files count from the recipe's folder, or lie in the real data after "data:" (`real_data.py`).
+    the person's bones have; the session's subject has these dimensions, radii included, and those of the rendered hands
+    and shoes; `subject_shape.toml` beside it has the file's dimensions alone. girth : how much stouter than usual the
+    flesh is. proportions : of the bones, where they differ from the published ones. wardrobe : "striped" or "plain"
+    clothes, which hardly stand out in the "office". colours : other ones for some of what is worn, RGB 0...1. room :
+    "office", "furnished", "hall", or "drawn-" and a number, which furnishes a room by chance. damage : what went wrong
+    with the take. sigma : a file whose first numbers are the session's σ0, one for each parameter of `body`, from frame
+    to frame at 60 Hz. Files count from the recipe's folder, or lie in the real data after "data:" (`real_data.py`).
     """
 
     title: str
@@ -182,9 +178,7 @@ def _entries(path: Path, chain: int) -> dict[str, Any]:
 
 
 def recipe_cameras(recipe: Recipe, rng: np.random.Generator) -> tuple[Camera, ...]:
-    """The cameras that are made up or put down by hand (those of a calibration file are read by the
-    caller).
-    """
+    """The cameras that are made up or put down by hand (those of a calibration file are read by the caller)."""
     size = (recipe.picture.width, recipe.picture.height)
     if recipe.cameras.placed:
         return tuple(

@@ -243,8 +243,7 @@ def trace_person(origin, rays, samples, room_depth, pieces, labels, lights, ward
 def floor_shadow(left, near, cell, pieces, labels, lights, key, ambient):
     """What the person leaves of the lamp and of the room's light on the floor.
 
-    Cell (j, i) of the (n, n) outputs lies at x = left + i * cell, y = near + j * cell, mm; 1 = nothing
-    taken away.
+    Cell (j, i) of the (n, n) outputs lies at x = left + i * cell, y = near + j * cell, mm; 1 = nothing taken away.
     """
     rows, columns = key.shape
     for row in prange(rows):

@@ -46,9 +46,8 @@ class Training:
     """What a model is learnt from and how; plain values.
 
     sources : recipes of people's motion, or "pointing". frames : of each at 30 Hz, 0 for all. performances : of each,
-    the first as recorded.
-    smoothings : of each performance. memory, epsilon : of the automaton. clusters : further learning knobs. seed : of
-    performances and clustering. tested : recipes on whose motion the entropy is measured.
+    the first as recorded. smoothings : of each performance. memory, epsilon : of the automaton. clusters : further
+    learning knobs. seed : of performances and clustering. tested : recipes on whose motion the entropy is measured.
     """
 
     sources: tuple[str, ...]
