@@ -14,8 +14,19 @@ from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from studio.body.person import SIDES, PersonMotion, Skeleton
 from studio.errors import StudioError
-from studio.synthesis.gait import FootTrack, Gait, Path, eased, rolled, swung
-from studio.synthesis.posture import add_arm, add_leg, allowed_height, frame_rate, trunk
+from studio.synthesis.gait import (
+    FootTrack,
+    Gait,
+    Path,
+    add_arm,
+    add_leg,
+    allowed_height,
+    eased,
+    frame_rate,
+    rolled,
+    swung,
+    trunk,
+)
 
 Array = NDArray[np.float64]
 Options = dict[str, float]

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from studio.body.person import PersonMotion, joint_points
 from studio.geometry.projection import project
 from studio.synthesis.damage import Damage
-from studio.synthesis.joined_clips import Clip
 from studio.synthesis.person import Proportions
 from studio.synthesis.recipe_file import (
     JOINED,
@@ -30,6 +29,7 @@ from studio.synthesis.recipe_file import (
     recipe_cameras,
 )
 from studio.synthesis.recipes import recipe_motion, recipe_person
+from studio.synthesis.recorded_clips import Clip
 from studio.synthesis.room import Room
 from studio.synthesis.rooms import DRAWN, FLOOR_AND_WALLS, room_called
 from studio.synthesis.wardrobes import MATERIALS

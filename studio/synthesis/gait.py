@@ -10,9 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
 
 from studio.body.person import Skeleton
 from studio.geometry.rotations import axis_turn
+from studio.synthesis.person import yaw_pitch_roll
 
 Array = NDArray[np.float64]
 Path = Callable[[Array], tuple[Array, Array]]
@@ -186,3 +188,139 @@ def _hanging_frame(down: Array, lateral: Array) -> Array:
     x = np.cross(lateral, z)
     x /= np.linalg.norm(x, axis=1, keepdims=True)
     return np.stack([x, np.cross(z, x), z], axis=-1)
+
+
+# Ways that change direction: straight stretches, bends and turns on the spot, one after the other.
+
+
+GRID_MM = 5.0
+LONG_ENOUGH_MM = 3000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A part of a way. length : mm that would be walked at full speed in its time. turn : radians to the left while
+    it lasts. onward : share of the speed that is left, 0 while turning on the spot.
+    """
+
+    length: float
+    turn: float = 0.0
+    onward: float = 1.0
+
+
+class Journey:
+    """A way made of stretches, straight on before the first and after the last: a `gait.Path` with a pace.
+
+    start : mm; heading : radians, both where the first stretch begins. ease : mm over which one stretch goes over
+    into the next (standard deviation of the smoothing).
+    """
+
+    def __init__(
+        self, start: tuple[float, float], heading: float, stretches: tuple[Stretch, ...], ease: float
+    ) -> None:
+        total = sum(stretch.length for stretch in stretches)
+        self._grid = np.arange(-LONG_ENOUGH_MM, total + LONG_ENOUGH_MM, GRID_MM)
+        middles = self._grid + 0.5 * GRID_MM
+        onward, rate, begin = np.ones_like(middles), np.zeros_like(middles), 0.0
+        for stretch in stretches:
+            inside = (middles >= begin) & (middles < begin + stretch.length)
+            onward[inside] = stretch.onward
+            # Spread over the cells that there are, so that the turn is whole whatever the grid.
+            rate[inside] = stretch.turn / (GRID_MM * max(np.count_nonzero(inside), 1))
+            begin += stretch.length
+        self._onward: Array = gaussian_filter1d(onward, ease / GRID_MM, mode="nearest")
+        rate = gaussian_filter1d(rate, ease / GRID_MM, mode="nearest")
+        zero = int(np.searchsorted(self._grid, 0.0))
+        turned = np.concatenate([[0.0], np.cumsum(rate[:-1] * GRID_MM)])
+        self._heading: Array = heading + turned
+        middle_heading = self._heading + 0.5 * rate * GRID_MM
+        steps = (
+            GRID_MM
+            * self._onward[:, None]
+            * np.stack([np.cos(middle_heading), np.sin(middle_heading)], axis=-1)
+        )
+        place = np.concatenate([np.zeros((1, 2)), np.cumsum(steps[:-1], axis=0)])
+        self._place: Array = place - place[zero] + np.array(start)
+
+    def __call__(self, distance: Array) -> tuple[Array, Array]:
+        """Position (F, 2) and heading (F,) after a distance (F,) that full speed would have covered, mm."""
+        return (
+            np.stack([np.interp(distance, self._grid, self._place[:, axis]) for axis in (0, 1)], axis=-1),
+            np.interp(distance, self._grid, self._heading),
+        )
+
+    def pace(self, distance: Array) -> Array:
+        """(F,) the share of full speed there."""
+        return np.interp(distance, self._grid, self._onward)
+
+
+# How the rendered person carries themselves: trunk, arms, and how high the pelvis may be over the feet.
+
+
+NEARLY_STRAIGHT = 0.994
+
+
+def allowed_height(skeleton: Skeleton, root: Array, pelvis: Array, feet: list[FootTrack]) -> Array:
+    """(F,) the height above `root` at which the pelvis still lets both ankles be reached without quite
+    straightening a knee."""
+    allowed = np.full(len(root), np.inf)
+    for sign, index, track in ((1.0, 0, feet[0]), (-1.0, 1, feet[1])):
+        leg = NEARLY_STRAIGHT * (skeleton.thigh[index] + skeleton.shin[index])
+        hip = root + sign * skeleton.hip_half_width[index] * pelvis[:, :, 1]
+        across = np.linalg.norm((track.ankle - hip)[:, :2], axis=1)
+        above = np.sqrt(np.maximum(leg**2 - across**2, 0.0))
+        allowed = np.minimum(allowed, track.ankle[:, 2] + above - hip[:, 2])
+    return allowed
+
+
+def trunk(
+    heading: Array, pitch: Array | float, twist: Array | float, roll: Array | float
+) -> dict[str, Array]:
+    """Pelvis, thorax (twisted against the pelvis about its own axis) and head, which looks where the person goes."""
+    level = np.zeros_like(heading)
+    pelvis = yaw_pitch_roll(heading, level + 0.6 * pitch, level + roll)
+    thorax = pelvis @ axis_turn(1, level + 0.4 * pitch) @ axis_turn(2, level + twist)
+    head = thorax @ yaw_pitch_roll(-0.55 * (level + twist), level + 0.10, -0.6 * (level + roll))
+    return {"pelvis": pelvis, "thorax": thorax, "head": head}
+
+
+def add_arm(turns: dict[str, Array], side: str, forward: Array, outward: Array, bend: Array) -> None:
+    """An arm swung `forward`, held `outward` and bent by `bend` at the elbow, radians; the clavicle gives
+    way to it a little. Adds clavicle, upper arm, forearm and hand.
+    """
+    sign = 1.0 if side == "left" else -1.0
+    clavicle = turns["thorax"] @ axis_turn(2, -sign * 0.08 * forward) @ axis_turn(0, sign * 0.06 * outward)
+    upper = (
+        turns["thorax"]
+        @ axis_turn(1, -forward)
+        @ axis_turn(0, sign * outward)
+        @ axis_turn(2, -sign * 0.25 + 0.0 * bend)
+    )
+    forearm = upper @ axis_turn(1, -bend)
+    turns |= {f"{side}_clavicle": clavicle, f"{side}_upper_arm": upper, f"{side}_forearm": forearm}
+    turns[f"{side}_hand"] = (
+        forearm @ axis_turn(2, -sign * 0.5 + 0.0 * bend) @ axis_turn(1, -0.15 + 0.0 * bend)
+    )
+
+
+def add_leg(
+    turns: dict[str, Array],
+    skeleton: Skeleton,
+    side: str,
+    root: Array,
+    foot: tuple[Array, Array],
+    ahead: Array,
+) -> None:
+    """A leg from the pelvis at `root` (F, 3) to a foot, the knee pointing `ahead`. foot : ankle (F, 3), turn (F, 3, 3).
+
+    Adds thigh, shin and foot.
+    """
+    sign, index = (1.0, 0) if side == "left" else (-1.0, 1)
+    hip = root + sign * skeleton.hip_half_width[index] * turns["pelvis"][:, :, 1]
+    thigh, shin = leg_to_ankle(hip, foot[0], ahead, skeleton.thigh[index], skeleton.shin[index])
+    turns |= {f"{side}_thigh": thigh, f"{side}_shin": shin, f"{side}_foot": foot[1]}
+
+
+def frame_rate(times: Array) -> float:
+    """Frames per second of evenly spaced times."""
+    return float(1.0 / (times[1] - times[0])) if len(times) > 1 else 60.0

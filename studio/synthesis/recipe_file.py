@@ -14,8 +14,8 @@ from studio.errors import StudioError
 from studio.geometry.camera import Camera
 from studio.synthesis.cameras import RIGS, placed_camera
 from studio.synthesis.damage import Damage
-from studio.synthesis.joined_clips import Clip
 from studio.synthesis.person import Proportions
+from studio.synthesis.recorded_clips import Clip
 from studio.synthesis.rooms import ROOMS, is_room
 from studio.synthesis.wardrobes import MATERIALS, WARDROBES
 from studio.typed_decoding import decode_toml

@@ -24,14 +24,19 @@ from studio.sessions.manifest import read_manifest, write_manifest
 from studio.sessions.named_rows import write_pose, write_sigma
 from studio.synthesis.arm_footage import render_arm
 from studio.synthesis.damage import misplaced
-from studio.synthesis.joined_clips import joined_person
 from studio.synthesis.motions import make_motion
-from studio.synthesis.person import marker_lengths, proportioned, skeleton_of_height
+from studio.synthesis.person import (
+    marker_lengths,
+    proportioned,
+    skeleton_of_height,
+    skeleton_of_subject,
+    subject_of_file,
+    with_hands_and_feet,
+)
 from studio.synthesis.person_footage import render_person
 from studio.synthesis.real_data import located
 from studio.synthesis.recipe_file import JOINED, RECORDED, Recipe, find_recipe, read_recipe, recipe_cameras
-from studio.synthesis.recorded_clip import recorded_person
-from studio.synthesis.shape import skeleton_of_subject, subject_of_file, with_hands_and_feet
+from studio.synthesis.recorded_clips import joined_person, recorded_person
 
 ARM = "arm"
 RECIPE_COPY = "recipe.toml"

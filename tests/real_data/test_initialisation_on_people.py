@@ -22,7 +22,7 @@ from studio.sessions.session import Session
 from studio.settings import default_settings
 from studio.synthesis.recipe_file import Recipe, find_recipe, read_recipe
 from studio.synthesis.recipes import recipe_motion, recipe_person
-from studio.synthesis.shape import with_hands_and_feet
+from studio.synthesis.person import with_hands_and_feet
 from studio.weighting.outlines import OutlineProjector
 from studio.weighting.silhouette_areas import Silhouettes
 
