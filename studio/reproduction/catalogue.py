@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from types import MappingProxyType
 
 from studio.errors import NotFoundError
+from studio.reproduction import fleischmann
 from studio.reproduction.caillette import (
     clusters_and_states,
     dynamics,
@@ -21,7 +22,6 @@ from studio.reproduction.deutscher_reid import (
     weight_of_a_knee,
 )
 from studio.reproduction.experiment import Experiment
-from studio.reproduction.fleischmann import computation_time, figures
 from studio.reproduction.open_questions import generalisation, robustness
 
 # A new experiment is named here.
@@ -41,8 +41,8 @@ LISTED: tuple[Experiment, ...] = (
     layers_of_a_body.FIG_20,
     particles_needed.BOTH_IMPROVEMENTS,
     processors.EXPERIMENT,
-    *figures.EXPERIMENTS,
-    computation_time.EXPERIMENT,
+    *fleischmann.EXPERIMENTS,
+    fleischmann.COMPUTATION_TIME,
     clusters_and_states.EXPERIMENT,
     table_1.EXPERIMENT,
     dynamics.FIG_11_EXPERIMENT,

@@ -35,10 +35,9 @@ from studio.synthesis.gait import (
 )
 from studio.synthesis.room import GRAIN, Block
 
-# A handstand: hands on the floor, kick up one leg after the other, hold with a sway, come down again.
-
-
 Array = NDArray[np.float64]
+
+# A handstand: hands on the floor, kick up one leg after the other, hold with a sway, come down again.
 
 # Key poses: share of the motion's length; degrees from upright of pelvis and thorax leaning forward (180 =
 # upside down), of the arms' lean, of the thighs swung backwards from hanging straight down (180 = straight

@@ -19,11 +19,10 @@ from studio.motion_files.recorded_motion import RecordedMotion
 from studio.synthesis.gait import eased
 from studio.training.smooth_noise import smooth_noise, warped_times
 
+Array = NDArray[np.float64]
+
 # Another performance of a person's motion: the same movements in another tempo, every joint a little different, the
 # feet where they stood.
-
-
-Array = NDArray[np.float64]
 
 CARRIERS = {
     "thorax": "pelvis",

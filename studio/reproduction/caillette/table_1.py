@@ -19,7 +19,7 @@ from studio.comparison.footage_shelf import FootageShelf
 from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.numba_in_threads import numba
-from studio.reproduction.caillette.problems import Known
+from studio.reproduction.caillette.following import Known
 from studio.reproduction.caillette.setting import (
     BLOBS,
     GUIDED,

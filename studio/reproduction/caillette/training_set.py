@@ -7,9 +7,10 @@ the body in any size.
 """
 
 import dataclasses
+import hashlib
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,10 @@ from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
 from studio.body.person import first_frames, sampled
 from studio.comparison.footage_shelf import FootageShelf
-from studio.reproduction.caillette.learnt_files import made_once
+from studio.comparison.kept_trials import code_digest, plain
+from studio.comparison.trials import Plain
+from studio.sessions.atomic_files import discard, move_into_place, new_folder_beside
+from studio.sessions.process_lock import ProcessLock
 from studio.synthesis.recipe_file import JOINED, find_recipe, read_recipe
 from studio.synthesis.recipes import recipe_motion
 from studio.training.learning import learn
@@ -33,6 +37,53 @@ from studio.training.oversampling import OversamplingSettings, performed
 from studio.training.resampling import frame_times
 from studio.training.sources import FPS, Recording, fitted_person
 from studio.training.targets import skeleton_of_body
+
+# What trials learn or fit once and share: folders of files beside the footage, each made by one process.
+# A folder is known by what it is made from and by the code that makes it, so another version of the studio makes its
+# own. It is whole or not there; who wants one that another process is making waits for it, and makes it where that
+# process died.
+
+
+LEARNT = "learnt"
+# Code that decides on what is learnt or fitted.
+ROOMS = ("geometry", "motion_files", "body", "behaviour", "synthesis", "training")
+WAIT_SECONDS = 0.2
+
+
+def made_once(
+    shelf: FootageShelf, kind: str, making: Mapping[str, Plain], make: Callable[[Path], None]
+) -> Path:
+    """The folder of a thing of some kind, made by `make(folder)` if it is not there. making : all it depends on."""
+    known = json.dumps({"making": plain(making), "code": code_digest(ROOMS)}, sort_keys=True)
+    name = f"{kind}-{hashlib.sha256(known.encode()).hexdigest()[:16]}"
+    place = shelf.folder / LEARNT / name
+    if place.is_dir():
+        return place
+    place.parent.mkdir(parents=True, exist_ok=True)
+    lock = _waited_for(place)
+    if lock is None:
+        return place
+    partial = new_folder_beside(place)
+    try:
+        if not place.is_dir():
+            make(partial)
+            move_into_place(partial, place)
+    finally:
+        discard(partial)
+        lock.free()
+    return place
+
+
+def _waited_for(place: Path) -> ProcessLock | None:
+    """The lock on a place; None once somebody else has made what belongs there."""
+    while True:
+        lock = ProcessLock.take(place.with_name(f"{place.name}.lock"))
+        if lock is not None:
+            return lock
+        time.sleep(WAIT_SECONDS)
+        if place.is_dir():
+            return None
+
 
 Array = NDArray[np.float64]
 
