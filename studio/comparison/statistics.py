@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 # Of a sample; one that takes `axis`, like NumPy's, is many times as fast.
 Statistic = Callable[..., ArrayLike]
 
-RESAMPLES = 9999
+RESAMPLES, LEVEL = 9999, 0.95
 SEED = 20050213
 
 
@@ -32,25 +32,19 @@ class SignTest(NamedTuple):
     p: float
 
 
-def bootstrap_interval(
-    values: Iterable[float], statistic: Statistic = np.mean, level: float = 0.95
-) -> tuple[float, float]:
-    """Low and high end of a statistic's bootstrap interval (bias-corrected and accelerated; percentiles where that is
-    not defined), always the same for the same values. One value, or equal ones: that value twice; none: NaN twice.
+def bootstrap_interval(values: Iterable[float], statistic: Statistic = np.mean) -> tuple[float, float]:
+    """Low and high end of a statistic's bootstrap 95 % interval (bias-corrected and accelerated; percentiles where that
+    is not defined), always the same for the same values. One value, or equal ones: that value twice; none: NaN twice.
     """
-    sample = np.asarray(values, dtype=np.float64)
-    return _interval((sample,), statistic, level)
+    return _interval((np.array(list(values), dtype=np.float64),), statistic)
 
 
-def ratio_interval(
-    ours: ArrayLike, theirs: ArrayLike, statistic: Statistic = np.mean, level: float = 0.95
-) -> tuple[float, float]:
-    """The interval of statistic(ours) / statistic(theirs), both of the same seeds in the same order.
+def ratio_interval(ours: ArrayLike, theirs: ArrayLike) -> tuple[float, float]:
+    """The interval of mean(ours) / mean(theirs), both of the same seeds in the same order.
 
     Raises ValueError where they are not equally many.
     """
-    first, second = _pairs(ours, theirs)
-    return _interval((first, second), _ratio_of(statistic), level)
+    return _interval(_pairs(ours, theirs), _ratio)
 
 
 def sign_test(ours: ArrayLike, theirs: ArrayLike) -> SignTest:
@@ -89,18 +83,19 @@ def ratio_number(
     unit: str = "",
     paper: float | None = None,
     better: str = "",
-    statistic: Statistic = np.mean,
 ) -> Number:
-    """statistic(ours) / statistic(theirs) with its interval and verdict, paired by seed; pairs that are not finite
-    are left out. Raises ValueError where they are not equally many.
+    """mean(ours) / mean(theirs) with its interval and verdict, paired by seed; pairs that are not finite are left out.
+
+    Raises ValueError where they are not equally many.
     """
     first, second = _pairs(ours, theirs)
     finite = np.isfinite(first) & np.isfinite(second)
     first, second = first[finite], second[finite]
-    value = float(_ratio_of(statistic)(first, second)) if len(first) else math.nan
-    low, high = ratio_interval(first.tolist(), second.tolist(), statistic)
-    verdict = verdict_of(low, high, paper, better)
-    return Number(name, value, low, high, unit, paper, better, len(first), verdict)
+    value = float(_ratio(first, second)) if len(first) else math.nan
+    low, high = ratio_interval(first, second)
+    return Number(
+        name, value, low, high, unit, paper, better, len(first), verdict_of(low, high, paper, better)
+    )
 
 
 def verdict_of(low: float, high: float, paper: float | None, better: str = "") -> str:
@@ -134,7 +129,7 @@ def firmness(seeds: int) -> str:
     return f"not firm: {seeds} {'seed' if seeds == 1 else 'seeds'} of at least {FIRM_SEEDS}"
 
 
-def _interval(samples: tuple[Array, ...], statistic: Statistic, level: float) -> tuple[float, float]:
+def _interval(samples: tuple[Array, ...], statistic: Statistic) -> tuple[float, float]:
     count = len(samples[0])
     if count == 0:
         return math.nan, math.nan
@@ -149,7 +144,7 @@ def _interval(samples: tuple[Array, ...], statistic: Statistic, level: float) ->
                 samples,
                 statistic,
                 n_resamples=RESAMPLES,
-                confidence_level=level,
+                confidence_level=LEVEL,
                 method=method,
                 paired=len(samples) > 1,
                 rng=np.random.default_rng(SEED),
@@ -159,18 +154,8 @@ def _interval(samples: tuple[Array, ...], statistic: Statistic, level: float) ->
     return math.nan, math.nan
 
 
-def _ratio_of(statistic: Statistic) -> Callable[..., Array]:
-    """statistic(first) / statistic(second) along an axis."""
-
-    def along(sample: Array, axis: int) -> Array:
-        if statistic in (np.mean, np.median):
-            return np.asarray(statistic(sample, axis=axis))
-        return np.apply_along_axis(statistic, axis, sample)
-
-    def ratio(first: Array, second: Array, axis: int = -1) -> Array:
-        return along(first, axis) / along(second, axis)
-
-    return ratio
+def _ratio(first: Array, second: Array, axis: int = -1) -> Array:
+    return np.mean(first, axis=axis) / np.mean(second, axis=axis)
 
 
 def _pairs(ours: ArrayLike, theirs: ArrayLike) -> tuple[Array, Array]:
