@@ -10,7 +10,7 @@ from studio.comparison.findings import VERDICTS, Findings
 from studio.comparison.tracked import Attempt, Tracked, tracking_trial
 from studio.comparison.trials import Outcome, Scale, Trial
 from studio.reproduction.catalogue import EXPERIMENTS
-from studio.reproduction.experiment import Experiment, group_of
+from studio.reproduction.experiment import group_of
 from studio.reproduction.open_questions.generalisation import ENTRIES
 from studio.reproduction.plan import frames_of
 from studio.reproduction.tracking import by_group, curves, spells
@@ -59,20 +59,6 @@ def concluded(name: str, error_of) -> Findings:
     """The findings of an experiment whose runs have the error that `error_of(trial label)` says."""
     experiment = EXPERIMENTS[name]
     return experiment.conclude([made(trial, error_of(trial.label)) for trial in experiment.trials(SCALE)])
-
-
-@pytest.mark.parametrize("name", TRACKED)
-def test_trials_are_plain_distinct_and_fewer_or_shorter_when_quick(name: str) -> None:
-    experiment: Experiment = EXPERIMENTS[name]
-    full, quick = experiment.trials(SCALE), experiment.trials(Scale((0,), quick=True))
-    written = [json.dumps(trial.arguments, sort_keys=True) for trial in full]
-    assert len(set(written)) == len(written)
-    assert len({trial.label for trial in full}) == len(full)
-    for trial in full + quick:
-        arguments = json.loads(json.dumps(trial.arguments))
-        attempt = Attempt.of_plain(arguments.get("attempt", arguments))
-        assert attempt.footage in experiment.footage
-    assert len(quick) < len(full)
 
 
 @pytest.mark.parametrize("name", TRACKED)
