@@ -1,5 +1,7 @@
-"""Several recorded clips as one motion: each goes on where the one before ends, facing the same way, with a blend in
-which both are seen; what one clip leaves out in speed and heading, the next takes up.
+"""Recorded motion as recipes ask for it: a stretch of it, several clips as one, another performance of a whole.
+
+Joined clips go on where the one before ends, facing the same way, with a blend in which both are seen; what one clip
+leaves out in speed and heading, the next takes up.
 """
 
 from dataclasses import dataclass
