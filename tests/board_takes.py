@@ -6,13 +6,13 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from board_footage import BoardRenderer, close_boards, floor_board, waved_boards
 
 from studio.calibration.boards import Board
 from studio.capture.footage_source import CameraSource, FootageSource
 from studio.geometry.camera import Camera
 from studio.sessions.manifest import SessionManifest, now, write_manifest
 from studio.sessions.session import Session
-from studio.synthesis.board_footage import BoardRenderer, close_boards, floor_board, waved_boards
 from studio.synthesis.cameras import placed_camera
 
 BOARD = Board("charuco", 6, 5, 120.0, 90.0, "DICT_4X4_50")

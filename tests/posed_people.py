@@ -8,7 +8,7 @@ from studio.body.person import SIDES, PersonMotion, Skeleton, joint_points
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.geometry.rotations import axis_turn
-from studio.synthesis.posture import add_arm, trunk
+from studio.synthesis.gait import add_arm, trunk
 
 Array = NDArray[np.float64]
 Masks = dict[int, dict[str, NDArray[np.uint8]]]

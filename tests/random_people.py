@@ -14,9 +14,9 @@ from studio.geometry.rotations import axis_turn
 from studio.motion_files.trc import write_trc
 from studio.sessions.importers.importing import import_source
 from studio.sessions.session import Session
+from studio.synthesis.gait import add_arm, trunk
 from studio.synthesis.person import yaw_pitch_roll
 from studio.synthesis.person_footage import render_person
-from studio.synthesis.posture import add_arm, trunk
 from studio.synthesis.recipe_file import Recipe
 
 FPS = 60.0

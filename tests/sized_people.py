@@ -77,7 +77,7 @@ def drawn_and_seen(rng: np.random.Generator) -> tuple[Skeleton, float, tuple[Cam
 
 def renderer_of(cameras: tuple[Camera, ...], motion: PersonMotion, seed: int, noise: float) -> Renderer:
     """The person in stripes, in a furnished room. noise : of the pictures, grey levels."""
-    room, wardrobe = ROOMS["furnished"](0.0), WARDROBES["striped"]
+    room, wardrobe = ROOMS["furnished"], WARDROBES["striped"]
     return Renderer(room, cameras, motion, noise=noise, samples=1, seed=seed, wardrobe=wardrobe)
 
 

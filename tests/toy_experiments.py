@@ -7,18 +7,18 @@ import math
 import os
 import signal
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from studio.comparison.findings import Chart, Findings, Heat, Series, Table
+from studio.comparison.findings import Chart, Heat, Series, Table
 from studio.comparison.footage_shelf import FootageShelf
-from studio.comparison.statistics import number, overall
+from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial
 from studio.errors import StudioError
-from studio.reproduction.experiment import Experiment
+from studio.reproduction.experiment import Experiment, Part
 
 SETTINGS = ("plain", "clever")
 
@@ -61,37 +61,26 @@ def toy(
         claim="The clever setting is at 30 mm, ten below the plain one.",
         trials=_trials(log, deeds),
         measure=measure,
-        conclude=conclude,
+        shown=shown,
         footage=footage,
         alone=alone,
     )
 
 
-def conclude(outcomes: Sequence[Outcome]) -> Findings:
+def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     """Numbers of every verdict, a table, and a chart of every kind."""
     errors = {
         name: [o.measured["error"] for o in outcomes if o.trial.arguments["setting"] == name]
         for name in SETTINGS
     }
-    numbers = (
-        number("error, plain", errors["plain"], "mm", paper=40.0, better="lower"),
-        number("error, clever", errors["clever"], "mm", paper=38.0, better="lower"),
-        number("seeds' gap", [o.measured["gap"] for o in outcomes]),
-    )
-    return Findings(
-        overall(entry.verdict for entry in numbers),
-        "As the paper says.",
-        numbers,
-        (
-            Table(
-                "By setting",
-                ("setting", "error (mm)"),
-                tuple((k, float(np.mean(v))) for k, v in errors.items()),
-            ),
-        ),
-        _charts(outcomes, errors),
-        {"particles": 200, "survival": 0.5},
-    )
+    yield number("error, plain", errors["plain"], "mm", paper=40.0, better="lower")
+    yield number("error, clever", errors["clever"], "mm", paper=38.0, better="lower")
+    yield number("seeds' gap", [o.measured["gap"] for o in outcomes])
+    yield "As the paper says."
+    means = tuple((name, float(np.mean(values))) for name, values in errors.items())
+    yield Table("By setting", ("setting", "error (mm)"), means)
+    yield from _charts(outcomes, errors)
+    yield {"particles": 200, "survival": 0.5}
 
 
 def _charts(outcomes: Sequence[Outcome], errors: Mapping[str, list[float]]) -> tuple[Chart, ...]:

@@ -11,7 +11,6 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.benchmarks.made_scene import camera_towards, filled
 from studio.benchmarks.timing import quickest
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_frames
@@ -23,6 +22,8 @@ from studio.geometry.cones import limb_outlines
 from studio.geometry.projection import project
 from studio.numba_in_threads import numba
 from studio.progress import Progress
+from studio.synthesis.arm_footage import filled
+from studio.synthesis.cameras import ring_camera
 from studio.volume.reconstruction import HullSettings, Reconstructor
 from studio.volume.tracking_space import box_of
 
@@ -30,8 +31,8 @@ Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 
 WIDTH, HEIGHT, FOCAL = 320, 240, 300.0
-DISTANCE, LOW, HIGH = 3300.0, 1500.0, 2500.0
-"""mm: the ring's radius, and the cameras' heights in turn."""
+DISTANCE, LOW, HIGH, MIDDLE = 3300.0, 1500.0, 2500.0, 950.0
+"""mm: the ring's radius, the cameras' heights in turn, and that of a person's middle."""
 VIEWS, DEPTHS = (3, 4, 5), (6, 7, 8)
 TABLE_1 = {3: (11.0, 24.1, 73.5), 4: (11.1, 22.8, 66.0), 5: (12.8, 28.1, 78.6)}
 """Milliseconds by number of views, at depths 6, 7 and 8."""
@@ -84,14 +85,12 @@ def run_hull_benchmark(
 
 def ring_of_small_cameras(count: int) -> tuple[Camera, ...]:
     """Cameras around the world's origin, looking at a person's middle, in turn lower and higher."""
-    cameras: list[Camera] = []
-    for number in range(count):
-        bearing = 2.0 * np.pi * number / count + 0.3
-        height = HIGH if number % 2 else LOW
-        centre = np.array([DISTANCE * np.cos(bearing), DISTANCE * np.sin(bearing), height])
-        middle = np.array([0.0, 0.0, 950.0])
-        cameras.append(camera_towards(f"ring{number + 1}", (WIDTH, HEIGHT), FOCAL, centre, middle))
-    return tuple(cameras)
+    middle, size = np.array([0.0, 0.0, MIDDLE]), (WIDTH, HEIGHT)
+    places = (
+        (2.0 * np.pi * number / count + 0.3, DISTANCE, (HIGH if number % 2 else LOW) - MIDDLE)
+        for number in range(count)
+    )
+    return tuple(ring_camera(f"ring{at}", size, FOCAL, middle, place) for at, place in enumerate(places, 1))
 
 
 def hull_evidence(

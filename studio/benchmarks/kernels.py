@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.benchmarks.made_scene import camera_towards, filled
 from studio.benchmarks.timing import quickest
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends
@@ -24,6 +23,8 @@ from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
 from studio.numba_in_threads import numba
 from studio.progress import Progress
+from studio.synthesis.arm_footage import filled
+from studio.synthesis.cameras import ring_camera
 from studio.weighting.bodytrack import BodytrackSettings, BodytrackWeigher
 from studio.weighting.edge_region import EdgeRegionProblem, EdgeRegionSettings, EdgeRegionWeigher
 from studio.weighting.edge_region_kernels import LANES, loads_only
@@ -97,20 +98,17 @@ def run_benchmark(
 def ring_of_cameras(body: BodyModel) -> tuple[Camera, ...]:
     """Four cameras around a body in its neutral pose, looking at its middle."""
     middle = limb_ends(body, body.neutral[None]).reshape(-1, 3).mean(axis=0)
-    cameras: list[Camera] = []
-    for number in range(4):
-        bearing = np.deg2rad(45.0 + 90.0 * number)
-        centre = middle + np.array([DISTANCE * np.cos(bearing), DISTANCE * np.sin(bearing), ABOVE])
-        cameras.append(camera_towards(f"made{number + 1}", (WIDTH, HEIGHT), FOCAL, centre, middle))
-    return tuple(cameras)
+    bearings = np.deg2rad(45.0 + 90.0 * np.arange(4))
+    return tuple(
+        ring_camera(f"made{number}", (WIDTH, HEIGHT), FOCAL, middle, (bearing, DISTANCE, ABOVE))
+        for number, bearing in enumerate(bearings, 1)
+    )
 
 
 def made_evidence(
     body: BodyModel, cameras: tuple[Camera, ...], rng: np.random.Generator
 ) -> dict[str, FrameEvidence]:
-    """A frame of the body in its neutral pose as its cones, brighter than a noisy ground, by kind of edge
-    map.
-    """
+    """A frame of the body in its neutral pose as its cones, brighter than a noisy ground, by kind of edge map."""
     corners, _ = OutlineProjector.of_body(body, cameras).corners(body.neutral[None])
     frames: dict[str, list[ViewEvidence]] = {"proximity": [], "bodytrack": []}
     for camera, outlines in zip(cameras, corners[0], strict=True):

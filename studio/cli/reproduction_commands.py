@@ -18,8 +18,7 @@ from studio.reproduction.catalogue import EXPERIMENTS, find_experiments
 from studio.reproduction.experiment import Experiment
 from studio.reproduction.findings_files import number_in_words, read_findings
 from studio.reproduction.plan import FULL_SEEDS, QUICK_SEEDS, scale_of
-from studio.reproduction.runner import Reproduction, reproduce
-from studio.reproduction.trial_pace import Report
+from studio.reproduction.runner import Report, Reproduction, reproduce
 from studio.sessions.workspace import workspace_root
 
 NOT_CONCLUDED = 1

@@ -2,13 +2,10 @@
 
 import csv
 import io
-from dataclasses import asdict
 from typing import Any
 
-import numpy as np
-
-from studio.comparison.findings import Chart, Findings, Number, Series, Table
-from studio.comparison.plan import Comparison, PairTest, TrackerResult, mean_curve
+from studio.comparison.findings import Chart, Findings, Series, Table
+from studio.comparison.plan import Comparison, PairTest, TrackerResult
 from studio.comparison.statistics import SignTest, number
 from studio.settings import values
 
@@ -28,7 +25,9 @@ def findings(comparison: Comparison) -> Findings:
     return Findings(
         verdict="answered",
         words=in_words(comparison),
-        numbers=tuple(_number(result) for result in comparison.trackers),
+        numbers=tuple(
+            number(f"{result.tracker}: mean error", result.means, "mm") for result in comparison.trackers
+        ),
         tables=(_table(comparison), _tests(comparison)) if comparison.pairs else (_table(comparison),),
         charts=(error_chart(comparison), seeds_chart(comparison)),
         settings=_settings(comparison),
@@ -43,15 +42,15 @@ def error_chart(comparison: Comparison) -> Chart:
         if len(result.seeds) > 1:
             series += [
                 Series(
-                    f"{result.tracker}, seed {seed.seed}",
+                    f"{result.tracker}, seed {seed}",
                     frames,
-                    seed.per_frame_mm,
+                    tuple(run.per_frame_mm),
                     group=result.tracker,
                     thin=True,
                 )
-                for seed in result.seeds
+                for seed, run in zip(comparison.plan.seeds, result.seeds, strict=True)
             ]
-        series.append(Series(result.tracker, frames, mean_curve(result), group=result.tracker))
+        series.append(Series(result.tracker, frames, tuple(result.curve), group=result.tracker))
     return Chart("Error over the frames", "lines", "frame", "mean error of the markers (mm)", tuple(series))
 
 
@@ -62,7 +61,7 @@ def seeds_chart(comparison: Comparison) -> Chart:
         Series(
             result.tracker,
             tuple(float(at) for at in range(len(names))),
-            tuple(seed.mean_mm for seed in result.seeds),
+            tuple(result.means),
             group=result.tracker,
         )
         for result in comparison.trackers
@@ -80,7 +79,7 @@ def document(comparison: Comparison) -> dict[str, Any]:
         "body": plan.body,
         "evaluations": plan.evaluations,
         "seeds": list(plan.seeds),
-        "trackers": [_plain_tracker(result) for result in comparison.trackers],
+        "trackers": [_plain_tracker(result, plan.seeds) for result in comparison.trackers],
         "settings": {
             candidate.name: {"weighting": candidate.weighting, **dict(candidate.changes)}
             for candidate in plan.entrants
@@ -103,9 +102,9 @@ def frames_csv(comparison: Comparison) -> str:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("tracker", "seed", "frame", "error_mm", "limbs_lost"))
     for result in comparison.trackers:
-        for seed in result.seeds:
-            for frame, error, lost in zip(comparison.frames, seed.per_frame_mm, seed.lost, strict=True):
-                writer.writerow((result.tracker, seed.seed, frame, f"{error:.3f}", " ".join(lost)))
+        for seed, run in zip(comparison.plan.seeds, result.seeds, strict=True):
+            for frame, error, lost in zip(comparison.frames, run.per_frame_mm, run.lost, strict=True):
+                writer.writerow((result.tracker, seed, frame, f"{error:.3f}", " ".join(lost)))
     return text.getvalue()
 
 
@@ -165,15 +164,11 @@ def _share(test: SignTest, ahead: bool) -> str:
     return f"{count} of {test.better + test.worse + test.ties}"
 
 
-def _number(result: TrackerResult) -> Number:
-    return number(f"{result.tracker}: mean error", [seed.mean_mm for seed in result.seeds], "mm")
-
-
 def _table(comparison: Comparison) -> Table:
     frames = max(1, comparison.plan.frame_count - 1)
     rows: list[tuple[Any, ...]] = []
     for result in comparison.trackers:
-        means = [seed.mean_mm for seed in result.seeds]
+        means = result.means
         clean = sum(seed.lost_frames == 0 for seed in result.seeds)
         count = len(result.seeds)
         rows.append(
@@ -223,13 +218,13 @@ def _settings(comparison: Comparison) -> dict[str, Any]:
     return told
 
 
-def _plain_tracker(result: TrackerResult) -> dict[str, Any]:
-    """A tracker's fields and its seeds', without single frames."""
-    fields = asdict(result)
-    left_out = ("per_frame_mm", "lost")
-    fields["seeds"] = [
-        {name: value for name, value in asdict(seed).items() if name not in left_out} for seed in result.seeds
+def _plain_tracker(result: TrackerResult, seeds: tuple[int, ...]) -> dict[str, Any]:
+    """A tracker's figures and its seeds', without single frames."""
+    names = ("evaluations", "mean_mm", "worst_mm", "lost_frames", "seconds")
+    runs = [
+        {"tracker": result.tracker, **{name: getattr(run, name) for name in names}, "seed": seed}
+        for seed, run in zip(seeds, result.seeds, strict=True)
     ]
-    fields["mean_mm"] = round(float(np.float64(result.mean_mm)), 4)
-    fields["seconds"] = round(result.seconds, 4)
-    return fields
+    fields = {name: getattr(result, name) for name in names}
+    rounded = {"mean_mm": round(result.mean_mm, 4), "seconds": round(result.seconds, 4)}
+    return {"tracker": result.tracker, **fields, **rounded, "seeds": runs}

@@ -41,9 +41,7 @@ class FootageShelf:
         self._footage: tuple[Path, Footage, Backgrounds] | None = None
 
     def session(self, name: str) -> Session:
-        """A recipe's session, or any session by the path of its folder. Raises SessionError where there is
-        none.
-        """
+        """A recipe's session, or any session by the path of its folder. Raises SessionError where there is none."""
         path = Path(name) if Path(name).is_absolute() else self.folder / name
         if not (path / "session.json").is_file():
             raise SessionError(

@@ -31,9 +31,8 @@ SCIENCE = (
 class KeptOutcome:
     """What became of a trial.
 
-    measured : plain values, None where it failed. failure : why, "" where it did not. seconds : it took.
-    software : what measured it. finished : UTC, ISO 8601. label, arguments : of the trial, for people who read the
-    file.
+    measured : plain values, None where it failed. failure : why, "" where it did not. seconds : it took. software :
+    what measured it. finished : UTC, ISO 8601. label, arguments : of the trial, for people who read the file.
     """
 
     measured: Mapping[str, Plain] | None

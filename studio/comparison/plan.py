@@ -6,17 +6,16 @@ them: `trials`, `conclude`. Trials are made and measured as those of the experim
 """
 
 import hashlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
 from studio.body.model import BodyModel
 from studio.comparison.candidates import Candidate, Lineup, candidates
 from studio.comparison.statistics import SignTest, sign_test
-from studio.comparison.tracked import Attempt
-from studio.comparison.tracking_trials import tracking_trial
+from studio.comparison.tracked import Attempt, Tracked, tracking_trial
 from studio.comparison.trials import Outcome, Trial
 from studio.errors import RunError, TruthError
 from studio.runs.behaviour_models import ChosenModel, chosen_model, needs_model
@@ -56,37 +55,46 @@ class Plan:
 
 
 @dataclass(frozen=True, slots=True)
-class SeedResult:
-    """One tracker with one seed, mm without alignment.
-
-    worst_mm : mean of the markers in the worst frame. lost_frames : frames with any limb lost. seconds : of the
-    search. per_frame_mm : in the order of the comparison's frames. lost : in that order the limbs that are lost.
-    """
-
-    tracker: str
-    evaluations: int
-    mean_mm: float
-    worst_mm: float
-    lost_frames: int
-    seconds: float
-    seed: int
-    per_frame_mm: tuple[float, ...]
-    lost: tuple[tuple[str, ...], ...]
-
-
-@dataclass(frozen=True, slots=True)
 class TrackerResult:
-    """One tracker over all seeds, taken together: the mean error, the worst frame of any seed, the frames with a limb
-    lost and the seconds of all seeds.
-    """
+    """One tracker over all seeds. seeds : its runs, in the order of the plan's."""
 
     tracker: str
-    evaluations: int
-    mean_mm: float
-    worst_mm: float
-    lost_frames: int
-    seconds: float
-    seeds: tuple[SeedResult, ...]
+    seeds: tuple[Tracked, ...]
+
+    @property
+    def evaluations(self) -> int:
+        """Poses weighed in a frame."""
+        return self.seeds[0].evaluations
+
+    @property
+    def means(self) -> list[float]:
+        """The mean error of each seed, mm."""
+        return [seed.mean_mm for seed in self.seeds]
+
+    @property
+    def mean_mm(self) -> float:
+        """The mean error over all seeds."""
+        return float(np.mean(self.means))
+
+    @property
+    def worst_mm(self) -> float:
+        """The mean of the markers in the worst frame of any seed."""
+        return max(seed.worst_mm for seed in self.seeds)
+
+    @property
+    def lost_frames(self) -> int:
+        """Frames with any limb lost, of all seeds."""
+        return sum(seed.lost_frames for seed in self.seeds)
+
+    @property
+    def seconds(self) -> float:
+        """The search's, of all seeds."""
+        return sum(seed.seconds for seed in self.seeds)
+
+    @property
+    def curve(self) -> list[float]:
+        """The error of each frame, mean over the seeds, mm."""
+        return np.array([seed.per_frame_mm for seed in self.seeds]).mean(axis=0).tolist()
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,9 +153,7 @@ def plan_comparison(
     begin, end = checked_frames(session, first, last)
     model = session.body(body or None)
     start_pose(session, model, None)
-    taking_part = candidates(
-        Lineup(lineup.names, weighting, lineup.evaluations, lineup.layers, lineup.changes)
-    )
+    taking_part = candidates(replace(lineup, weighting=weighting))
     chosen = _chosen_model(session, model, taking_part, behaviour)
     return Plan(
         footage=str(session.path.absolute()),
@@ -176,23 +182,22 @@ def trials(plan: Plan) -> tuple[Trial, ...]:
 
 def conclude(plan: Plan, outcomes: Sequence[Outcome]) -> Comparison:
     """The comparison from the outcomes of all trials, in the order of `trials`."""
-    measured = iter(outcome.measured for outcome in outcomes)
-    found: dict[str, list[SeedResult]] = {candidate.name: [] for candidate in plan.entrants}
-    frames: tuple[int, ...] = ()
-    for seed in plan.seeds:
-        for candidate in plan.entrants:
-            values = next(measured)
-            frames = tuple(values["frames"])
-            found[candidate.name].append(_seed_result(candidate.name, seed, values))
-    trackers = tuple(_tracker_result(name, tuple(seeds)) for name, seeds in found.items())
-    pairs = tuple(_pair(first, second) for at, first in enumerate(trackers) for second in trackers[at + 1 :])
-    return Comparison(plan, frames, trackers, pairs)
-
-
-def mean_curve(result: TrackerResult) -> tuple[float, ...]:
-    """The error of each frame, mean over the seeds, mm."""
-    rows = np.array([seed.per_frame_mm for seed in result.seeds])
-    return tuple(float(value) for value in rows.mean(axis=0))
+    count = len(plan.entrants)
+    runs = [Tracked(**outcome.measured) for outcome in outcomes]
+    trackers = tuple(
+        TrackerResult(candidate.name, tuple(runs[place::count]))
+        for place, candidate in enumerate(plan.entrants)
+    )
+    pairs = tuple(
+        PairTest(
+            first.tracker,
+            second.tracker,
+            sign_test(first.curve, second.curve),
+            sign_test(first.means, second.means),
+        )
+        for first, second in combinations(trackers, 2)
+    )
+    return Comparison(plan, tuple(runs[-1].frames), trackers, pairs)
 
 
 def _chosen_model(
@@ -206,6 +211,7 @@ def _chosen_model(
 
 
 def _attempt(plan: Plan, candidate: Candidate, seed: int) -> Attempt:
+    guided = plan.behaviour_path and needs_model(candidate.tracker, candidate.settings().tracker)
     return Attempt(
         plan.footage,
         candidate.tracker,
@@ -215,46 +221,5 @@ def _attempt(plan: Plan, candidate: Candidate, seed: int) -> Attempt:
         plan.first,
         plan.last,
         body=plan.body,
-        behaviour=_behaviour_of(plan, candidate),
-    )
-
-
-def _behaviour_of(plan: Plan, candidate: Candidate) -> str:
-    """The file of the model that an candidate is guided by, "" for one that is not."""
-    guided = plan.behaviour_path and needs_model(candidate.tracker, candidate.settings().tracker)
-    return plan.behaviour_path if guided else ""
-
-
-def _seed_result(name: str, seed: int, values: Mapping[str, Any]) -> SeedResult:
-    return SeedResult(
-        tracker=name,
-        evaluations=values["evaluations"],
-        mean_mm=values["mean_mm"],
-        worst_mm=values["worst_mm"],
-        lost_frames=values["lost_frames"],
-        seconds=values["seconds"],
-        seed=seed,
-        per_frame_mm=tuple(values["per_frame_mm"]),
-        lost=tuple(tuple(limbs) for limbs in values["lost"]),
-    )
-
-
-def _tracker_result(name: str, seeds: tuple[SeedResult, ...]) -> TrackerResult:
-    return TrackerResult(
-        tracker=name,
-        evaluations=seeds[0].evaluations,
-        mean_mm=float(np.mean([seed.mean_mm for seed in seeds])),
-        worst_mm=max(seed.worst_mm for seed in seeds),
-        lost_frames=sum(seed.lost_frames for seed in seeds),
-        seconds=sum(seed.seconds for seed in seeds),
-        seeds=seeds,
-    )
-
-
-def _pair(first: TrackerResult, second: TrackerResult) -> PairTest:
-    return PairTest(
-        first.tracker,
-        second.tracker,
-        sign_test(mean_curve(first), mean_curve(second)),
-        sign_test([seed.mean_mm for seed in first.seeds], [seed.mean_mm for seed in second.seeds]),
+        behaviour=plan.behaviour_path if guided else "",
     )

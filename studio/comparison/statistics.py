@@ -6,7 +6,7 @@ wholly on the better side of it (better), or does not (not reproduced). It is fi
 
 import math
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 # Of a sample; one that takes `axis`, like NumPy's, is many times as fast.
 Statistic = Callable[..., ArrayLike]
 
-RESAMPLES = 9999
+RESAMPLES, LEVEL = 9999, 0.95
 SEED = 20050213
 
 
@@ -32,29 +32,22 @@ class SignTest(NamedTuple):
     p: float
 
 
-def bootstrap_interval(
-    values: Sequence[float], statistic: Statistic = np.mean, level: float = 0.95
-) -> tuple[float, float]:
-    """Low and high end of a statistic's bootstrap interval (bias-corrected and accelerated; percentiles where
-    that is not defined), always the same for the same values. One value, or equal ones: that value twice; none:
-    NaN twice.
+def bootstrap_interval(values: Iterable[float], statistic: Statistic = np.mean) -> tuple[float, float]:
+    """Low and high end of a statistic's bootstrap 95 % interval (bias-corrected and accelerated; percentiles where that
+    is not defined), always the same for the same values. One value, or equal ones: that value twice; none: NaN twice.
     """
-    sample = np.asarray(values, dtype=np.float64)
-    return _interval((sample,), statistic, level)
+    return _interval((np.array(list(values), dtype=np.float64),), statistic)
 
 
-def ratio_interval(
-    ours: Sequence[float], theirs: Sequence[float], statistic: Statistic = np.mean, level: float = 0.95
-) -> tuple[float, float]:
-    """The interval of statistic(ours) / statistic(theirs), both of the same seeds in the same order.
+def ratio_interval(ours: ArrayLike, theirs: ArrayLike) -> tuple[float, float]:
+    """The interval of mean(ours) / mean(theirs), both of the same seeds in the same order.
 
     Raises ValueError where they are not equally many.
     """
-    first, second = _pairs(ours, theirs)
-    return _interval((first, second), _ratio_of(statistic), level)
+    return _interval(_pairs(ours, theirs), _ratio)
 
 
-def sign_test(ours: Sequence[float], theirs: Sequence[float]) -> SignTest:
+def sign_test(ours: ArrayLike, theirs: ArrayLike) -> SignTest:
     """Whether ours is smaller than theirs, pair by pair (two-sided sign test).
 
     Raises ValueError where they are not equally many.
@@ -67,7 +60,7 @@ def sign_test(ours: Sequence[float], theirs: Sequence[float]) -> SignTest:
 
 def number(
     name: str,
-    values: Sequence[float],
+    values: Iterable[float],
     unit: str = "",
     paper: float | None = None,
     better: str = "",
@@ -85,23 +78,24 @@ def number(
 
 def ratio_number(
     name: str,
-    ours: Sequence[float],
-    theirs: Sequence[float],
+    ours: ArrayLike,
+    theirs: ArrayLike,
     unit: str = "",
     paper: float | None = None,
     better: str = "",
-    statistic: Statistic = np.mean,
 ) -> Number:
-    """statistic(ours) / statistic(theirs) with its interval and verdict, paired by seed; pairs that are not finite
-    are left out. Raises ValueError where they are not equally many.
+    """mean(ours) / mean(theirs) with its interval and verdict, paired by seed; pairs that are not finite are left out.
+
+    Raises ValueError where they are not equally many.
     """
     first, second = _pairs(ours, theirs)
     finite = np.isfinite(first) & np.isfinite(second)
     first, second = first[finite], second[finite]
-    value = float(_ratio_of(statistic)(first, second)) if len(first) else math.nan
-    low, high = ratio_interval(first.tolist(), second.tolist(), statistic)
-    verdict = verdict_of(low, high, paper, better)
-    return Number(name, value, low, high, unit, paper, better, len(first), verdict)
+    value = float(_ratio(first, second)) if len(first) else math.nan
+    low, high = ratio_interval(first, second)
+    return Number(
+        name, value, low, high, unit, paper, better, len(first), verdict_of(low, high, paper, better)
+    )
 
 
 def verdict_of(low: float, high: float, paper: float | None, better: str = "") -> str:
@@ -135,7 +129,7 @@ def firmness(seeds: int) -> str:
     return f"not firm: {seeds} {'seed' if seeds == 1 else 'seeds'} of at least {FIRM_SEEDS}"
 
 
-def _interval(samples: tuple[Array, ...], statistic: Statistic, level: float) -> tuple[float, float]:
+def _interval(samples: tuple[Array, ...], statistic: Statistic) -> tuple[float, float]:
     count = len(samples[0])
     if count == 0:
         return math.nan, math.nan
@@ -150,7 +144,7 @@ def _interval(samples: tuple[Array, ...], statistic: Statistic, level: float) ->
                 samples,
                 statistic,
                 n_resamples=RESAMPLES,
-                confidence_level=level,
+                confidence_level=LEVEL,
                 method=method,
                 paired=len(samples) > 1,
                 rng=np.random.default_rng(SEED),
@@ -160,21 +154,11 @@ def _interval(samples: tuple[Array, ...], statistic: Statistic, level: float) ->
     return math.nan, math.nan
 
 
-def _ratio_of(statistic: Statistic) -> Callable[..., Array]:
-    """statistic(first) / statistic(second) along an axis."""
-
-    def along(sample: Array, axis: int) -> Array:
-        if statistic in (np.mean, np.median):
-            return np.asarray(statistic(sample, axis=axis))
-        return np.apply_along_axis(statistic, axis, sample)
-
-    def ratio(first: Array, second: Array, axis: int = -1) -> Array:
-        return along(first, axis) / along(second, axis)
-
-    return ratio
+def _ratio(first: Array, second: Array, axis: int = -1) -> Array:
+    return np.mean(first, axis=axis) / np.mean(second, axis=axis)
 
 
-def _pairs(ours: Sequence[float], theirs: Sequence[float]) -> tuple[Array, Array]:
+def _pairs(ours: ArrayLike, theirs: ArrayLike) -> tuple[Array, Array]:
     first, second = np.asarray(ours, dtype=np.float64), np.asarray(theirs, dtype=np.float64)
     if first.shape != second.shape:
         raise ValueError(f"{len(first)} values cannot be paired with {len(second)}.")

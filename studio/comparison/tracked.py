@@ -1,6 +1,5 @@
 """A tracker on a footage, kept in memory only: the trial that most experiments are made of."""
 
-import dataclasses
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
@@ -16,22 +15,20 @@ from studio.body.inverse_kinematics import known_markers, pose_from_markers
 from studio.body.model import BodyModel
 from studio.body.subject import read_subject
 from studio.comparison.footage_shelf import FootageShelf
+from studio.comparison.trials import Trial, kept_as
 from studio.errors import NotFoundError, TruthError
 from studio.evaluation.errors import evaluate, rows_of_frames
-from studio.evidence.distance_maps import silhouettes_by_camera
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 from studio.motion_files.trc import read_trc
 from studio.runs.behaviour_models import check_prediction, fitting, model_folders, model_path
-from studio.runs.run_behaviour import learner_of
+from studio.runs.following import Following
 from studio.runs.search_space import search_space, session_sigma
-from studio.runs.shape_on_the_way import WEIGHTING, FittedShape, shaped_body
+from studio.runs.shape_on_the_way import WEIGHTING, shaped_body
 from studio.runs.sides import known_silhouettes
 from studio.sessions.session import Session
 from studio.settings import RunSettings, changed_settings, default_settings
-from studio.tracking.catalogue import TRACKERS
-from studio.tracking.frame_loop import search_frame
-from studio.tracking.frame_refinement import FrameRefiner, space_after
+from studio.tracking.frame_refinement import FrameRefiner
 from studio.tracking.refinement import Distances
 from studio.tracking.side_exchange import with_sides_right
 from studio.tracking.tracker import LayerRecord, start_of
@@ -135,131 +132,51 @@ def track(
     body = session.body(attempt.body or None, subject)
     changes = {**AS_PUBLISHED, **attempt.changes}
     settings = changed_settings(default_settings(attempt.tracker, attempt.weighting), changes)
-    follow = _Following(attempt, session, shelf, settings, spoilt)
-    start = _start_pose(session, body, attempt.first, session.manifest.fps)
+    cameras, fps = _cameras(session, attempt.cameras), session.manifest.fps
+    seen_with, rate = spoilt.cameras(cameras), fps / attempt.every
     frames = range(attempt.first, attempt.last or session.manifest.frame_count, attempt.every)
+
+    def evidence(frame: int, name: str = attempt.weighting) -> FrameEvidence:
+        """What is seen in a frame, as a weighting wants it."""
+        kind, pictures = WEIGHTINGS[name].edge_kind, WEIGHTINGS[name].reads_pictures
+        return spoilt.evidence(shelf.evidence(session, cameras, frame, settings.evidence, kind, pictures))
+
+    start = _start_pose(session, body, attempt.first, fps)
     if attempt.shape_frames and start is not None:
-        shaped = follow.shaped(body, start, frames[: attempt.shape_frames])
+        sigma, first = session_sigma(session, body, rate), frames[: attempt.shape_frames]
+        of_shape = partial(evidence, name=WEIGHTING)
+        shaped = shaped_body(body, seen_with, of_shape, first, np.array(start), sigma)
         body, start = shaped.body, tuple(float(value) for value in shaped.start)
-    found = follow(body, start, frames, on_layer=on_layer, on_frame=on_frame)
-    if settings.refinement.refine_frames:
-        found.poses = follow.sides_right(body, frames, found)
-    return measured(session, body, found.poses, np.array(frames), found.evaluations, found.seconds)
-
-
-@dataclass(slots=True, eq=False)
-class _Followed:
-    """poses (F, D) and log_weights (F,) of frames; memories: what the search knew in each; evaluations of one after the
-    first; seconds of the search.
-    """
-
-    poses: Array
-    log_weights: Array
-    memories: list[Mapping[str, Array]] = field(default_factory=list[Mapping[str, Array]])
-    evaluations: int = 0
-    seconds: float = 0.0
-
-
-class _Following:
-    """A session's frames followed with one tracker and its settings, by any body."""
-
-    def __init__(
-        self, attempt: Attempt, session: Session, shelf: FootageShelf, settings: RunSettings, spoilt: Changed
-    ) -> None:
-        self.attempt, self.session, self.shelf, self.settings = attempt, session, shelf, settings
-        self.spoilt, self.cameras = spoilt, _cameras(session, attempt.cameras)
-        self.seen_with = spoilt.cameras(self.cameras)
-
-    def evidence(self, frame: int, weighting: str = "") -> FrameEvidence:
-        """What is seen in a frame, as a weighting wants it ("": the attempt's)."""
-        reader = WEIGHTINGS[weighting or self.attempt.weighting]
-        return self.spoilt.evidence(
-            self.shelf.evidence(
-                self.session,
-                self.cameras,
-                frame,
-                self.settings.evidence,
-                reader.edge_kind,
-                reader.reads_pictures,
-            )
-        )
-
-    def shaped(self, body: BodyModel, start: tuple[float, ...], frames: range) -> FittedShape:
-        """The body in the shape that the first frames show, and its pose in the first."""
-        sigma = session_sigma(self.session, body, self.session.manifest.fps / self.attempt.every)
-        return shaped_body(
+    following = Following(
+        settings,
+        search_space(
             body,
-            self.seen_with,
-            lambda frame: self.evidence(frame, WEIGHTING),
-            frames,
-            np.array(start),
-            sigma,
-        )
-
-    def __call__(
-        self,
-        body: BodyModel,
-        start: tuple[float, ...] | None,
-        frames: range,
-        on_layer: Callable[[LayerRecord], None] | None = None,
-        on_frame: Callable[[int, int], None] | None = None,
-    ) -> _Followed:
-        """The frames followed from a start pose."""
-        attempt, settings = self.attempt, self.settings
-        fps = self.session.manifest.fps
-        behaviour = _behaviour(self.session, body, settings, attempt)
-        sigma = session_sigma(self.session, body, fps / attempt.every) * attempt.sigma_scale
-        space = search_space(body, sigma, behaviour)
-        learner = learner_of(behaviour, settings, attempt.seed)
-        weigher = WEIGHTINGS[attempt.weighting].prepare(body, self.seen_with, settings.weighting)
-        refiner = FrameRefiner(body, self.seen_with, attempt.seed)
-        carried = start_of(start)
-        found = _Followed(np.zeros((len(frames), len(body.parameters))), np.zeros(len(frames)))
-
-        def tracked(count: int) -> tuple[Array, Array]:
-            return found.poses[:count], found.log_weights[:count]
-
-        for number, frame in enumerate(frames):
-            seen = self.evidence(frame)
-            began = time.perf_counter()
-            if learner is not None:
-                space = dataclasses.replace(space, behaviour=learner.model_in(number, tracked))
-                carried = learner.carried_into(number, carried, tracked)
-            problem = weigher.problem(seen)
-            result = search_frame(
-                TRACKERS[attempt.tracker],
-                problem,
-                carried,
-                space_after(space, carried, settings.refinement),
-                seed=attempt.seed,
-                frame=frame,
-                settings_source=lambda: (1, settings.tracker),
-                repeats=settings.tracker.start_repeats if number == 0 else 1,
-                on_layer=on_layer,
-            )
-            result = refiner.refined(
-                result, partial(silhouettes_by_camera, seen), problem, settings.refinement
-            )
-            if number:
-                found.seconds += time.perf_counter() - began
-            carried, found.evaluations = result.carried, result.evaluations
-            found.poses[number], found.log_weights[number] = result.estimate.pose, result.estimate.log_weight
-            found.memories.append(carried.memory)
-            if on_frame is not None:
-                on_frame(number + 1, len(frames))
-        return found
-
-    def sides_right(self, body: BodyModel, frames: range, found: _Followed) -> Array:
-        """(F, D) the poses with left and right, front and back put right, as a finished run has them."""
-        rows = {frame: row for row, frame in enumerate(frames)}
+            session_sigma(session, body, rate) * attempt.sigma_scale,
+            _behaviour(session, body, settings, attempt),
+        ),
+        start_of(start),
+        attempt.seed,
+        FrameRefiner(body, seen_with, attempt.seed),
+        on_layer,
+    )
+    weigher = WEIGHTINGS[attempt.weighting].prepare(body, seen_with, settings.weighting)
+    seconds, evaluations = 0.0, 0
+    for number, frame in enumerate(frames):
+        seen = evidence(frame)
+        began = time.perf_counter()
+        evaluations = following.step(frame, weigher.problem(seen), seen).evaluations
+        seconds += time.perf_counter() - began if number else 0.0
+        if on_frame is not None:
+            on_frame(number + 1, len(frames))
+    poses = np.array(following.poses)
+    if settings.refinement.refine_frames:
 
         def silhouettes_of(frame: int) -> Mapping[str, Distances]:
-            row = rows[frame]
-            seen = self.evidence(frame)
-            return known_silhouettes(body, self.seen_with, seen, found.poses[row], found.memories[row])
+            row = frames.index(frame)
+            return known_silhouettes(body, seen_with, evidence(frame), poses[row], following.memories[row])
 
-        rate = self.session.manifest.fps / self.attempt.every
-        return with_sides_right(body, self.seen_with, np.array(frames), found.poses, rate, silhouettes_of)[0]
+        poses = with_sides_right(body, seen_with, np.array(frames), poses, rate, silhouettes_of)[0]
+    return measured(session, body, poses, np.array(frames), evaluations, seconds)
 
 
 def measured(
@@ -328,3 +245,17 @@ def _pose_on_truth(session: Session, body: BodyModel, frame: int, fps: float, ne
     kept, names = known_markers(body, truth.names)
     points = truth.positions[rows[frame], kept]
     return pose_from_markers(body, names, points, body.neutral if near is None else near)[0]
+
+
+# The trial that experiments on tracked footage and comparisons share: the same attempt is the same trial, whoever asks.
+
+
+def tracking_trial(group: str, attempt: Attempt) -> Trial:
+    """The trial of an attempt. group : contender and setting in words, the same for all its seeds."""
+    return Trial(f"{group}, seed {attempt.seed}", attempt.plain())
+
+
+@kept_as("tracking_trials.measure_tracking")
+def measure_tracking(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
+    """Track; the fields of `Tracked`."""
+    return asdict(track(Attempt.of_plain(arguments), shelf))

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from types import MappingProxyType
 
 from studio.errors import NotFoundError
+from studio.reproduction import fleischmann
 from studio.reproduction.caillette import (
     clusters_and_states,
     dynamics,
@@ -13,38 +14,35 @@ from studio.reproduction.caillette import (
     table_1,
 )
 from studio.reproduction.deutscher_reid import (
-    fig_3,
-    fig_7,
-    fig_16,
-    figs_19_and_20,
+    layers_of_a_body,
     localisation,
-    particles_on_arms,
-    particles_on_bodies,
+    particles_needed,
     processors,
     tracked_people,
+    weight_of_a_knee,
 )
 from studio.reproduction.experiment import Experiment
-from studio.reproduction.fleischmann import computation_time, figures
 from studio.reproduction.open_questions import generalisation, robustness
 
 # A new experiment is named here.
 LISTED: tuple[Experiment, ...] = (
-    fig_3.EXPERIMENT,
-    fig_7.EXPERIMENT,
+    layers_of_a_body.FIG_3,
+    weight_of_a_knee.FIG_7,
     tracked_people.FIG_8,
     *tracked_people.THREE_CAMERAS,
-    particles_on_bodies.MORE_LAYERS,
+    particles_needed.MORE_LAYERS,
     tracked_people.ENOUGH_PARTICLES,
     *localisation.EXPERIMENTS,
-    particles_on_arms.DIFFUSION,
-    fig_16.EXPERIMENT,
+    particles_needed.DIFFUSION,
+    localisation.FIG_16,
     *localisation.EXPERIMENTS_ON_BRANCHES,
-    particles_on_arms.CROSSOVER,
-    *figs_19_and_20.EXPERIMENTS,
-    particles_on_bodies.BOTH_IMPROVEMENTS,
+    particles_needed.CROSSOVER,
+    layers_of_a_body.FIG_19,
+    layers_of_a_body.FIG_20,
+    particles_needed.BOTH_IMPROVEMENTS,
     processors.EXPERIMENT,
-    *figures.EXPERIMENTS,
-    computation_time.EXPERIMENT,
+    *fleischmann.EXPERIMENTS,
+    fleischmann.COMPUTATION_TIME,
     clusters_and_states.EXPERIMENT,
     table_1.EXPERIMENT,
     dynamics.FIG_11_EXPERIMENT,

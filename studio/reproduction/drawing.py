@@ -1,6 +1,7 @@
 """Series and tables that experiments have in common: what rows of seeds look like."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,6 +11,7 @@ from studio.comparison.statistics import Statistic, bootstrap_interval
 
 Array = NDArray[np.float64]
 Values = Mapping[str, Sequence[float]]
+T = TypeVar("T")
 
 
 def places(count: int, first: int = 0) -> tuple[float, ...]:
@@ -77,6 +79,22 @@ def bar_chart(title: str, x: str, y: str, series: Sequence[Series], names: Itera
 def line_chart(title: str, x: str, y: str, series: Iterable[Series], *, log_y: bool = False) -> Chart:
     """Lines over an axis."""
     return Chart(title, "lines", x, y, tuple(series), log_y=log_y)
+
+
+def table_over(
+    title: str,
+    head: str,
+    columns: Mapping[str, Callable[[Sequence[T]], Any]],
+    groups: Mapping[str, Sequence[T]],
+    digits: int = 1,
+) -> Table:
+    """A line a group, a column a reading of its seeds. head : of the groups' names."""
+
+    def cell(value: Any) -> Any:  # noqa: ANN401
+        return round(value, digits) if isinstance(value, float) else value
+
+    rows = ((name, *(cell(of(found)) for of in columns.values())) for name, found in groups.items())
+    return Table(title, (head, *columns), tuple(rows))
 
 
 def heat_chart(title: str, x: str, y: str, columns: Iterable[str], rows: Values, digits: int = 2) -> Chart:

@@ -4,19 +4,18 @@ All that is done is kept at once: the same command goes on where a killed one st
 """
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from studio.comparison.findings_document import Document
+from studio.comparison.findings import VERDICTS, Findings
+from studio.comparison.findings_document import Document, Making, as_document, failed_document
 from studio.comparison.kept_trials import KeptOutcome, KeptTrials, measured_by
-from studio.comparison.trials import Scale, TrialJob
+from studio.comparison.trials import Outcome, Scale, Trial, TrialJob, failure_in_words
 from studio.errors import RunError, SessionError, StudioError
-from studio.reproduction.conclusion import conclude
 from studio.reproduction.experiment import Experiment
 from studio.reproduction.findings_files import FOOTAGE, TRIALS, write_findings, write_overview
 from studio.reproduction.plan import PlannedExperiment, each_once, footage_needed, is_rendered, plan
-from studio.reproduction.trial_pace import Report, TrialPace
 from studio.sessions.atomic_files import PARTIAL_PREFIX, discard, move_into_place, new_folder_beside
 from studio.sessions.manifest import FILE_NAME as MANIFEST
 from studio.sessions.manifest import now
@@ -27,6 +26,10 @@ from studio.worker.trial_process import TrialResult
 
 LOCK = "reproduction.lock"
 SECONDS_BETWEEN_REPORTS = 30.0
+
+# Called with a step in words, what is done of it, how much it is, and the seconds that are left (None: unknown).
+Report = Callable[[str, int, int, float | None], None]
+Kind = tuple[str, tuple[str, ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,6 +190,74 @@ class _Work:
     def _tell(self, step: str) -> None:
         waiting = [job for key, job in self._jobs.items() if key not in self._kept]
         self._report(step, len(self._kept), len(self._jobs), self._pace.left(waiting))
+
+
+def conclude(planned: PlannedExperiment, kept: Mapping[str, KeptOutcome]) -> Document:
+    """The document of an experiment whose trials have all been run. kept : their outcomes by key.
+
+    A trial that failed, and a conclusion that cannot be drawn, give a document with the verdict "failed".
+    """
+    outcomes = [kept[job.key] for job in planned.jobs]
+    making = Making(
+        planned.scale,
+        len(outcomes),
+        sum(outcome.seconds for outcome in outcomes),
+        measured_by(),
+        tuple(sorted({outcome.software for outcome in outcomes})),
+        now(),
+    )
+    reasons = [("", planned.problem)] if planned.problem else []
+    reasons += [(outcome.label, outcome.failure) for outcome in outcomes if outcome.measured is None]
+    if not reasons:
+        try:
+            return as_document(planned.experiment, _findings(planned, outcomes), making)
+        except Exception as error:
+            reasons = [("The conclusion", failure_in_words(error))]
+    return failed_document(planned.experiment, reasons, making)
+
+
+def _findings(planned: PlannedExperiment, outcomes: list[KeptOutcome]) -> Findings:
+    """Raises what the experiment's conclusion raises, and StudioError for a verdict that is none."""
+    found = planned.experiment.conclude(
+        [
+            Outcome(Trial(trial.label, job.arguments), outcome.measured or {})
+            for trial, job, outcome in zip(planned.trials, planned.jobs, outcomes, strict=True)
+        ]
+    )
+    for verdict in (found.verdict, *(number.verdict for number in found.numbers)):
+        if verdict not in VERDICTS:
+            raise StudioError(f"'{verdict}' is no verdict.", f"Use one of {', '.join(VERDICTS)}.")
+    return found
+
+
+class TrialPace:
+    """Mean seconds of trials by what is measured on which footage."""
+
+    def __init__(self, jobs: Mapping[str, TrialJob], kept: Mapping[str, KeptOutcome], processes: int) -> None:
+        self._processes = processes
+        self._taken: dict[Kind, list[float]] = {}
+        for key, outcome in kept.items():
+            self.took(jobs[key], outcome.seconds)
+
+    def took(self, job: TrialJob, seconds: float) -> None:
+        """A trial is done."""
+        self._taken.setdefault(_kind(job), []).append(seconds)
+
+    def left(self, waiting: Iterable[TrialJob]) -> float | None:
+        """Seconds for the trials that wait, None while nothing is known."""
+        known = [seconds for taken in self._taken.values() for seconds in taken]
+        if not known:
+            return None
+        together = alone = 0.0
+        for job in waiting:
+            taken = self._taken.get(_kind(job), known)
+            seconds = sum(taken) / len(taken)
+            together, alone = (together, alone + seconds) if job.alone else (together + seconds, alone)
+        return together / self._processes + alone
+
+
+def _kind(job: TrialJob) -> Kind:
+    return f"{job.measure.__module__}.{job.measure.__qualname__}", job.footage
 
 
 def _taken(out: Path) -> ProcessLock:

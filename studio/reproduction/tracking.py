@@ -1,29 +1,28 @@
-"""Experiments whose trials are tracked footage: contenders, their outcomes by group, curves and tables.
+"""Experiments whose trials are tracked footage: contenders, lines of settings, and what is read from their runs.
 
 Trials of the same attempt are the same trial whichever experiment asks for it, so figures that look at one set of
 runs from several sides share them.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from studio.comparison.findings import Chart, Number, Series, Table
-from studio.comparison.statistics import number, ratio_interval, sign_test
-from studio.comparison.tracked import Attempt, Tracked
-from studio.comparison.tracking_trials import group_of, measure_tracking, tracking_trial
-from studio.comparison.trials import Outcome, Trial
-from studio.reproduction.drawing import seeds_and_mean
-from studio.reproduction.experiment import Experiment, concluding
+from studio.comparison.statistics import number
+from studio.comparison.tracked import Attempt, Tracked, measure_tracking, tracking_trial
+from studio.comparison.trials import Outcome, Scale, Trial
+from studio.reproduction.claims import ratio, sign_tests
+from studio.reproduction.drawing import seeds_and_mean, table_over
+from studio.reproduction.experiment import ON_ALL, Experiment, Part, Verdict, grouped
 from studio.tracking.catalogue import knobs_for_evaluations
 
 Array = NDArray[np.float64]
-T = TypeVar("T")
-Groups = Mapping[str, Sequence[Tracked]]
-Claim = Callable[[Groups], Number | None]
+Runs = Sequence[Tracked]
+Groups = Mapping[str, Runs]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,18 +44,20 @@ class Contender:
 class Line:
     """A line of an experiment's table of settings: what is tracked with every seed.
 
-    evaluations : a frame, 0 where the contender's knobs say it. wanted : other fields of `Attempt`.
+    evaluations : a frame, 0 where the contender's knobs say it. wanted : other fields of `Attempt`, of a seed's own
+    where it is a function.
     """
 
     name: str
     contender: Contender
     footage: str
     evaluations: int = 0
-    wanted: Mapping[str, Any] = field(default_factory=dict)
+    wanted: Mapping[str, Any] | Callable[[int], Mapping[str, Any]] = field(default_factory=dict)
 
     def trial(self, seed: int) -> Trial:
         """The trial of a seed."""
-        attempt = self.contender.attempt(self.footage, seed, self.evaluations, **self.wanted)
+        wanted = self.wanted(seed) if callable(self.wanted) else self.wanted
+        attempt = self.contender.attempt(self.footage, seed, self.evaluations, **wanted)
         return tracking_trial(self.name, attempt)
 
 
@@ -67,167 +68,130 @@ def tracked_experiment(
     claim: str,
     *,
     lines: Callable[[bool], Iterable[Line]],
-    claims: Iterable[Claim],
-    words: Callable[[Groups, Sequence[Number]], str],
-    tables: Iterable[Callable[[Groups], Table]],
-    charts: Iterable[Callable[[Groups], Chart]],
-    settings: Mapping[str, Any] | Callable[[Sequence[Outcome]], Mapping[str, Any]],
-    judged: Callable[[Number], bool] = lambda number: True,
+    shown: Callable[[dict[str, list[Tracked]]], Iterable[Part]],
+    verdict: Verdict = ON_ALL,
 ) -> Experiment:
-    """An experiment that is a table of settings and one of claims.
-
-    lines : the settings, for a quick look or in full. claims and the rest : of `concluding`, from the runs by line.
+    """An experiment of tracked footage. lines : the settings, for a quick look or in full. shown : what the runs by
+    line say.
     """
+
+    def trials(scale: Scale) -> tuple[Trial, ...]:
+        return tuple(line.trial(seed) for line in lines(scale.quick) for seed in scale.seeds)
+
+    footage = tuple(dict.fromkeys(line.footage for line in lines(False)))
     return Experiment(
         name,
         title,
         source,
         claim,
-        lambda scale: tuple(line.trial(seed) for line in lines(scale.quick) for seed in scale.seeds),
+        trials,
         measure_tracking,
-        concluding(
-            by_group,
-            claims=claims,
-            words=words,
-            tables=tables,
-            charts=charts,
-            settings=settings,
-            judged=judged,
-        ),
-        tuple(dict.fromkeys(line.footage for line in lines(False))),
+        lambda found: shown(by_group(found)),
+        verdict,
+        footage,
     )
 
 
-def mean_of(name: str, group: str, paper: float | None = None) -> Claim:
-    """The mean over seeds of a line's mean error, beside the paper's."""
-    return lambda groups: mean_number(name, groups[group], paper)
+def by_group(outcomes: Sequence[Outcome]) -> dict[str, list[Tracked]]:
+    """What was tracked, by line in the order of the trials, seeds in order."""
+    return grouped(outcomes, Tracked)
 
 
-def worst_of(name: str, group: str, paper: float | None = None) -> Claim:
-    """The mean over seeds of a line's worst frame, beside the paper's."""
-    return lambda groups: mean_number(name, groups[group], paper, of=lambda run: run.worst_mm)
-
-
-def ratio_of(name: str, ours: str, theirs: str, claim: str) -> Claim:
-    """The ratio of two lines' mean errors; claim : "equal" or "lower"."""
-    return lambda groups: error_ratio(name, groups[ours], groups[theirs], claim)
-
-
-def summary(title: str) -> Callable[[Groups], Table]:
-    """`summary_table` of all lines."""
-    return lambda groups: summary_table(title, groups)
-
-
-def curves_of(title: str, names: Mapping[str, str], fps: float = 60.0) -> Callable[[Groups], Chart]:
-    """`curves` of some lines. names : in the chart, to the lines'."""
-    return lambda groups: curves(title, {name: groups[line] for name, line in names.items()}, fps)
-
-
-def mean_errors(runs: Sequence[Tracked]) -> list[float]:
+def mean_errors(runs: Runs) -> list[float]:
     """The mean error of every seed, mm."""
     return [run.mean_mm for run in runs]
 
 
-def grouped(outcomes: Sequence[Outcome], made: Callable[..., T]) -> dict[str, list[T]]:
-    """What was measured, by group in the order of the trials, seeds in order. made : from the plain fields."""
-    found: dict[str, list[T]] = {}
-    for outcome in outcomes:
-        found.setdefault(group_of(outcome.trial), []).append(made(**outcome.measured))
-    return found
+def lost_percent(run: Tracked) -> float:
+    """Frames with a limb lost, per cent."""
+    return 100.0 * run.lost_frames / len(run.frames)
 
 
-def by_group(outcomes: Sequence[Outcome]) -> dict[str, list[Tracked]]:
-    """What was tracked, by group in the order of the trials, seeds in order."""
-    return grouped(outcomes, Tracked)
+def mean_number(name: str, runs: Runs, paper: float | None = None) -> Number:
+    """The mean over seeds of the mean error, mm, beside the paper's."""
+    return number(name, mean_errors(runs), "mm", paper=paper, better="lower")
+
+
+def worst_number(name: str, runs: Runs, paper: float | None = None) -> Number:
+    """The mean over seeds of the worst frame, mm, beside the paper's."""
+    return number(name, [run.worst_mm for run in runs], "mm", paper=paper, better="lower")
+
+
+def error_ratio(name: str, ours: Runs, theirs: Runs, claim: str) -> Number:
+    """The ratio of two lines' mean errors. claim : of `ratio`."""
+    return ratio(name, mean_errors(ours), mean_errors(theirs), claim)
+
+
+def error_rows(runs: Runs) -> Array:
+    """(S, F) mean error of every seed and frame, mm."""
+    return np.array([run.per_frame_mm for run in runs])
+
+
+def error_tests(groups: Groups, pairs: Iterable[tuple[str, str]]) -> Table:
+    """`sign_tests` of lines' errors."""
+    return sign_tests(
+        lambda name: (mean_errors(groups[name]), error_rows(groups[name]).ravel().tolist()), pairs
+    )
 
 
 def curves(
-    title: str,
-    groups: Mapping[str, Sequence[Tracked]],
-    fps: float = 60.0,
-    bands: tuple[tuple[float, float, str], ...] = (),
+    title: str, groups: Groups, fps: float = 60.0, bands: tuple[tuple[float, float, str], ...] = ()
 ) -> Chart:
     """Error over frames: every seed thin, the mean over seeds thick. Frames are those of the footage at 60 Hz when
     `fps` is the footage's own rate (a frame k at 20 Hz is drawn at 3 k).
     """
     series: list[Series] = []
     for group, runs in groups.items():
-        frames = tuple(frame * 60.0 / fps for frame in runs[0].frames)
-        series += seeds_and_mean(group, frames, error_rows(runs))
+        series += seeds_and_mean(
+            group, tuple(frame * 60.0 / fps for frame in runs[0].frames), error_rows(runs)
+        )
     return Chart(title, "lines", "frame (at 60 Hz)", "mean error (mm)", tuple(series), bands=bands)
 
 
-def error_rows(runs: Sequence[Tracked]) -> Array:
-    """(S, F) mean error of every seed and frame, mm."""
-    return np.array([run.per_frame_mm for run in runs])
+def summary_table(title: str, groups: Groups) -> Table:
+    """A line a setting: error, worst frame, lost limbs, time."""
+    return table_over(title, "setting", COLUMNS, groups)
 
 
-def summary_table(title: str, groups: Mapping[str, Sequence[Tracked]]) -> Table:
-    """A line a group: error, worst frame, lost limbs, time."""
-    columns = (
-        "setting", "seeds", "evaluations a frame", "mean (mm)", "highest seed (mm)", "mean of worst frames (mm)",
-        "largest (mm)", "frames with a limb lost (%)", "runs without loss", "search (ms a frame)",
-    )  # fmt: skip
-    rows = []
-    for group, runs in groups.items():
-        means = [run.mean_mm for run in runs]
-        worst = [run.worst_mm for run in runs]
-        count = len(runs[0].frames)
-        rows.append(
-            (
-                group,
-                len(runs),
-                runs[0].evaluations,
-                round(float(np.mean(means)), 1),
-                round(max(means), 1),
-                round(float(np.mean(worst)), 1),
-                round(max(worst), 1),
-                round(100.0 * float(np.mean([run.lost_frames for run in runs])) / count, 1),
-                sum(not run.lost_limbs for run in runs),
-                round(1000.0 * float(np.mean([run.seconds for run in runs])) / max(1, count - 1), 1),
-            )
-        )
-    return Table(title, columns, tuple(rows))
+def _mean(of: Callable[[Tracked], float]) -> Callable[[Runs], float]:
+    return lambda runs: float(np.mean([of(run) for run in runs]))
 
 
-def mean_number(
-    name: str,
-    runs: Sequence[Tracked],
-    paper: float | None = None,
-    of: Callable[[Tracked], float] | None = None,
-) -> Number:
-    """The mean over seeds of a run's mean error (or what `of` takes of it), mm, beside the paper's."""
-    values = [of(run) if of else run.mean_mm for run in runs]
-    return number(name, values, "mm", paper=paper, better="lower")
+COLUMNS: Mapping[str, Callable[[Runs], float]] = {
+    "seeds": len,
+    "evaluations a frame": lambda runs: runs[0].evaluations,
+    "mean (mm)": _mean(lambda run: run.mean_mm),
+    "highest seed (mm)": lambda runs: max(mean_errors(runs)),
+    "mean of worst frames (mm)": _mean(lambda run: run.worst_mm),
+    "largest (mm)": lambda runs: max(run.worst_mm for run in runs),
+    "frames with a limb lost (%)": lambda runs: (
+        100.0 * float(np.mean([run.lost_frames for run in runs])) / len(runs[0].frames)
+    ),
+    "runs without loss": lambda runs: sum(not run.lost_limbs for run in runs),
+    "search (ms a frame)": lambda runs: (
+        1000.0 * float(np.mean([run.seconds for run in runs])) / max(1, len(runs[0].frames) - 1)
+    ),
+}
 
 
-def error_ratio(name: str, ours: Sequence[Tracked], theirs: Sequence[Tracked], claim: str) -> Number:
-    """The ratio of two settings' mean errors, paired by seed.
+@dataclass(frozen=True, slots=True)
+class Spell:
+    """A limb lost: which, for how many frames in a row, and whether it was found again before the end."""
 
-    claim : "equal" (1 lies in the interval, or ours is better) or "lower" (the whole interval lies below 1).
-    """
-    first, second = [run.mean_mm for run in ours], [run.mean_mm for run in theirs]
-    low, high = ratio_interval(first, second)
-    verdict = claimed_verdict(low, high, claim)
-    ratio = float(np.mean(first) / np.mean(second))
-    paper = 1.0 if claim == "equal" else None
-    return Number(name, ratio, low, high, "×", paper, "lower", len(first), verdict)
+    limb: str
+    frames: int
+    found_again: bool
 
 
-def claimed_verdict(low: float, high: float, claim: str) -> str:
-    """Whether an interval bears out that a ratio is "equal" to 1, or "lower"."""
-    if claim == "lower":
-        return "reproduced" if high < 1.0 else "not reproduced"
-    return "better" if high < 1.0 else "reproduced" if low <= 1.0 else "not reproduced"
-
-
-def sign_words(first: str, ours: Sequence[Tracked], second: str, theirs: Sequence[Tracked]) -> str:
-    """Who has the smaller error in more seeds and in more frames, with the sign test."""
-    seeds = sign_test([run.mean_mm for run in ours], [run.mean_mm for run in theirs])
-    frames = sign_test(error_rows(ours).ravel().tolist(), error_rows(theirs).ravel().tolist())
-    better, worse, _, p_seeds = seeds
-    return (
-        f"{first} is nearer than {second} in {better} of {better + worse} seeds (sign test p = "
-        f"{p_seeds:.2g}) and in {100.0 * frames[0] / max(1, frames[0] + frames[1]):.0f} % of all frames (p "
-        f"= {frames[3]:.1g}; frames of one run follow from each other, so that p flatters)."
-    )
+def spells(run: Tracked) -> Iterator[Spell]:
+    """All rows of frames in which a limb is lost (one of its markers is too far off), limb by limb."""
+    for limb in sorted({limb for limbs in run.lost for limb in limbs}):
+        length = 0
+        for limbs in run.lost:
+            if limb in limbs:
+                length += 1
+            elif length:
+                yield Spell(limb, length, True)
+                length = 0
+        if length:
+            yield Spell(limb, length, False)

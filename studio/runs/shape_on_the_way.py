@@ -15,7 +15,6 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from functools import partial
 
 import msgspec
 import numpy as np
@@ -25,10 +24,11 @@ from studio.body.dimensions import with_dimensions
 from studio.body.model import BodyModel
 from studio.body.shape_space import ShapeSpace, dimension_kinds, shape_space
 from studio.errors import NotFoundError, SessionError
-from studio.evidence.distance_maps import silhouette_distances, silhouettes_by_camera
+from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
 from studio.progress import Progress
+from studio.runs.following import Following
 from studio.runs.problem_source import ProblemSource
 from studio.runs.search_space import search_space, session_sigma
 from studio.runs.subject_frames import varied_frames
@@ -36,9 +36,7 @@ from studio.sessions.made_from import digests
 from studio.sessions.record_files import RecordFile
 from studio.sessions.session import Session
 from studio.settings import RunSettings, default_settings
-from studio.tracking.catalogue import TRACKERS
-from studio.tracking.frame_loop import search_frame
-from studio.tracking.frame_refinement import FrameRefiner, space_after
+from studio.tracking.frame_refinement import FrameRefiner
 from studio.tracking.loss_detection import Onlooker, anything_seen
 from studio.tracking.shape_prior import ShapePrior, ShapeSpreads
 from studio.tracking.shape_refinement import ShapeRefiner
@@ -171,31 +169,20 @@ def shaped_body(
     """
     rules = default_settings(TRACKER, WEIGHTING)
     weigher = WEIGHTINGS[WEIGHTING].prepare(body, cameras, rules.weighting)
-    refiner, space = FrameRefiner(body, cameras, 0), search_space(body, sigma)
-    carried, poses = start_of(tuple(start.tolist())), []
+    following = Following(
+        rules, search_space(body, sigma), start_of(tuple(start.tolist())), 0, FrameRefiner(body, cameras, 0)
+    )
     for number, frame in enumerate(frames):
         if progress is not None:
             progress(STEP, number, len(frames) + 1)
         seen = evidence(frame)
         if not anything_seen(seen):
             break
-        problem = weigher.problem(seen)
-        result = search_frame(
-            TRACKERS[TRACKER],
-            problem,
-            carried,
-            space_after(space, carried, rules.refinement),
-            seed=0,
-            frame=frame,
-            settings_source=lambda: (1, rules.tracker),
-            repeats=1 if number else rules.tracker.start_repeats,
-        )
-        result = refiner.refined(result, partial(silhouettes_by_camera, seen), problem, rules.refinement)
-        carried = result.carried
-        poses.append(result.estimate.pose)
-    numbers, followed = np.array(frames[: len(poses)]), np.array(poses).reshape(len(poses), len(start))
-    if not poses:
+        following.step(frame, weigher.problem(seen), seen)
+    if not following.poses:
         return FittedShape(body, start, {}, (0.0, 0.0))
+    followed = np.array(following.poses)
+    numbers = np.array(frames[: len(followed)])
     chosen = varied_frames(body, numbers, followed, FITTED_FRAMES)
     rows = np.searchsorted(numbers, chosen)
     found = fitted_shape(body, cameras, [evidence(frame) for frame in chosen], followed[rows])

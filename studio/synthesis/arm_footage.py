@@ -1,9 +1,7 @@
-"""Footage of planar arms: one camera facing the plane, the picture being the tracker's own body, moving
-smoothly.
+"""Footage of planar arms: one camera facing the plane, the picture being the tracker's own body, moving smoothly.
 
-Deutscher & Reid 6.1 and 6.2.2: the arms are the model itself, and what is studied is the search, not the
-fit of a model to a person. The mask is exact: a pixel is arm when its centre lies in the outline of a drawn
-limb.
+Deutscher & Reid 6.1 and 6.2.2: the arms are the model itself, and what is studied is the search, not the fit of a model
+to a person. The mask is exact: a pixel is arm when its centre lies in the outline of a drawn limb.
 """
 
 from pathlib import Path
@@ -61,8 +59,7 @@ def arm_outlines(body: BodyModel, poses: Array, camera: Camera) -> Array:
 
 
 def coverage(outlines: Array, width: int, height: int, samples: int) -> NDArray[np.float32]:
-    """(height, width) share, 0...1, of samples × samples points a pixel that lie in any of the
-    quadrilaterals.
+    """(height, width) share, 0...1, of samples × samples points a pixel that lie in any of the quadrilaterals.
 
     outlines : (L, 4, 2) pixels, convex. One sample is the pixel's centre.
     """
@@ -81,6 +78,14 @@ def coverage(outlines: Array, width: int, height: int, samples: int) -> NDArray[
     return blocks.mean(axis=(1, 3)).astype(np.float32)
 
 
+def filled(outlines: Array, width: int, height: int) -> Bytes:
+    """(H, W) 255 where a pixel's centre lies in any of the convex outlines (L, 4, 2); those not in front of the camera,
+    which are not finite, cover nothing.
+    """
+    finite = outlines[np.isfinite(outlines).all(axis=(1, 2))]
+    return np.where(coverage(finite, width, height, 1) > 0.0, 255, 0).astype(np.uint8)
+
+
 def render_arm(recipe: Recipe, camera: Camera, source: Path, progress: Progress | None) -> MarkerMotion:
     """Write videos/ and masks/ of the recipe's body and truth/poses.csv; returns the markers' motion."""
     body = load_body(recipe.body)
@@ -96,7 +101,7 @@ def render_arm(recipe: Recipe, camera: Camera, source: Path, progress: Progress 
             share = coverage(outlines[frame], *size, SAMPLES)
             stream = recipe.seed * 1_000_003 + frame
             footage.add(_picture(share, recipe.picture.noise, stream))
-            masks.add(np.where(coverage(outlines[frame], *size, 1) > 0.0, 255, 0).astype(np.uint8))
+            masks.add(filled(outlines[frame], *size))
             if progress is not None:
                 progress("rendering", frame + 1, recipe.frames)
     names = tuple(entry.name for entry in body.parameters)

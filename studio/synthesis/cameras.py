@@ -66,10 +66,22 @@ def placed_camera(
     )
 
 
-def corner_rig(size: tuple[int, int], rng: np.random.Generator) -> tuple[Camera, ...]:
-    """Four cameras under the ceiling of the room's corners, slightly rolled, with barrel distortion as
-    webcams have.
+def ring_camera(
+    name: str, size: tuple[int, int], focal_px: float, target: Array, place: tuple[float, float, float]
+) -> Camera:
+    """An upright camera that looks at `target` (3,) with the distortion of a usual lens. place : its bearing (radians),
+    distance and height (mm) from there.
     """
+    bearing, distance, above = place
+    position = target + np.array([distance * np.cos(bearing), distance * np.sin(bearing), above])
+    x, y, z = (float(value) for value in position)
+    middle, lens = (size[0] / 2, size[1] / 2), (-0.32, 0.14, 0.0, 0.0, 0.0)
+    at = (float(target[0]), float(target[1]), float(target[2]))
+    return placed_camera(name, (x, y, z), at, size=size, focal_px=focal_px, distortion=lens, principal=middle)
+
+
+def corner_rig(size: tuple[int, int], rng: np.random.Generator) -> tuple[Camera, ...]:
+    """Four cameras under the ceiling of the room's corners, slightly rolled, with barrel distortion as webcams have."""
     return _webcams(CORNERS, CORNER_TARGET, CORNER_FOCAL, size, rng)
 
 
@@ -116,8 +128,7 @@ def _webcams(
 
 
 def pixel_rays(camera: Camera, samples: int) -> NDArray[np.float32]:
-    """(H * samples, W * samples, 3) unit directions in the world through a regular grid of points in every
-    pixel.
+    """(H * samples, W * samples, 3) unit directions in the world through a regular grid of points in every pixel.
 
     The lens model is inverted by fixed-point iteration (as OpenCV's undistortPoints does, to convergence).
     """

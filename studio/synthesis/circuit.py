@@ -14,14 +14,27 @@ from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from studio.body.person import SIDES, PersonMotion, Skeleton
 from studio.errors import StudioError
-from studio.synthesis.footfalls import ROLL_UP, Footfalls, planned_track
-from studio.synthesis.gait import FootTrack, Gait, Path, eased, leg_to_ankle
-from studio.synthesis.posture import add_arm, allowed_height, frame_rate, trunk
+from studio.synthesis.gait import (
+    FootTrack,
+    Gait,
+    Path,
+    add_arm,
+    add_leg,
+    allowed_height,
+    eased,
+    frame_rate,
+    rolled,
+    swung,
+    trunk,
+)
 
 Array = NDArray[np.float64]
 Options = dict[str, float]
 
 NEVER = 200_000.0
+# Shares of an ordinary stance: rolling down from the heel at its beginning, up over the ball at its end.
+ROLL_DOWN, ROLL_UP = 0.18, 0.38
+LANDING_PITCH = 0.28
 # Seconds: of slowing down and of speeding up, from the last landing to the halt, from the halt to the first
 # lift-off, of fading gestures, of the pelvis' rise into the halt.
 SLOWING, SETTLING, GOING, FADING, RISING = 0.75, 0.12, 0.16, 0.6, 0.3
@@ -40,6 +53,20 @@ class Halt:
 
     begin: float
     end: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Footfalls:
+    """One foot's stances, in order.
+
+    down, up : (S,) seconds of landing and lift-off. rise : (S,) seconds before lift-off in which the heel rises. at :
+    (S,) mm along the path.
+    """
+
+    down: Array
+    up: Array
+    rise: Array
+    at: Array
 
 
 def circuit(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
@@ -124,12 +151,10 @@ class _Bearing:
         bones, turns = self.skeleton, dict(self.turns)
         root = self.root.copy()
         root[:, 2] += height
-        for index, (side, track) in enumerate(zip(SIDES, self.feet, strict=True)):
+        for side, track in zip(SIDES, self.feet, strict=True):
             sign = 1.0 if side == "left" else -1.0
-            hip = root + sign * bones.hip_half_width[index] * turns["pelvis"][:, :, 1]
             ahead = turns["pelvis"][:, :, 0] + track.turn[:, :, 0]
-            thigh, shin = leg_to_ankle(hip, track.ankle, ahead, bones.thigh[index], bones.shin[index])
-            turns |= {f"{side}_thigh": thigh, f"{side}_shin": shin, f"{side}_foot": track.turn}
+            add_leg(turns, bones, side, root, (track.ankle, track.turn), ahead)
             forward = 0.04 - sign * SWING * self.stride
             bend = ELBOW + 0.4 * SWING * self.vigour * (1.0 - sign * np.cos(self.phase - 0.3))
             add_arm(turns, side, forward, np.full(len(root), 0.26), bend)
@@ -210,3 +235,35 @@ def _halt(options: Options, gait: Gait) -> Halt:
             f"Begin it after {gait.cycle:.1f} s (still_from_s) and let it last half a second (still_until_s).",
         )
     return Halt(begin, end)
+
+
+# A plan holds the stances of one foot in order. Between two stances the foot travels as in `gait.py`; how far it lifts
+# and how much the ankle turns shrinks with the step, so that the short steps into and out of a halt are low.
+
+
+def planned_track(
+    plan: Footfalls, gait: Gait, path: Path, times: Array, skeleton: Skeleton, *, left: bool, toes_out: float
+) -> FootTrack:
+    """The foot's journey over the stances of a plan.
+
+    times : (F,) seconds, between the first landing and the last lift-off. toes_out : radians that the foot is turned
+    outward against the path.
+    """
+    stance = np.clip(np.searchsorted(plan.down, times, side="right") - 1, 0, len(plan.down) - 2)
+    swing = np.clip((times - plan.up[stance]) / (plan.down[stance + 1] - plan.up[stance]), 0.0, 1.0)
+    along = plan.at[stance] + swung(swing) * (plan.at[stance + 1] - plan.at[stance])
+    step = np.clip(np.diff(plan.at) / (gait.speed * gait.cycle), 0.0, 1.0)
+    coming = step[stance]
+    last = np.concatenate([[1.0], step])[stance]
+    ordinary = gait.duty * gait.cycle
+    push = eased(1.0 + (times - plan.up[stance]) / plan.rise[stance])
+    push *= np.where(swing > 0.0, 1.0 - eased(swing / 0.7), 1.0) * coming
+    land = eased((swing - 0.6) / 0.4) * (swing > 0.0) * coming
+    land += (1.0 - eased((times - plan.down[stance]) / (ROLL_DOWN * ordinary))) * (swing == 0.0) * last
+    pitch = gait.heel_rise * push - LANDING_PITCH * land
+    sign = 1.0 if left else -1.0
+    centre, heading = path(along)
+    beside = 0.5 * gait.foot_spacing * sign * np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
+    ankle, turn = rolled(centre + beside, heading + sign * toes_out, pitch, skeleton)
+    ankle[:, 2] += gait.lift * (0.4 + 0.6 * coming) * eased(swing / 0.5) * eased((1.0 - swing) / 0.5)
+    return FootTrack(ankle, turn, swing)

@@ -19,9 +19,8 @@ KEYFRAME_EVERY = 50
 class ClipWriter:
     """An mp4 file (H.264, yuv420p) that takes pictures one after the other; use it as a context manager.
 
-    path : the file. size : width and height in pixels, both even. quality : x264's constant rate factor, 0
-    (exact) to 51. The encoder runs on one thread, so the same pictures give the same bytes. Raises
-    FootageError for odd sizes.
+    path : the file. size : width and height in pixels, both even. quality : x264's constant rate factor, 0 (exact) to
+    51. The encoder runs on one thread, so the same pictures give the same bytes. Raises FootageError for odd sizes.
     """
 
     def __init__(self, path: Path, size: tuple[int, int], fps: float, quality: float) -> None:

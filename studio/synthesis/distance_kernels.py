@@ -1,8 +1,7 @@
 """The person as a signed distance field: swept spheres, melted within a group, folded where they are cloth.
 
-Distances (mm) are lower bounds of the true ones up to the folds' depth, so marching at SAFETY × distance
-never passes through. Smooth union: I. Quilez, "Smooth minimum" (quadratic polynomial). Piece columns: see
-`flesh.py`.
+Distances (mm) are lower bounds of the true ones up to the folds' depth, so marching at SAFETY × distance never passes
+through. Smooth union: I. Quilez, "Smooth minimum" (quadratic polynomial). Piece columns: see `flesh.py`.
 """
 
 import math
@@ -81,9 +80,7 @@ def beyond(px, py, pz, piece, limit):
 
 @njit(cache=True, error_model="numpy", fastmath=True)
 def body_distance(px, py, pz, pieces, labels, active, count):
-    """Signed distance to the union of the first `count` pieces named in `active` (in order of their
-    groups).
-    """
+    """Signed distance to the union of the first `count` pieces named in `active` (in order of their groups)."""
     total, group_distance, group = FAR, FAR, -1
     for index in range(count):
         piece = active[index]
@@ -187,8 +184,7 @@ def body_normal(px, py, pz, pieces, labels, active, count):
 def light_share(px, py, pz, light, light_radius, pieces, labels, active):
     """How much of a round lamp a point sees past the person: 0 in full shadow, 1 in the open.
 
-    Distance over distance marched, against the lamp's angular size: I. Quilez, "Soft shadows in
-    raymarched SDFs".
+    Distance over distance marched, against the lamp's angular size: I. Quilez, "Soft shadows in raymarched SDFs".
     """
     x, y, z = light[0] - px, light[1] - py, light[2] - pz
     reach = math.sqrt(x * x + y * y + z * z)

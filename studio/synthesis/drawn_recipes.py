@@ -5,8 +5,7 @@ second. The drawn recipes come along as files; a test draws them again.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from types import MappingProxyType
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import msgspec
@@ -17,8 +16,6 @@ from numpy.typing import NDArray
 from studio.body.person import PersonMotion, joint_points
 from studio.geometry.projection import project
 from studio.synthesis.damage import Damage
-from studio.synthesis.drawn_room import DRAWN, FLOOR_AND_WALLS
-from studio.synthesis.joined_clips import Clip
 from studio.synthesis.person import Proportions
 from studio.synthesis.recipe_file import (
     JOINED,
@@ -32,8 +29,9 @@ from studio.synthesis.recipe_file import (
     recipe_cameras,
 )
 from studio.synthesis.recipes import recipe_motion, recipe_person
+from studio.synthesis.recorded_clips import Clip
 from studio.synthesis.room import Room
-from studio.synthesis.rooms import room_called
+from studio.synthesis.rooms import DRAWN, FLOOR_AND_WALLS, room_called
 from studio.synthesis.wardrobes import MATERIALS
 
 Array = NDArray[np.float64]
@@ -99,240 +97,146 @@ HARD = Damage(clutter=HARD_CLUTTER, calibration_px=HARD_PX)
 GONE = Damage(missing=("last",))
 BLURRED = Damage(shutter=0.7)
 
-KINDS: Mapping[str, Kind] = MappingProxyType(
-    {
-        "walk": Kind(
-            "Walk, 60 Hz",
-            60,
-            118,
-            (
-                Stretch(file="05_01.amc", start_s=0.35, jitter_s=0.15, bends=50.0),
-                Stretch(file="05_01.amc", start_s=2.75, jitter_s=0.15, bends=50.0),
-            ),
-        ),
-        "walk-20hz": Kind("The same walk, 20 Hz", 20, 40, like="walk"),
-        "turns": Kind(
-            "Walk with turns, 30 Hz",
-            30,
-            75,
-            (
-                Stretch(
-                    "turning_walk",
-                    options={
-                        "start_s": (0.5, 0.9),
-                        "speed_mm_s": (850.0, 1050.0),
-                        "cadence": (1.8, 2.1),
-                        "start_degrees": (0.0, 360.0),
-                    },
-                ),
-                Stretch(
-                    "turning_walk",
-                    options={
-                        "start_s": (3.2, 3.7),
-                        "speed_mm_s": (850.0, 1050.0),
-                        "cadence": (1.8, 2.1),
-                        "start_degrees": (0.0, 360.0),
-                    },
-                ),
-            ),
-            (4, 5),
-        ),
-        "dance": Kind(
-            "Dance, 30 Hz",
-            30,
-            75,
-            (
-                Stretch(file="05_02.amc", start_s=3.6, jitter_s=0.6),
-                Stretch(file="05_11.amc", start_s=1.2, jitter_s=0.6),
-            ),
-            (5, 6),
-            (Damage(), GONE),
-        ),
-        "kick": Kind(
-            "High kick, 60 Hz",
-            60,
-            75,
-            (
-                Stretch(file="05_09.amc", start_s=6.55, jitter_s=0.1),
-                Stretch(file="05_10.amc", start_s=2.75, jitter_s=0.1),
-            ),
-            (5, 4),
-        ),
-        "leap": Kind(
-            "Leap, 60 Hz",
-            60,
-            75,
-            (
-                Stretch(file="CMU_01_01.bvh", start_s=6.1, jitter_s=0.1),
-                Stretch(file="05_06.amc", start_s=3.25, jitter_s=0.1),
-            ),
-            (6, 5),
-        ),
-        "cartwheel": Kind(
-            "Cartwheel, 60 Hz",
-            60,
-            75,
-            (
-                Stretch(file="amp_humanoid_cartwheel.npz", start_s=2.9, jitter_s=0.05),
-                Stretch(file="amp_humanoid_cartwheel.npz", start_s=0.1, jitter_s=0.05),
-            ),
-            (5, 6),
-        ),
-        "hard": Kind(
-            "Walk with noise, clutter in front and calibration 2 px off, 60 Hz",
-            60,
-            70,
-            (
-                Stretch(
-                    "walk",
-                    options={
-                        "radius_mm": (600.0, 900.0),
-                        "sway_mm": (20.0, 70.0),
-                        "speed_mm_s": (800.0, 1100.0),
-                        "cadence": (1.75, 2.05),
-                        "start_degrees": (0.0, 360.0),
-                    },
-                ),
-                Stretch(
-                    "walk",
-                    options={
-                        "radius_mm": (600.0, 900.0),
-                        "sway_mm": (20.0, 70.0),
-                        "speed_mm_s": (800.0, 1100.0),
-                        "cadence": (1.75, 2.05),
-                        "start_degrees": (0.0, 360.0),
-                    },
-                ),
-            ),
-            damage=(HARD, HARD),
-            noise=HARD_NOISE,
-        ),
-        "crouch": Kind(
-            "Crouch",
-            60,
-            75,
-            (
-                Stretch(
-                    "crouch",
-                    options={
-                        "depth": (0.46, 0.56),
-                        "down_s": (0.5, 0.65),
-                        "hold_s": (0.05, 0.15),
-                        "up_s": (0.5, 0.6),
-                        "heading_degrees": (0.0, 360.0),
-                        "stance": (0.15, 0.22),
-                        "swing": (0.1, 0.5),
-                    },
-                ),
-                Stretch(
-                    "crouch",
-                    options={
-                        "depth": (0.46, 0.56),
-                        "down_s": (0.5, 0.65),
-                        "hold_s": (0.05, 0.15),
-                        "up_s": (0.5, 0.6),
-                        "heading_degrees": (0.0, 360.0),
-                        "stance": (0.15, 0.22),
-                        "swing": (0.1, 0.5),
-                    },
-                ),
-            ),
-            (3, 8),
-        ),
-        "sit": Kind(
-            "Sitting down on a stool",
-            60,
-            75,
-            (
-                Stretch(
-                    "sit",
-                    options={
-                        "seat_mm": (400.0, 470.0),
-                        "down_s": (0.8, 1.0),
-                        "heading_degrees": (0.0, 360.0),
-                        "stance": (0.14, 0.2),
-                    },
-                ),
-                Stretch(
-                    "sit",
-                    options={
-                        "seat_mm": (400.0, 470.0),
-                        "down_s": (0.45, 0.55),
-                        "start_s": 0.02,
-                        "heading_degrees": (0.0, 360.0),
-                        "stance": (0.14, 0.2),
-                    },
-                ),
-            ),
-            (5, 4),
-            (GONE, Damage()),
-        ),
-        "arms": Kind(
-            "Arms overhead",
-            60,
-            75,
-            (
-                Stretch(file="05_09.amc", start_s=4.7, jitter_s=0.1),
-                Stretch(file="05_10.amc", start_s=0.75, jitter_s=0.1),
-            ),
-            (4, 3),
-            (BLURRED, Damage()),
-        ),
-        "run": Kind(
-            "Run",
-            60,
-            70,
-            (
-                Stretch(
-                    "run",
-                    options={
-                        "radius_mm": (950.0, 1200.0),
-                        "speed_mm_s": (1900.0, 2300.0),
-                        "cadence": (2.6, 2.9),
-                        "start_degrees": (0.0, 360.0),
-                    },
-                ),
-                Stretch(
-                    RECORDED,
-                    file="amp_humanoid_run.npz",
-                    start_s=0.1833,
-                    options={
-                        "cycle_s": 0.7667,
-                        "speed": (0.75, 0.85),
-                        "radius_mm": (1050.0, 1250.0),
-                        "bank": 0.5,
-                    },
-                ),
-            ),
-            (8, 5),
-            (Damage(), BLURRED),
-        ),
-        "fast-cameras": Kind(
-            "Stepping over a box, 120 Hz",
-            120,
-            90,
-            (
-                Stretch(
-                    "box",
-                    options={
-                        "height_mm": (90.0, 150.0),
-                        "speed_mm_s": (900.0, 1100.0),
-                        "before_mm": (750.0, 850.0),
-                    },
-                ),
-                Stretch(
-                    "run",
-                    options={
-                        "radius_mm": (950.0, 1150.0),
-                        "speed_mm_s": (1900.0, 2300.0),
-                        "cadence": (2.6, 2.9),
-                        "start_degrees": (0.0, 360.0),
-                    },
-                ),
-            ),
-        ),
-    }
+ANY_WAY = (0.0, 360.0)
+TURNING = {"speed_mm_s": (850.0, 1050.0), "cadence": (1.8, 2.1), "start_degrees": ANY_WAY}
+RUNNING = Stretch(
+    "run",
+    options={
+        "radius_mm": (950.0, 1200.0),
+        "speed_mm_s": (1900.0, 2300.0),
+        "cadence": (2.6, 2.9),
+        "start_degrees": ANY_WAY,
+    },
 )
+WALKING = Stretch(
+    "walk",
+    options={
+        "radius_mm": (600.0, 900.0),
+        "sway_mm": (20.0, 70.0),
+        "speed_mm_s": (800.0, 1100.0),
+        "cadence": (1.75, 2.05),
+        "start_degrees": ANY_WAY,
+    },
+)
+CROUCHING = Stretch(
+    "crouch",
+    options={
+        "depth": (0.46, 0.56),
+        "down_s": (0.5, 0.65),
+        "hold_s": (0.05, 0.15),
+        "up_s": (0.5, 0.6),
+        "heading_degrees": ANY_WAY,
+        "stance": (0.15, 0.22),
+        "swing": (0.1, 0.5),
+    },
+)
+BOX = Stretch(
+    "box",
+    options={"height_mm": (90.0, 150.0), "speed_mm_s": (900.0, 1100.0), "before_mm": (750.0, 850.0)},
+)
+
+
+def _sitting(down_s: tuple[float, float], **options: float) -> Stretch:
+    drawn = {"seat_mm": (400.0, 470.0), "down_s": down_s, **options}
+    return Stretch("sit", options={**drawn, "heading_degrees": ANY_WAY, "stance": (0.14, 0.2)})
+
+
+def _shown(file: str, start_s: float, jitter_s: float, bends: float = 0.0) -> Stretch:
+    return Stretch(JOINED, file, start_s, jitter_s, bends)
+
+
+KINDS: Mapping[str, Kind] = {
+    "walk": Kind(
+        "Walk, 60 Hz",
+        60,
+        118,
+        (_shown("05_01.amc", 0.35, 0.15, bends=50.0), _shown("05_01.amc", 2.75, 0.15, bends=50.0)),
+    ),
+    "walk-20hz": Kind("The same walk, 20 Hz", 20, 40, like="walk"),
+    "turns": Kind(
+        "Walk with turns, 30 Hz",
+        30,
+        75,
+        (
+            Stretch("turning_walk", options={"start_s": (0.5, 0.9), **TURNING}),
+            Stretch("turning_walk", options={"start_s": (3.2, 3.7), **TURNING}),
+        ),
+        (4, 5),
+    ),
+    "dance": Kind(
+        "Dance, 30 Hz",
+        30,
+        75,
+        (_shown("05_02.amc", 3.6, 0.6), _shown("05_11.amc", 1.2, 0.6)),
+        (5, 6),
+        (Damage(), GONE),
+    ),
+    "kick": Kind(
+        "High kick, 60 Hz", 60, 75, (_shown("05_09.amc", 6.55, 0.1), _shown("05_10.amc", 2.75, 0.1)), (5, 4)
+    ),
+    "leap": Kind(
+        "Leap, 60 Hz", 60, 75, (_shown("CMU_01_01.bvh", 6.1, 0.1), _shown("05_06.amc", 3.25, 0.1)), (6, 5)
+    ),
+    "cartwheel": Kind(
+        "Cartwheel, 60 Hz",
+        60,
+        75,
+        (_shown("amp_humanoid_cartwheel.npz", 2.9, 0.05), _shown("amp_humanoid_cartwheel.npz", 0.1, 0.05)),
+        (5, 6),
+    ),
+    "hard": Kind(
+        "Walk with noise, clutter in front and calibration 2 px off, 60 Hz",
+        60,
+        70,
+        (WALKING, WALKING),
+        damage=(HARD, HARD),
+        noise=HARD_NOISE,
+    ),
+    "crouch": Kind("Crouch", 60, 75, (CROUCHING, CROUCHING), (3, 8)),
+    "sit": Kind(
+        "Sitting down on a stool",
+        60,
+        75,
+        (_sitting((0.8, 1.0)), _sitting((0.45, 0.55), start_s=0.02)),
+        (5, 4),
+        (GONE, Damage()),
+    ),
+    "arms": Kind(
+        "Arms overhead",
+        60,
+        75,
+        (_shown("05_09.amc", 4.7, 0.1), _shown("05_10.amc", 0.75, 0.1)),
+        (4, 3),
+        (BLURRED, Damage()),
+    ),
+    "run": Kind(
+        "Run",
+        60,
+        70,
+        (
+            RUNNING,
+            Stretch(
+                RECORDED,
+                "amp_humanoid_run.npz",
+                0.1833,
+                options={
+                    "cycle_s": 0.7667,
+                    "speed": (0.75, 0.85),
+                    "radius_mm": (1050.0, 1250.0),
+                    "bank": 0.5,
+                },
+            ),
+        ),
+        (8, 5),
+        (Damage(), BLURRED),
+    ),
+    "fast-cameras": Kind(
+        "Stepping over a box, 120 Hz",
+        120,
+        90,
+        (BOX, replace(RUNNING, options={**RUNNING.options, "radius_mm": (950.0, 1150.0)})),
+    ),
+}
 
 
 def clip_name(half: str, kind: str) -> str:

@@ -1,13 +1,13 @@
 """The clothed person: rounded pieces laid around the skeleton, their cloth, skin and hair.
 
-Each piece is a sphere swept along a line in one segment's frame, its radius running from one end to the
-other with a muscle's bulge between, its cross-section elliptical, its surface folded where it is cloth. The
-pieces of a group (trunk and head, each arm, each leg) melt into each other; groups barely do, so that an
-arm beside the trunk stays apart. Nothing here is a truncated cone, and no number comes from a tracker's
-body file.
+Each piece is a sphere swept along a line in one segment's frame, its radius running from one end to the other with a
+muscle's bulge between, its cross-section elliptical, its surface folded where it is cloth. The pieces of a group (trunk
+and head, each arm, each leg) melt into each other; groups barely do, so that an arm beside the trunk stays apart.
+Nothing here is a truncated cone, and no number comes from a tracker's body file.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,9 +62,7 @@ def clothed_pieces(bones: Skeleton, girth: float = 1.0) -> tuple[Piece, ...]:
 
 
 def piece_tables(motion: PersonMotion, pieces: tuple[Piece, ...]) -> tuple[Array, IntArray]:
-    """The pieces in the world: (F, P, COLUMNS) floats as the column names above say, and (P, 2) material
-    and group.
-    """
+    """The pieces in the world: (F, P, COLUMNS) floats as the column names above say, and (P, 2) material and group."""
     joints = joint_points(motion)
     tables = np.zeros((motion.frame_count, len(pieces), COLUMNS))
     for index, piece in enumerate(pieces):
@@ -101,18 +99,8 @@ def _upright_frame(axis: Array) -> Array:
 
 def _grown(piece: Piece, scale: float) -> Piece:
     """The piece with its girth scaled."""
-    return Piece(
-        piece.segment,
-        piece.group,
-        piece.material,
-        piece.start,
-        piece.end,
-        (piece.radius[0] * scale, piece.radius[1] * scale),
-        piece.bulge * scale,
-        piece.scale,
-        piece.fold,
-        piece.fold_period,
-    )
+    first, last = piece.radius
+    return replace(piece, radius=(first * scale, last * scale), bulge=piece.bulge * scale)
 
 
 def _trunk(bones: Skeleton) -> list[Piece]:
@@ -123,69 +111,28 @@ def _trunk(bones: Skeleton) -> list[Piece]:
     up, (hip_left, hip_right) = bones.trunk, bones.hip_half_width
     (_, left, left_up), (_, right, right_up) = bones.shoulder
     middle, low = CHEST_FOLLOWS * 0.5 * (left - right), up + 0.5 * (left_up + right_up)
+    seat, shirt = partial(Piece, "pelvis", TRUNK, TROUSERS), partial(Piece, "thorax", TRUNK, SHIRT)
+    waist, chest = (0, 0.6 * middle, 0.48 * up), (-6, middle, 0.76 * up)
     return [
-        Piece(
-            "pelvis",
-            TRUNK,
-            TROUSERS,
-            (-8, -0.7 * hip_right, 5),
-            (-8, 0.7 * hip_left, 5),
-            (110, 110),
-            fold=2.0,
-        ),
-        Piece("pelvis", TRUNK, TROUSERS, (-4, 0, 20), (0, 0, 0.16 * up), (136, 128), scale=(0.80, 1.06)),
-        Piece(
-            "thorax",
-            TRUNK,
-            SHIRT,
-            (-2, 0, 0.13 * up),
-            (0, 0.6 * middle, 0.48 * up),
-            (140, 138),
-            5,
-            (0.86, 1.04),
-            6.0,
-            130.0,
-        ),
-        Piece(
-            "thorax",
-            TRUNK,
-            SHIRT,
-            (2, 0.6 * middle, 0.48 * up),
-            (-6, middle, 0.76 * up),
-            (141, 136),
-            6,
-            (0.89, 1.07),
-            4.0,
-            150.0,
-        ),
-        Piece(
-            "thorax",
-            TRUNK,
-            SHIRT,
-            (-12, -0.62 * right, low - 18),
-            (-12, 0.62 * left, low - 18),
-            (80, 80),
-        ),
-        Piece(
-            "thorax",
-            TRUNK,
-            SHIRT,
-            (-14, -0.25 * right, up - 36),
-            (-14, 0.25 * left, up - 36),
-            (56, 56),
-        ),
+        seat((-8, -0.7 * hip_right, 5), (-8, 0.7 * hip_left, 5), (110, 110), fold=2.0),
+        seat((-4, 0, 20), (0, 0, 0.16 * up), (136, 128), scale=(0.80, 1.06)),
+        shirt((-2, 0, 0.13 * up), waist, (140, 138), 5, (0.86, 1.04), 6.0, 130.0),
+        shirt((2, *waist[1:]), chest, (141, 136), 6, (0.89, 1.07), 4.0, 150.0),
+        shirt((-12, -0.62 * right, low - 18), (-12, 0.62 * left, low - 18), (80, 80)),
+        shirt((-14, -0.25 * right, up - 36), (-14, 0.25 * left, up - 36), (56, 56)),
     ]
 
 
 def _head(bones: Skeleton) -> list[Piece]:
     """Neck, skull, face, nose, hair. The crown of the hair lies at the head-top marker."""
     top = bones.head
+    skin, hair = partial(Piece, "head", TRUNK, SKIN), partial(Piece, "head", TRUNK, HAIR)
     return [
         Piece("thorax", TRUNK, SKIN, (-8, 0, bones.trunk - 40), (6, 0, bones.trunk + 0.32 * top), (58, 54)),
-        Piece("head", TRUNK, SKIN, (8, 0, 0.44 * top), (2, 0, 0.66 * top), (66, 80), scale=(1.12, 0.95)),
-        Piece("head", TRUNK, SKIN, (86, 0, 0.46 * top), (82, 0, 0.56 * top), (13, 9)),
-        Piece("head", TRUNK, HAIR, (-12, 0, 0.66 * top), (-14, 0, 0.685 * top), (84, 83), scale=(1.1, 0.98)),
-        Piece("head", TRUNK, HAIR, (-36, 0, 0.42 * top), (-28, 0, 0.62 * top), (56, 70)),
+        skin((8, 0, 0.44 * top), (2, 0, 0.66 * top), (66, 80), scale=(1.12, 0.95)),
+        skin((86, 0, 0.46 * top), (82, 0, 0.56 * top), (13, 9)),
+        hair((-12, 0, 0.66 * top), (-14, 0, 0.685 * top), (84, 83), scale=(1.1, 0.98)),
+        hair((-36, 0, 0.42 * top), (-28, 0, 0.62 * top), (56, 70)),
     ]
 
 
@@ -195,46 +142,19 @@ def _arm(bones: Skeleton, side: str, index: int) -> list[Piece]:
     inward = -1.0 if side == "left" else 1.0
     upper, fore, hand = bones.upper_arm[index], bones.forearm[index], bones.hand
     ahead, out, up = bones.shoulder[index]
+    begin = (0.55 * ahead - 4, -0.55 * inward * out, up - 10)
+    end = (0.98 * ahead, -0.98 * inward * out, up - 2)
+    sleeve, skin = f"{side}_upper_arm", partial(Piece, f"{side}_hand", group, SKIN)
     return [
+        Piece(f"{side}_clavicle", group, SHIRT, begin, end, (63, 60)),
         Piece(
-            f"{side}_clavicle",
-            group,
-            SHIRT,
-            (0.55 * ahead - 4, -0.55 * inward * out, up - 10),
-            (0.98 * ahead, -0.98 * inward * out, up - 2),
-            (63, 60),
+            sleeve, group, SHIRT, (0, 0, 4), (0, 0, -0.62 * upper), (60, 57), 3, fold=4.0, fold_period=90.0
         ),
-        Piece(
-            f"{side}_upper_arm",
-            group,
-            SHIRT,
-            (0, 0, 4),
-            (0, 0, -0.62 * upper),
-            (60, 57),
-            3,
-            fold=4.0,
-            fold_period=90.0,
-        ),
-        Piece(f"{side}_upper_arm", group, SKIN, (0, 0, -0.35 * upper), (0, 0, -upper), (48, 42), 5),
+        Piece(sleeve, group, SKIN, (0, 0, -0.35 * upper), (0, 0, -upper), (48, 42), 5),
         Piece(f"{side}_forearm", group, SKIN, (0, 0, 0), (0, 0, -fore), (42, 29), 7),
-        Piece(f"{side}_hand", group, SKIN, (0, 0, 4), (0, 0, -0.50 * hand), (30, 42), scale=(1.0, 0.62)),
-        Piece(
-            f"{side}_hand",
-            group,
-            SKIN,
-            (4, 0, -0.50 * hand),
-            (14, 0, -0.90 * hand),
-            (40, 18),
-            scale=(1.0, 0.5),
-        ),
-        Piece(
-            f"{side}_hand",
-            group,
-            SKIN,
-            (22, 4 * inward, -0.15 * hand),
-            (52, 8 * inward, -0.48 * hand),
-            (16, 11),
-        ),
+        skin((0, 0, 4), (0, 0, -0.50 * hand), (30, 42), scale=(1.0, 0.62)),
+        skin((4, 0, -0.50 * hand), (14, 0, -0.90 * hand), (40, 18), scale=(1.0, 0.5)),
+        skin((22, 4 * inward, -0.15 * hand), (52, 8 * inward, -0.48 * hand), (16, 11)),
     ]
 
 
@@ -243,48 +163,13 @@ def _leg(bones: Skeleton, side: str, index: int) -> list[Piece]:
     group = LEFT_LEG if side == "left" else RIGHT_LEG
     outward = 1.0 if side == "left" else -1.0
     thigh, shin, foot, sole = bones.thigh[index], bones.shin[index], bones.foot, bones.ankle_height
+    above, below = (partial(Piece, f"{side}_{part}", group, TROUSERS) for part in ("thigh", "shin"))
+    shoe = partial(Piece, f"{side}_foot", group, SHOE)
     return [
-        Piece(f"{side}_thigh", group, TROUSERS, (-34, 0, 5), (-22, 0, -0.16 * thigh), (88, 82)),
-        Piece(
-            f"{side}_thigh",
-            group,
-            TROUSERS,
-            (0, 4 * outward, 0),
-            (2, 0, -thigh),
-            (94, 77),
-            5,
-            fold=4.0,
-            fold_period=120.0,
-        ),
-        Piece(
-            f"{side}_shin",
-            group,
-            TROUSERS,
-            (2, 0, 0),
-            (-4, 0, -0.90 * shin),
-            (77, 65),
-            4,
-            fold=5.0,
-            fold_period=100.0,
-        ),
-        Piece(
-            f"{side}_shin",
-            group,
-            TROUSERS,
-            (-6, 0, -0.84 * shin),
-            (-2, 0, -0.95 * shin),
-            (68, 69),
-            fold=4.0,
-            fold_period=60.0,
-        ),
-        Piece(f"{side}_foot", group, SHOE, (-30, 0, 42 - sole), (0.38 * foot, 0, 36 - sole), (42, 36), 4),
-        Piece(
-            f"{side}_foot",
-            group,
-            SHOE,
-            (0.34 * foot, 0, 35 - sole),
-            (0.62 * foot, 0, 27 - sole),
-            (42, 27),
-            scale=(0.85, 1.15),
-        ),
+        above((-34, 0, 5), (-22, 0, -0.16 * thigh), (88, 82)),
+        above((0, 4 * outward, 0), (2, 0, -thigh), (94, 77), 5, fold=4.0, fold_period=120.0),
+        below((2, 0, 0), (-4, 0, -0.90 * shin), (77, 65), 4, fold=5.0, fold_period=100.0),
+        below((-6, 0, -0.84 * shin), (-2, 0, -0.95 * shin), (68, 69), fold=4.0, fold_period=60.0),
+        shoe((-30, 0, 42 - sole), (0.38 * foot, 0, 36 - sole), (42, 36), 4),
+        shoe((0.34 * foot, 0, 35 - sole), (0.62 * foot, 0, 27 - sole), (42, 27), scale=(0.85, 1.15)),
     ]

@@ -1,9 +1,8 @@
 """Steps along a path: where the feet stand, how they swing, and legs that reach them.
 
-A gait is written as smooth parametric curves: the pelvis follows a path at its speed and bobs; each foot
-stands still for a share of the step cycle (`duty`) and travels to its next footprint along an eased arc for
-the rest, the ankle turning about the ball of the foot at the end of the stance. Hips and knees then follow
-from the ankles.
+A gait is written as smooth parametric curves: the pelvis follows a path at its speed and bobs; each foot stands still
+for a share of the step cycle (`duty`) and travels to its next footprint along an eased arc for the rest, the ankle
+turning about the ball of the foot at the end of the stance. Hips and knees then follow from the ankles.
 """
 
 from collections.abc import Callable
@@ -11,23 +10,27 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
 
 from studio.body.person import Skeleton
 from studio.geometry.rotations import axis_turn
+from studio.synthesis.person import yaw_pitch_roll
 
 Array = NDArray[np.float64]
 Path = Callable[[Array], tuple[Array, Array]]
 Obstacle = Callable[[Array, Array, Array], Array]
+
+BALL, HEEL = 0.66, -0.20
+"""Where a foot rolls, as shares of its length before the ankle."""
 
 
 @dataclass(frozen=True, slots=True)
 class Gait:
     """The numbers of a way of walking or running.
 
-    speed : mm/s. cadence : steps per second (of both feet together). duty : share of a foot's cycle on the
-    floor (> 0.5 walking, < 0.5 running). foot_spacing : lateral distance between footprints, mm. lift :
-    height of the ankle's arc in swing, mm. heel_rise : turn of the foot about its ball at push-off,
-    radians.
+    speed : mm/s. cadence : steps per second (of both feet together). duty : share of a foot's cycle on the floor (> 0.5
+    walking, < 0.5 running). foot_spacing : lateral distance between footprints, mm. lift : height of the ankle's arc in
+    swing, mm. heel_rise : turn of the foot about its ball at push-off, radians.
     """
 
     speed: float
@@ -50,17 +53,13 @@ def eased(share: Array) -> Array:
 
 
 def swung(share: Array) -> Array:
-    """Progress of a foot in the air: 0 to 1, at rest at both ends, without the haste of a minimum-jerk
-    curve.
-    """
+    """Progress of a foot in the air: 0 to 1, at rest at both ends, without the haste of a minimum-jerk curve."""
     s = np.clip(share, 0.0, 1.0)
     return s * s * (3.0 - 2.0 * s)
 
 
 def circle_path(radius: float, start_angle: float = 0.0, turn: float = 1.0) -> Path:
-    """A circle about the origin: distance (mm) to position (F, 2) and heading (F,). turn : 1 left, -1
-    right.
-    """
+    """A circle about the origin: distance (mm) to position (F, 2) and heading (F,). turn : 1 left, -1 right."""
 
     def at(distance: Array) -> tuple[Array, Array]:
         angle = start_angle + turn * distance / radius
@@ -122,7 +121,6 @@ def foot_track(
     times : (F,) seconds. obstacle : extra height (F,) mm that the ankle must keep above points (F, 2) on its way from
     one footprint (F, 2) to the next (F, 2).
     """
-    ankle_height, foot_length = skeleton.ankle_height, skeleton.foot
     phase = times / gait.cycle + (0.0 if left else 0.5)
     count, share = np.floor(phase), phase - np.floor(phase)
     swing = np.clip((share - gait.duty) / (1.0 - gait.duty), 0.0, 1.0)
@@ -134,17 +132,25 @@ def foot_track(
         swing == 0.0
     )
     pitch = gait.heel_rise * push - 0.28 * land
-    ball = np.array([0.66 * foot_length, 0.0, -ankle_height])
-    heel = np.array([-0.20 * foot_length, 0.0, -ankle_height])
-    level, tilted = axis_turn(2, heading), axis_turn(2, heading) @ axis_turn(1, pitch)
-    pivot = np.where((pitch > 0.0)[:, None], ball, heel)
-    ground = np.concatenate([flat, np.full((len(times), 1), ankle_height)], axis=1)
-    ankle = ground + (level @ pivot[..., None])[..., 0] - (tilted @ pivot[..., None])[..., 0]
+    ankle, tilted = rolled(flat, heading, pitch, skeleton)
     ankle[:, 2] += gait.lift * eased(swing / 0.5) * eased((1.0 - swing) / 0.5)
     if obstacle is not None:
         ends = [_footprint(gait, path, count + step, left)[0] for step in (0.0, 1.0)]
         ankle[:, 2] += eased(swing / 0.3) * eased((1.0 - swing) / 0.45) * obstacle(flat, *ends)
     return FootTrack(ankle, tilted, swing)
+
+
+def rolled(ground: Array, heading: Array, pitch: Array, skeleton: Skeleton) -> tuple[Array, Array]:
+    """Ankle (F, 3) and world_from_foot (F, 3, 3) of a foot over `ground` (F, 2) that is turned by `pitch` about its
+    ball (up) or heel (down), which stay where they are.
+    """
+    ball = np.array([BALL * skeleton.foot, 0.0, -skeleton.ankle_height])
+    heel = np.array([HEEL * skeleton.foot, 0.0, -skeleton.ankle_height])
+    level = axis_turn(2, heading)
+    tilted = level @ axis_turn(1, pitch)
+    pivot = np.where((pitch > 0.0)[:, None], ball, heel)
+    flat = np.concatenate([ground, np.full((len(ground), 1), skeleton.ankle_height)], axis=1)
+    return flat + (level @ pivot[..., None])[..., 0] - (tilted @ pivot[..., None])[..., 0], tilted
 
 
 def _footprint(gait: Gait, path: Path, count: Array, left: bool) -> tuple[Array, Array]:
@@ -158,11 +164,10 @@ def _footprint(gait: Gait, path: Path, count: Array, left: bool) -> tuple[Array,
 
 
 def leg_to_ankle(hip: Array, ankle: Array, forward: Array, thigh: float, shin: float) -> tuple[Array, Array]:
-    """Rotations of thigh and shin, (F, 3, 3) each, that put the ankle where it is wanted, the knee pointing
-    forward.
+    """Rotations of thigh and shin, (F, 3, 3) each, that put the ankle where it is wanted, the knee pointing forward.
 
-    hip, ankle : (F, 3) mm. forward : (F, 3) the direction in which the knee bends. An ankle out of reach
-    (0.2 % of the leg is always kept bent) is approached as far as the leg goes.
+    hip, ankle : (F, 3) mm. forward : (F, 3) the direction in which the knee bends. An ankle out of reach (0.2 % of the
+    leg is always kept bent) is approached as far as the leg goes.
     """
     reach = ankle - hip
     distance = np.minimum(np.linalg.norm(reach, axis=1), 0.998 * (thigh + shin))
@@ -183,3 +188,139 @@ def _hanging_frame(down: Array, lateral: Array) -> Array:
     x = np.cross(lateral, z)
     x /= np.linalg.norm(x, axis=1, keepdims=True)
     return np.stack([x, np.cross(z, x), z], axis=-1)
+
+
+# Ways that change direction: straight stretches, bends and turns on the spot, one after the other.
+
+
+GRID_MM = 5.0
+LONG_ENOUGH_MM = 3000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A part of a way. length : mm that would be walked at full speed in its time. turn : radians to the left while
+    it lasts. onward : share of the speed that is left, 0 while turning on the spot.
+    """
+
+    length: float
+    turn: float = 0.0
+    onward: float = 1.0
+
+
+class Journey:
+    """A way made of stretches, straight on before the first and after the last: a `gait.Path` with a pace.
+
+    start : mm; heading : radians, both where the first stretch begins. ease : mm over which one stretch goes over
+    into the next (standard deviation of the smoothing).
+    """
+
+    def __init__(
+        self, start: tuple[float, float], heading: float, stretches: tuple[Stretch, ...], ease: float
+    ) -> None:
+        total = sum(stretch.length for stretch in stretches)
+        self._grid = np.arange(-LONG_ENOUGH_MM, total + LONG_ENOUGH_MM, GRID_MM)
+        middles = self._grid + 0.5 * GRID_MM
+        onward, rate, begin = np.ones_like(middles), np.zeros_like(middles), 0.0
+        for stretch in stretches:
+            inside = (middles >= begin) & (middles < begin + stretch.length)
+            onward[inside] = stretch.onward
+            # Spread over the cells that there are, so that the turn is whole whatever the grid.
+            rate[inside] = stretch.turn / (GRID_MM * max(np.count_nonzero(inside), 1))
+            begin += stretch.length
+        self._onward: Array = gaussian_filter1d(onward, ease / GRID_MM, mode="nearest")
+        rate = gaussian_filter1d(rate, ease / GRID_MM, mode="nearest")
+        zero = int(np.searchsorted(self._grid, 0.0))
+        turned = np.concatenate([[0.0], np.cumsum(rate[:-1] * GRID_MM)])
+        self._heading: Array = heading + turned
+        middle_heading = self._heading + 0.5 * rate * GRID_MM
+        steps = (
+            GRID_MM
+            * self._onward[:, None]
+            * np.stack([np.cos(middle_heading), np.sin(middle_heading)], axis=-1)
+        )
+        place = np.concatenate([np.zeros((1, 2)), np.cumsum(steps[:-1], axis=0)])
+        self._place: Array = place - place[zero] + np.array(start)
+
+    def __call__(self, distance: Array) -> tuple[Array, Array]:
+        """Position (F, 2) and heading (F,) after a distance (F,) that full speed would have covered, mm."""
+        return (
+            np.stack([np.interp(distance, self._grid, self._place[:, axis]) for axis in (0, 1)], axis=-1),
+            np.interp(distance, self._grid, self._heading),
+        )
+
+    def pace(self, distance: Array) -> Array:
+        """(F,) the share of full speed there."""
+        return np.interp(distance, self._grid, self._onward)
+
+
+# How the rendered person carries themselves: trunk, arms, and how high the pelvis may be over the feet.
+
+
+NEARLY_STRAIGHT = 0.994
+
+
+def allowed_height(skeleton: Skeleton, root: Array, pelvis: Array, feet: list[FootTrack]) -> Array:
+    """(F,) the height above `root` at which the pelvis still lets both ankles be reached without quite
+    straightening a knee."""
+    allowed = np.full(len(root), np.inf)
+    for sign, index, track in ((1.0, 0, feet[0]), (-1.0, 1, feet[1])):
+        leg = NEARLY_STRAIGHT * (skeleton.thigh[index] + skeleton.shin[index])
+        hip = root + sign * skeleton.hip_half_width[index] * pelvis[:, :, 1]
+        across = np.linalg.norm((track.ankle - hip)[:, :2], axis=1)
+        above = np.sqrt(np.maximum(leg**2 - across**2, 0.0))
+        allowed = np.minimum(allowed, track.ankle[:, 2] + above - hip[:, 2])
+    return allowed
+
+
+def trunk(
+    heading: Array, pitch: Array | float, twist: Array | float, roll: Array | float
+) -> dict[str, Array]:
+    """Pelvis, thorax (twisted against the pelvis about its own axis) and head, which looks where the person goes."""
+    level = np.zeros_like(heading)
+    pelvis = yaw_pitch_roll(heading, level + 0.6 * pitch, level + roll)
+    thorax = pelvis @ axis_turn(1, level + 0.4 * pitch) @ axis_turn(2, level + twist)
+    head = thorax @ yaw_pitch_roll(-0.55 * (level + twist), level + 0.10, -0.6 * (level + roll))
+    return {"pelvis": pelvis, "thorax": thorax, "head": head}
+
+
+def add_arm(turns: dict[str, Array], side: str, forward: Array, outward: Array, bend: Array) -> None:
+    """An arm swung `forward`, held `outward` and bent by `bend` at the elbow, radians; the clavicle gives
+    way to it a little. Adds clavicle, upper arm, forearm and hand.
+    """
+    sign = 1.0 if side == "left" else -1.0
+    clavicle = turns["thorax"] @ axis_turn(2, -sign * 0.08 * forward) @ axis_turn(0, sign * 0.06 * outward)
+    upper = (
+        turns["thorax"]
+        @ axis_turn(1, -forward)
+        @ axis_turn(0, sign * outward)
+        @ axis_turn(2, -sign * 0.25 + 0.0 * bend)
+    )
+    forearm = upper @ axis_turn(1, -bend)
+    turns |= {f"{side}_clavicle": clavicle, f"{side}_upper_arm": upper, f"{side}_forearm": forearm}
+    turns[f"{side}_hand"] = (
+        forearm @ axis_turn(2, -sign * 0.5 + 0.0 * bend) @ axis_turn(1, -0.15 + 0.0 * bend)
+    )
+
+
+def add_leg(
+    turns: dict[str, Array],
+    skeleton: Skeleton,
+    side: str,
+    root: Array,
+    foot: tuple[Array, Array],
+    ahead: Array,
+) -> None:
+    """A leg from the pelvis at `root` (F, 3) to a foot, the knee pointing `ahead`. foot : ankle (F, 3), turn (F, 3, 3).
+
+    Adds thigh, shin and foot.
+    """
+    sign, index = (1.0, 0) if side == "left" else (-1.0, 1)
+    hip = root + sign * skeleton.hip_half_width[index] * turns["pelvis"][:, :, 1]
+    thigh, shin = leg_to_ankle(hip, foot[0], ahead, skeleton.thigh[index], skeleton.shin[index])
+    turns |= {f"{side}_thigh": thigh, f"{side}_shin": shin, f"{side}_foot": foot[1]}
+
+
+def frame_rate(times: Array) -> float:
+    """Frames per second of evenly spaced times."""
+    return float(1.0 / (times[1] - times[0])) if len(times) > 1 else 60.0

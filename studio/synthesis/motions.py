@@ -5,32 +5,209 @@ All were written for this project; none is recorded from a person.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
-from studio.body.person import SIDES, PersonMotion, Skeleton
+from studio.body.person import SIDES, PersonMotion, Skeleton, joint_points
 from studio.errors import StudioError
 from studio.geometry.rotations import axis_turn
 from studio.synthesis.circuit import circuit
-from studio.synthesis.exercises import crouch, sit
 from studio.synthesis.gait import (
     Gait,
+    Journey,
     Obstacle,
     Path,
+    Stretch,
+    add_arm,
+    add_leg,
+    allowed_height,
     circle_path,
+    eased,
     foot_track,
-    leg_to_ankle,
+    frame_rate,
     line_path,
+    trunk,
     winding_path,
 )
-from studio.synthesis.handstand import handstand
-from studio.synthesis.journeys import Journey, Stretch
-from studio.synthesis.posture import add_arm, allowed_height, frame_rate, trunk
+from studio.synthesis.room import GRAIN, Block
 
 Array = NDArray[np.float64]
+
+# A handstand: hands on the floor, kick up one leg after the other, hold with a sway, come down again.
+
+# Key poses: share of the motion's length; degrees from upright of pelvis and thorax leaning forward (180 =
+# upside down), of the arms' lean, of the thighs swung backwards from hanging straight down (180 = straight
+# up), and knees.
+KEYS = np.array(
+    [
+        # share pelvis thorax arms thigh_l thigh_r knee_l knee_r
+        (0.00, 108.0, 128.0, 4.0, 22.0, 28.0, 4.0, 30.0),
+        (0.10, 110.0, 130.0, 2.0, 30.0, 24.0, 6.0, 22.0),
+        (0.35, 158.0, 164.0, -3.0, 150.0, 70.0, 4.0, 26.0),
+        (0.50, 177.0, 179.0, -1.0, 182.0, 150.0, 4.0, 20.0),
+        (0.60, 181.0, 181.0, 0.0, 184.0, 180.0, 4.0, 5.0),
+        (0.78, 179.0, 180.0, 0.0, 178.0, 182.0, 5.0, 4.0),
+        (1.00, 150.0, 160.0, -2.0, 120.0, 140.0, 10.0, 6.0),
+    ]
+)
+
+
+def handstand(skeleton: Skeleton, times: Array, options: dict[str, float]) -> PersonMotion:
+    """Kick-up to a handstand: options heading_degrees, hands_apart_mm. The wrists stay where they stand."""
+    length = times[-1] if len(times) > 1 and times[-1] > 0.0 else 1.0
+    shares = times / length
+    angles = np.radians(PchipInterpolator(KEYS[:, 0], KEYS[:, 1:])(shares))
+    pelvis, thorax, arms, thigh_left, thigh_right, knee_left, knee_right = angles.T
+    heading = axis_turn(2, np.full(len(times), np.radians(options.get("heading_degrees", 20.0))))
+    sway = 0.015 * np.sin(2.0 * np.pi * 1.3 * times)
+    turns = {
+        "pelvis": heading @ axis_turn(1, pelvis + sway),
+        "thorax": heading @ axis_turn(1, thorax + 0.5 * sway),
+        "head": heading @ axis_turn(1, thorax - 0.45),
+    }
+    half_apart = 0.5 * options.get("hands_apart_mm", 480.0)
+    for side, thigh, knee in zip(SIDES, (thigh_left, thigh_right), (knee_left, knee_right), strict=True):
+        sign = 1.0 if side == "left" else -1.0
+        turns[f"{side}_thigh"] = (
+            heading @ axis_turn(1, thigh + sway) @ axis_turn(0, np.full(len(times), sign * 0.05))
+        )
+        turns[f"{side}_shin"] = turns[f"{side}_thigh"] @ axis_turn(1, knee)
+        turns[f"{side}_foot"] = turns[f"{side}_shin"] @ axis_turn(
+            1, 0.25 + 0.5 * np.clip(thigh - 0.6, 0.0, 1.0)
+        )
+        _add_supporting_arm(turns, skeleton, side, heading, arms, half_apart)
+    free = PersonMotion(skeleton, float(1.0 / (times[1] - times[0])), np.zeros((len(times), 3)), turns)
+    points = joint_points(free)
+    hands = 0.5 * (points["left_hand"] + points["right_hand"])
+    return PersonMotion(skeleton, free.fps, np.array([0.0, 0.0, 55.0]) - hands, turns)
+
+
+def _add_supporting_arm(
+    turns: dict[str, Array], skeleton: Skeleton, side: str, heading: Array, lean: Array, half_apart: float
+) -> None:
+    """An arm that stands on its palm: nearly straight, spread so that the wrists are `half_apart` from the middle."""
+    sign, index = (1.0, 0) if side == "left" else (-1.0, 1)
+    turns[f"{side}_clavicle"] = turns["thorax"] @ axis_turn(0, np.full(len(lean), sign * 0.25))
+    length = skeleton.upper_arm[index] + skeleton.forearm[index]
+    spread = np.full(
+        len(lean), sign * np.arcsin(np.clip((half_apart - skeleton.shoulder[index][1]) / length, -0.5, 0.5))
+    )
+    upper = heading @ axis_turn(1, lean) @ axis_turn(0, spread)
+    turns[f"{side}_upper_arm"] = upper
+    turns[f"{side}_forearm"] = upper @ axis_turn(1, np.full(len(lean), -0.06))
+    turns[f"{side}_hand"] = heading @ axis_turn(1, np.full(len(lean), -1.45))
+
+
+# Written exercises on both feet that no recording has: going down into a crouch and up again, sitting down on a
+# stool.
+# The feet stay where they stand; the pelvis goes down and back along eased curves and the legs reach from it to the
+# ankles.
+
+
 Options = dict[str, float]
+
+STANDING_BENT = 12.0
+"""mm that the hips of somebody who stands are lower than straight legs would have them."""
+SEAT_MM, SEAT_HALF = 430.0, 165.0
+PELVIS_ABOVE_SEAT = 0.066
+"""Height of the pelvis centre above what one sits on, of the person's height: the seat's flesh."""
+SEAT_BEHIND = 0.235
+"""How far behind the ankles the pelvis of somebody who sits is, of the height."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Carriage:
+    """How the person is held in every frame, (F,) each. down, back : mm of the pelvis from where it stands. lean :
+    of the trunk, radians. arm, out, bend : of both arms as `add_arm` takes them; arms are two (left, right).
+    """
+
+    down: Array
+    back: Array
+    lean: Array
+    arm: tuple[Array, Array]
+    out: Array
+    bend: tuple[Array, Array]
+
+
+def crouch(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
+    """Down into a crouch and up again, arms reaching forward: options depth (of the standing hips' height), down_s,
+    hold_s, up_s, start_s (before the going down), heading_degrees, stance (between the ankles, of the height), swing
+    (of one arm against the other, radians), at_x_mm, at_y_mm.
+    """
+    start, down = options.get("start_s", 0.1), options.get("down_s", 0.6)
+    again = start + down + options.get("hold_s", 0.2)
+    share = eased((times - start) / down) - eased((times - again) / options.get("up_s", 0.6))
+    hips, tall, swing = skeleton.standing_hip_height, skeleton.height, options.get("swing", 0.25)
+    sway = swing * np.sin(2.0 * np.pi * 0.8 * times)
+    held = _Carriage(
+        down=options.get("depth", 0.5) * hips * share,
+        back=0.10 * tall * share,
+        lean=0.85 * share,
+        arm=(0.05 + 1.5 * share + sway * share, 0.05 + 1.5 * share - sway * share),
+        out=0.22 + 0.15 * share,
+        bend=(0.35 + 0.3 * share, 0.35 + 0.3 * share + 0.5 * np.abs(sway)),
+    )
+    return _on_both_feet(skeleton, times, options, held)
+
+
+def sit(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
+    """Sitting down on a stool that stands there (`stool`), hands to the thighs: options seat_mm (its height), down_s,
+    start_s, heading_degrees, stance, at_x_mm, at_y_mm.
+    """
+    share = eased((times - options.get("start_s", 0.15)) / options.get("down_s", 0.9))
+    seated = options.get("seat_mm", SEAT_MM) + PELVIS_ABOVE_SEAT * skeleton.height
+    bow = 4.0 * share * (1.0 - share)
+    held = _Carriage(
+        down=(skeleton.standing_hip_height - STANDING_BENT - seated) * share,
+        # The pelvis goes back before it goes down: one reaches for the seat, bowed.
+        back=SEAT_BEHIND * skeleton.height * eased(np.sqrt(share)),
+        lean=0.75 * bow + 0.10 * share,
+        arm=(0.05 + 0.45 * share + 0.5 * bow, 0.05 + 0.40 * share + 0.4 * bow),
+        out=0.22 - 0.06 * share,
+        bend=(0.35 + 0.75 * share, 0.35 + 0.85 * share),
+    )
+    return _on_both_feet(skeleton, times, options, held)
+
+
+def stool(skeleton: Skeleton, options: Options) -> Block:
+    """What `sit` sits down on."""
+    heading, half = np.radians(options.get("heading_degrees", 0.0)), 0.5 * options.get("seat_mm", SEAT_MM)
+    back = SEAT_BEHIND * skeleton.height
+    x, y = _place(options) - back * np.array([np.cos(heading), np.sin(heading)])
+    colours = (0.46, 0.40, 0.36), (0.36, 0.30, 0.27)
+    centre, size = (float(x), float(y), half), (SEAT_HALF, SEAT_HALF, half)
+    return Block(centre, size, colours[0], GRAIN, colours[1], float(heading))
+
+
+def _place(options: Options) -> Array:
+    """(2,) mm, the middle between the ankles."""
+    return np.array([options.get("at_x_mm", 0.0), options.get("at_y_mm", 0.0)])
+
+
+def _on_both_feet(skeleton: Skeleton, times: Array, options: Options, held: _Carriage) -> PersonMotion:
+    """The motion of a carriage over two feet that stand still."""
+    count, zero = len(times), np.zeros(len(times))
+    heading = np.full(count, np.radians(options.get("heading_degrees", 0.0)))
+    ahead = np.stack([np.cos(heading), np.sin(heading), zero], axis=-1)
+    outward = np.stack([-np.sin(heading), np.cos(heading), zero], axis=-1)
+    root = -held.back[:, None] * ahead
+    root[:, :2] += _place(options) + np.stack([4.0 * np.sin(1.7 * times), 4.0 * np.sin(1.1 * times)], axis=-1)
+    root[:, 2] = skeleton.standing_hip_height - STANDING_BENT - held.down
+    turns = trunk(heading, held.lean, 0.03 * np.sin(1.9 * times), zero)
+    stance = 0.5 * options.get("stance", 0.16) * skeleton.height
+    for index, side in enumerate(SIDES):
+        sign = 1.0 if side == "left" else -1.0
+        toes_out = axis_turn(2, heading + sign * 0.22)
+        ankle = sign * stance * outward + np.array([*_place(options), skeleton.ankle_height])
+        add_leg(turns, skeleton, side, root, (ankle, toes_out), toes_out[:, :, 0])
+        add_arm(turns, side, held.arm[index], held.out, held.bend[index])
+    return PersonMotion(skeleton, frame_rate(times), root, turns)
+
+
 BOB, RUNNING_BOB, RISE_S = 0.6, 0.018, 0.5
 
 MotionMaker = Callable[[Skeleton, Array, Options], PersonMotion]
@@ -122,14 +299,10 @@ def stand(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
     root[:, 2] = skeleton.standing_hip_height - 9.0
     turns = trunk(heading, zero, 0.02 * np.sin(1.3 * times), zero)
     forward = turns["pelvis"][:, :, 0]
-    for index, side in enumerate(SIDES):
-        sign = 1.0 if side == "left" else -1.0
-        outward = np.stack([-np.sin(heading), np.cos(heading), zero], axis=-1)
-        hip = root + sign * skeleton.hip_half_width[index] * turns["pelvis"][:, :, 1]
+    outward = np.stack([-np.sin(heading), np.cos(heading), zero], axis=-1)
+    for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
         ankle = sign * 0.065 * skeleton.height * outward + np.array([0.0, 0.0, skeleton.ankle_height])
-        thigh, shin = leg_to_ankle(hip, ankle, forward, skeleton.thigh[index], skeleton.shin[index])
-        turns |= {f"{side}_thigh": thigh, f"{side}_shin": shin}
-        turns[f"{side}_foot"] = axis_turn(2, heading + sign * 0.15)
+        add_leg(turns, skeleton, side, root, (ankle, axis_turn(2, heading + sign * 0.15)), forward)
         add_arm(turns, side, 0.04 * np.sin(1.5 * times), np.full(count, 0.2), np.full(count, 0.35))
     return PersonMotion(skeleton, frame_rate(times), root, turns)
 
@@ -185,11 +358,9 @@ def _along(
     if isinstance(path, Journey):
         root[:, 2] = _risen(root[:, 2], allowed, frame_rate(times))
     for side, track in zip(SIDES, feet, strict=True):
-        sign, index = (1.0, 0) if side == "left" else (-1.0, 1)
-        hip = root + sign * skeleton.hip_half_width[index] * turns["pelvis"][:, :, 1]
+        sign = 1.0 if side == "left" else -1.0
         ahead = turns["pelvis"][:, :, 0] + track.turn[:, :, 0]
-        thigh, shin = leg_to_ankle(hip, track.ankle, ahead, skeleton.thigh[index], skeleton.shin[index])
-        turns |= {f"{side}_thigh": thigh, f"{side}_shin": shin, f"{side}_foot": track.turn}
+        add_leg(turns, skeleton, side, root, (track.ankle, track.turn), ahead)
         forward = 0.05 - sign * swing * stride
         bend = elbow + 0.45 * swing * (1.0 - sign * np.cos(phase - 0.3))
         add_arm(turns, side, forward, np.full(len(times), 0.24), bend)

@@ -11,7 +11,7 @@ from studio.geometry.camera import Camera
 from studio.progress import Progress
 from studio.synthesis.clips import ClipWriter
 from studio.synthesis.damage import cameras_left, clutter_in_front
-from studio.synthesis.exercises import stool
+from studio.synthesis.motions import stool
 from studio.synthesis.recipe_file import Picture, Recipe
 from studio.synthesis.renderer import Renderer
 from studio.synthesis.room import Block

@@ -1,8 +1,8 @@
-"""What footage is to be made: the entries of a recipe file (TOML), checked, and the recipes that come
-along.
-"""
+"""What footage is to be made: the entries of a recipe file (TOML), checked, and the recipes that come along."""
 
 import tomllib
+from collections.abc import Iterable, Mapping
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,8 @@ from studio.errors import StudioError
 from studio.geometry.camera import Camera
 from studio.synthesis.cameras import RIGS, placed_camera
 from studio.synthesis.damage import Damage
-from studio.synthesis.joined_clips import Clip
 from studio.synthesis.person import Proportions
+from studio.synthesis.recorded_clips import Clip
 from studio.synthesis.rooms import ROOMS, is_room
 from studio.synthesis.wardrobes import MATERIALS, WARDROBES
 from studio.typed_decoding import decode_toml
@@ -27,9 +27,8 @@ LIKE, LONGEST_CHAIN = "like", 5
 
 
 class Picture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Pictures. noise : standard deviation of the sensor's noise at mid grey, levels. samples : rays along
-    a pixel's side. quality : x264's constant rate factor of the footage. empty_frames : length of the
-    empty clip.
+    """Pictures. noise : standard deviation of the sensor's noise at mid grey, levels. samples : rays along a pixel's
+    side. quality : x264's constant rate factor of the footage. empty_frames : length of the empty clip.
     """
 
     width: int = 640
@@ -82,18 +81,17 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     `body` itself, seen by one camera, as in Deutscher & Reid 6.1; or "recorded", the motion of `motion_file` (.amc,
     .bvh, .npz; `skeleton_file` for an .amc whose ASF is not beside it); or "joined", several `clips` of such motion one
     after the other (`joined_clips.py`). options : numbers of the motion. weighting : what runs of the session use by
-    default. An entry `like` in the file names another recipe, bundled or beside it, whose entries count where this
-    one has none of its own.
+    default. An entry `like` in the file names another recipe, bundled or beside it, whose entries count where this one
+    has none of its own.
 
     height_mm : of a person with published proportions. shape : instead, a file of `body`'s dimensions, whose lengths
-    the person's bones have; the session's subject has these dimensions, radii included, and those of the rendered
-    hands and shoes; `subject_shape.toml` beside it has the file's dimensions alone. girth : how much stouter than
-    usual the flesh is. proportions : of the bones, where they differ from the published ones. wardrobe : "striped" or
-    "plain" clothes, which hardly stand out in the "office". colours : other ones for some of what is worn, RGB 0...1.
-    room : "office", "furnished", "hall", or "drawn-" and a number, which furnishes a room by chance. damage : what went
-    wrong with the take.
-    sigma : a file whose first numbers are the session's σ0, one for each parameter of `body`, from frame to frame at
-    60 Hz. Files count from the recipe's folder, or lie in the real data after "data:" (`real_data.py`).
+    the person's bones have; the session's subject has these dimensions, radii included, and those of the rendered hands
+    and shoes; `subject_shape.toml` beside it has the file's dimensions alone. girth : how much stouter than usual the
+    flesh is. proportions : of the bones, where they differ from the published ones. wardrobe : "striped" or "plain"
+    clothes, which hardly stand out in the "office". colours : other ones for some of what is worn, RGB 0...1. room :
+    "office", "furnished", "hall", or "drawn-" and a number, which furnishes a room by chance. damage : what went wrong
+    with the take. sigma : a file whose first numbers are the session's σ0, one for each parameter of `body`, from frame
+    to frame at 60 Hz. Files count from the recipe's folder, or lie in the real data after "data:" (`real_data.py`).
     """
 
     title: str
@@ -180,9 +178,7 @@ def _entries(path: Path, chain: int) -> dict[str, Any]:
 
 
 def recipe_cameras(recipe: Recipe, rng: np.random.Generator) -> tuple[Camera, ...]:
-    """The cameras that are made up or put down by hand (those of a calibration file are read by the
-    caller).
-    """
+    """The cameras that are made up or put down by hand (those of a calibration file are read by the caller)."""
     size = (recipe.picture.width, recipe.picture.height)
     if recipe.cameras.placed:
         return tuple(
@@ -200,72 +196,61 @@ def recipe_cameras(recipe: Recipe, rng: np.random.Generator) -> tuple[Camera, ..
     return RIGS[recipe.cameras.rig](size, rng)
 
 
+RANGES: Mapping[str, tuple[float, float]] = {
+    "frames": (1, 100_000),
+    "fps": (1, 1000),
+    "height_mm": (300, 3000),
+    "girth": (0.5, 2),
+    "damage.clutter": (0, 24),
+    "damage.calibration_px": (0, 50),
+    "damage.shutter": (0, 1),
+    "picture.width": (16, 8192),
+    "picture.height": (16, 8192),
+    "picture.noise": (0, 40),
+    "picture.samples": (1, 4),
+    "picture.quality": (0, 51),
+}
+CHOICES: Mapping[str, Iterable[str]] = {
+    "wardrobe": WARDROBES,
+    "cameras.rig": ("", *RIGS),
+    "include.background": ("clip", "picture", "none"),
+}
+
+
 def _problem(recipe: Recipe) -> str:
     """What is wrong with a recipe whose entries have the right types, "" when nothing is."""
-    picture, include, cameras = recipe.picture, recipe.include, recipe.cameras
-    checks = (
-        (not 1 <= recipe.frames <= 100_000, f"frames is {recipe.frames}, not 1 to 100000"),
-        (not 1.0 <= recipe.fps <= 1000.0, f"fps is {recipe.fps:g}, not 1 to 1000"),
-        (not 300.0 <= recipe.height_mm <= 3000.0, f"height_mm is {recipe.height_mm:g}, not 300 to 3000"),
-        (
-            not is_room(recipe.room),
-            f"room is '{recipe.room}', not one of {', '.join(ROOMS)}, or 'drawn-' and a number",
+    for name, (low, high) in RANGES.items():
+        value = attrgetter(name)(recipe)
+        if not low <= value <= high:
+            return f"{name} is {value:g}, not {low:g} to {high}"
+    for name, known in CHOICES.items():
+        if attrgetter(name)(recipe) not in known:
+            return f"{name} is '{attrgetter(name)(recipe)}', not one of {', '.join(filter(None, known))}"
+    picture, cameras, is_arm = recipe.picture, recipe.cameras, recipe.motion == "arm"
+    strange = sorted(set(recipe.colours) - set(MATERIALS))
+    checks = {
+        f"room is '{recipe.room}', not one of {', '.join(ROOMS)}, or 'drawn-' and a number": (
+            not is_room(recipe.room)
         ),
-        (
-            recipe.wardrobe not in WARDROBES,
-            f"wardrobe is '{recipe.wardrobe}', not one of {', '.join(WARDROBES)}",
+        f"colours are of {', '.join(MATERIALS)}, not of {', '.join(strange)}": bool(strange),
+        "colours are RGB from 0 to 1": (
+            not all(0.0 <= value <= 1.0 for colour in recipe.colours.values() for value in colour)
         ),
-        (
-            not set(recipe.colours) <= set(MATERIALS),
-            f"colours are of {', '.join(MATERIALS)}, not of {', '.join(sorted(set(recipe.colours) - set(MATERIALS)))}",
+        "proportions are factors from 0.7 to 1.4": (
+            not all(0.7 <= value <= 1.4 for value in msgspec.structs.astuple(recipe.proportions))
         ),
-        (
-            not all(0.0 <= value <= 1.0 for colour in recipe.colours.values() for value in colour),
-            "colours are RGB from 0 to 1",
+        "proportions belong to no shape file": bool(recipe.shape) and recipe.proportions != Proportions(),
+        "damage is done to footage of a person, not to motion 'arm'": is_arm and recipe.damage != Damage(),
+        "shape and sigma belong to a person, not to motion 'arm'": is_arm
+        and bool(recipe.shape or recipe.sigma),
+        "picture sides must be even for H.264": bool(picture.width % 2 or picture.height % 2),
+        f"motion '{RECORDED}' and an entry motion_file belong together": (
+            (recipe.motion == RECORDED) != bool(recipe.motion_file)
         ),
-        (not 0.5 <= recipe.girth <= 2.0, f"girth is {recipe.girth:g}, not 0.5 to 2"),
-        (
-            not all(0.7 <= value <= 1.4 for value in msgspec.structs.astuple(recipe.proportions)),
-            "proportions are factors from 0.7 to 1.4",
+        f"motion '{JOINED}' and [[clips]] belong together": (recipe.motion == JOINED) != bool(recipe.clips),
+        "picture.empty_frames must be 1 or more": picture.empty_frames < 1,
+        "[cameras] must hold one of rig, calibration, placed": (
+            sum(map(bool, (cameras.rig, cameras.calibration, cameras.placed))) != 1
         ),
-        (bool(recipe.shape) and recipe.proportions != Proportions(), "proportions belong to no shape file"),
-        (
-            recipe.motion == "arm" and recipe.damage != Damage(),
-            "damage is done to footage of a person, not to motion 'arm'",
-        ),
-        (not 0 <= recipe.damage.clutter <= 24, f"damage.clutter is {recipe.damage.clutter}, not 0 to 24"),
-        (
-            not 0.0 <= recipe.damage.calibration_px <= 50.0,
-            f"damage.calibration_px is {recipe.damage.calibration_px:g}, not 0 to 50",
-        ),
-        (
-            not 0.0 <= recipe.damage.shutter <= 1.0,
-            f"damage.shutter is {recipe.damage.shutter:g}, not 0 to 1",
-        ),
-        (
-            recipe.motion == "arm" and bool(recipe.shape or recipe.sigma),
-            "shape and sigma belong to a person, not to motion 'arm'",
-        ),
-        (not 16 <= picture.width <= 8192, f"picture.width is {picture.width}, not 16 to 8192"),
-        (not 16 <= picture.height <= 8192, f"picture.height is {picture.height}, not 16 to 8192"),
-        (bool(picture.width % 2 or picture.height % 2), "picture sides must be even for H.264"),
-        (not 0.0 <= picture.noise <= 40.0, f"picture.noise is {picture.noise:g}, not 0 to 40"),
-        (not 1 <= picture.samples <= 4, f"picture.samples is {picture.samples}, not 1 to 4"),
-        (not 0.0 <= picture.quality <= 51.0, f"picture.quality is {picture.quality:g}, not 0 to 51"),
-        (
-            (recipe.motion == RECORDED) != bool(recipe.motion_file),
-            f"motion '{RECORDED}' and an entry motion_file belong together",
-        ),
-        ((recipe.motion == JOINED) != bool(recipe.clips), f"motion '{JOINED}' and [[clips]] belong together"),
-        (picture.empty_frames < 1, "picture.empty_frames must be 1 or more"),
-        (cameras.rig not in ("", *RIGS), f"cameras.rig is '{cameras.rig}', not one of {', '.join(RIGS)}"),
-        (
-            sum(map(bool, (cameras.rig, cameras.calibration, cameras.placed))) != 1,
-            "[cameras] must hold one of rig, calibration, placed",
-        ),
-        (
-            include.background not in ("clip", "picture", "none"),
-            f"include.background is '{include.background}', not clip, picture or none",
-        ),
-    )
-    return next((words for wrong, words in checks if wrong), "")
+    }
+    return next((words for words, wrong in checks.items() if wrong), "")

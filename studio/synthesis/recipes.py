@@ -24,14 +24,19 @@ from studio.sessions.manifest import read_manifest, write_manifest
 from studio.sessions.named_rows import write_pose, write_sigma
 from studio.synthesis.arm_footage import render_arm
 from studio.synthesis.damage import misplaced
-from studio.synthesis.joined_clips import joined_person
 from studio.synthesis.motions import make_motion
-from studio.synthesis.person import marker_lengths, proportioned, skeleton_of_height
+from studio.synthesis.person import (
+    marker_lengths,
+    proportioned,
+    skeleton_of_height,
+    skeleton_of_subject,
+    subject_of_file,
+    with_hands_and_feet,
+)
 from studio.synthesis.person_footage import render_person
 from studio.synthesis.real_data import located
 from studio.synthesis.recipe_file import JOINED, RECORDED, Recipe, find_recipe, read_recipe, recipe_cameras
-from studio.synthesis.recorded_clip import recorded_person
-from studio.synthesis.shape import skeleton_of_subject, subject_of_file, with_hands_and_feet
+from studio.synthesis.recorded_clips import joined_person, recorded_person
 
 ARM = "arm"
 RECIPE_COPY = "recipe.toml"
@@ -93,11 +98,10 @@ def render_source(
     progress: Progress | None = None,
     frames: int | None = None,
 ) -> None:
-    """Write the folder that `import` understands: videos, background, masks, calibration, truth, subject,
-    start pose.
+    """Write the folder that `import` understands: videos, background, masks, calibration, truth, subject, start pose.
 
-    recipe_folder : where a relative `cameras.calibration` starts. source : an empty folder.
-    frames : as in `synthesize`.
+    recipe_folder : where a relative `cameras.calibration` starts. source : an empty folder. frames : as in
+    `synthesize`.
     """
     rng = np.random.default_rng(recipe.seed)
     if recipe.motion == ARM:
@@ -160,9 +164,7 @@ def recipe_person(
 
 
 def person_subject(recipe: Recipe, motion: PersonMotion) -> Subject:
-    """What a tape measure says of the rendered person: height and the distances between neighbouring
-    markers.
-    """
+    """What a tape measure says of the rendered person: height and the distances between neighbouring markers."""
     lengths = {pair: round(length, 1) for pair, length in marker_lengths(motion).items()}
     return Subject(body=recipe.body, height_mm=recipe.height_mm, lengths_mm=lengths)
 
@@ -189,9 +191,8 @@ def _write_sigma(recipe: Recipe, given: Path, path: Path) -> None:
 def _write_start_pose(
     recipe: Recipe, subject: Subject, truth: MarkerMotion, rng: np.random.Generator, path: Path
 ) -> None:
-    """The subject's pose in frame 0 as a person would find it: inverse kinematics on the true markers, each
-    coordinate moved by normal noise of `start_pose_noise_mm` (so it is close to the truth, not the
-    truth).
+    """The subject's pose in frame 0 as a person would find it: inverse kinematics on the true markers, each coordinate
+    moved by normal noise of `start_pose_noise_mm` (so it is close to the truth, not the truth).
     """
     body, _ = fit_subject(load_body(recipe.body), subject)
     kept, names = known_markers(body, truth.names)

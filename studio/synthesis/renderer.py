@@ -1,9 +1,8 @@
 """Pictures of the person in the room, with their exact masks.
 
-The room is traced once a camera; in each frame the person's shadow on the floor is computed once for all
-cameras and the person is traced inside the window that can hold them. A picture is then the room, darkened
-by the shadow, under the person, softened as by a lens, with sensor noise that depends only on seed, camera
-and frame.
+The room is traced once a camera; in each frame the person's shadow on the floor is computed once for all cameras and
+the person is traced inside the window that can hold them. A picture is then the room, darkened by the shadow, under the
+person, softened as by a lens, with sensor noise that depends only on seed, camera and frame.
 """
 
 from dataclasses import dataclass
@@ -75,16 +74,12 @@ class Renderer:
         self._views = tuple(_view(room, camera, samples) for camera in cameras)
 
     def empty(self, camera: int, frame: int) -> Bytes:
-        """(H, W, 3) BGR picture of the room alone; its noise is that of frame -1 - `frame`, which no other
-        has.
-        """
+        """(H, W, 3) BGR picture of the room alone; its noise is that of frame -1 - `frame`, which no other has."""
         view = self._views[camera]
         return self._developed(view.key + view.ambient, camera, -1 - frame)
 
     def shadow(self, frame: int) -> tuple[Floats, Floats]:
-        """The person's shadow of the lamp and of the surroundings on the floor's grid, (n, n) each, 1 = no
-        shadow.
-        """
+        """The person's shadow of the lamp and of the surroundings on the floor's grid, (n, n) each, 1 = no shadow."""
         count = int(2 * SHADOW_REACH / SHADOW_CELL) + 1
         key, ambient = np.ones((count, count), np.float32), np.ones((count, count), np.float32)
         left = -SHADOW_REACH

@@ -18,9 +18,7 @@ SKIRTING_HEIGHT = 90.0
 
 @njit(cache=True, error_model="numpy", fastmath=True)
 def block_entry(ox, oy, oz, dx, dy, dz, block):
-    """Distance along a ray to a turned box and the axis of the face it enters (0..2); (FAR, 0) when it
-    misses.
-    """
+    """Distance along a ray to a turned box and the axis of the face it enters (0..2); (FAR, 0) when it misses."""
     cosine, sine = block[12], block[13]
     x, y = ox - block[0], oy - block[1]
     start = (cosine * x + sine * y, -sine * x + cosine * y, oz - block[2])
@@ -63,9 +61,7 @@ def first_surface(ox, oy, oz, dx, dy, dz, half_x, half_y, height, blocks):
 
 @njit(cache=True, error_model="numpy", fastmath=True)
 def pattern_share(pattern, u, v):
-    """How much of the second colour a pattern shows at (u, v) mm of a face, and a factor for its
-    brightness.
-    """
+    """How much of the second colour a pattern shows at (u, v) mm of a face, and a factor for its brightness."""
     grain = value_noise(u / 14.0, v / 14.0, 3.0) - 0.5
     if pattern == PLANKS:
         plank = math.floor(v / 140.0)

@@ -57,11 +57,12 @@ def cloth_colour(material, x, y, z, wardrobe):
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)
-def shaded(px, py, pz, dx, dy, dz, pieces, labels, active, count, shadow_active, lights, wardrobe, out):
+def shaded(px, py, pz, dx, dy, dz, person, active, count, shadow_active, out):
     """Light that a point of the person sends to the camera, written to `out` (3,), 0...1.
 
-    lights : (4, 3) lamp position, (lamp radius, -, -), lamp colour, ambient colour.
+    person : pieces, labels, lights (4, 3: lamp position, (lamp radius, -, -), lamp colour, ambient colour), wardrobe.
     """
+    pieces, labels, lights, wardrobe = person
     nx, ny, nz = body_normal(px, py, pz, pieces, labels, active, count)
     piece = nearest_piece(px, py, pz, pieces, active, count)
     x, y, z = local_point(px, py, pz, pieces[piece])
@@ -148,26 +149,14 @@ def first_touch(origin, dx, dy, dz, start, pieces, labels, nearby, near_count, a
 
 @njit(cache=True, error_model="numpy", fastmath=True)
 def trace_pixel(
-    origin,
-    rays,
-    samples,
-    row,
-    column,
-    room_depth,
-    start,
-    nearby,
-    near_count,
-    scratch,
-    pieces,
-    labels,
-    lights,
-    wardrobe,
-    light,
+    origin, rays, samples, row, column, room_depth, start, nearby, near_count, scratch, person, light
 ):
     """Share of a pixel that the person covers; adds the light of its samples to light[row, column].
 
-    start, nearby, near_count : as `first_touch` takes them. scratch : two rows of room for pieces' indices.
+    start, nearby, near_count : as `first_touch` takes them. scratch : two rows of room for pieces' indices. person : as
+    `shaded` takes it.
     """
+    pieces, labels = person[0], person[1]
     hits, shaded_at, each, colour = 0, -FAR, 1.0 / (samples * samples), np.zeros(3)
     for sample in range(samples * samples):
         ray = rays[row * samples + sample // samples, column * samples + sample % samples]
@@ -179,22 +168,7 @@ def trace_pixel(
         if abs(t - shaded_at) > SAME_SURFACE:
             shaded_at = t
             px, py, pz = origin[0] + t * dx, origin[1] + t * dy, origin[2] + t * dz
-            shaded(
-                px,
-                py,
-                pz,
-                dx,
-                dy,
-                dz,
-                pieces,
-                labels,
-                scratch[0],
-                count,
-                scratch[1],
-                lights,
-                wardrobe,
-                colour,
-            )
+            shaded(px, py, pz, dx, dy, dz, person, scratch[0], count, scratch[1], colour)
         for channel in range(3):
             light[row, column, channel] += colour[channel] * each
     return hits * each
@@ -209,6 +183,7 @@ def trace_person(origin, rays, samples, room_depth, pieces, labels, lights, ward
     0...1.
     """
     height, width = coverage.shape
+    person = (pieces, labels, lights, wardrobe)
     down, across = (height + TILE - 1) // TILE, (width + TILE - 1) // TILE
     for tile in prange(down * across):
         top, left = TILE * (tile // across), TILE * (tile % across)
@@ -231,10 +206,7 @@ def trace_person(origin, rays, samples, room_depth, pieces, labels, lights, ward
                     nearby,
                     near_count,
                     scratch,
-                    pieces,
-                    labels,
-                    lights,
-                    wardrobe,
+                    person,
                     light,
                 )
 
@@ -243,8 +215,7 @@ def trace_person(origin, rays, samples, room_depth, pieces, labels, lights, ward
 def floor_shadow(left, near, cell, pieces, labels, lights, key, ambient):
     """What the person leaves of the lamp and of the room's light on the floor.
 
-    Cell (j, i) of the (n, n) outputs lies at x = left + i * cell, y = near + j * cell, mm; 1 = nothing
-    taken away.
+    Cell (j, i) of the (n, n) outputs lies at x = left + i * cell, y = near + j * cell, mm; 1 = nothing taken away.
     """
     rows, columns = key.shape
     for row in prange(rows):

@@ -9,7 +9,7 @@ from pathlib import Path
 from studio.comparison.kept_comparison import KeptComparison, trial_key
 from studio.comparison.kept_trials import KeptOutcome, measured_by, plain
 from studio.comparison.plan import Comparison, Plan, conclude, trials
-from studio.comparison.tracking_trials import measure_tracking
+from studio.comparison.tracked import measure_tracking
 from studio.comparison.trials import Outcome, Trial, TrialJob
 from studio.errors import RunError
 from studio.progress import Progress

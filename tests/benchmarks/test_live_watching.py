@@ -7,8 +7,7 @@ import pytest
 from live_driving import live_run
 from toy_session import make_session
 
-from studio.benchmarks.live import run_live_benchmark
-from studio.benchmarks.live_watching import track_watched
+from studio.benchmarks.live import run_live_benchmark, track_watched
 from studio.runs.live_replay import compare, prepare_replay
 from studio.runs.live_summary import LiveStanding
 from studio.scene.light_viewer import LightViewer

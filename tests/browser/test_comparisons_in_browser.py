@@ -217,7 +217,7 @@ def found(name: str) -> dict:
     """An experiment's document."""
     experiment = Experiment(
         name, f"Experiment {name}", "Fleischmann et al. 2012, Table 2", "The mean error is 38.0 mm.",
-        trials=lambda _: (), measure=lambda _arguments, _shelf: {}, conclude=lambda _: Findings("answered", ""),
+        trials=lambda _: (), measure=lambda _arguments, _shelf: {}, shown=lambda _: (),
     )  # fmt: skip
     line = Series("ours", (0.0, 1.0, 2.0), (30.0, 36.0, 33.0), group="ours")
     findings = Findings(

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
-from toy_experiments import conclude, measure, toy
+from toy_experiments import measure, toy
 
 from studio.comparison.findings_document import Making, as_document, failed_document
 from studio.comparison.kept_trials import plain
@@ -26,7 +26,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     outcomes = [Outcome(trial, plain(measure(trial.arguments, None))) for trial in trials]  # pyright: ignore
     making = Making(Scale(SEEDS), 24, 100.0, "0.1.0", ("0.1.0",), "2025-01-02T03:04:05+00:00")
     documents = [
-        as_document(experiment, conclude(outcomes), making),
+        as_document(experiment, experiment.conclude(outcomes), making),
         failed_document(toy("bad", folder / "log"), [("seed 1", "<img src=x onerror=alert(1)>")], making),
     ]
     path = folder / "report.html"

@@ -2,6 +2,7 @@
 
 import cv2
 import numpy as np
+from board_footage import waved_boards
 from numpy.typing import NDArray
 
 from studio.calibration.boards import Board, Sighting
@@ -10,7 +11,6 @@ from studio.calibration.intrinsics import Lens
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.geometry.rigid import transform
-from studio.synthesis.board_footage import waved_boards
 from studio.synthesis.cameras import placed_camera
 
 Array = NDArray[np.float64]

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from board_footage import BoardRenderer, close_boards
 from calibrated_scenes import CHARUCO, ring, seen
 from toy_footage import write_video
 
@@ -21,7 +22,6 @@ from studio.calibration.detection import BoardFinder
 from studio.errors import CalibrationError
 from studio.geometry.projection import project
 from studio.geometry.rigid import transform
-from studio.synthesis.board_footage import BoardRenderer, close_boards
 from studio.synthesis.cameras import placed_camera
 
 BOARD = Board("charuco", 5, 4, 90.0, 68.0, "DICT_4X4_50")

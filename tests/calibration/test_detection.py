@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from board_footage import BoardRenderer, Footage, close_boards
 
 from studio.calibration.boards import Board
 from studio.calibration.detection import BoardFinder, on_a_plane, sharpness
 from studio.geometry.projection import project
 from studio.geometry.rigid import transform
-from studio.synthesis.board_footage import BoardRenderer, Footage, close_boards
 from studio.synthesis.cameras import placed_camera
 
 CAMERA = placed_camera(

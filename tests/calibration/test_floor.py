@@ -5,6 +5,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+from board_footage import floor_board
 from calibrated_scenes import CHARUCO, ring, seen, true_lens, waved
 
 from studio.calibration.boards import Board
@@ -20,7 +21,6 @@ from studio.calibration.floor import (
 from studio.errors import CalibrationError
 from studio.geometry.projection import project
 from studio.geometry.rigid import transform
-from studio.synthesis.board_footage import floor_board
 
 CAMERAS = ring(4)
 FLOOR_POINTS = np.array(

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from board_footage import BoardRenderer, close_boards
 from calibrated_scenes import CHARUCO, SIZE, ring
 
 from studio.calibration.boards import Board, Sighting, board_from_text
@@ -18,7 +19,6 @@ from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.geometry.rigid import rigid, transform
-from studio.synthesis.board_footage import BoardRenderer, close_boards
 from studio.synthesis.cameras import placed_camera
 
 CAMERA = ring(1)[0]

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from board_footage import BoardRenderer, close_boards, waved_boards
 from calibrated_scenes import CHARUCO, ring
 
 from studio.calibration.detection import BoardFinder
@@ -12,7 +13,6 @@ from studio.calibration.findings import blocking
 from studio.calibration.intrinsics import solve_lens
 from studio.calibration.lens_verdict import lens_findings
 from studio.geometry.rigid import best_fit, transform
-from studio.synthesis.board_footage import BoardRenderer, close_boards, waved_boards
 
 
 @pytest.mark.slow

@@ -16,11 +16,10 @@ from studio.comparison.plan import (
     Comparison,
     Plan,
     conclude,
-    mean_curve,
     plan_comparison,
     trials,
 )
-from studio.comparison.tracking_trials import measure_tracking
+from studio.comparison.tracked import measure_tracking
 from studio.comparison.trials import Outcome
 from studio.errors import RunError, StudioError, TruthError
 from studio.sessions.session import Session
@@ -83,8 +82,8 @@ def test_all_seeds_are_taken_together(concluded: Comparison) -> None:
     assert first.mean_mm == pytest.approx(10 + 1 + 0.15)
     assert first.worst_mm == pytest.approx(10 + 2 + 0.3)
     assert (first.lost_frames, second.lost_frames, third.seconds) == (0, 3, 6.0)
-    assert mean_curve(first) == pytest.approx([11.0, 11.1, 11.2, 11.3])
-    assert [seed.seed for seed in third.seeds] == [0, 1, 2]
+    assert first.curve == pytest.approx([11.0, 11.1, 11.2, 11.3])
+    assert third.means == pytest.approx([30.15, 31.15, 32.15])
 
 
 def test_every_pair_is_tested_over_frames_and_seeds(concluded: Comparison) -> None:

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from studio.comparison import statistics
 from studio.comparison.statistics import (
     bootstrap_interval,
     firmness,
@@ -25,8 +24,6 @@ def test_the_interval_of_a_mean_is_close_to_students_and_repeatable() -> None:
     exact = stats.t.interval(0.95, 39, np.mean(values), stats.sem(values))
     assert (low, high) == pytest.approx(exact, abs=0.25)
     assert (low, high) == bootstrap_interval(values)
-    narrow = bootstrap_interval(values, level=0.5)
-    assert low < narrow[0] < narrow[1] < high
 
 
 def test_the_interval_covers_the_truth_as_often_as_it_says() -> None:
@@ -60,7 +57,6 @@ def test_a_ratio_is_paired() -> None:
     assert shuffled[0] < 1.9 < 2.1 < shuffled[1]
     with pytest.raises(ValueError, match="paired"):
         ratio_interval([1.0, 2.0], [1.0])
-    assert ratio_interval([4.0, 8.0, 6.0], [2.0, 4.0, 3.0], statistics.np.max) == pytest.approx((2.0, 2.0))
 
 
 def test_the_sign_test_is_scipys_without_ties() -> None:

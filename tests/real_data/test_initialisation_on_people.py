@@ -20,9 +20,9 @@ from studio.runs.problem_source import ProblemSource
 from studio.sessions.importers.importing import import_source
 from studio.sessions.session import Session
 from studio.settings import default_settings
+from studio.synthesis.person import with_hands_and_feet
 from studio.synthesis.recipe_file import Recipe, find_recipe, read_recipe
 from studio.synthesis.recipes import recipe_motion, recipe_person
-from studio.synthesis.shape import with_hands_and_feet
 from studio.weighting.outlines import OutlineProjector
 from studio.weighting.silhouette_areas import Silhouettes
 

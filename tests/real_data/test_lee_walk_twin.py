@@ -20,12 +20,12 @@ from studio.geometry.projection import project
 from studio.geometry.rotations import axis_turn
 from studio.synthesis.flesh import BOUND, BOUND_RADIUS, clothed_pieces, piece_tables
 from studio.synthesis.gait import leg_to_ankle
-from studio.synthesis.office import office
 from studio.synthesis.person import marker_lengths
 from studio.synthesis.person_footage import recipe_renderer
 from studio.synthesis.recipe_file import Recipe, find_recipe, read_recipe
 from studio.synthesis.recipes import recipe_motion, recipe_person
 from studio.synthesis.renderer import Renderer
+from studio.synthesis.rooms import room_called
 from studio.synthesis.wardrobes import PLAIN
 
 pytestmark = pytest.mark.real_data
@@ -109,7 +109,7 @@ def test_its_silhouettes_are_about_as_large_as_the_real_ones(data: Path, cameras
     """Laid on the real start pose. The real person has more hair and a looser shirt."""
     recipe, skeleton, _ = twin("lee-walk-twin")
     renderer = Renderer(
-        office(),
+        room_called("office"),
         cameras,
         _on_start_pose(data, skeleton),
         noise=0.0,

@@ -14,8 +14,7 @@ import pytest
 from studio.comparison.footage_shelf import FootageShelf
 from studio.comparison.statistics import sign_test
 from studio.comparison.tracked import Attempt, Tracked, track
-from studio.reproduction.fleischmann.figures import FILTER_3, SWARM_3
-from studio.reproduction.fleischmann.setting import EQ13, EVALUATIONS, SWARM, TWIN, TWIN_20
+from studio.reproduction.fleischmann import EQ13, EVALUATIONS, FILTER_3, SWARM, SWARM_3, TWIN, TWIN_20
 from studio.reproduction.tracking import Contender
 from studio.settings import DEFAULT_WEIGHTING
 from studio.synthesis.recipes import synthesize

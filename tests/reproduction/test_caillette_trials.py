@@ -14,12 +14,16 @@ from studio.body.forward_kinematics import marker_points
 from studio.comparison.footage_shelf import FootageShelf
 from studio.errors import SettingsError, TruthError
 from studio.motion_files.trc import read_trc, write_trc
-from studio.reproduction.caillette import learnt_files
-from studio.reproduction.caillette.following import Follow, Followed, measure
-from studio.reproduction.caillette.learnt_files import made_once
-from studio.reproduction.caillette.pointing import POINTING, pointing_poses
-from studio.reproduction.caillette.problems import Known, known_problems, problems
-from studio.reproduction.caillette.training_set import Training, learnt, recorded
+from studio.reproduction.caillette import training_set
+from studio.reproduction.caillette.following import Follow, Followed, Known, known_problems, measure, problems
+from studio.reproduction.caillette.training_set import (
+    POINTING,
+    Training,
+    learnt,
+    made_once,
+    pointing_poses,
+    recorded,
+)
 from studio.reproduction.caillette.true_motion import joint_errors, true_motion
 from studio.sessions.process_lock import ProcessLock
 from studio.settings import changed_settings, default_settings
@@ -68,7 +72,7 @@ def test_what_failed_is_made_again_and_leaves_nothing(tmp_path) -> None:
         made_once(shelf, "thing", {}, fail)
     place = made_once(shelf, "thing", {}, lambda folder: (folder / "whole").touch())
     assert [path.name for path in place.iterdir()] == ["whole"]
-    assert not list((tmp_path / learnt_files.LEARNT).glob(".partial-*"))
+    assert not list((tmp_path / training_set.LEARNT).glob(".partial-*"))
 
 
 def test_who_waits_takes_what_another_process_has_made(tmp_path, monkeypatch) -> None:
@@ -78,7 +82,7 @@ def test_who_waits_takes_what_another_process_has_made(tmp_path, monkeypatch) ->
     held = ProcessLock.take(place.with_name(f"{place.name}.lock"))
     assert held is not None
     # While we wait the other process finishes.
-    monkeypatch.setattr(learnt_files.time, "sleep", lambda seconds: place.mkdir())
+    monkeypatch.setattr(training_set.time, "sleep", lambda seconds: place.mkdir())
     assert made_once(shelf, "thing", {}, lambda folder: pytest.fail("made twice")) == place
     held.free()
 

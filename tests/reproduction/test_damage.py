@@ -6,7 +6,7 @@ import pytest
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
 from studio.geometry.projection import project
-from studio.reproduction.open_questions.damage import (
+from studio.reproduction.open_questions.robustness import (
     calibration_error,
     clutter,
     clutter_edges,

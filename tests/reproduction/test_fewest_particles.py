@@ -2,30 +2,32 @@
 
 import json
 import math
+from dataclasses import asdict
 
 import numpy as np
 import pytest
 
 from studio.comparison.findings import Findings
 from studio.comparison.footage_shelf import FootageShelf
-from studio.comparison.tracking_trials import group_of
 from studio.comparison.trials import Outcome, Scale
-from studio.reproduction.deutscher_reid import particles_on_arms, particles_on_bodies
-from studio.reproduction.deutscher_reid.fewest_particles import (
+from studio.reproduction.deutscher_reid import particles_needed
+from studio.reproduction.deutscher_reid.particles_needed import (
     ABOVE,
     BELOW,
+    RATE,
     Fewest,
+    arm_sequence,
     bars,
-    censored_in_words,
     fewest,
+    group,
+    is_tracked,
     per_seed,
     saving,
     sizes,
     successes,
 )
-from studio.reproduction.deutscher_reid.particles_on_arms import RATE, arm_sequence, group, is_tracked
 from studio.reproduction.deutscher_reid.setting import annealing_as_ten
-from studio.reproduction.experiment import Experiment
+from studio.reproduction.experiment import Experiment, group_of
 from studio.tracking.settings import AnnealedSettings
 
 SEEDS = Scale(tuple(range(10)))
@@ -70,11 +72,6 @@ def test_the_ends_of_the_grid_are_said() -> None:
     assert (above.particles, above.censored) == (64.0, ABOVE)
     below = fewest(lambda particles, run: True, (8, 16, 32), 1)
     assert (below.particles, below.censored) == (8.0, BELOW)
-    words = censored_in_words({"one": [above, below], "other": [Fewest(16, "", [])]})
-    assert "one failed with the most particles tried in 1 of 2" in words
-    assert "one succeeded with the fewest tried in 1 of 2" in words
-    assert "other" not in words
-    assert censored_in_words({"other": [Fewest(16, "", [])]}) == ""
 
 
 def test_saving_is_the_geometric_mean_of_ratios_paired_by_seed() -> None:
@@ -119,12 +116,12 @@ def test_an_arm_in_motion_is_tracked_with_many_particles_and_not_with_few() -> N
 
 
 def test_a_trial_is_measured_the_same_again_and_survives_json(tmp_path) -> None:
-    filters = particles_on_arms.diffusion_filters(0.5)
-    trial = particles_on_arms.trials(Scale((2,), quick=True), filters, "planar_arm4", 20.0)[0]
+    filters = particles_needed.diffusion_filters(0.5)
+    trial = next(particles_needed.arm_trials(Scale((2,), quick=True), filters, "planar_arm4", 20.0))
     arguments = json.loads(json.dumps({**trial.arguments, "frames": 5, "sizes": [8, 32, 128]}))
     shelf = FootageShelf(tmp_path)
-    first = json.loads(json.dumps(particles_on_arms.measure(arguments, shelf)))
-    assert first == particles_on_arms.measure(arguments, shelf)
+    first = json.loads(json.dumps(particles_needed.measure_arm(arguments, shelf)))
+    assert first == particles_needed.measure_arm(arguments, shelf)
     assert Fewest(**first).particles in (8, 32, 128, 512)
 
 
@@ -133,7 +130,7 @@ def concluded(experiment: Experiment, needed: dict[str, float]) -> Findings:
     outcomes = []
     for trial in experiment.trials(SEEDS):
         particles = needed[group_of(trial)] * 2.0 ** (((7 * trial.arguments["seed"]) % 5 - 2) / 8)
-        measured = Fewest(particles, "", [[int(particles), 2, 3]]).plain()
+        measured = asdict(Fewest(particles, "", [[int(particles), 2, 3]]))
         outcomes.append(Outcome(trial, json.loads(json.dumps(measured))))
     return experiment.conclude(outcomes)
 
@@ -142,7 +139,7 @@ def concluded(experiment: Experiment, needed: dict[str, float]) -> Findings:
     ("slow", "verdict"), [(200.0, "reproduced"), (800.0, "better"), (100.0, "not reproduced")]
 )
 def test_adaptive_diffusion_saves_two_more_or_nothing(slow: float, verdict: str) -> None:
-    experiment = particles_on_arms.DIFFUSION
+    experiment = particles_needed.DIFFUSION
     names = {group_of(trial) for trial in experiment.trials(SEEDS)}
     needed = {name: 100.0 for name in names}
     # The verdict is on the first case alone.
@@ -164,12 +161,12 @@ def test_adaptive_diffusion_saves_two_more_or_nothing(slow: float, verdict: str)
     ],
 )
 def test_crossover_saves_on_branches_and_not_on_a_chain(branched: float, chain: float, verdict: str) -> None:
-    experiment = particles_on_arms.CROSSOVER
+    experiment = particles_needed.CROSSOVER
     needed = {group_of(trial): 100.0 for trial in experiment.trials(SEEDS)}
-    first = particles_on_arms.ADDED_TO[0]
-    assert (first.base, first.survival) == ("adaptive", 0.5)
-    needed[group(first.name("parameters"), "branched_arms6", RATE)] = branched
-    needed[group(first.name("parameters"), "planar_arm4", RATE)] = chain
+    first = f"{next(iter(particles_needed.ADDED_TO))}, crossed by parameters"
+    assert first.startswith("adaptive, α 0.5,")
+    needed[group(first, "branched_arms6", RATE)] = branched
+    needed[group(first, "planar_arm4", RATE)] = chain
     found = concluded(experiment, needed)
     assert found.verdict == verdict
     ours = {entry.name: entry.ours for entry in found.numbers}
@@ -179,11 +176,11 @@ def test_crossover_saves_on_branches_and_not_on_a_chain(branched: float, chain: 
 
 
 def test_every_particle_is_crossed_and_the_chain_is_shared_with_adaptive_diffusion() -> None:
-    trials = particles_on_arms.CROSSOVER.trials(SEEDS)
+    trials = particles_needed.CROSSOVER.trials(SEEDS)
     assert {trial.arguments["knobs"]["crossover"] for trial in trials} == {0.0, 1.0}
     keys = [
         {json.dumps(trial.arguments, sort_keys=True) for trial in experiment.trials(SEEDS)}
-        for experiment in (particles_on_arms.DIFFUSION, particles_on_arms.CROSSOVER)
+        for experiment in (particles_needed.DIFFUSION, particles_needed.CROSSOVER)
     ]
     assert len(keys[0] & keys[1]) == 4 * len(SEEDS.seeds)
 
@@ -191,15 +188,15 @@ def test_every_particle_is_crossed_and_the_chain_is_shared_with_adaptive_diffusi
 def test_six_layers_may_anneal_as_much_as_ten() -> None:
     assert annealing_as_ten(10) == 0.5
     assert annealing_as_ten(6) ** 6 == pytest.approx(0.5**10)
-    assert particles_on_arms.SURVIVALS == (0.5, 0.315)
+    assert particles_needed.SURVIVALS == (0.5, 0.315)
 
 
 @pytest.mark.parametrize(
     ("both", "verdict"), [(100.0, "reproduced"), (20.0, "better"), (300.0, "not reproduced")]
 )
 def test_both_together_save_four_on_a_whole_body(both: float, verdict: str) -> None:
-    needed = dict(zip(particles_on_bodies.FILTERS, (400.0, 200.0, both, 100.0), strict=True))
-    found = concluded(particles_on_bodies.BOTH_IMPROVEMENTS, needed)
+    needed = dict(zip(particles_needed.FILTERS, (400.0, 200.0, both, 100.0), strict=True))
+    found = concluded(particles_needed.BOTH_IMPROVEMENTS, needed)
     assert found.verdict == verdict
     assert found.numbers[0].ours == pytest.approx(400.0 / both)
     assert [entry.paper for entry in found.numbers[:2]] == [4.0, 4.0]
@@ -207,16 +204,16 @@ def test_both_together_save_four_on_a_whole_body(both: float, verdict: str) -> N
 
 @pytest.mark.parametrize(("ten", "verdict"), [(100.0, "reproduced"), (300.0, "not reproduced")])
 def test_doubling_the_layers_more_than_halves_the_particles(ten: float, verdict: str) -> None:
-    layers = particles_on_bodies.MORE_LAYERS
+    layers = particles_needed.MORE_LAYERS
     found = concluded(layers, {"5 layers": 400.0, "10 layers": ten, "20 layers": 60.0})
     assert found.verdict == verdict
-    assert f"{400.0 / ten:.1f} times" in found.words
+    assert found.numbers[0].ours == pytest.approx(400.0 / ten)
 
 
 def test_ten_layers_and_eq_13_are_the_same_trial() -> None:
-    layers = particles_on_bodies.MORE_LAYERS
+    layers = particles_needed.MORE_LAYERS
     keys = [
         {json.dumps(trial.arguments, sort_keys=True) for trial in experiment.trials(SEEDS)}
-        for experiment in (layers, particles_on_bodies.BOTH_IMPROVEMENTS)
+        for experiment in (layers, particles_needed.BOTH_IMPROVEMENTS)
     ]
     assert len(keys[0] & keys[1]) == len(SEEDS.seeds)

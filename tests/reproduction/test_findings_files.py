@@ -9,7 +9,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
-from toy_experiments import conclude, measure, toy
+from toy_experiments import measure, toy
 
 from studio.comparison.findings import Chart, Findings, Number, Series
 from studio.comparison.findings_document import Making, as_document, failed_document
@@ -38,7 +38,7 @@ def document(tmp_path: Path) -> dict:
     experiment = toy("toy", tmp_path / "log")
     trials = experiment.trials(Scale(tuple(range(12))))
     outcomes = [Outcome(trial, plain(measure(trial.arguments, None))) for trial in trials]  # pyright: ignore
-    return as_document(experiment, conclude(outcomes), making())
+    return as_document(experiment, experiment.conclude(outcomes), making())
 
 
 class Page(HTMLParser):

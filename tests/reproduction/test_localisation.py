@@ -57,7 +57,6 @@ def test_seeds_are_counted_as_the_claim_says() -> None:
     assert found.crossings.tolist() == [[1, 2, 3], [2, 2, 3], [1, 2, 4], [3, 2, 1]]
     assert found.strictly_rising.tolist() == [True, False, False, False]
     assert found.even.tolist() == [False, True, False, False]
-    assert found.mean_layers == "2.8, 3.0, 3.8"
 
 
 @pytest.fixture(scope="module")

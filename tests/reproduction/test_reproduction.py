@@ -124,7 +124,7 @@ def test_a_process_that_dies_once_is_replaced(tmp_path: Path) -> None:
 def test_a_conclusion_that_cannot_be_drawn_is_told(tmp_path: Path) -> None:
     log = tmp_path / "log"
     wrong = toy("toy", log)
-    wrong = dataclasses.replace(wrong, conclude=lambda outcomes: outcomes[0].measured["nothing"])
+    wrong = dataclasses.replace(wrong, shown=lambda outcomes: outcomes[0].measured["nothing"])
     found = run([wrong], tmp_path / "out")
     assert found.documents[0]["verdict"] == "failed"
     assert "The conclusion: KeyError: 'nothing'" in found.documents[0]["words"]

@@ -11,11 +11,11 @@ from studio.errors import StudioError
 from studio.geometry.projection import project
 from studio.geometry.rotations import axis_turn
 from studio.motion_files.recorded_motion import RecordedMotion
-from studio.synthesis.joined_clips import Clip, joined_person, wound
 from studio.synthesis.motions import make_motion
 from studio.synthesis.person import skeleton_of_height
 from studio.synthesis.recipe_file import find_recipe, read_recipe, recipe_cameras
 from studio.synthesis.recipes import recipe_motion, recipe_person
+from studio.synthesis.recorded_clips import Clip, joined_person, wound
 
 BONES = skeleton_of_height(1760.0, np.random.default_rng(1))
 FPS = 60.0

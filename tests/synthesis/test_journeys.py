@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studio.synthesis.journeys import Journey, Stretch
+from studio.synthesis.gait import Journey, Stretch
 
 
 def test_a_turn_on_the_spot_stays_and_turns_by_the_whole_angle() -> None:

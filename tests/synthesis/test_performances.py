@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 from studio.body.person import joint_points, marker_motion
 from studio.body.retargeting import lowest_of_sole
 from studio.synthesis.motions import make_motion
-from studio.synthesis.performances import CARRIERS, Variation, from_local, performance, to_local
 from studio.synthesis.person import skeleton_of_height
+from studio.synthesis.recorded_clips import CARRIERS, Variation, from_local, performance, to_local
 from studio.training.smooth_noise import smooth_noise, warped_times
 
 BONES = skeleton_of_height(1760.0, np.random.default_rng(1))

@@ -13,7 +13,7 @@ from studio.geometry.rotations import axis_turn
 from studio.motion_files.reading import read_recording
 from studio.motion_files.recorded_motion import RecordedMotion
 from studio.synthesis.person import skeleton_of_height
-from studio.synthesis.recorded_clip import bent, recorded_person
+from studio.synthesis.recorded_clips import bent, recorded_person
 
 BONES = skeleton_of_height(1760.0, np.random.default_rng(1))
 FPS = 60.0

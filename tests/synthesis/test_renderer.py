@@ -10,7 +10,7 @@ from studio.synthesis.cameras import corner_rig
 from studio.synthesis.motions import make_motion
 from studio.synthesis.person import skeleton_of_height
 from studio.synthesis.renderer import Renderer
-from studio.synthesis.room import furnished_room
+from studio.synthesis.rooms import room_called
 
 SIZE = (160, 120)
 
@@ -23,7 +23,7 @@ def motion():
 @pytest.fixture(scope="module")
 def renderer(motion) -> Renderer:
     cameras = corner_rig(SIZE, np.random.default_rng(1))
-    return Renderer(furnished_room(), cameras, motion, noise=2.0, samples=1, seed=3)
+    return Renderer(room_called("furnished"), cameras, motion, noise=2.0, samples=1, seed=3)
 
 
 @pytest.mark.parametrize("frame", [0, 19])
@@ -80,7 +80,7 @@ def test_what_stands_before_the_person_hides_it() -> None:
     counts = []
     for height in (0.0, 700.0):
         cameras = corner_rig(SIZE, np.random.default_rng(1))
-        renderer = Renderer(furnished_room(height), cameras, motion, noise=0.0, samples=1, seed=3)
+        renderer = Renderer(room_called("furnished", height), cameras, motion, noise=0.0, samples=1, seed=3)
         _, mask = renderer.picture(0, frame, renderer.shadow(frame))
         counts.append(np.count_nonzero(mask))
     assert counts[1] < 0.95 * counts[0]

@@ -18,7 +18,7 @@ from studio.synthesis.motions import make_motion
 from studio.synthesis.person import skeleton_of_height
 from studio.synthesis.recipe_file import find_recipe, read_recipe, recipe_cameras
 from studio.synthesis.renderer import Renderer
-from studio.synthesis.room import furnished_room
+from studio.synthesis.rooms import room_called
 
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_sessions"
 
@@ -91,7 +91,7 @@ def test_background_subtraction_finds_the_person_nearly_whole() -> None:
     try:
         for index in (0, 3):
             renderer = Renderer(
-                furnished_room(), cameras[index : index + 1], motion, noise=0.0, samples=1, seed=1
+                room_called("furnished"), cameras[index : index + 1], motion, noise=0.0, samples=1, seed=1
             )
             name = cameras[index].name
             background = footage.background_path(name)

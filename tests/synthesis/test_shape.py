@@ -17,10 +17,9 @@ from studio.errors import BodyError, StudioError
 from studio.motion_files.trc import read_trc
 from studio.sessions.session import Session
 from studio.synthesis.circuit import circuit
-from studio.synthesis.person import marker_lengths
+from studio.synthesis.person import marker_lengths, skeleton_of_subject, subject_of_file, with_hands_and_feet
 from studio.synthesis.recipe_file import read_recipe
 from studio.synthesis.recipes import synthesize
-from studio.synthesis.shape import skeleton_of_subject, subject_of_file, with_hands_and_feet
 
 BODY = load_body("human31")
 assert BODY.definition is not None

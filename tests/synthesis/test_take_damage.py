@@ -23,7 +23,6 @@ from studio.synthesis.person import Proportions, proportioned, skeleton_of_heigh
 from studio.synthesis.recipe_file import read_recipe, recipe_cameras
 from studio.synthesis.recipes import synthesize
 from studio.synthesis.renderer import Renderer
-from studio.synthesis.room import furnished_room
 from studio.synthesis.rooms import is_room, room_called
 
 RUN = {"radius_mm": 1000.0, "speed_mm_s": 2200.0}
@@ -82,7 +81,9 @@ def test_an_exposed_picture_is_less_sharp_where_the_person_moves(tmp_path: Path)
     cameras = tuple(replace(camera, distortion=np.zeros(5)) for camera in cameras)
     sharpness, coverage = {}, {}
     for shutter in (0.0, 0.9):
-        renderer = Renderer(furnished_room(), cameras, motion, noise=0.0, samples=1, seed=3, shutter=shutter)
+        renderer = Renderer(
+            room_called("furnished"), cameras, motion, noise=0.0, samples=1, seed=3, shutter=shutter
+        )
         picture, mask = renderer.picture(0, 6, renderer.shadow(6))
         grey = cv2.Laplacian(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), cv2.CV_64F)
         around = cv2.dilate(mask, np.ones((5, 5), np.uint8)) > 0
@@ -101,7 +102,7 @@ def test_clutter_hides_parts_of_the_person_and_stays_clear_of_them(tmp_path: Pat
     for thing in things:
         away = np.linalg.norm(points[..., :2] - np.array(thing.centre[:2]), axis=-1)
         assert away.min() > 250.0
-    room, hidden = furnished_room(), 0
+    room, hidden = room_called("furnished"), 0
     for index in range(len(cameras)):
         seen = []
         for blocks in (room.blocks, room.blocks + things):

@@ -8,7 +8,7 @@ from studio.synthesis.cameras import pixel_rays, placed_camera
 from studio.synthesis.distance_kernels import body_distance
 from studio.synthesis.motions import make_motion
 from studio.synthesis.person import skeleton_of_height
-from studio.synthesis.room import LIGHTS
+from studio.synthesis.rooms import LIGHTS
 from studio.synthesis.tracing_kernels import floor_shadow, trace_person
 from studio.synthesis.wardrobes import STRIPED
 

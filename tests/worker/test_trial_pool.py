@@ -4,7 +4,7 @@ from toy_experiments import measure
 
 from studio.comparison.kept_trials import KeptOutcome
 from studio.comparison.trials import TrialJob
-from studio.reproduction.trial_pace import TrialPace
+from studio.reproduction.runner import TrialPace
 from studio.worker.trial_pool import next_job
 
 

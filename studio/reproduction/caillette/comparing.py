@@ -7,20 +7,21 @@ the joints changes; joint angles stand beside it.
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from operator import attrgetter
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from studio.comparison.findings import Chart, Number, Series, Table
-from studio.comparison.statistics import number, ratio_interval
+from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome
+from studio.reproduction import claims
 from studio.reproduction.caillette.following import Followed
 from studio.reproduction.caillette.setting import FPS
-from studio.reproduction.drawing import places, seeds_and_mean
-from studio.reproduction.tracking import claimed_verdict, grouped
+from studio.reproduction.drawing import places, seeds_and_mean, table_over
+from studio.reproduction.experiment import grouped
 
-Array = NDArray[np.float64]
 Runs = Sequence[Followed]
 Groups = Mapping[str, Runs]
 Error = Callable[[Followed], float]
@@ -28,6 +29,10 @@ Error = Callable[[Followed], float]
 OFF_MM = 150.0
 """RMS over the markers: the body is no longer on the person."""
 
+angle: Error = attrgetter("angle_rms")
+limb: Error = attrgetter("limb_rms")
+position: Error = attrgetter("position_rms")
+"""A run's RMS error of joint angles and of limbs' directions (degrees), and of joint positions (mm)."""
 
 LIMB, ANGLE, POSITION = "limb direction", "joint angle", "joint position"
 MEASURES: Mapping[str, tuple[str, str]] = {
@@ -38,24 +43,9 @@ MEASURES: Mapping[str, tuple[str, str]] = {
 """Words to a field of `Followed` and an axis."""
 
 
-def by_contender(outcomes: Sequence[Outcome]) -> dict[str, list[Followed]]:
+def by_contender(outcomes: Iterable[Outcome]) -> dict[str, list[Followed]]:
     """What was measured, by contender in the order of the trials, seeds in order."""
     return grouped(outcomes, Followed)
-
-
-def angle(run: Followed) -> float:
-    """A run's RMS joint angle error, degrees."""
-    return run.angle_rms
-
-
-def limb(run: Followed) -> float:
-    """A run's RMS error of limbs' directions, degrees."""
-    return run.limb_rms
-
-
-def position(run: Followed) -> float:
-    """A run's RMS joint position error, mm."""
-    return run.position_rms
 
 
 def beginning(run: Followed, frames: int) -> Followed:
@@ -80,22 +70,14 @@ def loses_track(run: Followed) -> bool:
     return longest_loss(run) >= 1.0
 
 
-def ratio(name: str, ours: Runs, theirs: Runs, claim: str, of: Error = limb) -> Number:
-    """The ratio of two contenders' errors, paired by seed. claim : "equal" or "lower" (`claimed_verdict`), "" where
-    there is none.
-    """
-    first, second = [of(run) for run in ours], [of(run) for run in theirs]
-    low, high = ratio_interval(first, second)
-    verdict = claimed_verdict(low, high, claim) if claim else "answered"
-    value = float(np.mean(first) / np.mean(second))
-    return Number(
-        name, value, low, high, "×", 1.0 if claim == "equal" else None, "lower", len(first), verdict
-    )
+def ratio(name: str, ours: Runs, theirs: Runs, claim: str = "", of: Error = limb) -> Number:
+    """The ratio of two contenders' errors, paired by seed. claim : of `claims.ratio`."""
+    return claims.ratio(name, [of(run) for run in ours], [of(run) for run in theirs], claim)
 
 
-def error_number(name: str, runs: Runs, of: Error = limb, unit: str = "°") -> Number:
-    """The mean over seeds of a run's error; the paper prints curves and no figures."""
-    return number(name, [of(run) for run in runs], unit)
+def errors(what: str, groups: Groups, of: Error = limb, unit: str = "°") -> Iterable[Number]:
+    """The mean over seeds of each contender's error; the paper prints curves and no figures."""
+    return (number(f"{what}: {name}", map(of, runs), unit) for name, runs in groups.items())
 
 
 def mean_of(runs: Runs, of: Error = limb) -> float:
@@ -115,27 +97,23 @@ def curves(title: str, groups: Groups, measure: str = LIMB) -> Chart:
 
 def summary_table(title: str, groups: Groups) -> Table:
     """A line a contender: errors, losses, time."""
-    columns = (
-        "contender", "seeds", "evaluations a frame", "joint angle, RMS (°)", "limb direction, RMS (°)",
-        "joint position, RMS (mm)", "mean (mm)", "frames with a limb lost (%)", "longest loss (s)",
-        "model-free share (%)", "search (ms a frame)",
-    )  # fmt: skip
-    rows = []
-    for group, runs in groups.items():
-        free = [value for run in runs for value in run.free]
-        rows.append(
-            (
-                group,
-                len(runs),
-                runs[0].evaluations,
-                round(mean_of(runs, angle), 1),
-                round(mean_of(runs, limb), 1),
-                round(mean_of(runs, position), 1),
-                round(float(np.mean([run.mean_mm for run in runs])), 1),
-                round(100.0 * float(np.mean([run.lost_share for run in runs])), 1),
-                round(max(longest_loss(run) for run in runs), 1),
-                round(100.0 * float(np.mean(free)), 0) if free else "",
-                round(float(np.mean([run.milliseconds for run in runs])), 1),
-            )
-        )
-    return Table(title, columns, tuple(rows))
+    return table_over(title, "contender", COLUMNS, groups)
+
+
+def _model_free(runs: Runs) -> Any:  # noqa: ANN401 - a cell
+    free = [value for run in runs for value in run.free]
+    return round(100.0 * float(np.mean(free)), 0) if free else ""
+
+
+COLUMNS: Mapping[str, Callable[[Runs], Any]] = {
+    "seeds": len,
+    "evaluations a frame": lambda runs: runs[0].evaluations,
+    "joint angle, RMS (°)": lambda runs: mean_of(runs, angle),
+    "limb direction, RMS (°)": lambda runs: mean_of(runs, limb),
+    "joint position, RMS (mm)": lambda runs: mean_of(runs, position),
+    "mean (mm)": lambda runs: mean_of(runs, lambda run: run.mean_mm),
+    "frames with a limb lost (%)": lambda runs: 100.0 * mean_of(runs, lambda run: run.lost_share),
+    "longest loss (s)": lambda runs: max(map(longest_loss, runs)),
+    "model-free share (%)": _model_free,
+    "search (ms a frame)": lambda runs: mean_of(runs, lambda run: run.milliseconds),
+}

@@ -14,13 +14,11 @@ edges, region and silhouette, and its prediction beside noise, in its own tracke
 annealed filter, tracking as a run does, at equal evaluations.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from studio.comparison.findings import Chart, Number, Table
-from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial
 from studio.reproduction.caillette.comparing import (
     MEASURES,
@@ -28,21 +26,19 @@ from studio.reproduction.caillette.comparing import (
     POSITION,
     Error,
     Groups,
-    Runs,
     angle,
     beginning,
     by_contender,
     curves,
-    error_number,
+    errors,
     limb,
     longest_loss,
     loses_track,
-    mean_of,
     position,
     ratio,
     summary_table,
 )
-from studio.reproduction.caillette.following import Followed, follow_trial, measure
+from studio.reproduction.caillette.following import follow_trial, measure
 from studio.reproduction.caillette.setting import (
     ANNEALED,
     BLOBS,
@@ -60,15 +56,14 @@ from studio.reproduction.caillette.setting import (
     taught_with,
     training_words,
 )
-from studio.reproduction.deutscher_reid.setting import share_number, times_in_words
-from studio.reproduction.experiment import Experiment, concluding
+from studio.reproduction.claims import EQUAL, LOWER, share
+from studio.reproduction.experiment import Experiment, Part
 from studio.reproduction.tracking import Contender
 from studio.tracking.catalogue import knobs_for_evaluations
 
-Claim = Callable[[Groups], Number | None]
-
 BLIND = (CONDENSATION, ANNEALED, IMPROVED)
 PREDICTION = {"prediction": "behaviour"}
+FREE_SHARE = {"model_free_share": 0.1, "model_free_grows": True}
 
 
 def _is_guided(contender: Contender) -> bool:
@@ -81,7 +76,7 @@ def _trials(
     *,
     frames: int | None = None,
     seeds: int | None = None,
-    from_truth: bool = False,
+    **wanted: Any,  # noqa: ANN401 - other fields of `Follow`
 ) -> Callable[[Scale], tuple[Trial, ...]]:
     """Every contender on every footage with every seed. clips : footage by the words behind a contender's name."""
 
@@ -95,7 +90,7 @@ def _trials(
                 seed,
                 last_frame(footage, scale.quick, frames),
                 training=taught if _is_guided(one) else None,
-                **({"from_truth": True} if from_truth else {}),
+                **wanted,
             )
             for words, footage in clips.items()
             for one in contenders
@@ -105,57 +100,41 @@ def _trials(
     return trials
 
 
-def _ratio(name: str, ours: str, theirs: str, claim: str = "", of: Error = limb) -> Claim:
-    return lambda groups: ratio(name, groups[ours], groups[theirs], claim, of)
-
-
-def _errors(what: str, names: Iterable[str], of: Error, unit: str = "°") -> tuple[Claim, ...]:
-    """Of each contender."""
-    return tuple(
-        lambda groups, name=name: error_number(f"{what}: {name}", groups[name], of, unit) for name in names
-    )
-
-
-def _told(groups: Groups, of: Error = limb) -> str:
-    return ", ".join(f"{name} {mean_of(runs, of):.1f}°" for name, runs in groups.items())
-
-
-def _taught(outcomes: Sequence[Outcome]) -> str:
-    """What the models were learnt from, in words."""
+def _settings(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    """The model's memory, and what it was learnt from in words."""
     named = [outcome.trial.arguments["training"] for outcome in outcomes]
-    return training_words(any(entry and len(entry["sources"]) == 1 for entry in named))
+    quick = any(entry and len(entry["sources"]) == 1 for entry in named)
+    return {"memory": MEMORY, "training": training_words(quick)}
 
 
 # Fig. 11.
 
 KEEPS = guided(1000, f"guided, 1000, memory {MEMORY}")
-SHARED = guided(1000, "guided, 1000, model-free share", model_free_share=0.1, model_free_grows=True)
-FIG_11 = (*BLIND, KEEPS, SHARED)
-FIG_11_NAMES = tuple(one.name for one in FIG_11)
+FIG_11 = (*BLIND, KEEPS, guided(1000, "guided, 1000, model-free share", **FREE_SHARE))
 FIG_11_FRAMES, FIG_11_SEEDS = 300, 5
 """Carving hulls and fitting blobs for every run makes this the longest of the figures."""
 
 
-def _loses(name: str, contender: Contender, paper: float) -> Claim:
-    return lambda groups: share_number(name, [loses_track(run) for run in groups[contender.name]], paper)
-
-
-def _longest(name: str) -> Claim:
-    return lambda groups: number(
-        f"longest time off: {name}", [longest_loss(run) for run in groups[name]], "s"
+def _fig_11(outcomes: Sequence[Outcome]) -> Iterator[Part]:
+    groups = by_contender(outcomes)
+    for name, one, paper in (
+        ("Condensation, 5000", CONDENSATION, 1.0),
+        ("annealed, 5 × 1000", ANNEALED, 1.0),
+        ("guided, 1000", KEEPS, 0.0),
+    ):
+        yield share(f"{name}: seeds that lose track", map(loses_track, groups[one.name]), paper)
+    for words, other in (("Condensation", CONDENSATION), ("annealed", ANNEALED)):
+        name = f"guided over {words}, joint position"
+        yield ratio(name, groups[KEEPS.name], groups[other.name], LOWER, position)
+    yield from errors("joint position, RMS", groups, position, "mm")
+    yield from errors("longest time off", groups, longest_loss, "s")
+    yield (
+        f"To have lost track: off by more than {OFF_MM:.0f} mm RMS for a second at a stretch. The paper's automatic "
+        "recovery by starting the automaton anew is not in these runs."
     )
-
-
-def _fig_11_words(groups: Groups, numbers: Sequence[Number]) -> str:
-    told = "; ".join(
-        f"{name}: {mean_of(runs, position):.0f} mm RMS, track lost in "
-        f"{times_in_words([loses_track(run) for run in runs])}"
-        for name, runs in groups.items()
-    )
-    return (
-        f"{told}. To have lost track: off by more than {OFF_MM:.0f} mm RMS for a second at a stretch. The paper's "
-        "automatic recovery by starting the automaton anew is not in these runs."
-    )
+    yield summary_table("Blobs fitted from the tracker's own expectations", groups)
+    yield curves("RMS joint position error over the first exercise", groups, POSITION)
+    yield {"footage": TEST, "weighting": BLOBS, **_settings(outcomes)}
 
 
 FIG_11_EXPERIMENT = Experiment(
@@ -166,43 +145,20 @@ FIG_11_EXPERIMENT = Experiment(
     "1000 particles guided by a model with a memory of 20 frames keep it.",
     trials=_trials(FIG_11, {"": TEST}, frames=FIG_11_FRAMES, seeds=FIG_11_SEEDS),
     measure=measure,
-    conclude=concluding(
-        by_contender,
-        claims=(
-            _loses("Condensation, 5000: seeds that lose track", CONDENSATION, 1.0),
-            _loses("annealed, 5 × 1000: seeds that lose track", ANNEALED, 1.0),
-            _loses("guided, 1000: seeds that lose track", KEEPS, 0.0),
-            *(
-                _ratio(f"guided over {words}, joint position", KEEPS.name, other.name, "lower", position)
-                for words, other in (("Condensation", CONDENSATION), ("annealed", ANNEALED))
-            ),
-            *_errors("joint position, RMS", FIG_11_NAMES, position, "mm"),
-            *(_longest(name) for name in FIG_11_NAMES),
-        ),
-        words=_fig_11_words,
-        tables=(lambda groups: summary_table("Blobs fitted from the tracker's own expectations", groups),),
-        charts=(lambda groups: curves("RMS joint position error over the first exercise", groups, POSITION),),
-        settings=lambda outcomes: {
-            "footage": TEST,
-            "weighting": BLOBS,
-            "memory": MEMORY,
-            "training": _taught(outcomes),
-        },
-    ),
+    shown=_fig_11,
     footage=(TEST,),
 )
 
 # Fig. 12.
 
-SHARE = {"model_free_share": 0.1, "model_free_grows": True}
 SECOND_SEEDS = 5
 CALM_FRAMES = 200
 """Of the first exercise, before its pirouettes."""
 FEW, MORE = guided(200), guided(1000)
-FEW_SHARED = guided(200, "guided, 200, model-free share", **SHARE)
+FEW_SHARED = guided(200, "guided, 200, model-free share", **FREE_SHARE)
 MANY = guided(5000, "guided, 5000, no model-free share")
 SAME = (*BLIND, FEW, FEW_SHARED, MORE, MANY)
-MANY_SHARED = guided(5000, "guided, 5000, model-free share", **SHARE)
+MANY_SHARED = guided(5000, "guided, 5000, model-free share", **FREE_SHARE)
 PREDICTED = Contender(
     "annealed, improved, behaviour first, 5 × 1000",
     "annealed",
@@ -211,107 +167,70 @@ PREDICTED = Contender(
 )
 STRANGE = (ANNEALED, IMPROVED, MANY, MANY_SHARED, PREDICTED)
 
-
-def _calm(groups: Groups) -> dict[str, list[Followed]]:
-    """The first frames alone; nothing where there are no more."""
-    if len(groups[FEW.name][0].limb_deg) <= CALM_FRAMES:
-        return {}
-    return {name: [beginning(run, CALM_FRAMES) for run in runs] for name, runs in groups.items()}
-
-
-def _calm_ratio(ours: str, theirs: str) -> Claim:
-    def claimed(groups: Groups) -> Number | None:
-        first = _calm(groups)
-        name = f"first {CALM_FRAMES} frames: {ours} over {theirs}"
-        return ratio(name, first[ours], first[theirs], "") if first else None
-
-    return claimed
-
-
-def _same_words(groups: Groups, numbers: Sequence[Number]) -> str:
-    ours, improved = groups[FEW.name], groups[IMPROVED.name]
-    words = (
-        f"RMS error of limb directions: {_told(groups)}. By joint angles, the figure's own measure, which are singular "
-        f"where an arm points sideways: {_told(groups, angle)}. The guided tracker weighs 200 poses a frame, the "
-        "others 5000. The annealed filter is the one of the paper's time (planned noise); the studio's improved one "
-        f"reaches {mean_of(improved):.1f}° and {mean_of(improved, position):.0f} mm beside "
-        f"the guided {mean_of(ours):.1f}° and {mean_of(ours, position):.0f} mm."
-    )
-    first = _calm(groups)
-    if not first:
-        return words
-    lost = ", ".join(
-        f"in {times_in_words([loses_track(run) for run in first[one.name]])} by {one.name}"
-        for one in (FEW, MORE, ANNEALED)
-    )
-    return (
-        f"{words} In the first {CALM_FRAMES} frames alone: {_told(first)}; the dancer is lost for a second or more "
-        f"{lost}."
-    )
-
-
-def _strange_words(groups: Groups, numbers: Sequence[Number]) -> str:
-    ours, without = groups[MANY_SHARED.name], groups[MANY.name]
-    free = [sum(run.free) / max(1, len(run.free)) for run in ours]
-    return (
-        f"RMS error of limb directions on a clip never learnt: {_told(groups)}. Without particles that go their own "
-        f"way the model's tracker is at {mean_of(without, position):.0f} mm RMS joint position, with them at "
-        f"{mean_of(ours, position):.0f} mm; their share, 10 % at least, grows to {100 * sum(free) / len(free):.0f} % "
-        "in the mean. " + _reason(numbers[0], ours, groups)
-    )
-
-
-def _reason(claim: Number, ours: Runs, groups: Groups) -> str:
-    """Why the model-free share does not reach the annealed filter, where it does not."""
-    if claim.verdict != "not reproduced":
-        return "With as many evaluations it is no worse than the annealed filter."
-    return (
-        "So it is worse than the annealed filter of as many evaluations. Particles that no model moves are spread once "
-        "by σ0, as Condensation's are, and the best of them is the pose; five layers that narrow down to the peak "
-        f"place the body better ({mean_of(groups[ANNEALED.name], position):.0f} against "
-        f"{mean_of(ours, position):.0f} mm). Where the model predicts for the annealed filter (behaviour first) both "
-        f"are had: {mean_of(groups[PREDICTED.name]):.1f}° and {mean_of(groups[PREDICTED.name], position):.0f} mm."
-    )
-
-
-SAME_CLAIMS: tuple[Claim, ...] = (
-    _ratio("guided 200 over annealed 5 × 1000", FEW.name, ANNEALED.name, "equal"),
-    _ratio("guided 200 over Condensation 5000", FEW.name, CONDENSATION.name, "lower"),
-    _ratio("guided 200 over annealed, improved, 5 × 1000", FEW.name, IMPROVED.name),
+Comparison = tuple[str, Contender, Contender, str, Error]
+SAME_CLAIMS: tuple[Comparison, ...] = (
+    ("guided 200 over annealed 5 × 1000", FEW, ANNEALED, EQUAL, limb),
+    ("guided 200 over Condensation 5000", FEW, CONDENSATION, LOWER, limb),
+    ("guided 200 over annealed, improved, 5 × 1000", FEW, IMPROVED, "", limb),
     # The figure's own measure.
     *(
-        _ratio(f"{FEW.name} over {other.name}, joint angle", FEW.name, other.name, "", angle)
+        (f"{FEW.name} over {other.name}, joint angle", FEW, other, "", angle)
         for other in (ANNEALED, CONDENSATION, IMPROVED)
     ),
-    _ratio("guided 200 over annealed, improved, joint position", FEW.name, IMPROVED.name, "", position),
-    _ratio("with a model-free share over without", FEW_SHARED.name, FEW.name),
-    _ratio("guided 1000 over annealed 5 × 1000", MORE.name, ANNEALED.name),
-    *(
-        _calm_ratio(ours.name, theirs.name)
-        for ours in (FEW, MORE)
-        for theirs in (ANNEALED, CONDENSATION, IMPROVED)
-    ),
+    ("guided 200 over annealed, improved, joint position", FEW, IMPROVED, "", position),
+    ("with a model-free share over without", FEW_SHARED, FEW, "", limb),
+    ("guided 1000 over annealed 5 × 1000", MORE, ANNEALED, "", limb),
 )
-STRANGE_CLAIMS: tuple[Claim, ...] = (
-    _ratio("model-free share over annealed, equal evaluations", MANY_SHARED.name, ANNEALED.name, "equal"),
-    _ratio("annealed, behaviour first, over annealed, improved", PREDICTED.name, IMPROVED.name, "equal"),
-    _ratio("with over without model-free share", MANY_SHARED.name, MANY.name, "lower"),
-    _ratio("model-free share over annealed, improved", MANY_SHARED.name, IMPROVED.name),
-    _ratio("model-free share over annealed, joint angle", MANY_SHARED.name, ANNEALED.name, "", angle),
-    _ratio("model-free share over annealed, joint position", MANY_SHARED.name, ANNEALED.name, "", position),
+STRANGE_CLAIMS: tuple[Comparison, ...] = (
+    ("model-free share over annealed, equal evaluations", MANY_SHARED, ANNEALED, EQUAL, limb),
+    ("annealed, behaviour first, over annealed, improved", PREDICTED, IMPROVED, EQUAL, limb),
+    ("with over without model-free share", MANY_SHARED, MANY, LOWER, limb),
+    ("model-free share over annealed, improved", MANY_SHARED, IMPROVED, "", limb),
+    ("model-free share over annealed, joint angle", MANY_SHARED, ANNEALED, "", angle),
+    ("model-free share over annealed, joint position", MANY_SHARED, ANNEALED, "", position),
+)
+"""Name, ours, theirs, claim and measure of each ratio."""
+REASON = (
+    "Particles that no model moves are spread once by σ0, as Condensation's are, and the best of them is the pose; "
+    "five layers that narrow down to the peak place the body better. Where the model predicts for the annealed filter "
+    "(behaviour first) both are had."
 )
 
 
-def _error_curves(title: str) -> Callable[[Groups], Chart]:
-    return lambda groups: curves(f"RMS error, {title}", groups, title)
+def _fig_12(footage: str, outcomes: Sequence[Outcome]) -> Iterator[Part]:
+    groups = by_contender(outcomes)
+    unseen = footage == UNSEEN
+    ratios = [
+        ratio(name, groups[ours.name], groups[theirs.name], claim, of)
+        for name, ours, theirs, claim, of in (STRANGE_CLAIMS if unseen else SAME_CLAIMS)
+    ]
+    yield from ratios
+    if not unseen and len(groups[FEW.name][0].limb_deg) > CALM_FRAMES:
+        first = {name: [beginning(run, CALM_FRAMES) for run in runs] for name, runs in groups.items()}
+        for ours in (FEW.name, MORE.name):
+            for theirs in (ANNEALED.name, CONDENSATION.name, IMPROVED.name):
+                yield ratio(f"first {CALM_FRAMES} frames: {ours} over {theirs}", first[ours], first[theirs])
+    yield from errors("limb direction, RMS", groups, limb)
+    yield from errors("joint angle, RMS", groups, angle)
+    if unseen:
+        yield "All weigh as many poses. Of the particles that go their own way there are 10 % at least."
+        if ratios[0].verdict == "not reproduced":
+            yield REASON
+    else:
+        yield (
+            "The guided tracker weighs 200 poses a frame, the others 5000. Joint angles, the figure's own measure, are "
+            "singular where an arm points sideways. The annealed filter is the one of the paper's time (planned noise)."
+        )
+    yield summary_table("Likelihood fitted from the true pose in every frame", groups)
+    for title in MEASURES:
+        yield curves(f"RMS error, {title}", groups, title)
+    yield {"footage": footage, "weighting": BLOBS, **_settings(outcomes)}
 
 
 def _dynamics(
     name: str, footage: str, title: str, source: str, claim: str, seeds: int | None = None
 ) -> Experiment:
-    unseen = footage == UNSEEN
-    contenders = STRANGE if unseen else SAME
-    names = [one.name for one in contenders]
+    contenders = STRANGE if footage == UNSEEN else SAME
     return Experiment(
         name=name,
         title=title,
@@ -319,25 +238,7 @@ def _dynamics(
         claim=claim,
         trials=_trials(contenders, {"": footage}, seeds=seeds, from_truth=True),
         measure=measure,
-        conclude=concluding(
-            by_contender,
-            claims=(
-                *(STRANGE_CLAIMS if unseen else SAME_CLAIMS),
-                *_errors("limb direction, RMS", names, limb),
-                *_errors("joint angle, RMS", names, angle),
-            ),
-            words=_strange_words if unseen else _same_words,
-            tables=(
-                lambda groups: summary_table("Likelihood fitted from the true pose in every frame", groups),
-            ),
-            charts=tuple(_error_curves(title) for title in MEASURES),
-            settings=lambda outcomes: {
-                "footage": footage,
-                "weighting": BLOBS,
-                "memory": MEMORY,
-                "training": _taught(outcomes),
-            },
-        ),
+        shown=lambda outcomes: _fig_12(footage, outcomes),
         footage=(footage,),
     )
 
@@ -394,35 +295,31 @@ CHOICES = (
     _of_equal_evaluations("Condensation, edges", "condensation", EDGES),
 )
 CLIPS = {"learnt dance": TEST, "clip never learnt": UNSEEN}
+QUESTIONS = (
+    ("behaviour first over noise, edges", "annealed, edges, behaviour first", "annealed, edges"),
+    ("behaviour first over noise, blobs", "annealed, blobs, behaviour first", "annealed, blobs"),
+    ("guided over annealed, edges", "guided, edges", "annealed, edges"),
+    ("blobs over edges, annealed", "annealed, blobs", "annealed, edges"),
+)
 
 
-def _on(clip: str, groups: Groups) -> dict[str, Runs]:
-    """The groups of one clip."""
-    return {name: runs for name, runs in groups.items() if name.endswith(clip)}
-
-
-def _choice_words(groups: Groups, numbers: Sequence[Number]) -> str:
-    told = []
-    for clip in CLIPS:
-        own = {name.removesuffix(f", {clip}"): runs for name, runs in _on(clip, groups).items()}
-        means = {name: float(np.mean([run.mean_mm for run in runs])) for name, runs in own.items()}
-        first, second, third, *_, furthest = sorted(means, key=means.__getitem__)
-        told.append(
-            f"On the {clip} the nearest is {first}: {means[first]:.0f} mm mean marker error, "
-            f"{mean_of(own[first]):.1f}° RMS limb direction, "
-            f"{np.mean([run.milliseconds for run in own[first]]):.0f} ms a frame on "
-            f"one core; then {second} ({means[second]:.0f} mm) and {third} ({means[third]:.0f} mm); the "
-            f"furthest {furthest} ({means[furthest]:.0f} mm)."
-        )
-    return " ".join(told) + " Times are the search alone, without carving hulls or making edge maps."
-
-
-def _choice_table(clip: str) -> Callable[[Groups], Table]:
-    return lambda groups: summary_table(f"{EVALUATIONS} evaluations a frame, {clip}", _on(clip, groups))
-
-
-def _choice_curves(clip: str) -> Callable[[Groups], Chart]:
-    return lambda groups: curves(f"RMS joint position error, {clip}", _on(clip, groups), POSITION)
+def _best_tracker(outcomes: Sequence[Outcome]) -> Iterator[Part]:
+    groups = by_contender(outcomes)
+    by_clip: dict[str, Groups] = {
+        clip: {name: runs for name, runs in groups.items() if name.endswith(clip)} for clip in CLIPS
+    }
+    for clip, own in by_clip.items():
+        for words, ours, theirs in QUESTIONS:
+            yield ratio(f"{words}, {clip}", own[f"{ours}, {clip}"], own[f"{theirs}, {clip}"], "", position)
+    for own in by_clip.values():
+        yield from errors("mean marker error", own, lambda run: run.mean_mm, "mm")
+    for clip, own in by_clip.items():
+        best = min(own, key=lambda name: float(np.mean([run.mean_mm for run in own[name]])))
+        yield f"On the {clip} the nearest is {best.removesuffix(f', {clip}')}."
+        yield summary_table(f"{EVALUATIONS} evaluations a frame, {clip}", own)
+        yield curves(f"RMS joint position error, {clip}", own, POSITION)
+    yield "Times are the search alone, without carving hulls or making edge maps."
+    yield {"evaluations": EVALUATIONS, "edges": EDGES, **_settings(outcomes)}
 
 
 BEST_TRACKER = Experiment(
@@ -434,43 +331,6 @@ BEST_TRACKER = Experiment(
     # There are eight contenders on two clips, and a weight of edges costs twenty times that of blobs.
     trials=_trials(CHOICES, {f", {clip}": footage for clip, footage in CLIPS.items()}, frames=100, seeds=3),
     measure=measure,
-    conclude=concluding(
-        by_contender,
-        claims=(
-            *(
-                _ratio(f"{words}, {clip}", f"{ours}, {clip}", f"{theirs}, {clip}", "", position)
-                for clip in CLIPS
-                for words, ours, theirs in (
-                    (
-                        "behaviour first over noise, edges",
-                        "annealed, edges, behaviour first",
-                        "annealed, edges",
-                    ),
-                    (
-                        "behaviour first over noise, blobs",
-                        "annealed, blobs, behaviour first",
-                        "annealed, blobs",
-                    ),
-                    ("guided over annealed, edges", "guided, edges", "annealed, edges"),
-                    ("blobs over edges, annealed", "annealed, blobs", "annealed, edges"),
-                )
-            ),
-            *_errors(
-                "mean marker error",
-                (f"{one.name}, {clip}" for clip in CLIPS for one in CHOICES),
-                lambda run: run.mean_mm,
-                "mm",
-            ),
-        ),
-        words=_choice_words,
-        tables=tuple(_choice_table(clip) for clip in CLIPS),
-        charts=tuple(_choice_curves(clip) for clip in CLIPS),
-        settings=lambda outcomes: {
-            "evaluations": EVALUATIONS,
-            "edges": EDGES,
-            "memory": MEMORY,
-            "training": _taught(outcomes),
-        },
-    ),
+    shown=_best_tracker,
     footage=tuple(CLIPS.values()),
 )

@@ -1,10 +1,9 @@
 """A tracker on the dance, with or without a behaviour model: the trial that most of these experiments are made of."""
 
-import dataclasses
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,20 +12,92 @@ from studio.behaviour.feature_space import feature_space
 from studio.behaviour.model import BehaviourModel
 from studio.comparison.footage_shelf import FootageShelf
 from studio.comparison.trials import Trial, kept_as
-from studio.reproduction.caillette.problems import known_problems, problems
+from studio.errors import SettingsError
 from studio.reproduction.caillette.training_set import Training, learnt
 from studio.reproduction.caillette.true_motion import TrueMotion, joint_errors, true_motion
 from studio.reproduction.tracking import Contender
 from studio.runs.behaviour_models import fitting
-from studio.runs.run_behaviour import learner_of
+from studio.runs.following import Following
 from studio.runs.search_space import search_space, session_sigma
 from studio.sessions.session import Session
 from studio.settings import RunSettings, changed_settings, default_settings
-from studio.tracking.catalogue import TRACKERS
-from studio.tracking.frame_loop import search_frame
-from studio.tracking.tracker import LayerRecord, SearchSpace, start_of
+from studio.tracking.tracker import LayerRecord, start_of
+from studio.weighting.catalogue import WEIGHTINGS
+from studio.weighting.problem import Expectant, FrameFunction
 
 Array = NDArray[np.float64]
+
+# The frames that trials weigh, prepared once for all trials of a process that look at the same ones.
+# Two ways: as in a run, where blobs are fitted from where the tracker expects the body; and with blobs that are
+# fitted from the true pose in every frame, learnt from true poses too (section 7.3: "initialised from the annotated
+# ground-truth pose", so that trackers are compared by their dynamics alone).
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """A frame that has been told where the body is, and is not told again by those who search it."""
+
+    told: FrameFunction
+
+    def weigh(self, poses: Array, stage: int = 0) -> Array:
+        """(N, D) poses to (N,) log-weights."""
+        return self.told.weigh(poses, stage)
+
+    def fitness(self, poses: Array, stage: int = 0) -> Array:
+        """(N, D) poses to (N,) what a swarm maximises."""
+        return self.told.fitness(poses, stage)
+
+    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
+        """(N, D) poses to (N,) whether the body can take them."""
+        return self.told.feasible(poses, limbs_apart)
+
+
+def problems(
+    shelf: FootageShelf, session: Session, settings: RunSettings, last: int
+) -> Callable[[int], FrameFunction]:
+    """Frame number to problem, for the first `last` frames. Those of hulls are kept, as carving takes longest."""
+    weighting, cameras = WEIGHTINGS[settings.weighting_name], session.cameras()
+    weigher = weighting.prepare(session.body(), cameras, settings.weighting)
+
+    def made(frame: int) -> FrameFunction:
+        seen = shelf.evidence(
+            session, cameras, frame, settings.evidence, weighting.edge_kind, weighting.reads_pictures
+        )
+        return weigher.problem(seen)
+
+    if weighting.edge_kind != "hull":
+        return made
+    key = ("hulls", session.path, settings.weighting, settings.evidence, last)
+    kept = shelf.prepared(key, lambda: [made(frame) for frame in range(last)])
+    return lambda frame: kept[frame]
+
+
+def known_problems(
+    shelf: FootageShelf, session: Session, settings: RunSettings, true_poses: Array
+) -> Callable[[int], FrameFunction]:
+    """Frame number to problem, each told the true pose (F, D) and nothing else. Raises SettingsError for a weighting
+    that needs no telling.
+    """
+    last = len(true_poses)
+
+    def told() -> Sequence[FrameFunction]:
+        memory: Mapping[str, Array] = {}
+        found = []
+        of_frame = problems(shelf, session, settings, last)
+        for frame, pose in enumerate(true_poses):
+            problem = of_frame(frame)
+            if not isinstance(problem, Expectant):
+                raise SettingsError(
+                    f"Weighting '{settings.weighting_name}' expects nothing.", "Take one that fits blobs."
+                )
+            expecting = problem.expecting(pose[None], memory)
+            memory = cast("Expectant", expecting).remembered(pose)
+            found.append(Known(expecting))
+        return found
+
+    key = ("known", session.path, settings.weighting, settings.evidence, last)
+    kept = shelf.prepared(key, told)
+    return lambda frame: kept[frame]
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,17 +152,17 @@ class Followed:
     @property
     def angle_rms(self) -> float:
         """RMS over frames and joint angles, degrees."""
-        return float(np.sqrt(np.mean(np.square(self.angle_deg))))
+        return _rms(self.angle_deg)
 
     @property
     def limb_rms(self) -> float:
         """RMS over frames and limbs of the angle between found and true axis, degrees."""
-        return float(np.sqrt(np.mean(np.square(self.limb_deg))))
+        return _rms(self.limb_deg)
 
     @property
     def position_rms(self) -> float:
         """RMS over frames and markers, mm."""
-        return float(np.sqrt(np.mean(np.square(self.position_mm))))
+        return _rms(self.position_mm)
 
     @property
     def lost_share(self) -> float:
@@ -138,47 +209,31 @@ def way_of(
     shelf: FootageShelf, session: Session, truth: TrueMotion, wanted: Follow, model: BehaviourModel | None
 ) -> Way:
     """Track the footage from the true pose of its first frame."""
-    settings, space = wanted.settings(), _space(session, model)
+    settings, body, fps = wanted.settings(), session.body(), session.manifest.fps
+    problem_of = problems(shelf, session, settings, wanted.last)
     if wanted.from_truth:
         problem_of = known_problems(shelf, session, settings, truth.poses)
-    else:
-        problem_of = problems(shelf, session, settings, wanted.last)
-    learner = learner_of(space.behaviour, settings, wanted.seed)
-    carried = start_of(tuple(float(value) for value in truth.poses[0]))
-    poses, log_weights = np.zeros((wanted.last, len(space.names))), np.zeros(wanted.last)
     free: list[float] = []
-    seconds, evaluations = 0.0, 0
-
-    def tracked(count: int) -> tuple[Array, Array]:
-        return poses[:count], log_weights[:count]
 
     def note(record: LayerRecord) -> None:
         if np.isfinite(record.model_free_share):
             free.append(float(record.model_free_share))
 
+    fitted = None if model is None else fitting(model, body, fps)
+    following = Following(
+        settings,
+        search_space(body, session_sigma(session, body, fps), fitted),
+        start_of(tuple(float(value) for value in truth.poses[0])),
+        wanted.seed,
+        on_layer=note,
+    )
+    seconds, evaluations = 0.0, 0
     for frame in range(wanted.last):
         problem = problem_of(frame)
         began = time.perf_counter()
-        if learner is not None:
-            space = dataclasses.replace(space, behaviour=learner.model_in(frame, tracked))
-            carried = learner.carried_into(frame, carried, tracked)
-        result = search_frame(
-            TRACKERS[wanted.tracker],
-            problem,
-            carried,
-            space,
-            seed=wanted.seed,
-            frame=frame,
-            settings_source=lambda: (1, settings.tracker),
-            repeats=settings.tracker.start_repeats if frame == 0 else 1,
-            on_layer=note,
-        )
-        if frame:
-            seconds += time.perf_counter() - began
-        carried, evaluations = result.carried, result.evaluations
-        poses[frame], log_weights[frame] = result.estimate.pose, result.estimate.log_weight
-    known = learner.model_in(wanted.last, tracked) if learner is not None else space.behaviour
-    return Way(poses, free, evaluations, seconds, known)
+        evaluations = following.step(frame, problem).evaluations
+        seconds += time.perf_counter() - began if frame else 0.0
+    return Way(np.array(following.poses), free, evaluations, seconds, following.model)
 
 
 def followed(session: Session, truth: TrueMotion, way: Way) -> Followed:
@@ -189,7 +244,7 @@ def followed(session: Session, truth: TrueMotion, way: Way) -> Followed:
         _rounded(found.angle_deg),
         _rounded(found.limb_deg),
         _rounded(found.position_mm),
-        [bool(value) for value in found.lost],
+        found.lost.tolist(),
         [round(value, 4) for value in way.free],
         round(float(found.mean_mm.mean()), 4),
         way.evaluations,
@@ -197,10 +252,8 @@ def followed(session: Session, truth: TrueMotion, way: Way) -> Followed:
     )
 
 
-def _space(session: Session, model: BehaviourModel | None) -> SearchSpace:
-    body, fps = session.body(), session.manifest.fps
-    fitted = None if model is None else fitting(model, body, fps)
-    return search_space(body, session_sigma(session, body, fps), fitted)
+def _rms(values: Sequence[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def _rounded(values: Sequence[float] | Array) -> list[float]:

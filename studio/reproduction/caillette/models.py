@@ -12,26 +12,23 @@ so that only the dynamics differ between the passes.
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from studio.body.catalogue import load_body
-from studio.comparison.findings import Chart, Number, Series
+from studio.comparison.findings import Series, Table
 from studio.comparison.footage_shelf import FootageShelf
 from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.reproduction.caillette.comparing import (
-    Error,
-    Groups,
     angle,
     by_contender,
     curves,
-    error_number,
+    errors,
     limb,
-    mean_of,
     position,
     ratio,
     summary_table,
@@ -53,8 +50,9 @@ from studio.reproduction.caillette.setting import (
 )
 from studio.reproduction.caillette.training_set import Training, learnt, recorded
 from studio.reproduction.caillette.true_motion import true_motion
+from studio.reproduction.claims import LOWER
 from studio.reproduction.drawing import line_chart, seed_range
-from studio.reproduction.experiment import Experiment, concluding
+from studio.reproduction.experiment import Experiment, Part, each_seed
 
 
 def _taught(outcomes: Sequence[Outcome]) -> str:
@@ -69,23 +67,7 @@ FRAMES = 200
 """Before the pirouettes, in which every tracker is lost whatever its model remembers."""
 
 
-@dataclass(frozen=True, slots=True)
-class Remembering:
-    """Runs by memory, and what each automaton says of the test performance, in the order of MEMORIES."""
-
-    groups: Groups
-    asked: Sequence[Mapping[str, Any]]
-
-    @classmethod
-    def of(cls, outcomes: Sequence[Outcome]) -> "Remembering":
-        """From the outcomes of all trials."""
-        runs = [outcome for outcome in outcomes if "entropy_of" not in outcome.trial.arguments]
-        asked = [outcome.measured for outcome in outcomes if "entropy_of" in outcome.trial.arguments]
-        return cls(by_contender(runs), asked)
-
-
-def group(memory: int) -> str:
-    """The words for a memory."""
+def _group(memory: int) -> str:
     return f"memory {memory}"
 
 
@@ -94,12 +76,11 @@ def _memory_trials(scale: Scale) -> tuple[Trial, ...]:
     last = last_frame(TEST, scale.quick, FRAMES)
     found = []
     for memory in MEMORIES:
-        model = taught_with(memory, scale.quick)
+        model, name = taught_with(memory, scale.quick), _group(memory)
         found += [
-            follow_trial(FEW, group(memory), TEST, seed, last, from_truth=True, training=model)
-            for seed in scale.seeds
+            follow_trial(FEW, name, TEST, seed, last, from_truth=True, training=model) for seed in scale.seeds
         ]
-        found.append(Trial(f"entropy, {group(memory)}", {"entropy_of": TEST, "last": last, **model.plain()}))
+        found.append(Trial(f"entropy, {name}", {"entropy_of": TEST, "last": last, **model.plain()}))
     return tuple(found)
 
 
@@ -119,65 +100,45 @@ def measure_memory(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[st
     }
 
 
-def _over_memory_1(
-    memory: int, claim: str, of: Error = limb, what: str = ""
-) -> Callable[[Remembering], Number]:
-    name = f"memory {memory} over memory 1{what}"
-    return lambda found: ratio(name, found.groups[group(memory)], found.groups[group(1)], claim, of)
-
-
-def _falling(found: Remembering) -> Number:
-    """Whether the error falls as the memory grows, in every seed."""
-    ranked = np.arange(len(MEMORIES))
-    values = []
-    for runs in zip(*(found.groups[group(memory)] for memory in MEMORIES), strict=True):
-        ranks = np.argsort(np.argsort([run.limb_rms for run in runs]))
-        values.append(float(np.corrcoef(ranked, ranks)[0, 1]))
-    return number("rank correlation of error and memory", values, "")
-
-
-def _limb_of(memory: int) -> Callable[[Remembering], Number]:
-    name = group(memory)
-    return lambda found: error_number(f"limb direction, RMS: {name}", found.groups[name])
-
-
-def _memory_words(found: Remembering, numbers: Sequence[Number]) -> str:
-    """What the automata say of the test, where a longer memory does not help."""
-    errors = ", ".join(f"{mean_of(found.groups[group(memory)]):.1f}" for memory in MEMORIES)
-    asked, tests = found.asked, [entry["test"] for entry in found.asked]
-    words = (
-        f"RMS error of limb directions with memory {', '.join(map(str, MEMORIES))}: {errors}°, states "
-        f"{', '.join(str(entry['states']) for entry in asked)}. "
+def _fig_13(outcomes: Sequence[Outcome]) -> Iterator[Part]:
+    """Runs by memory, and what each automaton says of the test performance, in the order of MEMORIES."""
+    groups = by_contender(outcome for outcome in outcomes if "entropy_of" not in outcome.trial.arguments)
+    automata = [outcome.measured for outcome in outcomes if "entropy_of" in outcome.trial.arguments]
+    for memory, claim, what, of in (
+        (30, LOWER, "", limb),
+        (10, LOWER, "", limb),
+        (30, "", ", joint angle", angle),
+        (30, "", ", joint position", position),
+    ):
+        name = f"memory {memory} over memory 1{what}"
+        yield ratio(name, groups[_group(memory)], groups[_group(1)], claim, of)
+    by_seed = zip(*groups.values(), strict=True)
+    ranks = (np.argsort(np.argsort([run.limb_rms for run in runs])) for runs in by_seed)
+    falling = [np.corrcoef(np.arange(len(MEMORIES)), row)[0, 1] for row in ranks]
+    yield number("rank correlation of error and memory", falling)
+    yield from errors("limb direction, RMS", groups)
+    yield (
+        f"From frame to frame the test stays in its cluster {automata[0]['stays']:.0%} of the time, so a memory of "
+        "some frames often is one cluster again and again; where the automaton's entropy of the test does not fall, "
+        "what long histories add is the training's own, which another performance does not repeat."
     )
-    said = (
-        f"The automaton's entropy on the test performance is {', '.join(f'{value:.2f}' for value in tests)} nats a "
-        f"frame (training {asked[0]['train']:.2f} to {asked[-1]['train']:.2f}), least with memory "
-        f"{MEMORIES[int(np.argmin(tests))]}"
+    yield summary_table("200 guided particles", groups)
+    heads = {"states": "states", "train": "entropy, training", "test": "entropy, test performance"}
+    rows = (
+        (memory, *(round(float(entry[name]), 2) for name in heads))
+        for memory, entry in zip(MEMORIES, automata, strict=True)
     )
-    if all(claim.verdict != "not reproduced" for claim in numbers):
-        return f"{words}A longer memory helps. {said}."
-    return (
-        f"{words}A longer memory does not help here. {said}: what long histories add is the training's own, which "
-        "another performance does not repeat. From frame to frame the test stays in its cluster "
-        f"{100 * asked[0]['stays']:.0f} % of the time, so a memory of some frames often is one cluster again and again."
-    )
-
-
-AXIS = tuple(float(memory) for memory in MEMORIES)
-
-
-def _error_chart(found: Remembering) -> Chart:
-    rows = ([run.limb_rms for run in found.groups[group(memory)]] for memory in MEMORIES)
-    series = seed_range("200 guided particles (bars: lowest and highest seed)", AXIS, rows)
-    return line_chart("Error over memory", "memory (frames)", "RMS limb direction error (°)", (series,))
-
-
-def _entropy_chart(found: Remembering) -> Chart:
-    series = (
-        Series(label, AXIS, tuple(float(entry[name]) for entry in found.asked))
+    yield Table("What the automaton says (nats a frame)", ("memory", *heads.values()), tuple(rows))
+    axis = tuple(map(float, MEMORIES))
+    reached = ([run.limb_rms for run in runs] for runs in groups.values())
+    series = (seed_range("200 guided particles (bars: lowest and highest seed)", axis, reached),)
+    yield line_chart("Error over memory", "memory (frames)", "RMS limb direction error (°)", series)
+    entropies = (
+        Series(label, axis, tuple(float(entry[name]) for entry in automata))
         for name, label in (("train", "training"), ("test", "test performance"))
     )
-    return line_chart("Entropy over memory", "memory (frames)", "entropy (nats a frame)", series)
+    yield line_chart("Entropy over memory", "memory (frames)", "entropy (nats a frame)", entropies)
+    yield {"footage": TEST, "weighting": BLOBS, "particles": 200, "training": _taught(outcomes)}
 
 
 FIG_13 = Experiment(
@@ -188,26 +149,7 @@ FIG_13 = Experiment(
     "frames, are more accurate.",
     trials=_memory_trials,
     measure=measure_memory,
-    conclude=concluding(
-        Remembering.of,
-        claims=(
-            _over_memory_1(30, "lower"),
-            _over_memory_1(10, "lower"),
-            _over_memory_1(30, "", angle, ", joint angle"),
-            _over_memory_1(30, "", position, ", joint position"),
-            _falling,
-            *(_limb_of(memory) for memory in MEMORIES),
-        ),
-        words=_memory_words,
-        tables=(lambda found: summary_table("200 guided particles", found.groups),),
-        charts=(_error_chart, _entropy_chart),
-        settings=lambda outcomes: {
-            "footage": TEST,
-            "weighting": BLOBS,
-            "particles": 200,
-            "training": _taught(outcomes),
-        },
-    ),
+    shown=_fig_13,
     footage=(TEST,),
 )
 
@@ -217,39 +159,16 @@ PARTICLES, INTERVAL = 1000, 30
 PLAIN, FIRST, SECOND = "not learning", "first pass, learning", "second pass, with what the first learnt"
 
 
-@dataclass(frozen=True, slots=True)
-class Passes:
-    """Runs by pass; of every seed clusters and states before and after."""
-
-    groups: Groups
-    sizes: Sequence[Mapping[str, Any]]
-
-    @classmethod
-    def of(cls, outcomes: Sequence[Outcome]) -> "Passes":
-        """From the outcomes of all trials."""
-        measured = [outcome.measured for outcome in outcomes]
-        names = (PLAIN, FIRST, SECOND)
-        return cls({name: [Followed(**one["passes"][name]) for one in measured] for name in names}, measured)
-
-
 def _online_trials(scale: Scale) -> tuple[Trial, ...]:
     """All three passes with every seed."""
-    taught = taught_with(MEMORY, scale.quick)
-    last = last_frame(UNSEEN, scale.quick)
-    knobs = {
-        "particles": PARTICLES,
-        "model_free_share": 0.1,
-        "estimate": "mode",
-        "learning_interval": INTERVAL,
-        **SIGMA,
-    }
-    return tuple(
-        Trial(
-            f"online learning, seed {seed}",
-            Follow(UNSEEN, GUIDED, BLOBS, seed, last, knobs, from_truth=True, training=taught).plain(),
-        )
-        for seed in scale.seeds
-    )
+    taught, last = taught_with(MEMORY, scale.quick), last_frame(UNSEEN, scale.quick)
+    free = {"model_free_share": 0.1, "estimate": "mode", "learning_interval": INTERVAL}
+    knobs = {"particles": PARTICLES, **free, **SIGMA}
+
+    def arguments(seed: int) -> dict[str, Any]:
+        return Follow(UNSEEN, GUIDED, BLOBS, seed, last, knobs, from_truth=True, training=taught).plain()
+
+    return tuple(each_seed("online learning", scale.seeds, arguments))
 
 
 @kept_as("caillette.online_learning.measure")
@@ -273,36 +192,21 @@ def measure_online(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[st
     }
 
 
-def _pass_ratio(name: str, ours: str, claim: str = "", of: Error = limb) -> Callable[[Passes], Number]:
-    return lambda found: ratio(name, found.groups[ours], found.groups[PLAIN], claim, of)
-
-
-def _pass_error(name: str) -> Callable[[Passes], Number]:
-    return lambda found: error_number(f"limb direction, RMS: {name}", found.groups[name])
-
-
-def _learnt_in_a_pass(what: str) -> Callable[[Passes], Number]:
-    return lambda found: number(f"{what} learnt", [one[what][1] - one[what][0] for one in found.sizes], "")
-
-
-def _pass_words(found: Passes, numbers: Sequence[Number]) -> str:
-    limbs, places, shares = (
-        {name: of(runs) for name, runs in found.groups.items()}
-        for of in (
-            mean_of,
-            lambda runs: mean_of(runs, position),
-            lambda runs: 100.0 * float(np.mean([np.mean(run.free) for run in runs])),
-        )
-    )
-    return (
-        f"On a clip never learnt the RMS error of limb directions is {limbs[PLAIN]:.1f}° without online "
-        f"learning, {limbs[FIRST]:.1f}° while the run learns (a lesson every {INTERVAL} frames) and "
-        f"{limbs[SECOND]:.1f}° in a second pass with what the first has learnt; joint positions "
-        f"{places[PLAIN]:.0f}, {places[FIRST]:.0f} and "
-        f"{places[SECOND]:.0f} mm RMS. Particles that go their own way are {shares[PLAIN]:.0f} %, "
-        f"{shares[FIRST]:.0f} % and {shares[SECOND]:.0f} % of all. What is learnt is what was tracked, its errors "
-        "included."
-    )
+def _online(outcomes: Sequence[Outcome]) -> Iterator[Part]:
+    found = [outcome.measured for outcome in outcomes]
+    groups = {name: [Followed(**one["passes"][name]) for one in found] for name in (PLAIN, FIRST, SECOND)}
+    plain = groups[PLAIN]
+    yield ratio("second pass over one that learnt nothing", groups[SECOND], plain, LOWER)
+    yield ratio("the same, joint angle", groups[SECOND], plain, of=angle)
+    yield ratio("the same, joint position", groups[SECOND], plain, of=position)
+    yield ratio("learning while tracking over not learning", groups[FIRST], plain)
+    yield from errors("limb direction, RMS", groups)
+    for what in ("clusters", "states"):
+        yield number(f"{what} learnt", [one[what][1] - one[what][0] for one in found])
+    yield f"A lesson every {INTERVAL} frames. What is learnt is what was tracked, its errors included."
+    yield summary_table("Passes over the clip", groups)
+    yield curves("RMS limb direction error", groups)
+    yield {"footage": UNSEEN, "particles": PARTICLES, "memory": MEMORY, "training": _taught(outcomes)}
 
 
 ONLINE_LEARNING = Experiment(
@@ -313,25 +217,6 @@ ONLINE_LEARNING = Experiment(
     "clip is more accurate than one whose model learnt nothing.",
     trials=_online_trials,
     measure=measure_online,
-    conclude=concluding(
-        Passes.of,
-        claims=(
-            _pass_ratio("second pass over one that learnt nothing", SECOND, "lower"),
-            _pass_ratio("the same, joint angle", SECOND, of=angle),
-            _pass_ratio("the same, joint position", SECOND, of=position),
-            _pass_ratio("learning while tracking over not learning", FIRST),
-            *(_pass_error(name) for name in (PLAIN, FIRST, SECOND)),
-            *(_learnt_in_a_pass(what) for what in ("clusters", "states")),
-        ),
-        words=_pass_words,
-        tables=(lambda found: summary_table("Passes over the clip", found.groups),),
-        charts=(lambda found: curves("RMS limb direction error", found.groups),),
-        settings=lambda outcomes: {
-            "footage": UNSEEN,
-            "particles": PARTICLES,
-            "memory": MEMORY,
-            "training": _taught(outcomes),
-        },
-    ),
+    shown=_online,
     footage=(UNSEEN,),
 )

@@ -5,7 +5,7 @@ the number of views hardly, particles count in proportion, and all together keep
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from studio.behaviour.model import BehaviourModel
 from studio.benchmarks.hulls import TABLE_1
 from studio.benchmarks.timing import quickest
-from studio.comparison.findings import Chart, Findings, Number, Series, Table
+from studio.comparison.findings import Series, Table
 from studio.comparison.footage_shelf import FootageShelf
-from studio.comparison.statistics import number, overall
+from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.numba_in_threads import numba
-from studio.reproduction.caillette.problems import Known
+from studio.reproduction.caillette.following import Known
 from studio.reproduction.caillette.setting import (
     BLOBS,
     GUIDED,
@@ -32,8 +32,9 @@ from studio.reproduction.caillette.setting import (
 )
 from studio.reproduction.caillette.training_set import Training, learnt
 from studio.reproduction.caillette.true_motion import true_motion
-from studio.reproduction.deutscher_reid.setting import share_number
-from studio.reproduction.experiment import Experiment
+from studio.reproduction.claims import share
+from studio.reproduction.drawing import bar_chart, places
+from studio.reproduction.experiment import Experiment, Part, verdict_on
 from studio.runs.behaviour_models import fitting
 from studio.runs.search_space import search_space, session_sigma
 from studio.sessions.session import Session
@@ -82,8 +83,7 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
     model = dataclasses.replace(training(scale.quick), memory=MEMORY).plain()
     return tuple(
         Trial(
-            f"{footage}, seed {seed}",
-            {"footage": footage, "seed": seed, "last": frames, "training": model},
+            f"{footage}, seed {seed}", {"footage": footage, "seed": seed, "last": frames, "training": model}
         )
         for footage in ((TEST,) if scale.quick else (TEST, TEST_640))
         for seed in scale.seeds[:MOST_SEEDS]
@@ -190,93 +190,75 @@ def _weigher(session: Session) -> BlobWeigher:
     return BlobWeigher(session.body(), session.cameras(), settings.weighting)
 
 
-def conclude(outcomes: Sequence[Outcome]) -> Findings:
+def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     """The table beside the paper's; the verdict is on what the paper says of it, which no machine changes."""
-    runs = [outcome.measured for outcome in outcomes if outcome.trial.arguments["footage"] == TEST]
-    large = [outcome.measured for outcome in outcomes if outcome.trial.arguments["footage"] == TEST_640]
-    claims = _claims(runs)
-    times = tuple(
-        number(label, [run[name] for run in runs], "ms", PAPER[name], "lower")
-        for name, label in LABELS.items()
+    runs, large = (
+        [outcome.measured for outcome in outcomes if outcome.trial.arguments["footage"] == footage]
+        for footage in (TEST, TEST_640)
     )
-    ratios = tuple(
-        number(name, [run[above] / run[below] for run in runs], "×", PAPER[above] / PAPER[below])
-        for name, above, below in (
-            ("depth 7 over 6, five views", "hull 7 5", "hull 6 5"),
-            ("depth 8 over 7, five views", "hull 8 5", "hull 7 5"),
-            ("five views over three, depth 7", "hull 7 5", "hull 7 3"),
-            ("fitting, depth 8 over 7", "fit 8", "fit 7"),
-            ("1000 particles over 500", "particles 1000", "particles 500"),
-        )
+    of = {name: np.array([run[name] for run in runs]) for name in LABELS}
+    claims = {
+        "deeper takes longer": (of["hull 6 5"] < of["hull 7 5"]) & (of["hull 7 5"] < of["hull 8 5"]),
+        f"five views take less than {NOT_MUCH:g} times what three do, at every depth": np.all(
+            [of[f"hull {depth} 5"] < NOT_MUCH * of[f"hull {depth} 3"] for depth in DEPTHS], axis=0
+        ),
+        "twice the particles take about twice the time": (
+            (LINEAR[0] < of["particles 1000"] / of["particles 500"])
+            & (of["particles 1000"] / of["particles 500"] < LINEAR[1])
+        ),
+        "depth 7, five views, a fit and 1000 particles within a 30th of a second": (
+            of["hull 7 5"] + of["fit 7"] + of["particles 1000"] <= FRAME_MS
+        ),
+    }
+    for name, held in claims.items():
+        yield share(name, held)
+    for name, above, below in (
+        ("depth 7 over 6, five views", "hull 7 5", "hull 6 5"),
+        ("depth 8 over 7, five views", "hull 8 5", "hull 7 5"),
+        ("five views over three, depth 7", "hull 7 5", "hull 7 3"),
+        ("fitting, depth 8 over 7", "fit 8", "fit 7"),
+        ("1000 particles over 500", "particles 1000", "particles 500"),
+    ):
+        yield number(name, of[above] / of[below], "×", PAPER[above] / PAPER[below])
+    for name, label in LABELS.items():
+        yield number(label, of[name], "ms", PAPER[name], "lower")
+    yield (
+        f"On {int(np.mean([run['threads'] for run in runs]))} threads of this machine. Our fit is from one prediction; "
+        "a run fits from several. Reading and decoding pictures is not in the times. The verdict is on what the paper "
+        "says of its table: depth matters, views hardly, particles count in proportion, 30 frames a second."
     )
-    whole = _whole(runs)
-    words = (
-        f"Depth 7 with five views takes {_mean(runs, 'hull 7 5'):.1f} ms (paper 28.1), a fit "
-        f"{_mean(runs, 'fit 7'):.1f} ms (14.8), 1000 particles {_mean(runs, 'particles 1000'):.1f} ms (45.3); together "
-        f"{np.mean(whole):.0f} ms a frame, on {int(_mean(runs, 'threads'))} threads of this machine. Our fit is from "
-        "one prediction; a run fits from several. Reading and decoding pictures is not in the times. The verdict is on "
-        "what the paper says of its table: depth matters, views hardly, particles count in proportion, 30 frames a "
-        "second."
+    yield _table("320 × 240 pictures", runs)
+    if large:
+        yield _table("640 × 480 pictures", large)
+    names = ("hull 7 5", "fit 7", "particles 500", "particles 1000")
+    series = (
+        Series("ours", places(len(names)), tuple(float(of[name].mean()) for name in names)),
+        Series(
+            "paper (2 GHz Pentium 4)", places(len(names)), tuple(PAPER[name] for name in names), dashed=True
+        ),
     )
-    return Findings(
-        overall(entry.verdict for entry in claims),
-        words,
-        (*claims, *ratios, *times),
-        (_table("320 × 240 pictures", runs), *((_table("640 × 480 pictures", large),) if large else ())),
-        (_chart(runs),),
-        {"footage": TEST, "memory": MEMORY, "rounds": "quickest of several"},
-    )
-
-
-def _claims(runs: Sequence[Mapping[str, Any]]) -> tuple[Number, ...]:
-    rising = [all(run[f"hull {low} 5"] < run[f"hull {low + 1} 5"] for low in DEPTHS[:-1]) for run in runs]
-    views = [
-        all(run[f"hull {depth} 5"] < NOT_MUCH * run[f"hull {depth} 3"] for depth in DEPTHS) for run in runs
-    ]
-    linear = [LINEAR[0] < run["particles 1000"] / run["particles 500"] < LINEAR[1] for run in runs]
-    return (
-        share_number("deeper takes longer", rising),
-        share_number(f"five views take less than {NOT_MUCH:g} times what three do, at every depth", views),
-        share_number("twice the particles take about twice the time", linear),
-        share_number("depth 7, five views, a fit and 1000 particles within a 30th of a second", [
-            total <= FRAME_MS for total in _whole(runs)
-        ]),
-    )  # fmt: skip
-
-
-def _whole(runs: Sequence[Mapping[str, Any]]) -> list[float]:
-    return [run["hull 7 5"] + run["fit 7"] + run["particles 1000"] for run in runs]
-
-
-def _mean(runs: Sequence[Mapping[str, Any]], name: str) -> float:
-    return float(np.mean([run[name] for run in runs]))
+    yield bar_chart("Time of a frame's parts", "part", "time (ms)", series, (LABELS[name] for name in names))
+    yield {"footage": TEST, "memory": MEMORY, "rounds": "quickest of several"}
 
 
 def _table(title: str, runs: Sequence[Mapping[str, Any]]) -> Table:
+    def mean(name: str) -> float:
+        return float(np.mean([run[name] for run in runs]))
+
+    def pair(name: str) -> str:
+        return f"{mean(name):.1f} / {PAPER[name]:g}"
+
     rows = []
     for depth in DEPTHS:
-        carved = (_pair(runs, f"hull {depth} {views}") for views in VIEWS)
-        searched = (_pair(runs, f"particles {count}") if depth == DEPTHS[1] else "" for count in PARTICLES)
-        voxels = round(_mean(runs, f"voxels {depth}"))
-        rows.append((f"depth {depth}", *carved, _pair(runs, f"fit {depth}"), *searched, voxels))
+        carved = (pair(f"hull {depth} {views}") for views in VIEWS)
+        searched = (pair(f"particles {count}") if depth == DEPTHS[1] else "" for count in PARTICLES)
+        voxels = round(mean(f"voxels {depth}"))
+        rows.append((f"depth {depth}", *carved, pair(f"fit {depth}"), *searched, voxels))
     heads = ("", "3 views", "4 views", "5 views", "blob fitting", "500 particles", "1000 particles", "voxels")
     return Table(f"Milliseconds, ours / paper: {title}", heads, tuple(rows))
 
 
-def _pair(runs: Sequence[Mapping[str, Any]], name: str) -> str:
-    return f"{_mean(runs, name):.1f} / {PAPER[name]:g}"
-
-
-def _chart(runs: Sequence[Mapping[str, Any]]) -> Chart:
-    names = ("hull 7 5", "fit 7", "particles 500", "particles 1000")
-    places = tuple(float(place) for place in range(len(names)))
-    series = (
-        Series("ours", places, tuple(_mean(runs, name) for name in names)),
-        Series("paper (2 GHz Pentium 4)", places, tuple(PAPER[name] for name in names), dashed=True),
-    )
-    labels = tuple(LABELS[name] for name in names)
-    return Chart("Time of a frame's parts", "bars", "part", "time (ms)", series, categories=labels)
-
+CLAIMED = ("deeper takes longer", "at every depth", "twice the particles", "within a 30th of a second")
 
 EXPERIMENT = Experiment(
     name="caillette-table-1",
@@ -286,7 +268,8 @@ EXPERIMENT = Experiment(
     "1000 particles run in real time.",
     trials=trials,
     measure=measure,
-    conclude=conclude,
+    shown=shown,
+    verdict=verdict_on(*CLAIMED),
     footage=(TEST, TEST_640),
     alone=True,
 )

@@ -7,9 +7,10 @@ the body in any size.
 """
 
 import dataclasses
+import hashlib
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -25,8 +26,10 @@ from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
 from studio.body.person import first_frames, sampled
 from studio.comparison.footage_shelf import FootageShelf
-from studio.reproduction.caillette.learnt_files import made_once
-from studio.reproduction.caillette.pointing import POINTING, pointing_poses
+from studio.comparison.kept_trials import code_digest, plain
+from studio.comparison.trials import Plain
+from studio.sessions.atomic_files import discard, move_into_place, new_folder_beside
+from studio.sessions.process_lock import ProcessLock
 from studio.synthesis.recipe_file import JOINED, find_recipe, read_recipe
 from studio.synthesis.recipes import recipe_motion
 from studio.training.learning import learn
@@ -35,9 +38,57 @@ from studio.training.resampling import frame_times
 from studio.training.sources import FPS, Recording, fitted_person
 from studio.training.targets import skeleton_of_body
 
+# What trials learn or fit once and share: folders of files beside the footage, each made by one process.
+# A folder is known by what it is made from and by the code that makes it, so another version of the studio makes its
+# own. It is whole or not there; who wants one that another process is making waits for it, and makes it where that
+# process died.
+
+
+LEARNT = "learnt"
+# Code that decides on what is learnt or fitted.
+ROOMS = ("geometry", "motion_files", "body", "behaviour", "synthesis", "training")
+WAIT_SECONDS = 0.2
+
+
+def made_once(
+    shelf: FootageShelf, kind: str, making: Mapping[str, Plain], make: Callable[[Path], None]
+) -> Path:
+    """The folder of a thing of some kind, made by `make(folder)` if it is not there. making : all it depends on."""
+    known = json.dumps({"making": plain(making), "code": code_digest(ROOMS)}, sort_keys=True)
+    name = f"{kind}-{hashlib.sha256(known.encode()).hexdigest()[:16]}"
+    place = shelf.folder / LEARNT / name
+    if place.is_dir():
+        return place
+    place.parent.mkdir(parents=True, exist_ok=True)
+    lock = _waited_for(place)
+    if lock is None:
+        return place
+    partial = new_folder_beside(place)
+    try:
+        if not place.is_dir():
+            make(partial)
+            move_into_place(partial, place)
+    finally:
+        discard(partial)
+        lock.free()
+    return place
+
+
+def _waited_for(place: Path) -> ProcessLock | None:
+    """The lock on a place; None once somebody else has made what belongs there."""
+    while True:
+        lock = ProcessLock.take(place.with_name(f"{place.name}.lock"))
+        if lock is not None:
+            return lock
+        time.sleep(WAIT_SECONDS)
+        if place.is_dir():
+            return None
+
+
 Array = NDArray[np.float64]
 
 USUAL_MEMORY, USUAL_EPSILON = 10, 0.05
+POINTING = "pointing"
 MODEL, NUMBERS, POSES = "model.behaviour", "learnt.json", "poses.npy"
 
 
@@ -46,9 +97,8 @@ class Training:
     """What a model is learnt from and how; plain values.
 
     sources : recipes of people's motion, or "pointing". frames : of each at 30 Hz, 0 for all. performances : of each,
-    the first as recorded.
-    smoothings : of each performance. memory, epsilon : of the automaton. clusters : further learning knobs. seed : of
-    performances and clustering. tested : recipes on whose motion the entropy is measured.
+    the first as recorded. smoothings : of each performance. memory, epsilon : of the automaton. clusters : further
+    learning knobs. seed : of performances and clustering. tested : recipes on whose motion the entropy is measured.
     """
 
     sources: tuple[str, ...]
@@ -197,3 +247,42 @@ def _write(folder: Path, lesson: Lesson) -> None:
 def _read(folder: Path) -> Lesson:
     numbers = json.loads((folder / NUMBERS).read_text(encoding="utf-8"))
     return Lesson(read_model(folder / MODEL), int(numbers["frames"]), float(numbers["seconds"]))
+
+
+# A simple sequence to learn clusters from: somebody stands and points with one arm, here and there. The paper's
+# clustering found 5 clusters in "a simpler arms pointing sequence" of which it says no more (section 7.1). Ours: the
+# right arm goes from hanging to one of two places and back, each way as an arm reaches (minimum jerk), with a rest at
+# both ends.
+
+TARGETS: tuple[dict[str, float], ...] = (
+    {"right_shoulder_swing": 85.0, "right_shoulder_spread": 10.0, "right_elbow": 5.0},
+    {"right_shoulder_swing": 20.0, "right_shoulder_spread": 85.0, "right_elbow": 5.0},
+)
+"""Degrees."""
+ROUNDS = 4
+MOVE_S, REST_S = 0.8, 0.7
+
+
+def pointing_poses(body: BodyModel, fps: float) -> Array:
+    """(F, D) the body pointing at each target in turn, ROUNDS times over."""
+    names = [entry.name for entry in body.parameters]
+    resting = body.neutral
+    found = [resting[None]]
+    for _ in range(ROUNDS):
+        for target in TARGETS:
+            pointed = resting.copy()
+            for name, degrees in target.items():
+                pointed[names.index(name)] = np.radians(degrees)
+            found += [_reach(resting, pointed, fps), _held(pointed, fps)]
+            found += [_reach(pointed, resting, fps), _held(resting, fps)]
+    return np.concatenate(found)
+
+
+def _reach(start: Array, end: Array, fps: float) -> Array:
+    """A movement of minimum jerk (Flash & Hogan 1985)."""
+    share = (np.arange(round(MOVE_S * fps)) + 1.0)[:, None] / round(MOVE_S * fps)
+    return start + (end - start) * (10.0 * share**3 - 15.0 * share**4 + 6.0 * share**5)
+
+
+def _held(pose: Array, fps: float) -> Array:
+    return np.repeat(pose[None], round(REST_S * fps), axis=0)

@@ -18,7 +18,7 @@ from studio.body.person import first_frames, marker_motion
 from studio.comparison.footage_shelf import FootageShelf
 from studio.errors import TruthError
 from studio.motion_files.trc import MarkerMotion, read_trc
-from studio.reproduction.caillette.learnt_files import made_once
+from studio.reproduction.caillette.training_set import made_once
 from studio.sessions.session import Session
 from studio.synthesis.recipe_file import read_recipe
 from studio.synthesis.recipes import RECIPE_COPY, recipe_motion, recipe_person

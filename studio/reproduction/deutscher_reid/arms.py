@@ -1,25 +1,22 @@
-"""The planar arms of Deutscher & Reid (2005), section 6: one camera facing the plane, a silhouette of a known
-pose.
+"""The planar arms of Deutscher & Reid (2005), section 6: one camera facing the plane, a silhouette of a known pose.
 
-Nothing is known before the search but the range of the joints (Fig. 12a: the first cloud is uniform over it),
-so the largest movement that can be expected is the whole range and σ0 of Eq. 13 is half of it.
+Nothing is known before the search but the range of the joints (Fig. 12a: the first cloud is uniform over it), so the
+largest movement that can be expected is the whole range and σ0 of Eq. 13 is half of it.
 """
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.benchmarks.made_scene import filled
 from studio.body.catalogue import load_body
-from studio.body.forward_kinematics import limb_ends, limb_frames
+from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel, kinematic_tables
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
-from studio.geometry.cones import limb_outlines
-from studio.geometry.projection import project
 from studio.runs.search_space import search_space
+from studio.synthesis.arm_footage import arm_outlines, filled
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.frame_loop import search_frame
 from studio.tracking.tracker import Carried, FrameProblem, FrameResult, LayerRecord, SearchSpace
@@ -33,24 +30,6 @@ FOCAL_PIXELS = 400.0
 FILLED = 0.9
 # True poses lie within this part of the joints' ranges, so that no answer lies on the search's border.
 TRUE_PART = 0.6
-
-
-class ArmScene(Protocol):
-    """A body to be found in one picture."""
-
-    @property
-    def name(self) -> str:
-        """The body's name."""
-        ...
-
-    @property
-    def space(self) -> SearchSpace:
-        """The joints, the range that is searched, and σ0."""
-        ...
-
-    def observed(self, pose: Array) -> FrameProblem:
-        """The picture of the body in pose (D,), as a function of poses."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,9 +61,7 @@ def template_arm(body_name: str) -> TemplateArm:
 
 
 def facing_camera(body: BodyModel) -> Camera:
-    """A camera whose picture plane is parallel to the plane that the body moves in, and which sees all of
-    it.
-    """
+    """A camera whose picture plane is parallel to the plane that the body moves in, and which sees all of it."""
     limits = np.array([(entry.lower, entry.upper) for entry in body.parameters])
     poses = np.random.default_rng(0).uniform(limits[:, 0], limits[:, 1], (500, len(limits)))
     ends = limb_ends(body, poses).reshape(-1, 3)
@@ -110,21 +87,17 @@ def facing_camera(body: BodyModel) -> Camera:
 
 def silhouette(body: BodyModel, camera: Camera, pose: Array) -> NDArray[np.uint8]:
     """(H, W) 255 where a pixel's centre lies inside the outline of a limb, else 0; pose (D,)."""
-    shapes = kinematic_tables(body).limb_shape
-    corners, _ = project(camera, limb_outlines(shapes, limb_frames(body, pose[None]), camera)[0])
-    return filled(corners, camera.width, camera.height)
+    return filled(arm_outlines(body, pose[None], camera)[0], camera.width, camera.height)
 
 
 def true_pose(space: SearchSpace, seed: int) -> Array:
-    """(D,) the pose to be found: uniform over the middle TRUE_PART of the joints' ranges, keyed by the
-    seed.
-    """
+    """(D,) the pose to be found: uniform over the middle TRUE_PART of the joints' ranges, keyed by the seed."""
     middle, half = (space.lower + space.upper) / 2.0, (space.upper - space.lower) / 2.0
     draws = np.random.default_rng((seed, 1)).uniform(-TRUE_PART, TRUE_PART, len(middle))
     return middle + draws * half
 
 
-def localise(scene: ArmScene, seed: int, **changes: Any) -> tuple[FrameResult, list[LayerRecord], Array]:  # noqa: ANN401
+def localise(scene: TemplateArm, seed: int, **changes: Any) -> tuple[FrameResult, list[LayerRecord], Array]:  # noqa: ANN401
     """Search one picture with the annealed filter: the result, its layers, and the true pose (D,).
 
     changes : knobs of `AnnealedSettings` that differ from the defaults.

@@ -6,20 +6,20 @@ The paper's filter takes 60 s a frame, all of it in the weighting; here a frame 
 shared (drawing, noise, a lock) is a larger part of it, so the weighting alone is measured beside the whole frame.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from studio.benchmarks.timing import quickest
-from studio.comparison.findings import Findings, Series, Table
+from studio.comparison.findings import Series, Table
 from studio.comparison.footage_shelf import FootageShelf
 from studio.comparison.statistics import number
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.numba_in_threads import numba
 from studio.reproduction.deutscher_reid.setting import CIRCLE, PLAIN, SOURCE, WEIGHTING
 from studio.reproduction.drawing import line, line_chart
-from studio.reproduction.experiment import Experiment
+from studio.reproduction.experiment import Experiment, Part, each_seed, measured, verdict_on
 from studio.runs.search_space import default_sigma, search_space
 from studio.settings import changed_settings, default_settings
 from studio.tracking.catalogue import TRACKERS
@@ -28,6 +28,7 @@ from studio.tracking.tracker import start_of
 from studio.weighting.catalogue import WEIGHTINGS
 
 PAPER = 0.8
+PER_PROCESSOR = "speed-up per processor"
 LAYERS, PARTICLES = 10, 2000
 ROUNDS, QUICK_ROUNDS = 8, 3
 
@@ -35,10 +36,8 @@ ROUNDS, QUICK_ROUNDS = 8, 3
 def trials(scale: Scale) -> tuple[Trial, ...]:
     """One a seed."""
     rounds = QUICK_ROUNDS if scale.quick else ROUNDS
-    return tuple(
-        Trial(f"processors, seed {seed}", {"footage": CIRCLE, "seed": seed, "rounds": rounds, "last": 1})
-        for seed in scale.seeds
-    )
+    fields = {"footage": CIRCLE, "rounds": rounds, "last": 1}
+    return tuple(each_seed("processors", scale.seeds, lambda seed: {"seed": seed, **fields}))
 
 
 @kept_as("deutscher_reid.processors.measure")
@@ -83,67 +82,37 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
     }
 
 
-def conclude(outcomes: Sequence[Outcome]) -> Findings:
+def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     """Speed-up over processors. The verdict is on the weighing with two, which is what the paper farms out and what its
     frames spend their time on.
     """
+    yield {"footage": CIRCLE, "layers": LAYERS, "particles": PARTICLES, "weighting": WEIGHTING}
     counts = outcomes[0].measured["threads"]
     if len(counts) < 2:
-        words = "This machine offers one processor, so there is nothing to compare."
-        return Findings("answered", words, settings=_settings())
-    speed = {
-        what: np.array([outcome.measured[what][0] / np.array(outcome.measured[what]) for outcome in outcomes])
-        for what in ("frame", "weighing")
-    }
-    numbers = [
-        number(
-            f"speed-up per processor, {label}, {count} processors",
-            (speed[what][:, place] / count).tolist(),
-            "",
-            PAPER if count == 2 else None,
-            "higher",
-        )
-        for what, label in (("weighing", "weighing"), ("frame", "a whole frame"))
-        for place, count in enumerate(counts)
-        if count > 1
-    ]
-    weighing = numbers[0]
-    frame = next(entry for entry in numbers if "a whole frame, 2" in entry.name)
-    words = (
-        f"Two processors weigh {PARTICLES} particles {2 * weighing.ours:.2f} times as fast as one, {weighing.ours:.2f} "
-        f"each ({weighing.low:.2f} to {weighing.high:.2f}; the paper says about 0.8), and search a whole frame of "
-        f"{LAYERS} layers {2 * frame.ours:.2f} times as fast, {frame.ours:.2f} each. The verdict is on the weighing, "
-        "which is what the paper farms out and what its frames spend their time on; here weighing takes "
-        "milliseconds, so "
-        "that drawing and noise, done by one, are a larger part. With 200 particles a layer there is "
-        "too little to share "
-        f"and one thread does it all. Measured with 1 to {max(counts)} threads of one machine in turn, "
-        "the quickest of the "
-        "rounds; other programs on the machine lower the figures."
+        yield "This machine offers one processor, so there is nothing to compare."
+        return
+    spent = {what: measured(outcomes, what) for what in ("frame", "weighing")}
+    speed = {what: times[:, :1] / times for what, times in spent.items()}
+    for what, label in (("weighing", "weighing"), ("frame", "a whole frame")):
+        for place, count in list(enumerate(counts))[1:]:
+            name, paper = f"{PER_PROCESSOR}, {label}, {count} processors", PAPER if count == 2 else None
+            yield number(name, speed[what][:, place] / count, "", paper, "higher")
+    yield (
+        "The verdict is on the weighing, which is what the paper farms out and what its frames spend their time on; "
+        "here it takes milliseconds, so that drawing and noise, done by one, are a larger part. With 200 particles a "
+        "layer there is too little to share and one thread does it all. Threads of one machine in turn, the quickest "
+        "of the rounds; other programs on the machine lower the figures."
     )
-    axis = tuple(float(count) for count in counts)
+    axis = tuple(map(float, counts))
     series = (
         line(label, axis, speed[what].mean(axis=0))
         for what, label in (("frame", "a whole frame"), ("weighing", "weighing alone"))
     )
     claimed = Series("paper: 0.8 each", axis, tuple(max(1.0, PAPER * count) for count in counts), dashed=True)
-    chart = line_chart("Speed-up over processors", "processors", "times as fast", (*series, claimed))
-    rows = tuple(
-        (
-            count,
-            *(
-                round(float(np.mean([outcome.measured[what][place] for outcome in outcomes])), 2)
-                for what in ("frame", "weighing")
-            ),
-        )
-        for place, count in enumerate(counts)
-    )
-    table = Table("Times of one machine", ("processors", "a frame (ms)", "weighing a layer (ms)"), rows)
-    return Findings(numbers[0].verdict, words, tuple(numbers), (table,), (chart,), _settings())
-
-
-def _settings() -> dict[str, Any]:
-    return {"footage": CIRCLE, "layers": LAYERS, "particles": PARTICLES, "weighting": WEIGHTING}
+    yield line_chart("Speed-up over processors", "processors", "times as fast", (*series, claimed))
+    means = ([round(float(value), 2) for value in times.mean(axis=0)] for times in spent.values())
+    rows = zip(counts, *means, strict=True)
+    yield Table("Times of one machine", ("processors", "a frame (ms)", "weighing a layer (ms)"), tuple(rows))
 
 
 EXPERIMENT = Experiment(
@@ -153,7 +122,8 @@ EXPERIMENT = Experiment(
     claim="Processing time decreases linearly in the number of processors, with a constant of about 0.8.",
     trials=trials,
     measure=measure,
-    conclude=conclude,
+    shown=shown,
+    verdict=verdict_on(f"{PER_PROCESSOR}, weighing, 2 "),
     footage=(CIRCLE,),
     alone=True,
 )

@@ -6,14 +6,9 @@ sequence" (6.3), judged by eye. Here: the mean error of every frame is below LIM
 ever more than 150 mm off.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
-from studio.comparison.findings import Number
-from studio.comparison.statistics import number
 from studio.comparison.tracked import Tracked
 
 SOURCE = "Deutscher & Reid 2005"
@@ -36,7 +31,6 @@ CIRCLE, BOX = "circle-three-cameras", "box-and-turn"
 TURNS, RUN, HANDSTAND = "walk-with-turns", "run-three-cameras", "handstand-three-cameras"
 
 LIMIT_MM = 100.0
-HALF = 0.5
 # Footage is rendered as far as it is looked at; a quick look takes so many frames of each.
 QUICK_FRAMES = 48
 
@@ -57,28 +51,3 @@ def annealing_as_ten(layers: int) -> float:
 def succeeded(found: Tracked) -> bool:
     """Whether every frame stays below LIMIT_MM and no limb is ever lost."""
     return found.worst_mm < LIMIT_MM and not found.lost_limbs
-
-
-def success_number(name: str, runs: Sequence[Tracked], paper: float | None = 1.0) -> Number:
-    """Share of the seeds that succeed, beside what the paper saw (1: it tracks; 0: it does not)."""
-    return share_number(name, [succeeded(run) for run in runs], paper)
-
-
-def share_number(name: str, held: Sequence[bool], paper: float | None = 1.0) -> Number:
-    """Share of the seeds in which something holds. A minority of the seeds never reproduces what the paper saw, even
-    where its interval is so wide that it contains it.
-    """
-    found = number(name, [float(value) for value in held], "of 1", paper=paper)
-    if found.verdict == "reproduced" and paper is not None and abs(found.ours - paper) > HALF:
-        return replace(found, verdict="not reproduced")
-    return found
-
-
-def times_in_words(held: Sequence[bool]) -> str:
-    """ "3 of 10 seeds"."""
-    return f"{sum(held)} of {len(held)} seeds"
-
-
-def geometric_mean(values: Any, axis: int = -1) -> Any:  # noqa: ANN401 - what NumPy's own mean takes and gives
-    """exp of the mean log: of ratios, and of particles that were tried in equal ratios."""
-    return np.exp(np.mean(np.log(values), axis=axis))

@@ -9,18 +9,16 @@ has bodies of 29 and 34 parameters. Beside the paper's filter and weighting ever
 choice does with as many evaluations.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
-
-import numpy as np
 
 from studio.comparison.findings import Chart, Number, Series
 from studio.comparison.statistics import number
 from studio.comparison.tracked import Tracked
-from studio.comparison.trials import Outcome
-from studio.reproduction.deutscher_reid.particles_on_bodies import FRAMES as FEW_FRAMES
-from studio.reproduction.deutscher_reid.particles_on_bodies import first_frame
+from studio.reproduction.claims import share
+from studio.reproduction.deutscher_reid.particles_needed import BODY_FRAMES, body_frames
 from studio.reproduction.deutscher_reid.setting import (
     BODY,
     BOX,
@@ -39,25 +37,28 @@ from studio.reproduction.deutscher_reid.setting import (
     TURNS,
     WEIGHTING,
     succeeded,
-    success_number,
-    times_in_words,
 )
 from studio.reproduction.drawing import bar_chart, intervals, places
-from studio.reproduction.experiment import Experiment
-from studio.reproduction.lost_limbs import spells
+from studio.reproduction.experiment import Experiment, Part, verdict_on
 from studio.reproduction.tracking import (
-    Claim,
     Contender,
     Groups,
     Line,
     curves,
+    lost_percent,
     mean_errors,
-    summary,
+    spells,
+    summary_table,
     tracked_experiment,
 )
 
 FPS = 60.0
 EQ13, SECTION_6, OWN = "Eq. 13", "section 6", "studio"
+THAT_TRACK = "seeds that track"
+SUCCESS_WORDS = (
+    f"Success is every frame below {LIMIT_MM:g} mm on average and no limb ever more than 150 mm off, which is stricter "
+    "than the paper's judgement by eye."
+)
 
 
 def _annealed(name: str, knobs: Mapping[str, Any], particles: int, layers: int = 10) -> Contender:
@@ -66,40 +67,21 @@ def _annealed(name: str, knobs: Mapping[str, Any], particles: int, layers: int =
     return Contender(name, "annealed", weighting, {**knobs, "layers": layers, "particles": particles})
 
 
-def _tracks(name: str, paper: float | None) -> Claim:
-    """The share of a line's seeds that succeed, beside what the paper saw: 1, it tracks; 0, it does not."""
-    return lambda groups: (
-        success_number(f"{name}: seeds that track", groups[name], paper) if name in groups else None
-    )
+def _tracks(groups: Groups, paper: Mapping[str, float]) -> Iterator[Number]:
+    """The share of each line's seeds that succeed. paper : what it saw of a line: 1, it tracks; 0, it does not."""
+    for name, runs in groups.items():
+        yield share(f"{name}: {THAT_TRACK}", map(succeeded, runs), paper.get(name))
 
 
-def _over_seeds(name: str, what: str, of: Callable[[Tracked], float], unit: str) -> Claim:
-    return lambda groups: (
-        number(f"{name}: {what}", [of(run) for run in groups[name]], unit) if name in groups else None
-    )
-
-
-def _successes(groups: Groups, name: str) -> str:
-    return times_in_words([succeeded(run) for run in groups[name]])
-
-
-def _frames(outcomes: Sequence[Outcome]) -> int:
-    return len(outcomes[0].measured["frames"])
-
-
-def _all_curves(groups: Groups) -> Chart:
-    return curves("Error over frames", groups, FPS)
+def _knobs(contenders: Iterable[Contender]) -> dict[str, Any]:
+    return {f"{one.name}: {knob}": value for one in contenders for knob, value in one.changes.items()}
 
 
 # Fig. 8: Condensation, with the same number of evaluations and with ten times as many.
 
 CONDENSATION, LARGE = "Condensation, 4000", "Condensation, 40 000"
-ONE_LAYER, TEN_LAYERS, FEW = (
-    "annealed, 1 × 4000, the mode carried",
-    "annealed, 10 × 400",
-    "annealed, 10 × 100",
-)
-OWN_LARGE, OWN_FEW = "studio's choice, 10 × 400", "studio's choice, 10 × 100"
+ONE_LAYER = "annealed, 1 × 4000, the mode carried"
+TEN_LAYERS, FEW = "annealed, 10 × 400", "annealed, 10 × 100"
 FIG_8_FRAMES = 240
 CONTENDERS = (
     Contender(CONDENSATION, "condensation", WEIGHTING, {"particles": 4000}),
@@ -112,8 +94,8 @@ CONTENDERS = (
     ),
     _annealed(TEN_LAYERS, PLAIN, 400),
     _annealed(FEW, PLAIN, 100),
-    _annealed(OWN_LARGE, STUDIO, 400),
-    _annealed(OWN_FEW, STUDIO, 100),
+    _annealed("studio's choice, 10 × 400", STUDIO, 400),
+    _annealed("studio's choice, 10 × 100", STUDIO, 100),
 )
 # What the paper saw of each: 1, it tracks; 0, it fails.
 PAPER = {CONDENSATION: 0.0, LARGE: 0.0, ONE_LAYER: 0.0, TEN_LAYERS: 1.0, FEW: 1.0}
@@ -141,47 +123,30 @@ def terminal_failure(found: Tracked) -> float:
     return (found.frames[since] - found.frames[0]) / FPS
 
 
-def _failure(name: str) -> Claim:
-    return lambda groups: number(
-        f"{name}: terminal failure after",
-        [terminal_failure(run) for run in groups[name]],
-        "s",
-        PAPER_SECONDS,
+def _fig_8(groups: Groups) -> Iterator[Part]:
+    yield from _tracks(groups, PAPER)
+    for name in FAILING:
+        seconds = [terminal_failure(run) for run in groups[name]]
+        yield number(f"{name}: terminal failure after", seconds, "s", PAPER_SECONDS)
+    for name, runs in groups.items():
+        yield number(f"{name}: mean error", mean_errors(runs), "mm")
+    yield (
+        f"{SUCCESS_WORDS} The verdict is on who tracks and who does not. A run that ends well counts with its whole "
+        "length as the time to its failure. The studio's choice (all three terms, Eq. 18, crossover by limbs, limbs "
+        "kept apart) is not in the paper; it says what the footage allows. The paper names no frame rate (60 a second "
+        f"here), and its Condensation has a likelihood of its own. {EQ17_WORDS}"
     )
-
-
-def _fig_8_words(groups: Groups, numbers: Sequence[Number]) -> str:
-    told = "; ".join(
-        f"{name}: {_successes(groups, name)}, {sum(mean_errors(runs)) / len(runs):.0f} mm"
-        for name, runs in groups.items()
-    )
-    lasts = sum(
-        run.per_frame_mm[-1] < LIMIT_MM and not run.lost[-1] for name in FAILING for run in groups[name]
-    )
-    seconds = "; ".join(
-        f"{entry.name} {entry.ours:.1f} s on average"
-        for entry in numbers
-        if entry.name.endswith("terminal failure after")
-    )
-    left_out = " 40 000 particles are left out of a quick look." if LARGE not in groups else ""
-    return (
-        f"Seeds that track (every frame below {LIMIT_MM:g} mm, no limb ever lost) and mean errors: {told}. "
-        f"{seconds} ({lasts} of these runs end well and count with their whole length; the paper: 1.2 s). "
-        "The verdict is on who tracks and who does not. The "
-        "studio's choice (all three terms, Eq. 18, crossover by limbs, limbs kept apart) is not in the paper; it says "
-        "what the footage allows. Deviations: the paper names no frame rate (60 a second here), its Condensation has a "
-        "likelihood of its own, and its judgement is by eye. "
-        f"{EQ17_WORDS}{left_out}"
-    )
-
-
-def _kept_chart(groups: Groups) -> Chart:
-    """In how many frames all limbs are held."""
-    shares = tuple(
+    if LARGE not in groups:
+        yield "40 000 particles are left out of a quick look."
+    yield summary_table("Trackers of Fig. 8", groups)
+    yield curves("Error over frames", groups, FPS)
+    held = tuple(
         sum(1.0 - run.lost_frames / len(run.frames) for run in runs) / len(runs) for runs in groups.values()
     )
-    series = Series("all limbs held", places(len(shares)), shares)
-    return bar_chart("Frames in which no limb is lost", "tracker", "share of the frames", (series,), groups)
+    series = (Series("all limbs held", places(len(held)), held),)
+    yield bar_chart("Frames in which no limb is lost", "tracker", "share of the frames", series, groups)
+    frames = len(groups[FEW][0].frames)
+    yield {"footage": CIRCLE, "frames": frames, "body": BODY, "weighting": WEIGHTING, **_knobs(CONTENDERS)}
 
 
 FIG_8 = tracked_experiment(
@@ -191,22 +156,8 @@ FIG_8 = tracked_experiment(
     "Condensation with 4000 particles fails after 1.2 s and with 40 000, too, as does a search of one layer; the "
     "annealed filter with 10 layers of 400 particles tracks very well, and of as few as 100.",
     lines=_fig_8_lines,
-    claims=(
-        *(_tracks(one.name, PAPER.get(one.name)) for one in CONTENDERS),
-        *(_failure(name) for name in FAILING),
-        *(_over_seeds(one.name, "mean error", lambda run: run.mean_mm, "mm") for one in CONTENDERS),
-    ),
-    words=_fig_8_words,
-    tables=(summary("Trackers of Fig. 8"),),
-    charts=(_all_curves, _kept_chart),
-    settings=lambda outcomes: {
-        "footage": CIRCLE,
-        "frames": _frames(outcomes),
-        "body": BODY,
-        "weighting": WEIGHTING,
-        **{f"{one.name}: {knob}": value for one in CONTENDERS for knob, value in one.changes.items()},
-    },
-    judged=lambda entry: entry.name.endswith("seeds that track"),
+    shown=_fig_8,
+    verdict=verdict_on(THAT_TRACK),
 )
 
 # Figs. 9, 10, 21, 22 and 23: 10 layers of 200 particles.
@@ -214,11 +165,6 @@ FIG_8 = tracked_experiment(
 FILTERS = tuple(
     _annealed(name, knobs, 200) for name, knobs in ((EQ13, PLAIN), (SECTION_6, IMPROVED), (OWN, STUDIO))
 )
-DESCRIBED = {
-    EQ13: "The filter of sections 3 to 5 (Eq. 13)",
-    SECTION_6: "The improved filter of section 6 (Eq. 18, 19)",
-    OWN: "The studio's own choice (all three terms, limbs kept apart, crossover by limbs)",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,76 +187,53 @@ FIGURES = (
 )
 
 
-def _lost_percent(run: Tracked) -> float:
-    return 100.0 * run.lost_frames / len(run.frames)
-
-
 def longest_loss(run: Tracked) -> float:
     """Seconds of the longest row of frames in which one limb is lost."""
-    return max((spell.frames for spell in spells(run.lost)), default=0) / FPS
+    return max((spell.frames for spell in spells(run)), default=0) / FPS
 
 
-def _which(runs: Sequence[Tracked]) -> str:
-    """Which limbs are lost, and in how many seeds."""
-    limbs = [limb for run in runs for limb in run.lost_limbs]
-    counts = ", ".join(f"{limb} in {limbs.count(limb)}" for limb in sorted(set(limbs)))
-    return f" ({counts})" if counts else ""
+def _figure_lines(figure: Figure, quick: bool) -> Iterable[Line]:
+    last = {"last": QUICK_FRAMES if quick else None}
+    return (Line(one.name, one, figure.footage, wanted=last) for one in FILTERS)
 
 
-def _figure_words(figure: Figure, groups: Groups) -> str:
-    told = " ".join(
-        f"{DESCRIBED[name]}: {_successes(groups, name)} succeed, mean "
-        f"{np.mean(mean_errors(runs)):.0f} mm, a limb lost in "
-        f"{np.mean([_lost_percent(run) for run in runs]):.0f} % of the frames{_which(runs)}, for "
-        f"{max(longest_loss(run) for run in runs):.2f} s at most."
-        for name, runs in groups.items()
+def _figure_claims(figure: Figure, groups: Groups) -> Iterator[Part]:
+    yield from _tracks(groups, {figure.filter: 1.0})
+    for name, runs in groups.items():
+        yield number(f"{name}: mean error", mean_errors(runs), "mm")
+        yield number(f"{name}: largest frame's mean", [run.worst_mm for run in runs], "mm")
+        yield number(f"{name}: frames with a limb lost", map(lost_percent, runs), "%")
+        yield number(f"{name}: longest time with a limb lost", map(longest_loss, runs), "s")
+    for name, runs in groups.items():
+        limbs = [limb for run in runs for limb in run.lost_limbs]
+        if limbs:
+            counts = ", ".join(f"{limb} in {limbs.count(limb)}" for limb in sorted(set(limbs)))
+            yield f"Lost by {name}, in seeds: {counts}."
+    yield (
+        f"{SUCCESS_WORDS} The verdict is on the paper's filter ({figure.filter}). The person is rendered, at 60 frames "
+        f"a second; the paper names no frame rate and has a real one. {EQ17_WORDS}"
     )
-    eq18 = f"{EQ18_WORDS} " if figure.filter == SECTION_6 else ""
-    return (
-        f"Success is every frame below {LIMIT_MM:g} mm on average and no limb ever more than 150 mm off, which is "
-        f"stricter than the paper's judgement by eye. {told} The verdict is on the paper's filter ({figure.filter}). "
-        "The person is rendered, at 60 frames a second; the paper names no frame rate and has a real one. "
-        f"{eq18}{EQ17_WORDS}"
-    )
+    if figure.filter == SECTION_6:
+        yield EQ18_WORDS
+    yield summary_table(f"Fig. {figure.number}: {figure.what}", groups)
+    yield curves("Error over frames", groups, FPS)
+    weightings = {f"{one.name}: weighting": one.weighting for one in FILTERS}
+    frames = len(groups[EQ13][0].frames)
+    yield {"footage": figure.footage, "frames": frames, "body": figure.body, **_knobs(FILTERS), **weightings}
 
 
-def _figure(figure: Figure) -> Experiment:
-    def lines(quick: bool) -> Iterable[Line]:
-        last = {"last": QUICK_FRAMES if quick else None}
-        return (Line(one.name, one, figure.footage, wanted=last) for one in FILTERS)
-
-    return tracked_experiment(
+THREE_CAMERAS: tuple[Experiment, ...] = tuple(
+    tracked_experiment(
         f"deutscher-fig-{figure.number}",
         f"Three cameras: {figure.what}",
         f"{SOURCE}, Fig. {figure.number}",
         "With three cameras and 10 layers of 200 particles the tracker keeps an accurate lock throughout: "
         f"{figure.what}.",
-        lines=lines,
-        claims=(
-            *(_tracks(one.name, 1.0 if one.name == figure.filter else None) for one in FILTERS),
-            *(
-                _over_seeds(one.name, what, of, unit)
-                for one in FILTERS
-                for what, of, unit in (
-                    ("mean error", lambda run: run.mean_mm, "mm"),
-                    ("largest frame's mean", lambda run: run.worst_mm, "mm"),
-                    ("frames with a limb lost", _lost_percent, "%"),
-                    ("longest time with a limb lost", longest_loss, "s"),
-                )
-            ),
-        ),
-        words=lambda groups, numbers: _figure_words(figure, groups),
-        tables=(summary(f"Fig. {figure.number}: {figure.what}"),),
-        charts=(_all_curves,),
-        settings=lambda outcomes: {
-            "footage": figure.footage,
-            "frames": _frames(outcomes),
-            "body": figure.body,
-            **{f"{one.name}: {knob}": value for one in FILTERS for knob, value in one.changes.items()},
-            **{f"{one.name}: weighting": one.weighting for one in FILTERS},
-        },
+        lines=partial(_figure_lines, figure),
+        shown=partial(_figure_claims, figure),
     )
-
+    for figure in FIGURES
+)
 
 # Section 3.1: ten layers with 200 particles and more, on the frames of the bisections.
 
@@ -323,52 +246,28 @@ def _size_name(name: str, particles: int) -> str:
     return f"{name}, {LAYERS} × {particles}"
 
 
-def _sizes(quick: bool) -> Iterable[tuple[str, int]]:
-    return (
-        (name, particles)
-        for name in (EQ13, SECTION_6)
-        for particles in (QUICK_PARTICLES if quick else PARTICLES)
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class _FramesOfSeed(Line):
-    """A line whose every seed tracks frames of its own."""
-
-    quick: bool = False
-
-    def trial(self, seed: int):
-        first = first_frame(seed, self.quick)
-        return Line(
-            self.name, self.contender, self.footage, 0, {"first": first, "last": first + FEW_FRAMES}
-        ).trial(seed)
-
-
 def _size_lines(quick: bool) -> Iterable[Line]:
-    for name, particles in _sizes(quick):
-        contender = _annealed(name, PLAIN if name == EQ13 else IMPROVED, particles)
-        yield _FramesOfSeed(_size_name(name, particles), contender, CIRCLE, quick=quick)
+    for name, knobs in ((EQ13, PLAIN), (SECTION_6, IMPROVED)):
+        for particles in QUICK_PARTICLES if quick else PARTICLES:
+            contender = _annealed(name, knobs, particles)
+            frames = partial(body_frames, quick=quick)
+            yield Line(_size_name(name, particles), contender, CIRCLE, wanted=frames)
 
 
-def _size_words(groups: Groups, numbers: Sequence[Number]) -> str:
-    told = "; ".join(f"{name}: {_successes(groups, name)}" for name in groups)
-    return (
-        f"Seeds that track 40 frames of the walk in a circle (every frame below {LIMIT_MM:g} mm, no limb lost): {told}."
-        " The paper says that 10 layers with 200 particles or more work well for a model of 30 parameters; the verdict "
-        f"is on Eq. 13 with 200. {EQ17_WORDS}"
-    )
-
-
-def _size_chart(groups: Groups) -> Chart:
+def _sizes(groups: Groups) -> Iterator[Part]:
+    yield from _tracks(groups, {_size_name(EQ13, size): 1.0 for size in PARTICLES if size >= ENOUGH})
+    yield f"{SUCCESS_WORDS} The verdict is on Eq. 13 with {ENOUGH}. {EQ17_WORDS}"
+    yield summary_table("Eq. 13 and section 6 with more and more particles", groups)
     series = []
     for name in (EQ13, SECTION_6):
-        found = {
-            size: groups[_size_name(name, size)] for size in PARTICLES if _size_name(name, size) in groups
+        of_size = {size: groups.get(_size_name(name, size)) for size in PARTICLES}
+        held = {
+            float(size): [float(succeeded(run)) for run in runs] for size, runs in of_size.items() if runs
         }
-        held = [[float(succeeded(run)) for run in runs] for runs in found.values()]
-        series.append(intervals(name, tuple(float(size) for size in found), held, group=name))
+        series.append(intervals(name, tuple(held), held.values(), group=name))
     title = "Seeds that track, by particles in each of ten layers"
-    return Chart(title, "lines", "particles", "share of the seeds", tuple(series), log_x=True)
+    yield Chart(title, "lines", "particles", "share of the seeds", tuple(series), log_x=True)
+    yield {"footage": CIRCLE, "frames": BODY_FRAMES, "layers": LAYERS, "weighting": WEIGHTING, **PLAIN}
 
 
 ENOUGH_PARTICLES = tracked_experiment(
@@ -377,22 +276,6 @@ ENOUGH_PARTICLES = tracked_experiment(
     f"{SOURCE}, section 3.1",
     "For a model of 30 parameters 10 layers with 200 particles or more work well.",
     lines=_size_lines,
-    claims=tuple(
-        _tracks(_size_name(name, size), 1.0 if name == EQ13 and size >= ENOUGH else None)
-        for name, size in _sizes(False)
-    ),
-    words=_size_words,
-    tables=(summary("Eq. 13 and section 6 with more and more particles"),),
-    charts=(_size_chart,),
-    settings={
-        "footage": CIRCLE,
-        "frames": FEW_FRAMES,
-        "layers": LAYERS,
-        "weighting": WEIGHTING,
-        **PLAIN,
-    },
-    judged=lambda entry: entry.name.startswith(f"{_size_name(EQ13, ENOUGH)}:"),
+    shown=_sizes,
+    verdict=verdict_on(f"{_size_name(EQ13, ENOUGH)}:"),
 )
-
-THREE_CAMERAS = tuple(_figure(figure) for figure in FIGURES)
-EXPERIMENTS = (FIG_8, *THREE_CAMERAS, ENOUGH_PARTICLES)

@@ -5,31 +5,169 @@ footage is the Lee-walk twin (for cameras a rendered walk with eight of them). O
 that each row begins with what the tracker reaches undamaged.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 
-from studio.comparison.findings import Chart, Table
+from studio.comparison.findings import Table
 from studio.comparison.footage_shelf import FootageShelf
-from studio.comparison.tracked import Attempt, Tracked, track
+from studio.comparison.tracked import Attempt, Changed, track
 from studio.comparison.trials import Outcome, Scale, Trial, kept_as
+from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
+from studio.geometry.camera import Camera
 from studio.reproduction.drawing import heat_chart
-from studio.reproduction.experiment import Experiment, concluding
-from studio.reproduction.fleischmann.setting import EQ13, EVALUATIONS, IMPROVED, SWARM, TWIN
-from studio.reproduction.open_questions.damage import DAMAGES
+from studio.reproduction.experiment import Experiment, Part, each_seed
+from studio.reproduction.fleischmann import EQ13, EVALUATIONS, IMPROVED, SWARM, TWIN
 from studio.reproduction.tracking import Contender, by_group
+from studio.synthesis.damage import misplaced
+
+Array = NDArray[np.float64]
+Bytes = NDArray[np.uint8]
+
+# Ways to spoil what a tracker is given, each of a degree, the same for the same seed.
+# Masks and edge maps are spoilt as they lie in memory, calibration as cameras: nothing of the session changes.
+
+HOLE_SHARE = 0.5
+"""Of the damage of a mask: holes in the person; the rest are blobs beside the person."""
+BLOB_PIXELS = 9.0
+"""Radius of holes and blobs, up to twice that: a hand's or a shadow's size in the twin's pictures."""
+AROUND = 40
+"""Blobs lie within this many pixels of the person."""
+CLUTTER_LENGTH = (30.0, 120.0)
+CLUTTER_BLUR = 2.0
+FOREGROUND = 255
+
+
+def nothing(degree: float, seed: int) -> Changed:
+    """No damage, whatever the degree."""
+    return Changed()
+
+
+def mask_damage(degree: float, seed: int) -> Changed:
+    """Holes torn into the masks, and blobs set beside the person, new in every frame.
+
+    degree : damaged pixels as a share of the person's.
+    """
+
+    def spoil(evidence: FrameEvidence) -> FrameEvidence:
+        views = tuple(
+            replace(
+                view,
+                mask=damaged_mask(view.mask, degree, np.random.default_rng((seed, evidence.frame, index))),
+            )
+            for index, view in enumerate(evidence.views)
+        )
+        return FrameEvidence(evidence.frame, views)
+
+    return Changed(evidence=spoil)
+
+
+def damaged_mask(mask: Bytes, degree: float, rng: np.random.Generator) -> Bytes:
+    """The mask with round holes and blobs until they cover `degree` of the person's pixels."""
+    person = int((mask > 0).sum())
+    if degree <= 0.0 or person == 0:
+        return mask
+    damaged = mask.copy()
+    rows, columns = np.nonzero(mask)
+    wanted = degree * person
+    torn = set_ = 0
+    while torn < HOLE_SHARE * wanted:
+        place = int(rng.integers(person))
+        torn += _paint(damaged, columns[place], rows[place], BLOB_PIXELS * (1.0 + rng.random()), 0)
+    # Blobs fall near the person; where they hit it they count for nothing, so the number of tries is bounded.
+    for _ in range(10_000):
+        if set_ >= (1.0 - HOLE_SHARE) * wanted:
+            break
+        place = int(rng.integers(person))
+        x, y = columns[place] + rng.uniform(-AROUND, AROUND), rows[place] + rng.uniform(-AROUND, AROUND)
+        if 0 <= int(y) < mask.shape[0] and 0 <= int(x) < mask.shape[1] and not mask[int(y), int(x)]:
+            set_ += _paint(damaged, x, y, BLOB_PIXELS * (1.0 + rng.random()), FOREGROUND)
+    return damaged
+
+
+def _paint(mask: Bytes, x: float, y: float, radius: float, value: int) -> int:
+    """Paint a disc; returns how many pixels changed."""
+    height, width = mask.shape
+    top, bottom = max(0, int(y - radius)), min(height, int(y + radius) + 2)
+    left, right = max(0, int(x - radius)), min(width, int(x + radius) + 2)
+    window = mask[top:bottom, left:right]
+    down, along = np.ogrid[top:bottom, left:right]
+    disc = (down - y) ** 2 + (along - x) ** 2 <= radius * radius
+    changed = int((disc & (window != value)).sum())
+    window[disc] = value
+    return changed
+
+
+def clutter(degree: float, seed: int) -> Changed:
+    """Straight edges all over the edge maps that do not move, as a cluttered room has them.
+
+    degree : pixels on an edge as a share of the picture's.
+    """
+    kept: dict[tuple[int, tuple[int, ...]], Bytes] = {}
+
+    def spoil(evidence: FrameEvidence) -> FrameEvidence:
+        views: list[ViewEvidence] = []
+        for index, view in enumerate(evidence.views):
+            key = (index, view.edges.shape)
+            if key not in kept:
+                kept[key] = clutter_edges(view.edges.shape, degree, np.random.default_rng((seed, index)))
+            views.append(replace(view, edges=np.maximum(view.edges, kept[key])))
+        return FrameEvidence(evidence.frame, tuple(views))
+
+    return Changed(evidence=spoil)
+
+
+def clutter_edges(shape: tuple[int, ...], degree: float, rng: np.random.Generator) -> Bytes:
+    """(H, W) an edge map of random lines, blurred and scaled to 0…255 as the real ones are."""
+    height, width = shape
+    lines = np.zeros(shape)
+    while lines.mean() < degree:
+        length, turn = rng.uniform(*CLUTTER_LENGTH), rng.uniform(0.0, np.pi)
+        along = np.arange(0.0, length, 0.5)
+        x = np.floor(rng.uniform(0, width) + along * np.cos(turn)).astype(int)
+        y = np.floor(rng.uniform(0, height) + along * np.sin(turn)).astype(int)
+        inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+        lines[y[inside], x[inside]] = 1.0
+    if degree <= 0.0:
+        return np.zeros(shape, np.uint8)
+    soft = gaussian_filter(lines, CLUTTER_BLUR)
+    # A lone line keeps its full height, as the evidence's own proximity maps do.
+    ridge = 1.0 / (CLUTTER_BLUR * np.sqrt(2.0 * np.pi))
+    return np.round(255.0 * np.minimum(1.0, soft / ridge)).astype(np.uint8)
+
+
+def calibration_error(degree: float, seed: int) -> Changed:
+    """Every camera believed to look elsewhere than it does.
+
+    degree : pixels by which the picture's middle is off, in a direction of its own for each camera.
+    """
+
+    def spoil(cameras: tuple[Camera, ...]) -> tuple[Camera, ...]:
+        return misplaced(cameras, degree, seed)
+
+    return Changed(cameras=spoil)
+
+
+DAMAGES: dict[str, Callable[[float, int], Changed]] = {
+    "none": nothing,
+    "mask": mask_damage,
+    "clutter": clutter,
+    "calibration": calibration_error,
+}
+
 
 EIGHT = "eight-cameras"
 FRAMES, QUICK_FRAMES = 90, 30
 ALL_TERMS = "edge-region-silhouette"
 MOST_SEEDS = 5
 """A cell of a heat map is a colour: more seeds than this change no colour, and there are 140 cells."""
-STANDS_MM, STANDS_LOST = 60.0, 0.05
-"""A tracker stands a degree if the mean over seeds stays below this error, and this share of frames with "
-"a loss."""
+STANDS_MM, STANDS_LOST = 60.0, 5.0
+"""A tracker stands a degree if the mean over seeds stays below this error, and this share of frames (%) with a loss."""
 
 CONTENDERS = (
     replace(IMPROVED, name="annealed, all terms", weighting=ALL_TERMS),
@@ -111,25 +249,26 @@ QUESTIONS = (
 )
 
 
-def group(contender: Contender, question: Question, degree: float) -> str:
-    """The words for a cell."""
-    return f"{contender.name}, {question.shown(degree)}"
-
-
 def _trials(question: Question, scale: Scale) -> tuple[Trial, ...]:
     """Every contender at every degree with every seed."""
-    found: list[Trial] = []
     last = QUICK_FRAMES if scale.quick else FRAMES
-    for contender in CONTENDERS:
-        for degree in question.degrees:
-            damage = {"damage": question.damage, "degree": degree if question.damage != "none" else 0.0}
-            for seed in scale.seeds[:MOST_SEEDS]:
-                attempt = contender.attempt(
-                    question.footage, seed, EVALUATIONS, last=last, **question.fields(degree)
-                )
-                label = f"{group(contender, question, degree)}, seed {seed}"
-                found.append(Trial(label, {"attempt": attempt.plain(), **damage}))
-    return tuple(found)
+
+    def arguments(contender: Contender, degree: float, seed: int) -> dict[str, Any]:
+        wanted = {"last": last, **question.fields(degree)}
+        attempt = contender.attempt(question.footage, seed, EVALUATIONS, **wanted)
+        damaged = degree if question.damage != "none" else 0.0
+        return {"attempt": attempt.plain(), "damage": question.damage, "degree": damaged}
+
+    return tuple(
+        trial
+        for contender in CONTENDERS
+        for degree in question.degrees
+        for trial in each_seed(
+            f"{contender.name}, {question.shown(degree)}",
+            scale.seeds[:MOST_SEEDS],
+            partial(arguments, contender, degree),
+        )
+    )
 
 
 @kept_as("open_questions.robustness.measure")
@@ -140,89 +279,48 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
     return asdict(track(attempt, shelf, spoilt=spoilt))
 
 
-@dataclass(frozen=True, slots=True)
-class Cells:
-    """What every contender (a row) reached at every degree (a column): mean error, mm, and frames with a loss, %."""
-
-    errors: Mapping[str, list[float]]
-    losses: Mapping[str, list[float]]
-
-
-def _cells(question: Question, outcomes: Sequence[Outcome]) -> Cells:
-    runs = by_group(outcomes)
-
-    def means(of: Callable[[Tracked], float], factor: float = 1.0) -> dict[str, list[float]]:
-        return {
-            entry.name: [
-                factor * float(np.mean([of(run) for run in runs[group(entry, question, degree)]]))
-                for degree in question.degrees
-            ]
-            for entry in CONTENDERS
-        }
-
-    return Cells(means(lambda run: run.mean_mm), means(lambda run: run.lost_frames / len(run.frames), 100.0))
-
-
-def _words(question: Question, cells: Cells) -> str:
-    last = question.shown(question.degrees[-1])
-    best = min(cells.errors, key=lambda name: cells.errors[name][-1])
-    stood = " ".join(f"{name} stands {_standing(question, cells, name)}." for name in cells.errors)
-    return (
-        f"{stood} At the last degree ({last} {question.axis}) {best} is the nearest: "
-        f"{cells.errors[best][-1]:.0f} mm. To stand: a mean below {STANDS_MM:.0f} mm and a limb lost in fewer "
-        f"than {100 * STANDS_LOST:.0f} % of the frames."
+def _shown(question: Question, outcomes: Sequence[Outcome]) -> Iterator[Part]:
+    """Mean error (mm) and frames with a limb lost (%) of every contender at every degree; what each stands."""
+    runs, columns = by_group(outcomes), tuple(map(question.shown, question.degrees))
+    errors: dict[str, list[float]] = {}
+    losses: dict[str, list[float]] = {}
+    for entry in CONTENDERS:
+        cells = [runs[f"{entry.name}, {degree}"] for degree in columns]
+        errors[entry.name] = [float(np.mean([run.mean_mm for run in cell])) for cell in cells]
+        losses[entry.name] = [
+            100.0 * float(np.mean([run.lost_frames / len(run.frames) for run in cell])) for cell in cells
+        ]
+    pairs = {name: list(zip(errors[name], losses[name], strict=True)) for name in errors}
+    stood = []
+    for name, cells in pairs.items():
+        stands = [error <= STANDS_MM and loss <= STANDS_LOST for error, loss in cells]
+        count = [*stands, False].index(False)
+        stood.append(f"{name} stands {f'up to {columns[count - 1]}' if count else 'none of it'}.")
+    yield (
+        f"{' '.join(stood)} In {question.axis}; to stand: a mean below {STANDS_MM:.0f} mm and a limb lost in fewer "
+        f"than {STANDS_LOST:.0f} % of the frames."
     )
-
-
-def _standing(question: Question, cells: Cells, name: str) -> str:
-    """Up to which degree errors and losses stay small, in words."""
-    stood = ""
-    for degree, error, loss in zip(question.degrees, cells.errors[name], cells.losses[name], strict=True):
-        if error > STANDS_MM or loss > 100.0 * STANDS_LOST:
-            break
-        stood = question.shown(degree)
-    return f"up to {stood} {question.axis}" if stood else "none of it"
-
-
-def _table(question: Question, cells: Cells) -> Table:
     rows = tuple(
-        (name, *(f"{error:.1f} / {loss:.0f}" for error, loss in zip(errors, cells.losses[name], strict=True)))
-        for name, errors in cells.errors.items()
+        (name, *(f"{error:.1f} / {loss:.0f}" for error, loss in cells)) for name, cells in pairs.items()
     )
-    heads = (f"{question.shown(degree)} {question.axis}" for degree in question.degrees)
-    return Table("Mean error over seeds (mm), frames with a limb lost (%)", ("tracker", *heads), rows)
+    heads = (f"{degree} {question.axis}" for degree in columns)
+    yield Table("Mean error over seeds (mm), frames with a limb lost (%)", ("tracker", *heads), rows)
+    for words, values in (("mean error (mm)", errors), ("frames with a limb lost (%)", losses)):
+        yield heat_chart(f"{question.title}: {words}", question.axis, "tracker", columns, values)
+    frames = outcomes[0].trial.arguments["attempt"]["last"]
+    yield {"footage": question.footage, "frames": frames, "evaluations": EVALUATIONS}
 
 
-def _heat(title: str, question: Question, values: Mapping[str, list[float]]) -> Chart:
-    columns = map(question.shown, question.degrees)
-    return heat_chart(f"{question.title}: {title}", question.axis, "tracker", columns, values)
-
-
-def _experiment(question: Question) -> Experiment:
-    return Experiment(
+EXPERIMENTS = tuple(
+    Experiment(
         name=f"robustness-{question.name}",
         title=question.title,
         source="an open question",
         claim=question.claim,
         trials=partial(_trials, question),
         measure=measure,
-        conclude=concluding(
-            partial(_cells, question),
-            claims=(),
-            words=lambda cells, numbers: _words(question, cells),
-            tables=(partial(_table, question),),
-            charts=(
-                lambda cells: _heat("mean error (mm)", question, cells.errors),
-                lambda cells: _heat("frames with a limb lost (%)", question, cells.losses),
-            ),
-            settings=lambda outcomes: {
-                "footage": question.footage,
-                "frames": outcomes[0].trial.arguments["attempt"]["last"],
-                "evaluations": EVALUATIONS,
-            },
-        ),
+        shown=partial(_shown, question),
         footage=(question.footage,),
     )
-
-
-EXPERIMENTS = tuple(_experiment(question) for question in QUESTIONS)
+    for question in QUESTIONS
+)
