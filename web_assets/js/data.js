@@ -4,9 +4,9 @@ import { fetchJson, post, runPath } from "./api.js";
 import { onEvent } from "./live.js";
 import { complain } from "./messages.js";
 import { paced } from "./pace.js";
-import { refreshSessions } from "./rail.js";
 import { dressScene } from "./scene_window.js";
 import { isWatched } from "./search_speed.js";
+import { refreshSessions } from "./sessions.js";
 import { get, set, watch } from "./state.js";
 
 const SUMMARY_MILLISECONDS = 1500;
@@ -48,8 +48,8 @@ async function loadRun() {
   layers = [];
   if (!run) return;
   try {
-    const told = await fetchJson(runPath(session, run));
-    if (isShown(session, run)) set({ parameters: told.parameters, layerCount: get("layerCount") ?? layersOf(told.settings) });
+    const { parameters, settings } = await fetchJson(runPath(session, run));
+    if (isShown(session, run)) set({ parameters, layerCount: get("layerCount") ?? layersOf(settings) });
   } catch (error) { complain(error); }
 }
 
@@ -81,6 +81,7 @@ function takeScene(event) {
   if (!isShown(event.session, event.run)) return;
   if (event.follow && get("follow") && searching()) return;
   const stored = get("summary")?.frames.some((line) => line.frame === event.frame);
+  /** @type {Record<string, any>} */
   const changes = { layer: event.layer, follow: event.follow, ...(stored ? { frame: event.frame } : {}) };
   scene = { session: event.session, run: event.run, layer: event.layer, frame: stored ? event.frame : scene.frame, follow: event.follow };
   if (stored && event.frame !== get("frame") && get("whatIf")) changes.whatIf = null;

@@ -6,14 +6,15 @@ import { startCurtain } from "./curtain.js";
 import { startData } from "./data.js";
 import { startExporting } from "./exporting.js";
 import { startHeader } from "./header.js";
-import { startKeys } from "./keys.js";
+import { startKeys, takeKey } from "./keys.js";
 import { startLive } from "./live.js";
 import { startLog } from "./log.js";
 import { startPlayback } from "./playback.js";
-import { openSession, refreshSessions, startRail } from "./rail.js";
+import { startRail } from "./rail.js";
 import { startSceneFrame } from "./scene_frame.js";
-import { get } from "./state.js";
 import { startSearchSpeed } from "./search_speed.js";
+import { openSession, refreshSessions } from "./sessions.js";
+import { get } from "./state.js";
 import { startSurvival } from "./survival.js";
 import { startTabs } from "./tabs.js";
 import { startTheme } from "./theme.js";
@@ -25,6 +26,7 @@ import { startWhatIf } from "./what_if.js";
 
 async function start() {
   startTheme();
+  startLive();
   startHeader();
   startSearchSpeed();
   startRail();
@@ -43,8 +45,7 @@ async function start() {
   startData();
   startTracks();
   startCorrecting();
-  startLive();
-  startSceneFrame();
+  startSceneFrame(takeKey);
   await refreshSessions();
   const wish = new URLSearchParams(location.search);
   const sessions = get("sessions") ?? [];

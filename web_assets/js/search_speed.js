@@ -2,38 +2,40 @@
 // the tracking process's own.
 
 import { fetchJson, post } from "./api.js";
+import { byId } from "./elements.js";
 import { complain } from "./messages.js";
 import { get, watch } from "./state.js";
 
-const select = document.getElementById("search-speed");
+/** @type {HTMLSelectElement} */
+const choice = byId("search-speed");
 let asking = false;
 
 const inUse = () => String(get("work")?.seconds_a_layer ?? 0);
-const isOffered = (seconds) => [...select.options].some((option) => option.value === seconds);
+const isOffered = () => [...choice.options].some((option) => option.value === inUse());
 
 /** Whether each layer is given time to be looked at. */
 export const isWatched = () => (get("work")?.seconds_a_layer ?? 0) > 0;
 
-async function askForChoices() {
+async function loadChoices() {
   if (asking) return;
   asking = true;
   try {
     const { choices } = await fetchJson("/api/worker/pace");
-    select.replaceChildren(...choices.map((choice) => new Option(choice.label, choice.seconds_a_layer)));
+    choice.replaceChildren(...choices.map((one) => new Option(one.label, String(one.seconds_a_layer))));
   } catch (error) { complain(error); } finally { asking = false; }
-  if (isOffered(inUse())) show();
+  if (isOffered()) show();
 }
 
 /** Show the speed in use; one that is none of the choices (set by a script) becomes one. */
 function show() {
-  select.disabled = !get("connected");
-  if (select.disabled) return;
-  if (!isOffered(inUse())) askForChoices();
-  else if (select.value !== inUse()) select.value = inUse();
+  choice.disabled = !get("connected");
+  if (choice.disabled) return;
+  if (!isOffered()) loadChoices();
+  else if (choice.value !== inUse()) choice.value = inUse();
 }
 
-/** Wire the select. */
+/** Wire the choice. */
 export function startSearchSpeed() {
-  select.onchange = () => post("/api/worker/pace", { seconds_a_layer: Number(select.value) }).catch((error) => { complain(error); show(); });
+  choice.onchange = () => post("/api/worker/pace", { seconds_a_layer: Number(choice.value) }).catch((error) => { complain(error); show(); });
   watch(["work", "connected"], show);
 }

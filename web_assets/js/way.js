@@ -1,87 +1,89 @@
-// The guided way: the stepper, the step's panel, pictures or the scene beside it.
+// The guided set-up: the stepper, the step's panel, pictures or the scene beside it.
 //
 // A step's module `way_<step>.js` (start-pose: way_start_pose.js) exports `mount(place, way) -> () => void`. `place` is
-// empty and the panel's; what it returns lets go of everything when another step is shown. `way` holds
-//   session        the session's name
-//   detail         `GET S` as it was when the step was mounted (cameras are [] before the calibration)
-//   steps          the steps as `GET S/way` has them; `way.step` is this one
-//   refresh()      ask for the steps again (after something was made); resolves with them
-//   go(step)       show another step
-//   api            the functions of api.js
-//   aside          the empty element at the right, for pictures (class "pictures" with figure.picture in it, if it fits)
-//   scene(wish)    show the 3-D scene in `aside` instead, moved by `POST /api/scene/show {session, ...wish}`
-//   on(type, fn)   hear events of this session of `WS /api/events` while the step is shown
-//   progress(place, {words, share, cancel})  draw a bar with words and a Cancel button in `place`; null takes it away
-// One `button.primary` a step: Enter presses the first that is shown. Classes to use: step-row, step-actions, hint, wrong,
-// notice (way.css). Errors go through `complain` (messages.js) or a p.wrong in place.
+// empty and the panel's; what it returns releases everything when another step is shown. One `button.primary` a step:
+// Enter presses the first that is shown.
 
-import * as api from "./api.js";
+import { fetchJson, post, sessionPath } from "./api.js";
 import { closeDialog, openForm } from "./dialogs.js";
-import { button, element } from "./elements.js";
+import { actions, button, byId, element, failure, fill, lead, NAME, nothing, notice, spring } from "./elements.js";
+import { listen, startEvents } from "./events.js";
 import { complain } from "./messages.js";
 import { loadScene } from "./scene_window.js";
+import { sessionWords } from "./sessions.js";
 import { startTheme } from "./theme.js";
-import { WORDS } from "./way_words.js";
-import { drawProgress } from "./way_progress.js";
-import { listen, startWayEvents } from "./way_events.js";
 
-const byId = (id) => document.getElementById(id);
+/**
+ * @import { Schemas } from "./api_types"
+ * @typedef Way what a step is given
+ * @property {string} session
+ * @property {Schemas["SessionDetail"]} detail the session as it was when the step was mounted (no cameras before the calibration)
+ * @property {HTMLElement} aside the empty element at the right, for pictures (class "pictures" with `picture`s in it, if it fits)
+ * @property {Schemas["WayAnswer"]["steps"][number]} step this step as the server sees it now
+ * @property {() => Promise<any>} refresh load the steps again, after something was made
+ * @property {(step: string) => Promise<void>} go show another step
+ * @property {(shown?: object) => Promise<void>} scene show the 3-D scene in `aside` instead, moved to what is to be shown
+ * @property {(type: string, handler: (event: any) => void) => void} on hear events of this session while the step is shown
+ */
+
+const STEPS = {
+  footage: { name: "Footage", lead: "One video, or one folder of pictures, per camera, all of the same recording." },
+  calibration: { name: "Calibration", lead: "Where the cameras stand and how their lenses draw, and whether that is right." },
+  background: { name: "Background", lead: "What of each picture is the person, and how far the views agree on it." },
+  subject: { name: "Subject", lead: "The body that is tracked, and its measures." },
+  "start-pose": { name: "Start pose", lead: "How the person stands in the frame where tracking begins." },
+  track: { name: "Track", lead: "The motion, frame by frame." },
+  check: { name: "Check", lead: "Whether the motion fits the pictures, and what makes it better." },
+  export: { name: "Export", lead: "The motion as a file that other programs open." },
+};
+const STATES = { done: "done", ready: "to be done", blocked: "not yet possible", stale: "to be done again", running: "running" };
+
 const stepper = byId("stepper");
 const panel = byId("step");
 const aside = byId("aside");
+const which = byId("which");
 
 let session = "";
 let steps = [];
 let shown = "";        // the step whose panel is mounted
-let unmount = null;
 let mounting = 0;      // rises with every mount, so that a slow one knows that it is too late
-let heard = [];
+let releases = [];     // what the mounted step has to release
 
 const statusOf = (name) => steps.find((one) => one.step === name);
+const beside = (by) => steps[steps.findIndex((one) => one.step === shown) + by]?.step;
 const moduleOf = (name) => import(`./way_${name.replaceAll("-", "_")}.js`);
 
 function drawStepper() {
-  const rows = steps.map((one) => {
-    const row = element("button", { type: "button" }, element("i", { className: "step-dot" }),
-      element("span", { className: "name", textContent: WORDS[one.step].name }),
-      one.words && element("span", { className: "words", textContent: one.words }),
-      one.why && element("span", { className: "why", textContent: one.why }));
-    row.dataset.step = one.step;
-    row.dataset.state = one.state;
-    row.title = `${WORDS[one.step].name}: ${WORDS.states[one.state]}${one.optional ? " (optional)" : ""}`;
-    row.setAttribute("aria-label", [row.title, one.words, one.why].filter(Boolean).join(". "));
-    if (one.step === shown) row.setAttribute("aria-current", "step");
-    row.onclick = () => go(one.step);
+  fill(stepper, element("ol", {}, steps.map((one) => {
+    const title = `${STEPS[one.step].name}: ${STATES[one.state]}${one.optional ? " (optional)" : ""}`;
+    const row = element("button", { type: "button", title, ariaLabel: [title, one.words, one.why].filter(Boolean).join(". "), dataset: { key: one.step, step: one.step, state: one.state }, onclick: () => go(one.step) },
+      element("i", { className: "step-dot" }), element("span", { className: "name" }, STEPS[one.step].name),
+      one.words && element("span", { className: "words" }, one.words), one.why && element("span", { className: "why" }, one.why));
+    if (one.step === shown) row.ariaCurrent = "step";
     return element("li", {}, row);
-  });
-  const focused = document.activeElement?.dataset?.step;
-  stepper.replaceChildren(element("ol", {}, ...rows));
-  if (focused) stepper.querySelector(`[data-step="${focused}"]`)?.focus();
+  })));
 }
 
-/** Ask how far the session is. */
+/** Load how far the session is. */
 async function refresh() {
-  const asked = session;
-  const told = await api.fetchJson(`${api.sessionPath(asked)}/way`);
-  if (asked !== session) return steps;
-  steps = told.steps;
+  const wanted = session;
+  const answer = await fetchJson(`${sessionPath(wanted)}/way`);
+  if (wanted !== session) return;
+  steps = answer.steps;
   drawStepper();
   drawHead();
-  return told.steps;
 }
 
-function letGo() {
-  unmount?.();
-  unmount = null;
-  for (const stop of heard) stop();
-  heard = [];
-  aside.replaceChildren();
+function release() {
+  for (const each of releases) each();
+  releases = [];
+  fill(aside);
 }
 
-/** The scene beside the panel, moved to what is wished. */
-async function scene(wish = {}) {
-  if (!aside.querySelector("iframe")) aside.replaceChildren(loadScene(element("iframe", { title: "3-D scene" })));
-  await api.post("/api/scene/show", { session, ...wish });
+/** The scene beside the panel, moved to what is to be shown. */
+async function scene(wanted = {}) {
+  if (!aside.querySelector("iframe")) fill(aside, loadScene(element("iframe", { title: "3-D scene" })));
+  await post("/api/scene/show", { session, ...wanted });
 }
 
 function drawHead() {
@@ -89,68 +91,62 @@ function drawHead() {
   const status = statusOf(shown);
   if (!head || !status) return;
   panel.dataset.state = status.state;
-  head.replaceChildren(element("h1", { textContent: WORDS[shown].name }), element("p", { className: "lead", textContent: WORDS[shown].lead }),
-    status.why && element("p", { className: "notice", textContent: status.why }));
+  fill(head, element("h1", {}, STEPS[shown].name), lead(STEPS[shown].lead), status.why && notice(status.why));
 }
 
 /** Show a step. */
 async function go(name) {
   if (!statusOf(name)) return;
   const turn = ++mounting;
-  letGo();
+  release();
   shown = name;
   drawStepper();
   history.replaceState(null, "", `?session=${encodeURIComponent(session)}&step=${name}`);
-  document.title = `${WORDS[name].name} · ${session} · Capture studio`;
+  document.title = `${STEPS[name].name} · ${session} · Capture studio`;
   const place = element("div", { className: "step-place" });
-  const at = steps.findIndex((one) => one.step === name);
-  const foot = element("div", { className: "step-foot" },
-    at > 0 && button(`‹ ${WORDS[steps[at - 1].step].name}`, () => go(steps[at - 1].step), "quiet"), element("span", { className: "spring" }),
-    at < steps.length - 1 && button(`${WORDS[steps[at + 1].step].name} ›`, () => go(steps[at + 1].step), "quiet next-step"));
-  panel.replaceChildren(element("header", { className: "step-head" }), place, foot);
+  const [before, next] = [beside(-1), beside(1)];
+  fill(panel, element("header", { className: "step-head" }), place, element("div", { className: "step-foot" },
+    before && button(`‹ ${STEPS[before].name}`, () => go(before), "quiet"), spring(), next && button(`${STEPS[next].name} ›`, () => go(next), "quiet next-step")));
   panel.scrollTop = 0;
   drawHead();
   if (statusOf(name).state === "blocked") return;
   try {
-    const [module, detail] = await Promise.all([moduleOf(name), api.fetchJson(api.sessionPath(session))]);
+    const [module, detail] = await Promise.all([moduleOf(name), fetchJson(sessionPath(session))]);
     if (turn !== mounting) return;
-    unmount = module.mount(place, wayOf(detail));
+    releases.push(module.mount(place, wayOf(detail)));
   } catch (error) {
-    place.replaceChildren(element("p", { className: "wrong", textContent: "This step cannot be shown." }), element("p", { className: "hint", textContent: `${error.message} ${error.hint ?? ""}` }));
+    fill(place, element("p", {}, "This step cannot be shown."), failure(error));
   }
 }
 
-/** What a step's module is given. */
-function wayOf(detail) {
-  return {
-    session, detail, aside, api, refresh, go, scene, progress: drawProgress,
-    get steps() { return steps; },
-    get step() { return statusOf(shown); },
-    on: (type, handler) => { heard.push(listen(type, (event) => { if (event.session === session) handler(event); })); },
-  };
-}
+/** What a step's module is given. @returns {Way} */
+const wayOf = (detail) => ({
+  session, detail, aside, refresh, go, scene,
+  get step() { return statusOf(shown); },
+  on: (type, handler) => { releases.push(listen(type, (event) => { if (event.session === session) handler(event); })); },
+});
 
-/** Open a session at its next step, or the one that is asked for. */
+/** Open a session at its next step, or the one that is wanted. */
 async function open(name, wanted = "") {
   session = name;
   shown = "";
-  byId("which").value = name;
+  which.value = name;
   try {
-    const told = await api.fetchJson(`${api.sessionPath(name)}/way`);
-    steps = told.steps;
-    await go(steps.some((one) => one.step === wanted) ? wanted : told.next || "footage");
+    const answer = await fetchJson(`${sessionPath(name)}/way`);
+    steps = answer.steps;
+    await go(statusOf(wanted) ? wanted : answer.next || "footage");
   } catch (error) {
-    letGo();
-    stepper.replaceChildren();
-    panel.replaceChildren(element("p", { className: "wrong", textContent: error.message }), element("p", { className: "hint", textContent: error.hint ?? "" }));
+    release();
+    fill(stepper);
+    fill(panel, failure(error));
   }
 }
 
 /** The sessions of the workspace in the bar's list; which there are. */
 async function drawSessions() {
-  const { sessions } = await api.fetchJson("/api/sessions");
-  byId("which").replaceChildren(...sessions.map((one) => new Option(one.title && one.title !== one.name ? `${one.name} · ${one.title}` : one.name, one.name, false, one.name === session)));
-  byId("which").hidden = !sessions.length;
+  const { sessions } = await fetchJson("/api/sessions");
+  which.replaceChildren(...sessions.map((one) => new Option(sessionWords(one), one.name, false, one.name === session)));
+  which.hidden = !sessions.length;
   return sessions.map((one) => one.name);
 }
 
@@ -158,35 +154,26 @@ async function drawSessions() {
 function beginForm() {
   openForm({
     heading: "New session", action: "Begin", intro: "It begins empty; footage and calibration come next. A name has letters, digits, - and _.",
-    rows: [[{ name: "name", label: "Name", required: true, pattern: "[A-Za-z0-9_\\-]{1,64}", title: "Letters, digits, - and _, up to 64" }]],
+    rows: [[{ name: "name", label: "Name", ...NAME, oninput: ({ target }) => { target.value = target.value.replace(/\s/g, "-"); } }]],
     send: async (values) => {
-      const made = await api.post("/api/sessions", { name: values.name });
+      const made = await post("/api/sessions", { name: values.name });
       closeDialog();
       session = made.name;
       await drawSessions();
       await open(made.name);
     },
   });
-  const name = document.querySelector("dialog input[name=name]");
-  name.oninput = () => { name.value = name.value.replace(/\s/g, "-"); };
-}
-
-function nothing() {
-  panel.replaceChildren(element("header", { className: "step-head" }, element("h1", { textContent: "From your own cameras" }),
-    element("p", { className: "lead", textContent: "From the raw footage of your cameras to a motion file, step by step. Begin with an empty session." })),
-  element("div", { className: "step-actions" }, button("New session", beginForm, "primary")));
 }
 
 /** Up and down (or k and j) between the steps, Enter for the step's own button. */
 function takeKey(event) {
   if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest?.("input, select, textarea, dialog, [role=slider], [role=menu], [role=radiogroup], canvas")) return;
   const by = { j: 1, ArrowDown: 1, k: -1, ArrowUp: -1 }[event.key];
-  if (by) {
-    const at = steps.findIndex((one) => one.step === shown) + by;
-    if (!steps[at]) return;
+  const next = by && beside(by);
+  if (next) {
     event.preventDefault();
-    go(steps[at].step);
-    stepper.querySelector(`[data-step="${steps[at].step}"]`)?.focus();
+    go(next);
+    stepper.querySelector(`[data-step="${next}"]`)?.focus();
   } else if (event.key === "Enter" && !(event.target.closest?.("button, a, summary") && !event.target.closest("#stepper"))) {
     const own = [...panel.querySelectorAll("button.primary")].find((one) => one.offsetParent && !one.disabled);
     const primary = own ?? (panel.dataset.state === "done" ? panel.querySelector(".next-step") : null);
@@ -198,20 +185,20 @@ function takeKey(event) {
 
 async function start() {
   startTheme();
-  startWayEvents();
+  startEvents();
   document.addEventListener("keydown", takeKey);
   byId("begin").onclick = beginForm;
-  byId("which").onchange = () => open(byId("which").value);
+  which.onchange = () => open(which.value);
   for (const type of ["sessions", "track", "subject", "initialise", "export", "state", "import"]) {
     listen(type, (event) => { if (session && event.session === session && event.state !== "running") refresh().catch(() => {}); });
   }
-  const wish = new URLSearchParams(location.search);
+  const query = new URLSearchParams(location.search);
   try {
-    const names = await drawSessions();
-    const wanted = wish.get("session") ?? names[0];
-    if (wish.has("new") || !wanted) nothing();
-    if (wish.has("new")) beginForm();
-    else if (wanted) await open(wanted, wish.get("step") ?? "");
+    const [first] = await drawSessions();
+    const wanted = query.get("session") ?? first;
+    if (wanted && !query.has("new")) return await open(wanted, query.get("step") ?? "");
+    fill(panel, nothing("From your own cameras", lead("From the raw footage of your cameras to a motion file, step by step. Begin with an empty session."), actions(button("New session", beginForm, "primary"))));
+    if (query.has("new")) beginForm();
   } catch (error) { complain(error); }
 }
 

@@ -1,77 +1,64 @@
 // Footage taken into the session: uploaded from this browser, or from a folder of the studio's computer.
 
-import { button, element } from "./elements.js";
+import { fault, fetchJson, post, remove, sessionPath } from "./api.js";
+import { actions, button, check, drawProgress, element, failure, field, files, fill, hint, number, text } from "./elements.js";
 import { CANCELLED, jobDone, shareOf, standing } from "./jobs.js";
 import { complain } from "./messages.js";
 import { uploadFiles } from "./uploading.js";
 
-/** Draw the form in `place` (a details element); `done(told)` is called when footage was taken in. */
+const MOST_FOLDERS = 60;
+
+/** Draw the form in `place` (a details element); `done(job)` is called when footage was taken in. @param {import("./way.js").Way} way */
 export function adder(place, way, done) {
-  const { fetchJson, post, remove, sessionPath } = way.api;
-  const state = { abort: null, identifier: "", stopped: false };
+  let abort = null;
+  let stopped = false;
   const going = element("div", {});
-  const wrong = element("p", { className: "wrong", role: "alert", hidden: true });
-  const remedy = element("p", { className: "hint", hidden: true });
-  const files = element("input", { type: "file", multiple: true, name: "files", accept: "video/*,image/*,.zip,.tar,.gz,.tgz,.bz2,.xz,.toml,.csv,.yml,.json" });
-  const folder = element("input", { type: "file", multiple: true, name: "folder" });
-  folder.setAttribute("webkitdirectory", "");
-  const source = element("input", { type: "text", name: "source", placeholder: "full path" });
-  const refer = element("input", { type: "checkbox", name: "refer" });
-  const fps = element("input", { type: "number", name: "fps", min: 1, step: "any", placeholder: "as the files say" });
-  const trial = element("input", { type: "text", name: "trial", placeholder: "the only one" });
-  const replaced = element("input", { type: "checkbox", name: "replace" });
-  const replaceLine = element("label", { className: "check", title: "Cameras that the new footage does not name are forgotten." }, replaced, "replace all cameras");
+  const wrong = element("div", {});
+  const videos = files({ multiple: true, name: "files", accept: "video/*,image/*,.zip,.tar,.gz,.tgz,.bz2,.xz,.toml,.csv,.yml,.json" });
+  const folder = files({ multiple: true, name: "folder", folder: true });
+  const source = text({ name: "source", placeholder: "full path" });
+  const refer = check("refer to it where it lies instead of copying it", { name: "refer" });
+  const fps = number("", { name: "fps", min: 1, placeholder: "as the files say" });
+  const trial = text({ name: "trial", placeholder: "the only one" });
+  const replace = check("replace all cameras", { name: "replace" }, "Cameras that the new footage does not name are forgotten.");
   const submit = button("Add footage", begin);
   const summary = element("summary", {});
-  const elsewhere = element("p", { className: "hint" }, "Cameras that are connected now (USB, RTSP, MJPEG) are looked at and recorded under ", element("a", { href: "/recording", textContent: "Live cameras" }), ".");
+  const elsewhere = hint("Cameras that are connected now (USB, RTSP, MJPEG) are looked at and recorded under ", element("a", { href: "/recording" }, "Live cameras"), ".");
   const folders = element("div", { className: "folder-list" });
-  place.append(summary, element("div", { className: "footage-form" },
-    element("label", {}, "Videos, one per camera (or a zip or tar of all)", files),
-    element("label", {}, "or a folder: videos/, pictures, masks/, background/, calibration/; Pose2Sim, FreeMoCap, Caliscope, anipose and EasyMocap layouts too", folder),
-    element("label", {}, "or a folder of the computer that the studio runs on", source), folders,
-    element("label", { className: "check" }, refer, "refer to it where it lies instead of copying it"),
-    element("div", { className: "step-row" }, element("label", {}, "Frames per second", fps), element("label", { title: "Where a folder holds several trials." }, "Trial", trial)),
-    replaceLine, element("div", { className: "step-actions" }, submit), going, wrong, remedy, elsewhere));
-  source.onfocus = () => browse(source.value).catch(() => folders.replaceChildren());
+  fill(place, summary, element("div", { className: "footage-form" },
+    field("Videos, one per camera (or a zip or tar of all)", videos),
+    field("or a folder: videos/, pictures, masks/, background/, calibration/; Pose2Sim, FreeMoCap, Caliscope, anipose and EasyMocap layouts too", folder),
+    field("or a folder of the computer that the studio runs on", source), folders, refer,
+    element("div", { className: "step-row" }, field("Frames per second", fps), field("Trial", trial, { title: "Where a folder holds several trials." })),
+    replace, actions(submit), going, wrong, elsewhere));
+  source.onfocus = () => browse(source.value).catch(() => fill(folders));
 
   /** Folders below the one that is typed, to be chosen by a click. */
   async function browse(path) {
-    const told = await fetchJson(`/api/folders?path=${encodeURIComponent(path)}`);
-    const go = (next) => { source.value = next; browse(next).catch(complain); };
-    folders.replaceChildren(...(told.path && told.parent !== null ? [button("‹ up", () => go(told.parent), "quiet small")] : []),
-      ...told.folders.slice(0, 60).map((name) => button(name, () => go(told.path ? `${told.path}/${name}` : name), "quiet small")));
+    const found = await fetchJson(`/api/folders?path=${encodeURIComponent(path)}`);
+    const open = (name, next) => button(name, () => { source.value = next; browse(next).catch(complain); }, "quiet small");
+    fill(folders, found.path && found.parent !== null && open("‹ up", found.parent), found.folders.slice(0, MOST_FOLDERS).map((name) => open(name, found.path ? `${found.path}/${name}` : name)));
   }
 
-  function fail(error) {
-    if (error.name === "AbortError" || error.code === CANCELLED) return;
-    wrong.textContent = error.message;
-    remedy.textContent = error.hint ?? "";
-    wrong.hidden = false;
-    remedy.hidden = !error.hint;
+  async function chosenSource() {
+    const chosen = videos.files.length ? videos.files : folder.files;
+    if (chosen.length) return { upload: await uploadFiles(chosen, (words, share) => drawProgress(going, { words, share, cancel: () => abort.abort() }), abort.signal) };
+    if (source.value.trim()) return { source: source.value.trim() };
+    throw fault("Nothing is chosen.", "Choose the cameras' videos, or a folder.");
   }
 
   async function begin() {
-    wrong.hidden = remedy.hidden = true;
-    state.abort = new AbortController();
-    const wish = { copy: !refer.checked, replace: replaced.checked, fps: fps.value ? Number(fps.value) : null, trial: trial.value.trim() || null };
-    const chosen = files.files.length ? files.files : folder.files;
+    fill(wrong);
+    abort = new AbortController();
+    const checked = (box) => box.querySelector("input").checked;
     try {
-      if (chosen.length) wish.upload = await uploadFiles(chosen, (words, share) => way.progress(going, { words, share, cancel: () => state.abort.abort() }), state.abort.signal);
-      else if (source.value.trim()) wish.source = source.value.trim();
-      else throw Object.assign(new Error("Nothing is chosen."), { hint: "Choose the cameras' videos, or a folder." });
-      const { identifier } = await post(`${sessionPath(way.session)}/footage`, wish);
-      state.identifier = identifier;
-      const told = await watchTaking(identifier);
-      if (told) { files.value = folder.value = ""; place.open = false; await done(told); }
-    } catch (error) { fail(error); }
-    state.identifier = "";
-    way.progress(going, null);
-  }
-
-  /** Wait until everything is read; null where the step was left meanwhile. */
-  function watchTaking(identifier) {
-    const cancel = () => remove(`/api/imports/${identifier}`).catch(complain);
-    return jobDone(`/api/imports/${identifier}`, (told) => way.progress(going, { words: standing(told, "beginning"), share: shareOf(told), cancel }), () => state.stopped);
+      const wish = { copy: !checked(refer), replace: checked(replace), fps: fps.value ? Number(fps.value) : null, trial: trial.value.trim() || null };
+      const { identifier } = await post(`${sessionPath(way.session)}/footage`, { ...wish, ...await chosenSource() });
+      const cancel = () => remove(`/api/imports/${identifier}`).catch(complain);
+      const job = await jobDone(`/api/imports/${identifier}`, (state) => drawProgress(going, { words: standing(state, "beginning"), share: shareOf(state), cancel }), () => stopped);
+      if (job) { videos.value = folder.value = ""; place.open = false; await done(job); }
+    } catch (error) { if (error.name !== "AbortError" && error.code !== CANCELLED) fill(wrong, failure(error)); }
+    drawProgress(going, null);
   }
 
   return {
@@ -82,8 +69,8 @@ export function adder(place, way, done) {
       place.classList.toggle("alone", !there);
       submit.className = there ? "" : "primary";
       elsewhere.hidden = there;
-      replaceLine.hidden = !there;
+      replace.hidden = !there;
     },
-    stop() { state.stopped = true; state.abort?.abort(); },
+    stop() { stopped = true; abort?.abort(); },
   };
 }

@@ -1,132 +1,140 @@
 // Calibration: the one in use or one that is proposed, three ways to get one, what speaks for and against it.
 
-import { uploadFiles } from "./uploading.js";
-import { button, duration, element } from "./elements.js";
-import { complain } from "./messages.js";
-import { findingList, plainNumbers, rigFromAbove, residualBars } from "./calibration_drawing.js";
+import { accepted, fetchJson, post, remove, sessionPath } from "./api.js";
+import { findingList, plainNumbers, residualBars, rigFromAbove } from "./calibration_drawing.js";
 import { clickFloor } from "./calibration_points.js";
+import { actions, button, check, dotted, drawProgress, element, failure, field, files, fill, hint, notice, picture, select, text } from "./elements.js";
+import { timeLeft } from "./jobs.js";
+import { complain } from "./messages.js";
+import { uploadFiles } from "./uploading.js";
 import { boardForm } from "./way_boards.js";
-import { field, files, select, text } from "./way_fields.js";
 
-const WAYS = { file: "From a file", boards: "From a board", used: "In use" };
-/** The step. */
+/** @import { Schemas } from "./api_types" */
+
+const TABS = { file: "From a file", boards: "From a board", used: "In use" };
+/** @type {[string, string][]} */
+const UNITS = [["", "as the file says"], ["mm", "millimetres"], ["m", "metres"]];
+/** @type {[string, string][]} */
+const AXES = [["z", "Z"], ["y", "Y"], ["x", "X"], ["-z", "−Z"], ["-y", "−Y"], ["-x", "−X"]];
+const savedAt = (name) => `replaced ${name.slice(0, 4)}-${name.slice(4, 6)}-${name.slice(6, 8)} ${name.slice(9, 11)}:${name.slice(11, 13)} UTC`;
+
+/** The step. @param {HTMLElement} place @param {import("./way.js").Way} way */
 export function mount(place, way) {
-  const here = `${way.api.sessionPath(way.session)}/calibration`;
+  const here = /** @type {const} */ (`${sessionPath(way.session)}/calibration`);
   const progress = element("div");
-  const state = { view: null, proposal: null, tab: "", job: "", clicking: null, board: true, said: [] };
+  /** @type {Schemas["CalibrationView"]} */
+  let view = null;
+  /** @type {Schemas["ProposalView"]} */
+  let proposal = null;
+  let tab = "";
+  let job = "";          // the identifier of the calibration that is being computed
+  let stopClicking = null;
+  let showsBoard = true; // whether the pictures are of the board, else of the recording
+  let failed = null;
   let gone = false;
+  /** @type {{ path: string, upload: string, unit: Schemas["CalibrationFileRequest"]["unit"], up: Schemas["CalibrationFileRequest"]["up"] }} */
+  const fromFile = { path: "", upload: null, unit: "", up: "z" };
+  const fromBoard = { distances: [], offsets: {} };
 
-  const shown = () => state.proposal ?? state.view?.present;
-  const identifier = () => state.proposal?.identifier ?? "current";
+  const shown = () => proposal ?? view?.present;
+  const identifier = () => proposal?.identifier ?? "current";
 
-  async function look() {
-    state.view = await way.api.fetchJson(here);
-    state.tab ||= state.view.present ? "used" : state.view.board_footage ? "boards" : "file";
+  async function load() {
+    view = await fetchJson(here);
+    tab ||= view.present ? "used" : view.board_footage ? "boards" : "file";
     draw();
   }
 
-  /** Ask, and show what was answered; failures are said where the button is. */
-  async function propose(ask) {
+  /** Propose, and show what was answered; what went wrong stands where the button is. */
+  async function propose(work) {
+    failed = proposal = null;
     try {
-      state.said = [];
-      state.proposal = await ask();
-      state.board = true;
-    } catch (error) {
-      state.proposal = null;
-      state.said = [error];
-    }
+      proposal = await work();
+      showsBoard = true;
+    } catch (error) { failed = error; }
     draw();
   }
 
-  const uploaded = (input) => uploadFiles(input.files, (words) => way.progress(progress, { words, share: null })).finally(() => way.progress(progress, null));
+  const uploaded = (input) => uploadFiles(input.files, (words, share) => drawProgress(progress, { words, share })).finally(() => drawProgress(progress, null));
 
-  // --- from a file
   function fileForm() {
-    const path = text({ placeholder: "full path of a file or folder", value: state.path ?? "" });
-    const upload = files({ multiple: true });
-    const unit = select({ "": "as the file says", mm: "millimetres", m: "metres" });
-    const up = select({ z: "Z", y: "Y", x: "X", "-z": "−Z", "-y": "−Y", "-x": "−X" });
-    unit.value = state.unit ?? "";
-    up.value = state.up ?? "z";
-    path.oninput = () => { state.path = path.value; state.upload = null; };
-    upload.onchange = () => { state.upload = null; state.path = path.value = ""; };
-    const read = async () => {
-      state.unit = unit.value;
-      state.up = up.value;
-      await propose(async () => {
-        if (upload.files.length) state.upload = await uploaded(upload);
-        const wish = state.upload ? { upload: state.upload } : { path: path.value };
-        return way.api.post(`${here}/proposals`, { ...wish, unit: unit.value, up: up.value });
-      });
-    };
+    const path = text({ placeholder: "full path of a file or folder", value: fromFile.path, oninput: () => Object.assign(fromFile, { path: path.value, upload: null }) });
+    const upload = files({ multiple: true, onchange: () => { path.value = ""; Object.assign(fromFile, { path: "", upload: null }); } });
+    const read = () => propose(async () => {
+      if (upload.files.length) fromFile.upload = await uploaded(upload);
+      const from = fromFile.upload ? { upload: fromFile.upload } : { path: path.value };
+      return post(`${here}/proposals`, { ...from, unit: fromFile.unit, up: fromFile.up });
+    });
     // A unit or an axis that is corrected is seen at once.
-    unit.onchange = up.onchange = () => { if (state.proposal && (state.upload || state.path)) read(); };
+    const corrected = (key) => ({ target }) => { fromFile[key] = target.value; if (proposal && (fromFile.upload || fromFile.path)) read(); };
     return [
-      element("p", { className: "hint", textContent: "Pose2Sim, anipose, FreeMoCap, Caliscope, EasyMocap, OpenCV, Qualisys or Bouguet files. Nothing changes before you use it." }),
+      hint("Pose2Sim, anipose, FreeMoCap, Caliscope, EasyMocap, OpenCV, Qualisys or Bouguet files. Nothing changes before you use it."),
       field("Upload", upload), field("or on this computer", path),
-      element("div", { className: "step-row" }, field("Unit", unit, "Lengths in the file"), field("Points up", up, "The axis of the file's world that points up")),
-      element("div", { className: "step-actions" }, button("Read the file", read, state.proposal ? "" : "primary")),
+      element("div", { className: "step-row" }, field("Unit", select(UNITS, fromFile.unit, { title: "Lengths in the file", onchange: corrected("unit") })),
+        field("Points up", select(AXES, fromFile.up, { title: "The axis of the file's world that points up", onchange: corrected("up") }))),
+      actions(button("Read the file", read, proposal ? "" : "primary")),
     ];
   }
 
-  // --- from boards
-  async function solve(wished) {
-    state.said = [];
-    state.proposal = null;
+  const boards = () => boardForm(way.session, { cameras: view.footage, wish: fromBoard, hasFootage: view.board_footage, isChief: !proposal, uploaded, solve });
+
+  async function solve(request) {
+    failed = proposal = null;
     try {
-      const begun = await way.api.post(`${here}/solve`, await wished());
-      state.job = begun.identifier;
+      const begun = await post(`${here}/solve`, await request());
+      job = begun.identifier;
       hear(begun);
-    } catch (error) { state.said = [error]; draw(); }
+    } catch (error) { failed = error; draw(); }
   }
 
-  /** The job got further. */
-  async function hear(told) {
-    if (gone || told.identifier !== state.job) return;
-    if (told.state === "running") {
-      const left = told.seconds_left > 2 ? ` · about ${duration(told.seconds_left)} left` : "";
-      way.progress(progress, { words: `${told.step || "Beginning"}${told.total > 1 ? ` · ${told.done} of ${told.total}` : ""}${left}`, share: told.share, cancel: () => way.api.remove(`/api/calibrations/${state.job}`).catch(complain) });
-      return;
+  /** The calibration that is being computed got further. */
+  async function hear(state) {
+    if (gone || state.identifier !== job) return;
+    if (state.state === "running") {
+      const cancel = () => remove(`/api/calibrations/${job}`).catch(complain);
+      return drawProgress(progress, { words: dotted(state.step || "Beginning", state.total > 1 && `${state.done} of ${state.total}`, timeLeft(state.seconds_left) && `about ${timeLeft(state.seconds_left)}`), share: state.share, cancel });
     }
-    state.job = "";
-    way.progress(progress, null);
-    if (told.state === "done") await propose(() => way.api.fetchJson(`${here}/proposals/${told.proposal}`));
-    else { state.said = told.state === "failed" ? [told] : []; draw(); }
+    job = "";
+    drawProgress(progress, null);
+    if (state.state === "done") return propose(() => fetchJson(`${here}/proposals/${state.proposal}`));
+    failed = state.state === "failed" ? state : null;
+    draw();
   }
 
-  // --- in use
+  async function download(format) {
+    const answer = await accepted(await fetch(`${here}/export?format=${format}`));
+    const name = answer.headers.get("content-disposition").match(/filename="([^"]+)"/)[1];
+    const link = element("a", { href: URL.createObjectURL(await answer.blob()), download: name });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    const notes = decodeURIComponent(answer.headers.get("x-studio-notes") ?? "");
+    failed = notes ? { message: notes } : null;
+    if (notes) draw();
+  }
+
   function usedForm() {
-    const { present, earlier, formats } = state.view;
-    if (!present) return [element("p", { className: "hint", textContent: "No calibration yet." })];
-    const form = select(formats);
-    const save = async () => {
-      const answer = await fetch(`${here}/export?format=${form.value}`);
-      if (!answer.ok) throw Object.assign(new Error((await answer.json()).message), { hint: "" });
-      const name = answer.headers.get("content-disposition").match(/filename="([^"]+)"/)[1];
-      const link = element("a", { href: URL.createObjectURL(await answer.blob()), download: name });
-      link.click();
-      setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-      const notes = decodeURIComponent(answer.headers.get("x-studio-notes") ?? "");
-      state.said = notes ? [{ message: notes, hint: "" }] : [];
-      if (notes) draw();
-    };
-    const back = select(Object.fromEntries(earlier.map((name) => [name, `replaced ${name.slice(0, 4)}-${name.slice(4, 6)}-${name.slice(6, 8)} ${name.slice(9, 11)}:${name.slice(11, 13)} UTC`])));
+    const { present, earlier, formats, notes, changed, stale_runs: stale } = view;
+    if (!present) return [hint("No calibration yet.")];
+    const format = select(Object.entries(formats));
+    const back = select(earlier.map((name) => [name, savedAt(name)]));
+    const row = (label, made, act) => element("div", { className: "step-row" }, field(label, made), element("div", { className: "step-actions at-end" }, act));
     return [
-      element("p", {}, element("b", { textContent: present.source || "imported with the footage" }), state.view.changed && element("span", { className: "quiet-text", textContent: ` · since ${new Date(state.view.changed).toLocaleString()}` })),
-      ...state.view.notes.map((note) => element("p", { className: "notice", textContent: note })),
-      !state.view.notes.length && state.view.stale_runs.length > 0 && element("p", { className: "notice", textContent: `Tracked with another calibration: ${state.view.stale_runs.join(", ")}.` }),
-      element("div", { className: "step-row" }, field("Export for other tools", form), element("div", { className: "step-actions at-end" }, button("Download", () => save().catch(complain)))),
-      earlier.length > 0 && element("div", { className: "step-row" }, field("Earlier ones", back), element("div", { className: "step-actions at-end" }, button("Look at it", () => propose(() => way.api.post(`${here}/proposals`, { earlier: back.value }))))),
+      element("p", {}, element("b", {}, present.source || "imported with the footage"), changed && element("span", { className: "quiet-text" }, ` · since ${new Date(changed).toLocaleString()}`)),
+      ...notes.map((note) => notice(note)), !notes.length && stale.length > 0 && notice(`Tracked with another calibration: ${stale.join(", ")}.`),
+      row("Export for other tools", format, button("Download", () => download(format.value).catch(complain))),
+      earlier.length > 0 && row("Earlier ones", back, button("Look at it", () => propose(() => post(`${here}/proposals`, { earlier: back.value })))),
     ];
   }
 
-  // --- what is proposed, and what is done with it
+  // What is proposed, and what is done with it.
+
   async function apply(anyway) {
     try {
-      state.view = await way.api.post(`${here}/proposals/${state.proposal.identifier}/apply`, { anyway });
-      Object.assign(state, { proposal: null, tab: "used", said: [] });
+      view = await post(`${here}/proposals/${proposal.identifier}/apply`, { anyway });
+      failed = proposal = null;
+      tab = "used";
       await way.refresh();
-    } catch (error) { state.said = [error]; }
+    } catch (error) { failed = error; }
     draw();
   }
 
@@ -137,67 +145,61 @@ export function mount(place, way) {
   }
 
   function proposalBox() {
-    const made = state.proposal;
-    const warned = made.findings.some((one) => one.severity === "blocks");
-    const sure = element("input", { type: "checkbox" });
-    const use = button("Use this calibration", () => apply(sure.checked), "primary");
-    use.disabled = warned;
-    sure.onchange = () => { use.disabled = !sure.checked; };
-    return element("section", { className: "proposal" }, element("h2", { textContent: made.source }),
-      made.unit_note && element("p", { className: "hint", textContent: made.unit_note }),
-      ...made.notes.map((note) => element("p", { className: "hint", textContent: note })),
-      made.points.length > 0 && element("p", { className: "hint", textContent: pointWords(made.points) }),
-      warned && made.cameras.length > 0 && element("label", { className: "check" }, sure, "Use it although results would be wrong"),
-      element("div", { className: "step-actions" }, use, button("Leave it", () => { state.proposal = null; draw(); }, "quiet")));
+    const blocked = proposal.findings.some((one) => one.severity === "blocks");
+    const use = button("Use this calibration", () => apply(blocked), "primary", { disabled: blocked });
+    return element("section", { className: "proposal" }, element("h2", {}, proposal.source), proposal.unit_note && hint(proposal.unit_note),
+      proposal.notes.map((note) => hint(note)), proposal.points.length > 0 && hint(pointWords(proposal.points)),
+      blocked && proposal.cameras.length > 0 && check("Use it although results would be wrong", { onchange: ({ target }) => { use.disabled = !target.checked; } }),
+      actions(use, button("Leave it", () => { proposal = null; draw(); }, "quiet")));
   }
 
   function startClicking() {
-    state.clicking = clickFloor(way.aside, {
+    const end = () => { stopClicking = null; draw(); };
+    stopClicking = clickFloor(way.aside, {
       cameras: shown().cameras,
-      picture: (camera) => `${here}/proposals/${identifier()}/views/${encodeURIComponent(camera)}.jpg?height=720&board=${state.board}&axes=false`,
-      send: async (points) => { const base = state.proposal?.identifier ?? ""; state.proposal = await way.api.post(`${here}/floor`, { proposal: base, points }); state.clicking = null; draw(); },
-      stop: () => { state.clicking = null; draw(); },
+      picture: (camera) => `${here}/proposals/${identifier()}/views/${encodeURIComponent(camera)}.jpg?height=720&board=${showsBoard}&axes=false`,
+      send: async (points) => { proposal = await post(`${here}/floor`, { proposal: proposal?.identifier ?? "", points }); end(); },
+      stop: end,
     });
   }
 
   function drawAside() {
     const rig = shown();
-    if (!rig) return way.aside.replaceChildren(element("div", { className: "aside-empty" }, element("p", { textContent: "The cameras are drawn here once there is a calibration." })));
+    if (!rig) return fill(way.aside, element("div", { className: "aside-empty" }, element("p", {}, "The cameras are drawn here once there is a calibration.")));
     const address = `${here}/proposals/${identifier()}`;
-    const lenses = rig.report?.cameras ?? [];
+    /** @type {any[]} */
+    const lenses = /** @type {any} */ (rig.report)?.cameras ?? [];
     const figures = rig.cameras.map((camera) => {
-      const image = element("img", { alt: `Floor and axes on the picture of ${camera.name}`, src: `${address}/views/${encodeURIComponent(camera.name)}.jpg?height=480&board=${state.board}&at=${Date.now()}` });
-      image.onerror = () => { image.hidden = true; };
-      const off = camera.rms_px === null ? "" : ` · ${plainNumbers(camera.rms_px, 2)} px`;
-      return element("figure", { className: "picture axes-picture" }, image, element("figcaption", {}, element("b", { textContent: camera.name }),
-        `${camera.width}×${camera.height}, focal length ${plainNumbers(camera.focal_px[0], 0)} px${off}`));
+      const image = element("img", { alt: `Floor and axes on the picture of ${camera.name}`, src: `${address}/views/${encodeURIComponent(camera.name)}.jpg?height=480&board=${showsBoard}&at=${Date.now()}`, onerror: () => { image.hidden = true; } });
+      const made = picture(image, camera.name, dotted(`${camera.width}×${camera.height}, focal length ${plainNumbers(camera.focal_px[0], 0)} px`, camera.rms_px !== null && `${plainNumbers(camera.rms_px, 2)} px`));
+      made.classList.add("axes-picture");
+      return made;
     });
     const coverage = lenses.filter((lens) => lens.pictures.length).map((lens) => element("figure", { className: "picture coverage" },
       element("img", { alt: `Where the board was seen by ${lens.name}`, src: `${address}/coverage/${encodeURIComponent(lens.name)}.png` }),
-      element("figcaption", {}, element("b", { textContent: `${lens.name}: ${Math.round(100 * lens.coverage)} % covered` }), residualBars(lens), element("span", { textContent: lens.verdict }))));
-    const head = element("div", { className: "aside-actions" }, rig.cameras.length > 1 && button("Set the floor by clicks", startClicking, "small"),
-      state.proposal && lenses.length > 0 && way.detail.cameras?.length > 0 && button(state.board ? "Show the take" : "Show the board", () => { state.board = !state.board; drawAside(); }, "small quiet"));
-    way.aside.replaceChildren(element("div", { className: "calibrated" }, head, rig.cameras.length > 0 && rigFromAbove(rig), element("div", { className: "pictures" }, ...figures),
-      coverage.length > 0 && element("h2", { textContent: "What the board told" }), element("div", { className: "pictures" }, ...coverage)));
+      element("figcaption", {}, element("b", {}, `${lens.name}: ${Math.round(100 * lens.coverage)} % covered`), residualBars(lens), element("span", {}, lens.verdict))));
+    fill(way.aside, element("div", { className: "calibrated" },
+      element("div", { className: "aside-actions" }, rig.cameras.length > 1 && button("Set the floor by clicks", startClicking, "small"),
+        proposal && lenses.length > 0 && way.detail.cameras.length > 0 && button(showsBoard ? "Show the recording" : "Show the board", () => { showsBoard = !showsBoard; drawAside(); }, "small quiet")),
+      rig.cameras.length > 0 && rigFromAbove(rig), element("div", { className: "pictures" }, figures),
+      coverage.length > 0 && element("h2", {}, "What the board shows"), element("div", { className: "pictures" }, coverage)));
   }
 
   function draw() {
-    if (gone || !state.view) return;
-    const tabs = element("div", { className: "ways", role: "tablist" }, ...Object.entries(WAYS).map(([name, words]) => {
-      const tab = button(words, () => { state.tab = name; state.said = []; draw(); }, "toggle");
-      tab.setAttribute("role", "tab");
-      tab.setAttribute("aria-selected", String(state.tab === name));
-      tab.setAttribute("aria-pressed", String(state.tab === name));
-      return tab;
-    }));
-    const form = { file: fileForm, boards: () => boardForm(way, state, { uploaded, solve }), used: usedForm }[state.tab]();
-    const said = state.said.map((error) => element("div", { role: "alert" }, element("p", { className: "wrong", textContent: error.message }), error.hint && element("p", { className: "hint", textContent: error.hint })));
+    if (gone || !view) return;
+    const tabs = element("div", { className: "ways", role: "tablist" }, Object.entries(TABS).map(([name, words]) => button(words, () => { tab = name; failed = null; draw(); }, "toggle",
+      { role: "tab", ariaSelected: String(tab === name), ariaPressed: String(tab === name) })));
     const rig = shown();
-    place.replaceChildren(...[tabs, ...form, progress, ...said, state.proposal && proposalBox(), rig && (state.proposal || rig.findings.length || !way.step?.why) && findingList(rig)].filter(Boolean));
-    if (!state.clicking) drawAside();
+    fill(place, tabs, { file: fileForm, boards, used: usedForm }[tab](), progress, failure(failed), proposal && proposalBox(), rig && (proposal || rig.findings.length || !way.step?.why) && findingList(rig));
+    if (!stopClicking) drawAside();
   }
 
   way.on("calibration", hear);
-  look().catch((error) => { state.view = { present: null, earlier: [], formats: {}, footage: [], notes: [], stale_runs: [] }; state.tab = "file"; state.said = [error]; draw(); });
-  return () => { gone = true; state.clicking?.(); };
+  load().catch((error) => {
+    view = /** @type {any} */ ({ present: null, earlier: [], formats: {}, footage: [], notes: [], stale_runs: [] });
+    tab = "file";
+    failed = error;
+    draw();
+  });
+  return () => { gone = true; stopClicking?.(); };
 }

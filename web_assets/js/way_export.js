@@ -1,26 +1,26 @@
 // Step Export: the studio's own export panel, which takes the best track.
 
-import { element } from "./elements.js";
+import { fetchJson, runPath } from "./api.js";
+import { byId, hint } from "./elements.js";
 import { startExporting } from "./exporting.js";
-import { tell } from "./live.js";
 import { complain } from "./messages.js";
 import { set } from "./state.js";
 import { viewWall } from "./way_views.js";
 
-const panel = document.getElementById("panel-export");
+const panel = byId("panel-export");
 let started = false;
 
+/** @param {HTMLElement} place @param {import("./way.js").Way} way */
 export function mount(place, way) {
   const run = way.detail.runs[0];
-  const which = element("p", { className: "hint" });
+  const which = hint();
   place.append(which, panel);
   panel.hidden = false;
   if (!started) { startExporting(); started = true; }
   set({ session: way.session, run: run.name });
-  way.on("export", (event) => { tell(event); if (event.state !== "running") way.refresh().catch(() => {}); });
-  way.api.fetchJson(`${way.api.runPath(way.session, run.name)}/check`).then((told) => {
-    which.textContent = `${run.name}: track "${told.usual}" is exported unless you choose another. ${told.note} Frames before the first and after the last tracked one are left out.`;
-    wall.show({ run: run.name, frame: Math.max(run.first, Math.floor((run.first + run.tracked_to) / 2)), track: told.usual === "raw" ? "" : told.usual, show: "outline" });
+  fetchJson(`${runPath(way.session, run.name)}/check`).then(({ usual, note }) => {
+    which.textContent = `${run.name}: track "${usual}" is exported unless you choose another. ${note} Frames before the first and after the last tracked one are left out.`;
+    wall.show({ run: run.name, frame: Math.max(run.first, Math.floor((run.first + run.tracked_to) / 2)), track: usual === "raw" ? "" : usual, show: "outline" });
   }).catch(complain);
   const wall = viewWall(way);
   return () => {

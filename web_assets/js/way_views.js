@@ -1,78 +1,56 @@
 // All cameras' pictures of one frame beside the step, with what a run found drawn over them; or the scene instead.
 
+import { post, runPath } from "./api.js";
 import { openPicture } from "./dialogs.js";
-import { element } from "./elements.js";
+import { check, element, fill, picture, showPicture, spring } from "./elements.js";
 import { complain } from "./messages.js";
 import { loadScene } from "./scene_window.js";
 
 const HEIGHT = 420;
 const LARGE = 1080;
 
-/** The wall in `way.aside`. show({run, frame, track, show}) draws; empty(words) says why there is nothing. */
+/** The wall in `way.aside`. show({run, frame, track, show}) draws; empty(words) says why there is nothing. @param {import("./way.js").Way} way */
 export function viewWall(way) {
-  const { runPath } = way.api;
-  const state = { wish: null, scene: false, stopped: false };
+  let shown = null;      // what is shown: run, frame, track, show
+  let stopped = false;
   const label = element("output", {});
-  const scene = element("input", { type: "checkbox" });
   const slot = element("div", { className: "wall-tools" });
-  const bar = element("div", { className: "pictures-bar" }, slot, label, element("span", { className: "spring" }), element("label", { className: "check" }, scene, "3-D scene"));
-  const figures = way.detail.cameras.map((camera) => {
-    const image = element("img", { alt: `View of ${camera.name}` });
+  const wantsScene = check("3-D scene", { onchange: draw });
+  const bar = element("div", { className: "pictures-bar" }, slot, label, spring(), wantsScene);
+  const views = way.detail.cameras.map(({ name }) => {
+    const image = element("img", { alt: `View of ${name}`, onclick: () => openPicture(name, address(name, LARGE)) });
     const note = element("span", {});
-    const figure = element("figure", { className: "picture" }, image, element("figcaption", {}, element("b", { textContent: camera.name }), note));
-    image.onclick = () => openPicture(camera.name, address(camera.name, LARGE));
-    return { camera: camera.name, figure, image, note };
+    return { name, image, note, figure: picture(image, name, note) };
   });
-  const wall = element("div", { className: "pictures" }, ...figures.map((one) => one.figure));
-  scene.onchange = () => { state.scene = scene.checked; draw(); };
+  const wall = element("div", { className: "pictures" }, views.map((view) => view.figure));
 
-  function address(camera, height) {
-    const { run, frame, track, show } = state.wish;
-    return `${runPath(way.session, run)}/frames/${frame}/views/${encodeURIComponent(camera)}.jpg?show=${show}&height=${height}${track ? `&track=${track}` : ""}`;
-  }
-
-  /** Swap a picture when the next one is decoded; the newest wish wins. */
-  function swap(one) {
-    const wanted = address(one.camera, HEIGHT);
-    if (one.wanted === wanted) return;
-    one.wanted = wanted;
-    if (one.busy) return;
-    one.busy = true;
-    const next = new Image();
-    const done = () => {
-      one.busy = false;
-      if (!state.stopped && one.wanted !== wanted) { one.wanted = null; swap(one); }
-    };
-    next.onload = () => { one.image.src = wanted; done(); };
-    next.onerror = done;
-    next.src = wanted;
-  }
+  const address = (camera, height) => `${runPath(way.session, shown.run)}/frames/${shown.frame}/views/${encodeURIComponent(camera)}.jpg?show=${shown.show}&height=${height}${shown.track ? `&track=${shown.track}` : ""}`;
 
   function draw() {
-    if (!state.wish || state.stopped) return;
-    label.textContent = `frame ${state.wish.frame}`;
-    if (!bar.isConnected) way.aside.replaceChildren(bar);
-    if (state.scene) {
+    if (!shown || stopped) return;
+    const { run, frame, track } = shown;
+    label.textContent = `frame ${frame}`;
+    if (!bar.isConnected) fill(way.aside, bar);
+    if (wantsScene.querySelector("input").checked) {
       wall.remove();
       if (!way.aside.querySelector("iframe")) way.aside.append(loadScene(element("iframe", { title: "3-D scene", className: "below-bar" })));
-      const { run, frame, track } = state.wish;
-      way.api.post("/api/scene/show", { session: way.session, run, frame, ...(track ? { options: { track } } : {}) }).catch(complain);
+      post("/api/scene/show", { session: way.session, run, frame, ...(track ? { options: { track } } : {}) }).catch(complain);
       return;
     }
     way.aside.querySelector("iframe")?.remove();
     if (!wall.isConnected) way.aside.append(wall);
-    figures.forEach(swap);
+    for (const { image, name } of views) showPicture(image, address(name, HEIGHT));
   }
 
   return {
     tools: slot,
     /** What stands under a camera's picture. */
     note(camera, words, className = "") {
-      const one = figures.find((entry) => entry.camera === camera);
-      if (one) { one.note.textContent = words; one.note.className = className; }
+      const view = views.find((one) => one.name === camera);
+      if (view) Object.assign(view.note, { textContent: words, className });
     },
-    show(wish) { state.wish = wish; draw(); },
-    empty(words) { state.wish = null; way.aside.replaceChildren(element("div", { className: "aside-empty" }, element("p", { textContent: words }))); },
-    stop() { state.stopped = true; },
+    show(wanted) { shown = wanted; draw(); },
+    empty(words) { shown = null; fill(way.aside, element("div", { className: "aside-empty" }, element("p", {}, words))); },
+    stop() { stopped = true; },
   };
 }

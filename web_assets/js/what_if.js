@@ -2,29 +2,24 @@
 
 import { post, runPath } from "./api.js";
 import { openForm } from "./dialogs.js";
+import { button, byId, element, fill } from "./elements.js";
 import { get, watch } from "./state.js";
-
-const line = document.getElementById("what-if");
 
 function keepForm(frame) {
   const path = runPath(get("session"), get("run"));
   openForm({
-    heading: `Keep the new answer of frame ${frame}?`, action: "Keep it", rows: [],
-    intro: "It replaces the stored one. The frames after it followed from the old answer and are dropped; tracking on computes them anew.",
+    heading: `Keep the new result of frame ${frame}?`, action: "Keep it", rows: [],
+    intro: "It replaces the stored one. The frames after it followed from the old result and are dropped; tracking on computes them again.",
     send: () => post(`${path}/reanneal`, { frame, keep: true }),
   });
 }
 
 /** Wire the line to the state. */
 export function startWhatIf() {
-  const words = document.createElement("span");
-  const keep = Object.assign(document.createElement("button"), { className: "small", textContent: "Keep…" });
-  line.append(words, keep);
+  const line = byId("what-if");
   watch(["whatIf"], () => {
-    const layers = get("whatIf");
-    line.hidden = !layers;
-    if (!layers) return;
-    words.textContent = `Frame ${layers[0].frame} re-annealed, not stored; the stored answer stays beside it in grey.`;
-    keep.onclick = () => keepForm(layers[0].frame);
+    const frame = get("whatIf")?.[0].frame;
+    line.hidden = frame === undefined;
+    if (!line.hidden) fill(line, element("span", {}, `Frame ${frame} re-annealed, not stored; the stored result stays beside it in grey.`), button("Keep…", () => keepForm(frame), "small"));
   });
 }
