@@ -14,7 +14,7 @@ from studio.sessions.stored_run import StoredRun
 from studio.settings import RecordingSettings
 from studio.tracking.catalogue import TRACKERS
 from studio.web.guide_routes import anchor_of
-from studio.web.pages import PLACES, assets_folder
+from studio.web.pages import PLACES
 from studio.weighting.catalogue import WEIGHTINGS
 
 

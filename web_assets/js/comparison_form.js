@@ -1,7 +1,7 @@
 // The form of a new comparison: which trackers take part, with how many evaluations, on which frames.
 
 import { fault, post } from "./api.js";
-import { button, card, element, field, fill, nothing, number, pageHead, select, sends, spring } from "./elements.js";
+import { button, card, element, failurePlace, field, fill, nothing, number, pageHead, select, sends, spring } from "./elements.js";
 import { sessionWords } from "./sessions.js";
 import { seriesColour } from "./theme.js";
 
@@ -21,7 +21,7 @@ function readKnobs(text) {
 
 const writeKnobs = (settings) => Object.entries(settings).map(([name, value]) => `${name}=${value}`).join(", ");
 
-/** The rows of trackers: `box` and `lineUp` are put on the page, `fill(wishes)` and `read()` as the API has them. */
+/** The rows of trackers: `box` and `lineUp` are put on the page, `fill(trackers)` and `read()` as the API has them. */
 function candidates({ entrants, weightings, lineups }, changed) {
   let rows = [];
   const list = element("div", { className: "entrants" });
@@ -55,7 +55,7 @@ function candidates({ entrants, weightings, lineups }, changed) {
     changed();
   }
 
-  const replace = (wishes) => { rows = []; for (const wish of wishes) add(wish); };
+  const replace = (wanted) => { rows = []; for (const each of wanted) add(each); };
   const lineUp = select([["", "Line-up…"], ...lineups.map((one) => /** @type {[string, string]} */ ([one.name, `${one.name}: ${one.trackers.join(", ")}`]))], "", { ariaLabel: "Line-up" });
   lineUp.onchange = () => {
     replace(lineups.find((one) => one.name === lineUp.value)?.trackers.map((name) => ({ name })) ?? []);
@@ -64,30 +64,30 @@ function candidates({ entrants, weightings, lineups }, changed) {
   return { list, more, lineUp, fill: replace, count: () => rows.length, read: () => rows.map((row) => row.read()) };
 }
 
-/** Show the form in `content`. wish: what it is filled with, as the API takes it. started: called with the line of what was begun. */
-export function showForm(content, { sessions, choices, bodies, wish, started }) {
+/** Show the form in `content`. initial: what it is filled with, as the API takes it. started: called with the line of what was begun. */
+export function showForm(content, { sessions, choices, bodies, initial, started }) {
   const able = sessions.filter((one) => one.has_truth && !one.problem);
   if (!able.length) {
     return fill(content, nothing("No session with a truth",
       element("p", {}, "Trackers are compared by their distance from true markers. Import a session with truth/*.trc, open the bundled walk in the studio, or render footage:"), element("code", {}, "studio synthesize walk")));
   }
-  const chosen = able.find((one) => one.name === wish.session) ?? able[0];
+  const chosen = able.find((one) => one.name === initial.session) ?? able[0];
   const sum = element("span", { className: "hint" });
-  const wrong = element("div", {});
+  const wrong = failurePlace();
   const rows = candidates(choices, () => count());
   const whole = (name, value, more = {}) => number(value, { name, step: 1, required: true, ...more });
   const session = select(able.map((one) => [one.name, sessionWords(one)]), chosen.name, { name: "session", onchange: takeSession });
   const likelihood = element("span", {});
   const body = element("span", {});
-  const first = whole("first", wish.first ?? 0);
+  const first = whole("first", initial.first ?? 0);
   const last = whole("last", 0);
   const submit = element("button", { className: "primary" }, "Compare");
   const form = element("form", { className: "compare-form" },
     card("", element("div", { className: "fields" },
-      field("Session", session), field("Evaluations a frame, each", whole("evaluations", wish.evaluations ?? 1000, { min: 1 })),
-      field("Seeds", whole("seeds", wish.seeds ?? 5, { min: 1, max: 1000 })), field("Likelihood of all", likelihood),
+      field("Session", session), field("Evaluations a frame, each", whole("evaluations", initial.evaluations ?? 1000, { min: 1 })),
+      field("Seeds", whole("seeds", initial.seeds ?? 5, { min: 1, max: 1000 })), field("Likelihood of all", likelihood),
       field("Frames", element("span", { className: "two" }, first, element("span", {}, "to"), last)),
-      field("Layers, where they can be chosen", whole("layers", wish.layers ?? 10, { min: 1, max: 60 })),
+      field("Layers, where they can be chosen", whole("layers", initial.layers ?? 10, { min: 1, max: 60 })),
       field("Body", body), field("Name", element("input", { name: "name", placeholder: "numbered", pattern: "[A-Za-z0-9_\\-]{0,64}" })))),
     card("", element("div", { className: "form-foot" }, element("h2", {}, "Trackers"), spring(), element("span", { style: "width: 130px" }, rows.lineUp)), rows.list, element("div", {}, rows.more)),
     wrong, element("div", { className: "form-foot" }, submit, sum));
@@ -96,9 +96,9 @@ export function showForm(content, { sessions, choices, bodies, wish, started }) 
   function takeSession() {
     const entry = able.find((one) => one.name === session.value);
     first.max = last.max = String(entry.frame_count - 1);
-    last.value = String(Math.min((wish.session === entry.name && wish.last ? wish.last : entry.frame_count) - 1, entry.frame_count - 1));
-    fill(likelihood, select([["", `the session's (${entry.weighting})`], ...choices.weightings], wish.weighting ?? "", { name: "weighting" }));
-    fill(body, select([["", `the session's (${entry.body})`], ...bodies.map((one) => one.name)], wish.body ?? "", { name: "body" }));
+    last.value = String(Math.min((initial.session === entry.name && initial.last ? initial.last : entry.frame_count) - 1, entry.frame_count - 1));
+    fill(likelihood, select([["", `the session's (${entry.weighting})`], ...choices.weightings], initial.weighting ?? "", { name: "weighting" }));
+    fill(body, select([["", `the session's (${entry.body})`], ...bodies.map((one) => one.name)], initial.body ?? "", { name: "body" }));
     count();
   }
 
@@ -116,7 +116,7 @@ export function showForm(content, { sessions, choices, bodies, wish, started }) 
     weighting: value("weighting") || null, body: value("body") || null, first: Number(value("first")), last: Number(value("last")) + 1, layers: Number(value("layers")),
   })));
   const known = new Set(choices.entrants.map((one) => one.name));
-  rows.fill(wish.trackers ?? USUAL.filter((name) => known.has(name)).map((name) => ({ name })));
+  rows.fill(initial.trackers ?? USUAL.filter((name) => known.has(name)).map((name) => ({ name })));
   takeSession();
   fill(content, element("div", { className: "column" },
     pageHead("Compare trackers", "Same evidence, likelihood, start and seeds, and as many poses evaluated in every frame: what differs is the search. Errors are measured against the session's truth."), form));

@@ -61,7 +61,7 @@ async function openComparison({ session, name }) {
 function show() {
   showComparison(content, detail, {
     cancel: () => act(() => post(`${pathOf(open)}/cancel`)), resume: () => act(() => post(`${pathOf(open)}/resume`)),
-    again: () => openNew(wishLike(detail)), remove: () => removeForm(detail.comparison),
+    again: () => openNew(initialLike(detail)), remove: () => removeForm(detail.comparison),
   });
 }
 
@@ -87,7 +87,7 @@ function removeForm(line) {
 }
 
 /** What the form has to be filled with to compare the same again. */
-function wishLike({ comparison: line, settings, body }) {
+function initialLike({ comparison: line, settings, body }) {
   const weightings = new Set(line.trackers.map((name) => settings[name].weighting));
   const common = weightings.size === 1 ? [...weightings][0] : null;
   const trackers = line.trackers.map((name) => {
@@ -101,13 +101,13 @@ function wishLike({ comparison: line, settings, body }) {
   return { session: line.session, trackers, evaluations: line.evaluations, seeds: line.seeds, weighting: common, body, first: line.first, last: line.last, layers };
 }
 
-function openNew(wish) {
+function openNew(initial) {
   clearTimeout(timer);
   clearComparison();
   open = detail = null;
-  address({ new: "", ...(wish.session ? { session: wish.session } : {}) });
+  address({ new: "", ...(initial.session ? { session: initial.session } : {}) });
   document.title = "New comparison · Capture studio";
-  showForm(content, { sessions, choices, bodies, wish, started: (line) => { refresh().then(() => openComparison(line)).catch(complain); } });
+  showForm(content, { sessions, choices, bodies, initial, started: (line) => { refresh().then(() => openComparison(line)).catch(complain); } });
   drawList();
 }
 

@@ -20,10 +20,10 @@ const PATIENCE_MILLISECONDS = 700;
 const searching = () => ["tracking", "compiling"].includes(get("work")?.state);
 const isShown = (session, run) => session === get("session") && run === get("run");
 
-let arrived = [];      // lines of frames that finished since the summary was last asked for
+let arrived = [];      // lines of frames that finished since the summary was last loaded
 let layers = [];       // of the frame that is being searched
 let drawnAt = 0;       // when live layers were last shown
-let scene = {};        // what the scene was last told, or told itself
+let scene = {};        // what the scene last showed
 
 /** The run's frames; those that finish while the answer is on its way are kept. */
 async function loadSummary() {
@@ -42,7 +42,7 @@ async function loadSummary() {
   } catch (error) { complain(error); }
 }
 
-/** What the run was asked to do, and its parameters' names. */
+/** The run: its parameters and its layers. */
 async function loadRun() {
   const [session, run] = [get("session"), get("run")];
   layers = [];
@@ -70,10 +70,10 @@ async function showInScene() {
   if (!session) return;
   const follow = get("follow") && searching();
   const frame = follow ? null : get("frame");
-  const wish = { session, run, layer, frame, follow: get("follow") };
-  if (Object.keys(wish).every((name) => wish[name] === scene[name])) return;
-  scene = wish;
-  await post("/api/scene/show", wish).catch(complain);
+  const shown = { session, run, layer, frame, follow: get("follow") };
+  if (Object.keys(shown).every((name) => shown[name] === scene[name])) return;
+  scene = shown;
+  await post("/api/scene/show", shown).catch(complain);
 }
 
 /** The scene's own controls moved, or it plays: follow them, and do not send it back what it said. */

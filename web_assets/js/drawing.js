@@ -1,18 +1,18 @@
-// When the page's canvases are drawn: together, before a frame of the screen, the newest wish only. However often they are
-// wished for, every other frame and a pause are left to everything else, so a machine that draws slowly still answers.
+// When the page's canvases are drawn: together, before a frame of the screen, the newest request only. However often they are
+// requested, every other frame and a pause are left to everything else, so a machine that draws slowly still answers.
 
 const LEAST_PAUSE_MILLISECONDS = 100;
 const LONGEST_PAUSE_MILLISECONDS = 500;
 
-const wished = new Set();
+const requested = new Set();
 let busy = false;
 
 const nextFrame = () => new Promise((resolve) => requestAnimationFrame(resolve));
 const pause = (milliseconds) => new Promise((resolve) => setTimeout(resolve, milliseconds));
 
 function drawAll() {
-  const drawings = [...wished];
-  wished.clear();
+  const drawings = [...requested];
+  requested.clear();
   for (const draw of drawings) {
     try { draw(); } catch (error) { console.error(error); }
   }
@@ -20,7 +20,7 @@ function drawAll() {
 
 async function serve() {
   busy = true;
-  while (wished.size) {
+  while (requested.size) {
     await nextFrame();
     const began = performance.now();
     drawAll();
@@ -32,8 +32,8 @@ async function serve() {
   busy = false;
 }
 
-/** Call `draw` soon; wishes for the same function that come before it are one. */
+/** Call `draw` soon; requests for the same function that come before it are one. */
 export function drawSoon(draw) {
-  wished.add(draw);
+  requested.add(draw);
   if (!busy) serve();
 }

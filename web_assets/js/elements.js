@@ -63,6 +63,8 @@ export const notice = (...children) => element("p", { className: "notice" }, ...
 export const lead = (...children) => element("p", { className: "lead" }, ...children);
 /** What went wrong, and what to do; nothing where nothing did. @param {{ message: string, hint?: string } | null} error */
 export const failure = (error) => error && element("p", { className: "wrong", role: "alert" }, error.message, error.hint && element("span", { className: "hint" }, ` ${error.hint}`));
+/** Where `failure`s of a form are put; takes no room while there is none. */
+export const failurePlace = () => element("div", { className: "failures" });
 /** What stands where there is nothing yet. */
 export const nothing = (heading, ...children) => element("div", { className: "nothing" }, element("h1", {}, heading), ...children);
 /** A part of a page in a frame, under its heading. */
@@ -155,7 +157,7 @@ export function drawProgress(place, state) {
 
 const cancels = new WeakMap();
 
-/** Show a picture when it is decoded, so that nothing flickers; of several wishes the newest wins. */
+/** Show a picture when it is decoded, so that nothing flickers; of several requests the newest wins. */
 export function showPicture(image, address) {
   if (image.wanted === address) return;
   image.wanted = address;
@@ -165,9 +167,9 @@ export function showPicture(image, address) {
   const done = () => {
     image.loading_next = false;
     if (image.wanted === address) return;
-    const wish = image.wanted;
+    const newest = image.wanted;
     image.wanted = null;
-    showPicture(image, wish);
+    showPicture(image, newest);
   };
   next.onload = () => { image.src = address; done(); };
   next.onerror = done;

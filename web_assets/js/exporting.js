@@ -22,7 +22,7 @@ let choices = null;
 /** @type {Schemas["ExportList"]} */
 let listing = null;
 let format = localStorage.getItem("export-format") || "bvh";
-let wish = {};         // options that are not at their defaults
+let changed = {};         // options that are not at their defaults
 let going = null;      // the export that is being made
 let failed = null;     // what went wrong last
 
@@ -37,11 +37,11 @@ function offered(option, form) {
   return option.choices.map((value) => [value, value === "auto" ? `auto (${form[option.name]})` : WORDS[value] ?? value]);
 }
 
-/** One option's field; what it holds goes to `wish` where it is not the default. */
+/** One option's field; what it holds goes to `changed` where it is not the default. */
 function optionField(option, form) {
   const label = option.label[0].toUpperCase() + option.label.slice(1);
-  const keep = (value) => { if (value === option.default || value === "") delete wish[option.name]; else wish[option.name] = value; };
-  const chosen = wish[option.name];
+  const keep = (value) => { if (value === option.default || value === "") delete changed[option.name]; else changed[option.name] = value; };
+  const chosen = changed[option.name];
   if (option.kind === "bool") return check(label, { checked: Boolean(chosen), onchange: ({ target }) => keep(target.checked) }, option.help);
   if (option.kind === "str") return field(label, select(offered(option, form), chosen ?? option.default, { ariaLabel: label, onchange: ({ target }) => keep(target.value) }), { title: option.help });
   const made = number(chosen ?? "", {
@@ -67,7 +67,7 @@ async function begin() {
   const { takes } = choices.formats.find((one) => one.name === format);
   failed = null;
   try {
-    going = await post(`${here()}/exports`, { format, options: Object.fromEntries(Object.entries(wish).filter(([name]) => takes.includes(name))) });
+    going = await post(`${here()}/exports`, { format, options: Object.fromEntries(Object.entries(changed).filter(([name]) => takes.includes(name))) });
   } catch (error) { failed = error; }
   draw();
 }
@@ -137,7 +137,7 @@ function hear(job) {
 
 /** Wire the panel. */
 export function startExporting() {
-  watch(["session", "run"], () => { going = failed = null; wish = {}; refresh(); });
+  watch(["session", "run"], () => { going = failed = null; changed = {}; refresh(); });
   document.addEventListener("panel", refresh);
   onEvent("export", (job, isHere) => { if (isHere) hear(job); });
 }

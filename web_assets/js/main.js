@@ -47,10 +47,10 @@ async function start() {
   startCorrecting();
   startSceneFrame(takeKey);
   await refreshSessions();
-  const wish = new URLSearchParams(location.search);
+  const query = new URLSearchParams(location.search);
   const sessions = get("sessions") ?? [];
-  const first = sessions.find((one) => one.name === wish.get("session")) ?? sessions.find((one) => one.runs.length) ?? sessions[0];
-  if (first) openSession(first.name, wish.get("run") ?? undefined);
+  const first = sessions.find((one) => one.name === query.get("session")) ?? sessions.find((one) => one.runs.length) ?? sessions[0];
+  if (first) openSession(first.name, query.get("run") ?? undefined);
 }
 
 start();

@@ -1,6 +1,6 @@
-// Doing again what changes often: never twice at once, not more often than told, the last wish always served.
+// Doing again what changes often: never twice at once, not more often than allowed, the last request always served.
 
-/** A function that asks for `work` (may be asynchronous); wishes that come meanwhile are served by one more call. */
+/** A function that asks for `work` (may be asynchronous); requests that come meanwhile are served by one more call. */
 export function paced(work, milliseconds) {
   let wanted = false;
   let busy = false;

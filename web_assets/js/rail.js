@@ -111,7 +111,7 @@ function runRow(entry, run) {
   const measured = run.mean_mm != null;
   const figures = element("div", { className: "figure" },
     measured ? [figure(run.mean_mm), " ", element("small", {}, "mm")] : element("small", { className: "done" }, `${run.done}/${run.last - run.first}`),
-    run.damaged?.length && [" ", element("small", { className: "damaged", title: `Frames ${run.damaged.join(", ")} are damaged on the disk: resume the run to track them again.` }, `${run.damaged.length} damaged`)]);
+    run.damaged?.length > 0 && [" ", element("small", { className: "damaged", title: `Frames ${run.damaged.join(", ")} are damaged on the disk: resume the run to track them again.` }, `${run.damaged.length} damaged`)]);
   return line(`${entry.name}/${run.name}`, "run", { ariaSelected: String(entry.name === get("session") && run.name === get("run")) },
     () => openSession(entry.name, run.name), (more) => runMenu(more, entry, run), lineWords(run.name, run.describe ?? run.tracker), figures);
 }

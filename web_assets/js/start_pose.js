@@ -9,9 +9,9 @@ import { openSession, refreshSessions } from "./sessions.js";
 
 const UNSURE = 0.75;
 
-/** Look for the pose in a frame; resolves with what was found, throws what went wrong. `wish`: frame, body, behaviour, replace. */
-export async function findStartPose(session, wish, report) {
-  const { identifier } = await post(`${sessionPath(session)}/initialise`, wish);
+/** Look for the pose in a frame; resolves with what was found, throws what went wrong. `request`: frame, body, behaviour, replace. */
+export async function findStartPose(session, request, report) {
+  const { identifier } = await post(`${sessionPath(session)}/initialise`, request);
   const stop = () => remove(`/api/initialisations/${identifier}`).catch(() => {});
   return whileOpen(stop, () => jobDone(`/api/initialisations/${identifier}`, (job) => report(standing(job, "Finding the pose…"))));
 }

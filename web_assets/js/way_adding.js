@@ -1,7 +1,7 @@
 // Footage taken into the session: uploaded from this browser, or from a folder of the studio's computer.
 
 import { fault, fetchJson, post, remove, sessionPath } from "./api.js";
-import { actions, button, check, drawProgress, element, failure, field, files, fill, hint, number, text } from "./elements.js";
+import { actions, button, check, drawProgress, element, failure, failurePlace, field, files, fill, hint, number, text } from "./elements.js";
 import { CANCELLED, jobDone, shareOf, standing } from "./jobs.js";
 import { complain } from "./messages.js";
 import { uploadFiles } from "./uploading.js";
@@ -13,7 +13,7 @@ export function adder(place, way, done) {
   let abort = null;
   let stopped = false;
   const going = element("div", {});
-  const wrong = element("div", {});
+  const wrong = failurePlace();
   const videos = files({ multiple: true, name: "files", accept: "video/*,image/*,.zip,.tar,.gz,.tgz,.bz2,.xz,.toml,.csv,.yml,.json" });
   const folder = files({ multiple: true, name: "folder", folder: true });
   const source = text({ name: "source", placeholder: "full path" });
@@ -52,8 +52,8 @@ export function adder(place, way, done) {
     abort = new AbortController();
     const checked = (box) => box.querySelector("input").checked;
     try {
-      const wish = { copy: !checked(refer), replace: checked(replace), fps: fps.value ? Number(fps.value) : null, trial: trial.value.trim() || null };
-      const { identifier } = await post(`${sessionPath(way.session)}/footage`, { ...wish, ...await chosenSource() });
+      const request = { copy: !checked(refer), replace: checked(replace), fps: fps.value ? Number(fps.value) : null, trial: trial.value.trim() || null };
+      const { identifier } = await post(`${sessionPath(way.session)}/footage`, { ...request, ...await chosenSource() });
       const cancel = () => remove(`/api/imports/${identifier}`).catch(complain);
       const job = await jobDone(`/api/imports/${identifier}`, (state) => drawProgress(going, { words: standing(state, "beginning"), share: shareOf(state), cancel }), () => stopped);
       if (job) { videos.value = folder.value = ""; place.open = false; await done(job); }

@@ -62,48 +62,48 @@ function distanceRows(cameras, kept) {
   return box;
 }
 
-/** Everything else that `studio calibrate` knows; what is entered stays in `wish`. */
-function moreFields(cameras, wish) {
-  const place = (key, placeholder) => text({ placeholder, value: wish[key] ?? "", oninput: ({ target }) => { wish[key] = target.value; } });
-  const shifts = element("div", { className: "shifts", hidden: Boolean(wish.own) }, cameras.map((camera) => field(`${camera} begins at`,
-    number(wish.offsets[camera] ?? 0, { step: 1, min: "", oninput: ({ target }) => { wish.offsets[camera] = Number(target.value); } }),
+/** Everything else that `studio calibrate` knows; what is entered stays in `inputs`. */
+function moreFields(cameras, inputs) {
+  const place = (key, placeholder) => text({ placeholder, value: inputs[key] ?? "", oninput: ({ target }) => { inputs[key] = target.value; } });
+  const shifts = element("div", { className: "shifts", hidden: Boolean(inputs.own) }, cameras.map((camera) => field(`${camera} begins at`,
+    number(inputs.offsets[camera] ?? 0, { step: 1, min: "", oninput: ({ target }) => { inputs.offsets[camera] = Number(target.value); } }),
     { title: "Frame of this camera's common board footage that the others' frame 0 belongs to" })));
-  return element("details", { className: "more-board", open: Boolean(wish.open) }, element("summary", { onclick: () => { wish.open = !wish.open; } }, "More"), element("div", { className: "more-fields" },
+  return element("details", { className: "more-board", open: Boolean(inputs.open) }, element("summary", { onclick: () => { inputs.open = !inputs.open; } }, "More"), element("div", { className: "more-fields" },
     field("Lenses from", place("intrinsics", "a folder, or a calibration file"), { title: "Board footage for the lenses, a video or folder of pictures a camera; or a calibration file that has them. Instead of intrinsics/" }),
     field("Places from", place("extrinsics", "a folder"), { title: "Board footage of all cameras at once, in step. Instead of extrinsics/" }),
     field("Floor from pictures in", place("floorFolder", "a folder"), { title: "A picture a camera of the board that lies on the floor, face up; instead of a frame of the common footage" }),
-    cameras.length > 1 && [distanceRows(cameras, wish.distances),
-      check("The board was recorded without stopping: use the session's offsets", { checked: Boolean(wish.own), onchange: ({ target }) => { wish.own = shifts.hidden = target.checked; } }, "Only where the board and the motion are one recording"), shifts],
-    check("let the lenses move a little in the last adjustment", { checked: Boolean(wish.refine), onchange: ({ target }) => { wish.refine = target.checked; } },
+    cameras.length > 1 && [distanceRows(cameras, inputs.distances),
+      check("The board was recorded without stopping: use the session's offsets", { checked: Boolean(inputs.own), onchange: ({ target }) => { inputs.own = shifts.hidden = target.checked; } }, "Only where the board and the motion are one recording"), shifts],
+    check("let the lenses move a little in the last adjustment", { checked: Boolean(inputs.refine), onchange: ({ target }) => { inputs.refine = target.checked; } },
       "Lenses that were found alone may change a little where all cameras together say so; only with a board that was seen all over the pictures")));
 }
 
 const sessionOffsets = async (session) => Object.fromEntries((await fetchJson(`${sessionPath(session)}/footage`)).cameras.map((camera) => [camera.name, camera.offset]));
 
 /**
- * The form. cameras: the footage's; wish: what was entered so far, which it goes on with; `solve(() => request)` begins;
+ * The form. cameras: the footage's; inputs: what was entered so far, which it goes on with; `solve(() => request)` begins;
  * `uploaded(input)` uploads and resolves with the upload's identifier.
  */
-export function boardForm(session, { cameras, wish, hasFootage, isChief, uploaded, solve }) {
+export function boardForm(session, { cameras, inputs, hasFootage, isChief, uploaded, solve }) {
   const board = boardFields();
-  const entered = (key, made) => Object.assign(made, { oninput: () => { wish[key] = made.value; } });
-  const path = entered("path", text({ placeholder: hasFootage ? "found in the session" : "full path of the folder", value: wish.path ?? "" }));
+  const entered = (key, made) => Object.assign(made, { oninput: () => { inputs[key] = made.value; } });
+  const path = entered("path", text({ placeholder: hasFootage ? "found in the session" : "full path of the folder", value: inputs.path ?? "" }));
   const upload = files({ folder: true, multiple: true });
-  const floor = entered("floor", number(wish.floor ?? "", { step: 1, placeholder: "not set" }));
-  const thickness = entered("thickness", number(wish.thickness ?? 0));
+  const floor = entered("floor", number(inputs.floor ?? "", { step: 1, placeholder: "not set" }));
+  const thickness = entered("thickness", number(inputs.thickness ?? 0));
 
   async function request() {
-    const distances = wish.distances.filter((each) => Number(each.mm) > 0).map((each) => ({ ...each, mm: Number(each.mm) }));
+    const distances = inputs.distances.filter((each) => Number(each.mm) > 0).map((each) => ({ ...each, mm: Number(each.mm) }));
     const same = distances.find((each) => each.first === each.second);
     if (same) throw fault(`A distance from ${same.first} to itself cannot be measured.`, "Choose two cameras.");
-    const shifted = Object.fromEntries(Object.entries(wish.offsets).filter(([, frames]) => frames));
+    const shifted = Object.fromEntries(Object.entries(inputs.offsets).filter(([, frames]) => frames));
     return {
-      board: board.description(), thickness_mm: Number(thickness.value), refine_lenses: Boolean(wish.refine), distances,
-      floor: wish.floorFolder || floor.value === "" ? "" : `frame:${floor.value}`,
-      ...(wish.floorFolder ? { floor_footage: { path: wish.floorFolder } } : {}),
-      ...(wish.intrinsics ? { intrinsics: { path: wish.intrinsics } } : {}), ...(wish.extrinsics ? { extrinsics: { path: wish.extrinsics } } : {}),
+      board: board.description(), thickness_mm: Number(thickness.value), refine_lenses: Boolean(inputs.refine), distances,
+      floor: inputs.floorFolder || floor.value === "" ? "" : `frame:${floor.value}`,
+      ...(inputs.floorFolder ? { floor_footage: { path: inputs.floorFolder } } : {}),
+      ...(inputs.intrinsics ? { intrinsics: { path: inputs.intrinsics } } : {}), ...(inputs.extrinsics ? { extrinsics: { path: inputs.extrinsics } } : {}),
       ...(upload.files.length ? { footage: { upload: await uploaded(upload) } } : path.value ? { footage: { path: path.value } } : {}),
-      ...(wish.own ? { offsets: await sessionOffsets(session) } : Object.keys(shifted).length ? { offsets: shifted } : {}),
+      ...(inputs.own ? { offsets: await sessionOffsets(session) } : Object.keys(shifted).length ? { offsets: shifted } : {}),
     };
   }
 
@@ -112,6 +112,6 @@ export function boardForm(session, { cameras, wish, hasFootage, isChief, uploade
     ...board.lines, field("Upload a folder", upload), field("or on this computer", path),
     element("div", { className: "step-row" }, field("Board on the floor in frame", floor, { title: "Frame of the common footage in which the board lies on the floor, face up; the floor can be clicked later instead" }),
       field("Plate thickness mm", thickness, { title: "Of the plate that carries the board; matters where it lies on the floor" })),
-    moreFields(cameras, wish), actions(button("Calibrate", () => solve(request), isChief ? "primary" : "")), printRow(),
+    moreFields(cameras, inputs), actions(button("Calibrate", () => solve(request), isChief ? "primary" : "")), printRow(),
   ];
 }

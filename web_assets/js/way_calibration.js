@@ -76,7 +76,7 @@ export function mount(place, way) {
     ];
   }
 
-  const boards = () => boardForm(way.session, { cameras: view.footage, wish: fromBoard, hasFootage: view.board_footage, isChief: !proposal, uploaded, solve });
+  const boards = () => boardForm(way.session, { cameras: view.footage, inputs: fromBoard, hasFootage: view.board_footage, isChief: !proposal, uploaded, solve });
 
   async function solve(request) {
     failed = proposal = null;

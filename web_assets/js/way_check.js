@@ -146,11 +146,11 @@ export function mount(place, way) {
   }
 
   /** Begin refining, smoothing or measuring, and follow it to its end; nothing else can be begun meanwhile. @param {"refine" | "smooth" | "check"} verb */
-  function begin(verb, wish) {
+  function begin(verb, request) {
     failed = null;
     job = { verb, state: "running" };
     draw();
-    return carry(() => post(`${here}/${verb}`, wish));
+    return carry(() => post(`${here}/${verb}`, request));
   }
 
   /** Follow a job, and what follows from it: a track that was made is looked at, whether it is better is the next question. */

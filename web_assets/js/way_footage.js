@@ -33,9 +33,9 @@ export function mount(place, way) {
     await way.refresh();
   });
 
-  async function change(wish) {
+  async function change(changes) {
     try {
-      footage = await patch(`${here}/footage`, wish);
+      footage = await patch(`${here}/footage`, changes);
       for (const note of footage.notes) say(note, { kind: footage.stale_runs.length ? "warning" : "info" });
       age += 1;
     } catch (error) { complain(error); }

@@ -33,7 +33,7 @@ export function mount(place, way) {
   let unfitted = null;   // what went wrong with the fit
   let preview = 0;
   let gone = false;
-  const wish = { symmetric: true, lengths: true, radii: true, count: 5, frames: "", run: "" };
+  const options = { symmetric: true, lengths: true, radii: true, count: 5, frames: "", run: "" };
   const who = element("section", { className: "subject-who background-make" });
   const fitting = element("section", { className: "subject-fit background-quality" });
   place.append(who, fitting);
@@ -94,15 +94,15 @@ export function mount(place, way) {
     const going = fit?.state === "running";
     const found = fit?.state === "done";
     const isReady = subject.saved && !changed();
-    const box = (name, title) => check(name === "symmetric" ? "left and right alike" : name, { checked: wish[name], onchange: ({ target }) => { wish[name] = target.checked; } }, title);
+    const box = (name, title) => check(name === "symmetric" ? "left and right alike" : name, { checked: options[name], onchange: ({ target }) => { options[name] = target.checked; } }, title);
     /** @type {[string, string][]} */
     const runs = way.detail.runs.filter((run) => run.done).map((run) => [run.name, `of ${run.name}`]);
     fill(fitting, element("h2", {}, "Fit the subject to the footage"),
       hint(isReady ? "Lengths and radii are found together with the poses of a few frames, on the silhouettes. Frames without a pose are searched first, which takes longest." : "Set the height first: it is the one measure that pictures cannot show by themselves."),
       element("div", { className: "step-row" },
-        field("How many frames", number(wish.count, { min: 1, max: 24, step: 1, onchange: ({ target }) => { wish.count = Number(target.value) || 5; } })),
-        field("or these frames", text({ value: wish.frames, placeholder: "chosen for variety", pattern: "[0-9, ]*", onchange: ({ target }) => { wish.frames = target.value; } }))),
-      field("First poses", select([["", "the newest run's, else searched for"], ...runs], wish.run, { onchange: ({ target }) => { wish.run = target.value; } })),
+        field("How many frames", number(options.count, { min: 1, max: 24, step: 1, onchange: ({ target }) => { options.count = Number(target.value) || 5; } })),
+        field("or these frames", text({ value: options.frames, placeholder: "chosen for variety", pattern: "[0-9, ]*", onchange: ({ target }) => { options.frames = target.value; } }))),
+      field("First poses", select([["", "the newest run's, else searched for"], ...runs], options.run, { onchange: ({ target }) => { options.run = target.value; } })),
       element("div", { className: "fit-boxes" }, box("symmetric", "Off: each side has its own lengths, which needs more frames."), box("lengths", "Of limbs"), box("radii", "Of limbs")),
       !going && actions(button(found ? "Fit again" : "Fit the subject", beginFit, isReady && !(found && !fit.file) ? "primary" : "", { disabled: !isReady })),
       element("div", { className: "going" }), failure(unfitted), found && results());
@@ -110,11 +110,11 @@ export function mount(place, way) {
   }
 
   async function beginFit() {
-    const frames = wish.frames.split(/[,\s]+/).filter(Boolean).map(Number);
+    const frames = options.frames.split(/[,\s]+/).filter(Boolean).map(Number);
     unfitted = null;
     try {
       if (frames.some((frame) => !Number.isInteger(frame))) throw fault("Frames are whole numbers.", "Write them like 10, 40, 80.");
-      fit = await post(`${here}/fit-subject`, { ...wish, frames, run: wish.run || null, keep: false });
+      fit = await post(`${here}/fit-subject`, { ...options, frames, run: options.run || null, keep: false });
       draw();
       fit = await followJob(`/api/subject-fits/${fit.identifier}`, (job) => { fit = job; drawGoing(); }, () => gone);
     } catch (error) { fit = null; unfitted = error; }
