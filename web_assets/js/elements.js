@@ -22,12 +22,17 @@ export function element(tag, { dataset = {}, ...properties } = {}, ...children) 
 }
 
 /** @param {(Child | Child[])[]} children @returns {(Node | string)[]} */
-const present = (children) => children.flat().filter((child) => child !== null && child !== undefined && child !== false && child !== "").map((child) => (child instanceof Node ? child : String(child)));
+const present = (children) => children.flat(2).filter((child) => child !== null && child !== undefined && child !== false && child !== "").map((child) => (child instanceof Node ? child : String(child)));
 
 /** A part of a page by its id. @returns {any} */
 export const byId = (id) => document.getElementById(id);
 
-const NAMES = ["data-key", "name", "id", "aria-label"];
+/** What finds an element again among those that replace it: its key, label, id or name (with the value, of several alike). */
+function keyOf(focused) {
+  const name = ["data-key", "aria-label", "id", "name"].find((one) => focused.getAttribute(one));
+  const has = (attribute) => `[${attribute}="${CSS.escape(focused.getAttribute(attribute))}"]`;
+  return name && has(name) + (name === "name" && focused.type === "radio" ? has("value") : "");
+}
 
 /**
  * Put children into a place instead of what is there. What has the focus keeps it, found again by its key, name, id or
@@ -37,8 +42,7 @@ const NAMES = ["data-key", "name", "id", "aria-label"];
  */
 export function fill(place, ...children) {
   const focused = place.contains(document.activeElement) ? document.activeElement : null;
-  const name = focused && NAMES.find((one) => focused.getAttribute(one));
-  const key = name && `[${name}="${CSS.escape(focused.getAttribute(name))}"]`;
+  const key = focused && keyOf(focused);
   const scrolled = place.scrollTop;
   place.replaceChildren(...present(children));
   place.scrollTop = scrolled;
@@ -91,7 +95,7 @@ export function button(label, act, className = "", more = {}) {
   const made = element("button", { type: "button", className, textContent: label, ...more });
   made.onclick = async () => {
     made.disabled = true;
-    try { await act(); } finally { made.disabled = Boolean(more.disabled); }
+    try { await act(); } finally { made.disabled = false; }
   };
   return made;
 }
