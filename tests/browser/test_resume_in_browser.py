@@ -32,7 +32,9 @@ def studio(tmp_path: Path) -> Iterator[StudioServer]:
 def test_a_killed_process_is_said_and_the_run_resumes_bit_for_bit(
     browser: Browser, studio: StudioServer, artefacts: Path
 ) -> None:
-    window = StudioPage(browser, studio, open_at=f"{studio.address}&session=walk&run=broken")
+    window = StudioPage(
+        browser, studio, open_at=f"{studio.address}&session=walk&run=broken", with_scene=False
+    )
     window.until("get('run') === 'broken' && get('connected') === true && get('summary') !== null")
     studio.pace(PACE)
     window.page.click("#track-toggle")
