@@ -5,7 +5,7 @@ import { button, element, failure, failurePlace, fill, hint, picture as pictureO
 const FEWEST = 3;
 
 /** Pixels of the stored picture under a point of the upright image: shares x, y (0..1) from its top left corner. */
-export function storedPixel(camera, x, y) {
+function storedPixel(camera, x, y) {
   const turned = [[x, y], [y, 1 - x], [1 - x, 1 - y], [1 - y, x]][camera.quarter_turns % 4];
   return [turned[0] * camera.width - 0.5, turned[1] * camera.height - 0.5];
 }

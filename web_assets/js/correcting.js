@@ -20,7 +20,7 @@ let going = null;      // work in the background: its last state
 const busy = () => ["tracking", "compiling", "reannealing"].includes(get("work")?.state) && get("work")?.run === get("run");
 
 /** Let the shown frame be corrected in the scene. */
-export async function correctFrame() {
+async function correctFrame() {
   const [session, run, shown] = [get("session"), get("run"), get("frame")];
   if (!run || shown === null) return;
   try {

@@ -12,7 +12,7 @@ const MOST_FOLDERS = 60;
 export function adder(place, way, done) {
   let abort = null;
   let stopped = false;
-  const going = element("div", {});
+  const going = element("div", { className: "going" });
   const wrong = failurePlace();
   const videos = files({ multiple: true, name: "files", accept: "video/*,image/*,.zip,.tar,.gz,.tgz,.bz2,.xz,.toml,.csv,.yml,.json" });
   const folder = files({ multiple: true, name: "folder", folder: true });

@@ -21,7 +21,7 @@ const savedAt = (name) => `replaced ${name.slice(0, 4)}-${name.slice(4, 6)}-${na
 /** The step. @param {HTMLElement} place @param {import("./way.js").Way} way */
 export function mount(place, way) {
   const here = /** @type {const} */ (`${sessionPath(way.session)}/calibration`);
-  const progress = element("div");
+  const progress = element("div", { className: "going" });
   /** @type {Schemas["CalibrationView"]} */
   let view = null;
   /** @type {Schemas["ProposalView"]} */

@@ -19,7 +19,7 @@ export function mount(place, way) {
   const here = runPath(way.session, run.name);
   const found = element("section", { className: "footage-step" });
   const better = element("section", { className: "footage-step" });
-  const going = element("div", {});
+  const going = element("div", { className: "going" });
   place.append(found, going, better);
   const wall = viewWall(way);
   /** @type {Schemas["CheckAnswer"]} */

@@ -17,7 +17,7 @@ export function mount(place, way) {
   const list = element("section", { className: "footage-cameras" });
   const step = element("section", { className: "footage-step" });
   const add = element("details", { className: "footage-add" });
-  const warnings = element("div", {});
+  const warnings = element("div", { className: "going" });
   /** @type {Schemas["FootageState"]} */
   let footage = null;
   let shown = 0;         // the frame that is looked at

@@ -36,7 +36,7 @@ export function synchroniser(place, way, use) {
   function draw(state = footage) {
     footage = state;
     if (footage.cameras.length < 2) return fill(place);
-    const bar = element("div", {});
+    const bar = element("div", { className: "going" });
     const apply = button("Apply", () => use(entered()), "apply-offsets", { hidden: true });
     const times = files({ accept: ".csv", hidden: true });
     times.onchange = () => readTimes(times.files[0]).catch(complain);

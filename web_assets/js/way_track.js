@@ -19,7 +19,7 @@ export function mount(place, way) {
   const here = sessionPath(way.session);
   const status = element("section", { className: "track-status" });
   const form = element("form", { className: "footage-form" });
-  const fold = element("details", {}, element("summary", {}, "Track anew"), form);
+  const fold = element("details", {}, element("summary", {}, "Track again"), form);
   place.append(status, fold);
   let { runs } = way.detail;
   let work = null;       // the tracking process's last state
@@ -102,7 +102,7 @@ export function mount(place, way) {
     const { start_pose_frame: first, frame_count: count, has_start_pose: known, doubts } = way.detail;
     /** @returns {[string, string][]} */
     const named = (entries) => entries.map((one) => [one.name, one.label]);
-    const submit = element("button", { type: "submit", className: "primary" }, newest() ? "Track anew" : "Track");
+    const submit = element("button", { type: "submit", className: "primary" }, newest() ? "Track again" : "Track");
     const wrong = failurePlace();
     fill(form,
       field("Tracker", select(named(trackers.filter((one) => !one.needs_behaviour)), way.detail.tracker, { name: "tracker" })),
