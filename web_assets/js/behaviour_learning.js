@@ -1,7 +1,7 @@
 // Learning a model: the form, and the card that says how far it is.
 
 import { post } from "./api.js";
-import { bar, button, card, element, failure, failurePlace, field, files, fill, hint, lead, NAME, number, pageHead, select, sends, table } from "./elements.js";
+import { bar, button, card, element, failure, field, files, fill, hint, lead, NAME, number, optional, pageHead, select, sends, table } from "./elements.js";
 import { progressOf } from "./jobs.js";
 import { uploadFiles } from "./uploading.js";
 
@@ -39,7 +39,7 @@ function read(form, knobs) {
 
 /** Show the form in `content`. choices: as `GET /api/learning` has them. started: called when it has begun. */
 export function showLearningForm(content, { choices, sessions, started }) {
-  const wrong = failurePlace();
+  const wrong = optional();
   const motions = files({ name: "files", multiple: true, accept: choices.endings.join(",") });
   const submit = element("button", { className: "primary" }, "Learn");
   const name = element("input", { name: "name", ...NAME });

@@ -1,6 +1,6 @@
 // The same points of the floor clicked in two views or more.
 
-import { button, element, failure, failurePlace, fill, hint, picture as pictureOf } from "./elements.js";
+import { button, element, failure, fill, hint, optional, picture as pictureOf } from "./elements.js";
 
 const FEWEST = 3;
 
@@ -21,7 +21,7 @@ export function clickFloor(aside, { cameras, picture, send, stop }) {
   const points = [{ pixels: {} }];
   let chosen = 0;
   const list = element("div", { className: "point-list" });
-  const wrong = failurePlace();
+  const wrong = optional();
   const complete = () => points.filter((point) => Object.keys(point.pixels).length > 1);
 
   const done = button("Set the floor", async () => {

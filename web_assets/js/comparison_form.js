@@ -1,7 +1,7 @@
 // The form of a new comparison: which trackers take part, with how many evaluations, on which frames.
 
 import { fault, post } from "./api.js";
-import { button, card, element, failurePlace, field, fill, nothing, number, pageHead, select, sends, spring } from "./elements.js";
+import { button, card, element, field, fill, nothing, number, optional, pageHead, select, sends, spring } from "./elements.js";
 import { sessionWords } from "./sessions.js";
 import { seriesColour } from "./theme.js";
 
@@ -73,7 +73,7 @@ export function showForm(content, { sessions, choices, bodies, initial, started 
   }
   const chosen = able.find((one) => one.name === initial.session) ?? able[0];
   const sum = element("span", { className: "hint" });
-  const wrong = failurePlace();
+  const wrong = optional();
   const rows = candidates(choices, () => count());
   const whole = (name, value, more = {}) => number(value, { name, step: 1, required: true, ...more });
   const session = select(able.map((one) => [one.name, sessionWords(one)]), chosen.name, { name: "session", onchange: takeSession });

@@ -1,6 +1,6 @@
 // Dialogs: a form, a list, a picture, a menu. One <dialog>, closed by Escape.
 
-import { button, byId, check, element, failurePlace, field, files, fill, hint, select, sends, spring } from "./elements.js";
+import { button, byId, check, element, field, files, fill, hint, optional, select, sends, spring } from "./elements.js";
 
 /** @type {HTMLDialogElement} */
 const dialog = byId("dialog");
@@ -45,7 +45,7 @@ export const valuesOf = (form) => Object.fromEntries([...form.querySelectorAll("
  *   send: (values: any, report: (words: string) => void) => any, changed?: (name: string, form: HTMLFormElement) => void }} what
  */
 export function openForm({ heading, intro = "", rows, action, danger = false, send, changed = null }) {
-  const wrong = failurePlace();
+  const wrong = optional();
   const submit = element("button", { className: danger ? "danger" : "primary" }, action);
   const lines = rows.map((row) => (row.length > 1 ? element("div", { className: "row" }, row.map(fieldOf)) : fieldOf(/** @type {any} */ (row[0]))));
   const form = element("form", {}, element("h2", {}, heading), intro && hint(intro), lines, wrong, buttons(button("Cancel", closeDialog), submit));

@@ -67,8 +67,8 @@ export const notice = (...children) => element("p", { className: "notice" }, ...
 export const lead = (...children) => element("p", { className: "lead" }, ...children);
 /** What went wrong, and what to do; nothing where nothing did. @param {{ message: string, hint?: string } | null} error */
 export const failure = (error) => error && element("p", { className: "wrong", role: "alert" }, error.message, error.hint && element("span", { className: "hint" }, ` ${error.hint}`));
-/** Where `failure`s of a form are put; takes no room while there is none. */
-export const failurePlace = () => element("div", { className: "failures" });
+/** A place for what is there at times; it takes no room while it is empty. */
+export const optional = () => element("div", { className: "optional" });
 /** What stands where there is nothing yet. */
 export const nothing = (heading, ...children) => element("div", { className: "nothing" }, element("h1", {}, heading), ...children);
 /** A part of a page in a frame, under its heading. */

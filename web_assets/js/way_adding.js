@@ -1,7 +1,7 @@
 // Footage taken into the session: uploaded from this browser, or from a folder of the studio's computer.
 
 import { fault, fetchJson, post, remove, sessionPath } from "./api.js";
-import { actions, button, check, drawProgress, element, failure, failurePlace, field, files, fill, hint, number, text } from "./elements.js";
+import { actions, button, check, drawProgress, element, failure, field, files, fill, hint, number, optional, text } from "./elements.js";
 import { CANCELLED, jobDone, shareOf, standing } from "./jobs.js";
 import { complain } from "./messages.js";
 import { uploadFiles } from "./uploading.js";
@@ -12,8 +12,8 @@ const MOST_FOLDERS = 60;
 export function adder(place, way, done) {
   let abort = null;
   let stopped = false;
-  const going = element("div", { className: "going" });
-  const wrong = failurePlace();
+  const going = optional();
+  const wrong = optional();
   const videos = files({ multiple: true, name: "files", accept: "video/*,image/*,.zip,.tar,.gz,.tgz,.bz2,.xz,.toml,.csv,.yml,.json" });
   const folder = files({ multiple: true, name: "folder", folder: true });
   const source = text({ name: "source", placeholder: "full path" });

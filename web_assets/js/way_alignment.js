@@ -1,7 +1,7 @@
 // Do the cameras agree? How far silhouettes miss, camera by camera; turning the cameras until they do, and back.
 
 import { fetchJson, post, remove, sessionPath } from "./api.js";
-import { actions, button, dotted, drawProgress, element, failure, fill, hint, notice, percent, table } from "./elements.js";
+import { actions, button, dotted, drawProgress, element, failure, fill, hint, notice, optional, percent, table } from "./elements.js";
 import { timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 
@@ -37,7 +37,7 @@ export function alignmentBox(way, place, changed) {
     const going = job?.state === "running";
     const done = job?.state === "done" ? job : null;
     const error = failed ?? (job?.state === "failed" ? job : null);
-    const bar = element("div", { className: "going" });
+    const bar = optional();
     fill(place, element("div", { className: "head-line" }, element("h2", {}, "Do the cameras agree?"),
       button(done ? "Measure again" : "Measure", () => { requested = true; return measure(); }, "small", { disabled: going || busy, ariaLabel: "Measure whether the cameras agree" })), bar,
       done && [table(["camera", "misses by", "turned by", done.kept ? "misses now by" : "would miss by"], done.cameras.map((line) => [line.camera, pixels(line.before_px), `${line.turn_degrees.toFixed(2)}°`, pixels(line.after_px)])),

@@ -1,7 +1,7 @@
 // Step Background: what backgrounds are made of, how masks are cut, what does not count, how far the views agree.
 
 import { fetchJson, post, put, remove, sessionPath } from "./api.js";
-import { actions, button, check, drawProgress, element, failure, field, files, fill, hint, notice, select } from "./elements.js";
+import { actions, button, check, drawProgress, element, failure, field, files, fill, hint, notice, optional, select } from "./elements.js";
 import { progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 import { uploadFiles } from "./uploading.js";
@@ -42,6 +42,7 @@ export function mount(place, way) {
   let preview = 0;
 
   const make = element("div", { className: "background-make" });
+  const going = optional();
   const agreement = element("section", { className: "background-quality" });
   const cameras = element("section", { className: "background-quality", hidden: true });
   const knobs = element("details", { className: "background-knobs" });
@@ -102,18 +103,19 @@ export function mount(place, way) {
   }
 
   function drawMake() {
-    const going = background.job?.state === "running";
+    const running = background.job?.state === "running";
     fill(make, background.source === "masks" && notice("Masks came with the footage and are used as they are. Set a background up only if they are not good."),
       sourceChoices(), plates(),
       check("try what makes the views agree best", { checked: tune, onchange: ({ target }) => { tune = target.checked; } }, "Knobs under which the views agree best are chosen; those that you set below stay."),
       source === "combined" && check("exclude what the person never comes near", { checked: unused, onchange: ({ target }) => { unused = target.checked; } }, "A bystander, a monitor, a window: what moves there is not the person."),
-      !going && actions(button("Set up the background", setUp, "primary", { disabled: !source })), element("div", { className: "going" }), failure(failed),
+      !running && actions(button("Set up the background", setUp, "primary", { disabled: !source })), going, failure(failed),
       (background.job?.notes ?? []).map((note) => hint(note)));
-    if (going) drawGoing();
+    if (running) drawGoing();
+    else fill(going);
   }
 
   function drawGoing() {
-    drawProgress(make.querySelector(".going"), progressOf(background.job, "Reading the footage", () => remove(`${here}/background`).catch(complain)));
+    drawProgress(going, progressOf(background.job, "Reading the footage", () => remove(`${here}/background`).catch(complain)));
   }
 
   async function setUp() {

@@ -3,7 +3,7 @@
 import { accepted, fetchJson, post, remove, sessionPath } from "./api.js";
 import { findingList, plainNumbers, residualBars, rigFromAbove } from "./calibration_drawing.js";
 import { clickFloor } from "./calibration_points.js";
-import { actions, button, check, dotted, drawProgress, element, failure, field, files, fill, hint, notice, picture, select, text } from "./elements.js";
+import { actions, button, check, dotted, drawProgress, element, failure, field, files, fill, hint, notice, optional, picture, select, text } from "./elements.js";
 import { timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 import { uploadFiles } from "./uploading.js";
@@ -21,7 +21,7 @@ const savedAt = (name) => `replaced ${name.slice(0, 4)}-${name.slice(4, 6)}-${na
 /** The step. @param {HTMLElement} place @param {import("./way.js").Way} way */
 export function mount(place, way) {
   const here = /** @type {const} */ (`${sessionPath(way.session)}/calibration`);
-  const progress = element("div", { className: "going" });
+  const progress = optional();
   /** @type {Schemas["CalibrationView"]} */
   let view = null;
   /** @type {Schemas["ProposalView"]} */

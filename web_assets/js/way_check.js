@@ -1,7 +1,7 @@
 // Step Check: whether the motion fits the pictures, frame by frame; refining and smoothing; which track is exported.
 
 import { fetchJson, post, remove, runPath } from "./api.js";
-import { actions, button, drawProgress, element, failure, fill, hint, percent, table } from "./elements.js";
+import { actions, button, drawProgress, element, failure, fill, hint, optional, percent, table } from "./elements.js";
 import { followJob, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 import { viewWall } from "./way_views.js";
@@ -19,7 +19,7 @@ export function mount(place, way) {
   const here = runPath(way.session, run.name);
   const found = element("section", { className: "footage-step" });
   const better = element("section", { className: "footage-step" });
-  const going = element("div", { className: "going" });
+  const going = optional();
   place.append(found, going, better);
   const wall = viewWall(way);
   /** @type {Schemas["CheckAnswer"]} */

@@ -1,7 +1,7 @@
 // Step Footage: what the cameras recorded, how it is turned, and whether it is in step.
 
 import { fetchJson, patch, sessionPath } from "./api.js";
-import { button, dotted, element, fill, hint, notice, spring, table } from "./elements.js";
+import { button, dotted, element, fill, hint, notice, optional, spring, table } from "./elements.js";
 import { complain, say } from "./messages.js";
 import { adder } from "./way_adding.js";
 import { synchroniser } from "./way_synchrony.js";
@@ -17,7 +17,7 @@ export function mount(place, way) {
   const list = element("section", { className: "footage-cameras" });
   const step = element("section", { className: "footage-step" });
   const add = element("details", { className: "footage-add" });
-  const warnings = element("div", { className: "going" });
+  const warnings = optional();
   /** @type {Schemas["FootageState"]} */
   let footage = null;
   let shown = 0;         // the frame that is looked at

@@ -1,7 +1,7 @@
 // Step Subject: which body, how tall, what follows from it; and the fit to the footage, with lengths before and after.
 
 import { fault, fetchJson, post, put, remove, sessionPath } from "./api.js";
-import { actions, button, check, drawProgress, element, failure, field, fill, hint, number, percent, select, table, text } from "./elements.js";
+import { actions, button, check, drawProgress, element, failure, field, fill, hint, number, optional, percent, select, table, text } from "./elements.js";
 import { followJob, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 import { drawStature } from "./way_stature.js";
@@ -36,6 +36,7 @@ export function mount(place, way) {
   const options = { symmetric: true, lengths: true, radii: true, count: 5, frames: "", run: "" };
   const who = element("section", { className: "subject-who background-make" });
   const fitting = element("section", { className: "subject-fit background-quality" });
+  const progress = optional();
   place.append(who, fitting);
 
   const changed = () => body !== subject.body || height !== subject.height_mm;
@@ -105,8 +106,9 @@ export function mount(place, way) {
       field("First poses", select([["", "the newest run's, else searched for"], ...runs], options.run, { onchange: ({ target }) => { options.run = target.value; } })),
       element("div", { className: "fit-boxes" }, box("symmetric", "Off: each side has its own lengths, which needs more frames."), box("lengths", "Of limbs"), box("radii", "Of limbs")),
       !going && actions(button(found ? "Fit again" : "Fit the subject", beginFit, isReady && !(found && !fit.file) ? "primary" : "", { disabled: !isReady })),
-      element("div", { className: "going" }), failure(unfitted), found && results());
+      progress, failure(unfitted), found && results());
     if (going) drawGoing();
+    else fill(progress);
   }
 
   async function beginFit() {
@@ -123,7 +125,7 @@ export function mount(place, way) {
 
   function drawGoing() {
     const { identifier } = fit;
-    drawProgress(fitting.querySelector(".going"), progressOf(fit, "beginning", () => remove(`/api/subject-fits/${identifier}`).catch(complain)));
+    drawProgress(progress, progressOf(fit, "beginning", () => remove(`/api/subject-fits/${identifier}`).catch(complain)));
   }
 
   const sizeWords = (name) => name.replaceAll("_", " ").replace(/ (length|radius)$/, "");

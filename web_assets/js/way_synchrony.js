@@ -1,7 +1,7 @@
 // The cameras in step: offsets by hand, by a recorder's times, or estimated; an estimate is shown and applied only by a click.
 
 import { accepted, post, remove, sessionPath } from "./api.js";
-import { actions, button, drawProgress, element, failure, files, fill, hint, notice, number, table } from "./elements.js";
+import { actions, button, drawProgress, element, failure, files, fill, hint, notice, number, optional, table } from "./elements.js";
 import { followJob, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 
@@ -36,7 +36,7 @@ export function synchroniser(place, way, use) {
   function draw(state = footage) {
     footage = state;
     if (footage.cameras.length < 2) return fill(place);
-    const bar = element("div", { className: "going" });
+    const bar = optional();
     const apply = button("Apply", () => use(entered()), "apply-offsets", { hidden: true });
     const times = files({ accept: ".csv", hidden: true });
     times.onchange = () => readTimes(times.files[0]).catch(complain);

@@ -2,7 +2,7 @@
 
 import { fetchJson, post, remove, runPath, sessionPath } from "./api.js";
 import { valuesOf } from "./dialogs.js";
-import { actions, button, check, dotted, drawProgress, duration, element, failure, failurePlace, field, fill, hint, notice, number, select, sends } from "./elements.js";
+import { actions, button, check, dotted, drawProgress, duration, element, failure, field, fill, hint, notice, number, optional, select, sends } from "./elements.js";
 import { followJob, timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 import { studioPath } from "./sessions.js";
@@ -103,7 +103,7 @@ export function mount(place, way) {
     /** @returns {[string, string][]} */
     const named = (entries) => entries.map((one) => [one.name, one.label]);
     const submit = element("button", { type: "submit", className: "primary" }, newest() ? "Track again" : "Track");
-    const wrong = failurePlace();
+    const wrong = optional();
     fill(form,
       field("Tracker", select(named(trackers.filter((one) => !one.needs_behaviour)), way.detail.tracker, { name: "tracker" })),
       field("Likelihood", select(named(weightings), way.detail.weighting, { name: "weighting" })),
