@@ -25,7 +25,7 @@ router = APIRouter(tags=["way"])
 @router.get("/way", include_in_schema=False)
 def page() -> Response:
     """The page of the guided set-up."""
-    return html_page("way.html", "/way", {"title": f"{PLACES['/way']} · {NAME}"})
+    return html_page("setup.html", "/way", {"title": f"{PLACES['/way']} · {NAME}"})
 
 
 @router.post("/api/sessions", status_code=201)

@@ -5,9 +5,9 @@ import { actions, button, drawProgress, element, failure, files, fill, hint, not
 import { followJob, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 
-/** Draw in `place`; `use(offsets)` applies offsets. @param {import("./way.js").Way} way */
-export function synchroniser(place, way, use) {
-  const here = sessionPath(way.session);
+/** Draw in `place`; `use(offsets)` applies offsets. @param {import("./setup.js").Setup} setup */
+export function synchroniser(place, setup, use) {
+  const here = sessionPath(setup.session);
   let footage = null;
   let estimate = null;   // its job, or what a recorder's times say
   let failed = null;

@@ -6,7 +6,7 @@ import { actions, button, check, dotted, drawProgress, duration, element, failur
 import { followJob, timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 import { studioPath } from "./sessions.js";
-import { viewWall } from "./way_views.js";
+import { viewWall } from "./setup_views.js";
 
 const PICTURE_MILLISECONDS = 700;
 const POLL_MILLISECONDS = 1500;
@@ -14,14 +14,14 @@ const POLL_MILLISECONDS = 1500;
 const EFFORTS = [["1000", "quick · 1000 poses a frame"], ["2000", "usual · 2000 poses a frame"], ["5000", "thorough · 5000 poses a frame"], ["0", "as the settings say"]];
 const BUSY = ["tracking", "compiling", "reannealing"];
 
-/** @param {HTMLElement} place @param {import("./way.js").Way} way */
-export function mount(place, way) {
-  const here = sessionPath(way.session);
+/** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
+export function mount(place, setup) {
+  const here = sessionPath(setup.session);
   const status = element("section", { className: "track-status" });
   const form = element("form", { className: "footage-form" });
   const fold = element("details", {}, element("summary", {}, "Track again"), form);
   place.append(status, fold);
-  let { runs } = way.detail;
+  let { runs } = setup.detail;
   let work = null;       // the tracking process's last state
   let job = null;        // what is tracked backwards
   let latest = null;     // the frame that was found last
@@ -29,10 +29,10 @@ export function mount(place, way) {
   let stopped = false;
   let timer = 0;
   let shownAt = 0;
-  const wall = viewWall(way);
+  const wall = viewWall(setup);
   const newest = () => runs[0] ?? null;
-  const path = () => runPath(way.session, newest().name);
-  const isHere = () => work && newest() && work.session === way.session && work.run === newest().name;
+  const path = () => runPath(setup.session, newest().name);
+  const isHere = () => work && newest() && work.session === setup.session && work.run === newest().name;
   const isBusy = () => Boolean(isHere() && BUSY.includes(work.state));
 
   async function loadRuns() { runs = (await fetchJson(here)).runs; }
@@ -50,22 +50,22 @@ export function mount(place, way) {
       return drawProgress(status, { words: dotted(`tracking backwards${total ? `, ${done} of ${total} frames` : ""}`, timeLeft(left)), share: total ? done / total : 0, cancel: () => remove(`/api/track-jobs/${identifier}`).catch(complain) });
     }
     if (isBusy()) return drawProgress(status, { words: workWords(), share: work.last > work.first ? work.done / (work.last - work.first) : 0, cancel: () => post(`${path()}/cancel`).catch(complain) });
-    const stale = way.step?.state === "stale";
+    const stale = setup.step?.state === "stale";
     const complete = run.done >= run.last - run.first;
     const which = run.first > 0 ? ` (from frame ${run.first} on)` : "";
     fill(status, element("p", {}, `${run.name}: ${run.done} of ${run.last - run.first} frames${which}, ${run.describe}${run.mean_mm != null ? `, ${run.mean_mm.toPrecision(3)} mm from the truth` : ""}.`),
       failure(isHere() && ["failed", "lost"].includes(work.state) ? work : failed),
       actions(!complete && !stale && button(run.done ? "Track on" : "Track", () => start(run.name), "primary"),
         run.done > 0 && run.first > 0 && !stale && button("Track back to frame 0", goBack, "", { title: `The run begins in frame ${run.first}. The frames before it are tracked backwards from there, into a new run; ${run.name} stays.` }),
-        element("a", { className: "download", href: studioPath(way.session, run.name) }, "Open in the studio")));
+        element("a", { className: "download", href: studioPath(setup.session, run.name) }, "Open in the studio")));
     fold.open ||= stale;
   }
 
   async function start(name) {
     failed = null;
     try {
-      await post(`${runPath(way.session, name)}/start`);
-      work = { session: way.session, run: name, state: "compiling", frame: 0, first: 0, last: 1, done: 0 };
+      await post(`${runPath(setup.session, name)}/start`);
+      work = { session: setup.session, run: name, state: "compiling", frame: 0, first: 0, last: 1, done: 0 };
     } catch (error) { failed = error; }
     drawStatus();
   }
@@ -84,7 +84,7 @@ export function mount(place, way) {
     await loadRuns().catch(complain);
     drawStatus();
     showNewest();
-    way.refresh().catch(complain);
+    setup.refresh().catch(complain);
   }
 
   async function begin() {
@@ -94,19 +94,19 @@ export function mount(place, way) {
     fold.open = false;
     await loadRuns();
     await start(made.name);
-    await way.refresh();
+    await setup.refresh();
   }
 
   async function drawForm() {
     const { trackers, weightings } = await fetchJson("/api/choices");
-    const { start_pose_frame: first, frame_count: count, has_start_pose: known, doubts } = way.detail;
+    const { start_pose_frame: first, frame_count: count, has_start_pose: known, doubts } = setup.detail;
     /** @returns {[string, string][]} */
     const named = (entries) => entries.map((one) => [one.name, one.label]);
     const submit = element("button", { type: "submit", className: "primary" }, newest() ? "Track again" : "Track");
     const wrong = optional();
     fill(form,
-      field("Tracker", select(named(trackers.filter((one) => !one.needs_behaviour)), way.detail.tracker, { name: "tracker" })),
-      field("Likelihood", select(named(weightings), way.detail.weighting, { name: "weighting" })),
+      field("Tracker", select(named(trackers.filter((one) => !one.needs_behaviour)), setup.detail.tracker, { name: "tracker" })),
+      field("Likelihood", select(named(weightings), setup.detail.weighting, { name: "weighting" })),
       hint("Edges and silhouette suit a room that is full of things: edges inside the masks are often the room's."),
       field("Effort", select(EFFORTS, "2000", { name: "evaluations" })),
       element("div", { className: "step-row" }, field("First frame", number(first, { name: "first", max: count - 1, step: 1 })), field("Last frame", number(count - 1, { name: "last", max: count - 1, step: 1 }))),
@@ -123,13 +123,13 @@ export function mount(place, way) {
     wall.show({ run: run.name, frame: latest ?? Math.max(run.first, run.tracked_to - 1), show: "outline" });
   }
 
-  way.on("state", async (event) => {
+  setup.on("state", async (event) => {
     const before = work?.state;
     work = event;
-    if (BUSY.includes(before) && !BUSY.includes(event.state)) { await loadRuns().catch(complain); showNewest(); way.refresh().catch(() => {}); }
+    if (BUSY.includes(before) && !BUSY.includes(event.state)) { await loadRuns().catch(complain); showNewest(); setup.refresh().catch(() => {}); }
     if (!stopped) drawStatus();
   });
-  way.on("frame", (event) => {
+  setup.on("frame", (event) => {
     if (!newest() || event.run !== newest().name || event.reannealed) return;
     latest = event.frame;
     if (performance.now() - shownAt < PICTURE_MILLISECONDS) return;

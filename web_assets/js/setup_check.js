@@ -4,7 +4,7 @@ import { fetchJson, post, remove, runPath } from "./api.js";
 import { actions, button, drawProgress, element, failure, fill, hint, optional, percent, table } from "./elements.js";
 import { followJob, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
-import { viewWall } from "./way_views.js";
+import { viewWall } from "./setup_views.js";
 
 /** @import { Schemas } from "./api_types" */
 
@@ -13,15 +13,15 @@ const GOOD = 0.85;
 const GOING = { refine: "refining", smooth: "smoothing", check: "comparing" };
 const millimetres = (value) => (value === null ? "–" : `${value.toFixed(1)} mm`);
 
-/** @param {HTMLElement} place @param {import("./way.js").Way} way */
-export function mount(place, way) {
-  const run = way.detail.runs[0];
-  const here = runPath(way.session, run.name);
+/** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
+export function mount(place, setup) {
+  const run = setup.detail.runs[0];
+  const here = runPath(setup.session, run.name);
   const found = element("section", { className: "footage-step" });
   const better = element("section", { className: "footage-step" });
   const going = optional();
   place.append(found, going, better);
-  const wall = viewWall(way);
+  const wall = viewWall(setup);
   /** @type {Schemas["CheckAnswer"]} */
   let answer = null;
   /** @type {Schemas["TrackList"]["tracks"]} */
@@ -48,7 +48,7 @@ export function mount(place, way) {
     wall.show({ run: run.name, frame, track: track === "raw" ? "" : track, show: "outline" });
     const check = answer?.check;
     const row = check?.frames.indexOf(frame) ?? -1;
-    for (const camera of way.detail.cameras) {
+    for (const camera of setup.detail.cameras) {
       const view = row < 0 ? -1 : check.cameras.indexOf(camera.name);
       const inside = view < 0 ? null : check.inside[row][view];
       wall.note(camera.name, view < 0 ? "" : `${percent(inside)} of the model in the mask, ${percent(check.covered[row][view])} of the mask under the model`, inside !== null && inside < GOOD ? "bad" : "");
@@ -121,10 +121,10 @@ export function mount(place, way) {
   function drawBetter() {
     const has = (name) => tracks.some((line) => line.name === name);
     const act = (verb, words, name) => button(words, () => begin(verb, { replace: has(name) }), "small", { disabled: Boolean(job) });
-    const truth = way.detail.has_truth;
+    const truth = setup.detail.has_truth;
     fill(better, element("h2", {}, "Make it better"),
       table(["track", "jitter", ...(truth ? ["from truth"] : [])], tracks.map((line) => [
-        element("td", {}, element("label", { className: "check" }, element("input", { type: "radio", name: "way-track", value: line.name, checked: line.name === track, ariaLabel: `Look at ${line.name}`, onchange: () => choose(line.name).catch(complain) }),
+        element("td", {}, element("label", { className: "check" }, element("input", { type: "radio", name: "setup-track", value: line.name, checked: line.name === track, ariaLabel: `Look at ${line.name}`, onchange: () => choose(line.name).catch(complain) }),
           line.name === "raw" ? "raw (as searched)" : line.name), line.made_by.exchanged && hint(/** @type {any} */ (line.made_by.exchanged).join("; ")),
         line.name === answer?.usual && element("span", { className: "badge good", title: "Step Export takes this one, unless you choose another." }, "for export")),
         millimetres(line.jitter_mm), ...(truth ? [millimetres(line.mean_mm)] : [])])),
@@ -176,7 +176,7 @@ export function mount(place, way) {
     if (stopped) return "";
     const made = ended?.state === "done" && ended.verb !== "check" ? ended.track : "";
     await load(made || track);
-    await way.refresh();
+    await setup.refresh();
     return made;
   }
 

@@ -4,7 +4,7 @@ import { fault, fetchJson, post, put, remove, sessionPath } from "./api.js";
 import { actions, button, check, drawProgress, element, failure, field, fill, hint, number, optional, percent, select, table, text } from "./elements.js";
 import { followJob, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
-import { drawStature } from "./way_stature.js";
+import { drawStature } from "./setup_stature.js";
 
 /** @import { Schemas } from "./api_types" */
 
@@ -18,9 +18,9 @@ const PICTURE_HEIGHT = 300;
 
 const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
 
-/** @param {HTMLElement} place @param {import("./way.js").Way} way */
-export function mount(place, way) {
-  const here = sessionPath(way.session);
+/** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
+export function mount(place, setup) {
+  const here = sessionPath(setup.session);
   /** @type {Schemas["SubjectAnswer"]} */
   let subject = null;
   /** @type {{ name: string, label: string }[]} */
@@ -69,7 +69,7 @@ export function mount(place, way) {
       await put(`${here}/subject`, { height_mm: height, body });
       await load();
       fit = null;
-      way.refresh().catch(complain);
+      setup.refresh().catch(complain);
     } catch (error) { failed = error; }
     draw();
   });
@@ -81,7 +81,7 @@ export function mount(place, way) {
       const query = new URLSearchParams({ body, ...(height ? { height_mm: String(height) } : {}) });
       try {
         const shown = changed() ? await fetchJson(`${here}/subject?${query}`) : subject;
-        if (!gone && !fit?.limbs?.length) drawStature(way.aside, shown.limbs, [], note(shown));
+        if (!gone && !fit?.limbs?.length) drawStature(setup.aside, shown.limbs, [], note(shown));
       } catch (error) { complain(error); }
     }, PREVIEW_MILLISECONDS);
   }
@@ -97,7 +97,7 @@ export function mount(place, way) {
     const isReady = subject.saved && !changed();
     const box = (name, title) => check(name === "symmetric" ? "left and right alike" : name, { checked: options[name], onchange: ({ target }) => { options[name] = target.checked; } }, title);
     /** @type {[string, string][]} */
-    const runs = way.detail.runs.filter((run) => run.done).map((run) => [run.name, `of ${run.name}`]);
+    const runs = setup.detail.runs.filter((run) => run.done).map((run) => [run.name, `of ${run.name}`]);
     fill(fitting, element("h2", {}, "Fit the subject to the footage"),
       hint(isReady ? "Lengths and radii are found together with the poses of a few frames, on the silhouettes. Frames without a pose are searched first, which takes longest." : "Set the height first: it is the one measure that pictures cannot show by themselves."),
       element("div", { className: "step-row" },
@@ -140,7 +140,7 @@ export function mount(place, way) {
     try {
       fit = await post(`/api/subject-fits/${fit.identifier}/keep`);
       await load();
-      way.refresh().catch(complain);
+      setup.refresh().catch(complain);
     } catch (error) { complain(error); }
     draw();
   }
@@ -156,7 +156,7 @@ export function mount(place, way) {
 
   /** The pictures of the fit: the new body over each frame, a camera each in turn. */
   function fitPictures() {
-    const names = way.detail.cameras.map((camera) => camera.name);
+    const names = setup.detail.cameras.map((camera) => camera.name);
     return element("div", { className: "pictures fitted" }, fit.frames.map((frame, at) => {
       const camera = names[at % names.length];
       return element("figure", { className: "picture" }, element("img", { alt: `Frame ${frame}, ${camera}`, src: `/api/subject-fits/${fit.identifier}/frames/${frame}/views/${encodeURIComponent(camera)}.jpg?height=${PICTURE_HEIGHT}` }),
@@ -168,8 +168,8 @@ export function mount(place, way) {
     drawWho();
     drawFit();
     if (fit?.state !== "done") return look();
-    drawStature(way.aside, fit.limbs, subject.limbs, fit.file ? "Fitted and saved. Dashed: by height alone." : "As fitted. Dashed: as it was before.");
-    way.aside.append(fitPictures());
+    drawStature(setup.aside, fit.limbs, subject.limbs, fit.file ? "Fitted and saved. Dashed: by height alone." : "As fitted. Dashed: as it was before.");
+    setup.aside.append(fitPictures());
   }
 
   async function load() {

@@ -3,17 +3,17 @@
 import { fetchJson, patch, sessionPath } from "./api.js";
 import { button, dotted, element, fill, hint, notice, optional, spring, table } from "./elements.js";
 import { complain, say } from "./messages.js";
-import { adder } from "./way_adding.js";
-import { synchroniser } from "./way_synchrony.js";
+import { adder } from "./setup_adding.js";
+import { synchroniser } from "./setup_synchrony.js";
 
 /** @import { Schemas } from "./api_types" */
 
 const THUMB_HEIGHT = 420;
 const FRAME_MILLISECONDS = 120;
 
-/** @param {HTMLElement} place @param {import("./way.js").Way} way */
-export function mount(place, way) {
-  const here = sessionPath(way.session);
+/** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
+export function mount(place, setup) {
+  const here = sessionPath(setup.session);
   const list = element("section", { className: "footage-cameras" });
   const step = element("section", { className: "footage-step" });
   const add = element("details", { className: "footage-add" });
@@ -23,14 +23,14 @@ export function mount(place, way) {
   let shown = 0;         // the frame that is looked at
   let age = 0;           // rises when the pictures changed
   let wait = 0;
-  const sync = synchroniser(step, way, (offsets) => change({ offsets }));
+  const sync = synchroniser(step, setup, (offsets) => change({ offsets }));
   place.append(list, warnings, step, add);
 
-  const adding = adder(add, way, async (job) => {
+  const adding = adder(add, setup, async (job) => {
     age += 1;
     for (const note of job.notes) say(note);
     await load(job.warnings);
-    await way.refresh();
+    await setup.refresh();
   });
 
   async function change(changes) {
@@ -40,7 +40,7 @@ export function mount(place, way) {
       age += 1;
     } catch (error) { complain(error); }
     draw();
-    await way.refresh();
+    await setup.refresh();
   }
 
   function drawList() {
@@ -53,7 +53,7 @@ export function mount(place, way) {
 
   function drawPictures() {
     const { cameras, frame_count: count } = footage;
-    if (!cameras.length) return fill(way.aside, element("div", { className: "aside-empty" }, element("p", {}, "The pictures of your cameras will be here."), hint("Two cameras at least, better four: around the person, each seeing head and feet all the time.")));
+    if (!cameras.length) return fill(setup.aside, element("div", { className: "aside-empty" }, element("p", {}, "The pictures of your cameras will be here."), hint("Two cameras at least, better four: around the person, each seeing head and feet all the time.")));
     const images = cameras.map((camera) => element("img", { src: pictureOf(camera), alt: `Camera ${camera.name}`, onerror: ({ target }) => { target.alt = `The footage of ${camera.name} cannot be read.`; } }));
     const figures = cameras.map((camera, at) => element("figure", { className: "picture", dataset: { camera: camera.name } }, images[at], element("figcaption", {},
       element("div", { className: "step-actions" }, element("b", {}, camera.name), spring(),
@@ -67,7 +67,7 @@ export function mount(place, way) {
       clearTimeout(wait);
       wait = setTimeout(() => { for (const [at, camera] of cameras.entries()) images[at].src = pictureOf(camera); }, FRAME_MILLISECONDS);
     };
-    fill(way.aside, element("div", { className: "pictures-bar" }, slider, label, element("span", { className: "hint" }, "The same moment in every camera?")), element("div", { className: "pictures" }, figures));
+    fill(setup.aside, element("div", { className: "pictures-bar" }, slider, label, element("span", { className: "hint" }, "The same moment in every camera?")), element("div", { className: "pictures" }, figures));
   }
 
   function draw() {
@@ -84,6 +84,6 @@ export function mount(place, way) {
     draw();
   }
 
-  load(way.detail.warnings ?? []).catch(complain);
+  load(setup.detail.warnings ?? []).catch(complain);
   return () => { clearTimeout(wait); sync.stop(); adding.stop(); };
 }

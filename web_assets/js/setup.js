@@ -1,6 +1,6 @@
 // The guided set-up: the stepper, the step's panel, pictures or the scene beside it.
 //
-// A step's module `way_<step>.js` (start-pose: way_start_pose.js) exports `mount(place, way) -> () => void`. `place` is
+// A step's module `setup_<step>.js` (start-pose: setup_start_pose.js) exports `mount(place, setup) -> () => void`. `place` is
 // empty and the panel's; what it returns releases everything when another step is shown. One `button.primary` a step:
 // Enter presses the first that is shown.
 
@@ -15,7 +15,7 @@ import { startTheme } from "./theme.js";
 
 /**
  * @import { Schemas } from "./api_types"
- * @typedef Way what a step is given
+ * @typedef Setup what a step is given
  * @property {string} session
  * @property {Schemas["SessionDetail"]} detail the session as it was when the step was mounted (no cameras before the calibration)
  * @property {HTMLElement} aside the empty element at the right, for pictures (class "pictures" with `picture`s in it, if it fits)
@@ -51,7 +51,7 @@ let releases = [];     // what the mounted step has to release
 
 const statusOf = (name) => steps.find((one) => one.step === name);
 const beside = (by) => steps[steps.findIndex((one) => one.step === shown) + by]?.step;
-const moduleOf = (name) => import(`./way_${name.replaceAll("-", "_")}.js`);
+const moduleOf = (name) => import(`./setup_${name.replaceAll("-", "_")}.js`);
 
 function drawStepper() {
   fill(stepper, element("ol", {}, steps.map((one) => {
@@ -113,14 +113,14 @@ async function go(name) {
   try {
     const [module, detail] = await Promise.all([moduleOf(name), fetchJson(sessionPath(session))]);
     if (turn !== mounting) return;
-    releases.push(module.mount(place, wayOf(detail)));
+    releases.push(module.mount(place, setupOf(detail)));
   } catch (error) {
     fill(place, element("p", {}, "This step cannot be shown."), failure(error));
   }
 }
 
-/** What a step's module is given. @returns {Way} */
-const wayOf = (detail) => ({
+/** What a step's module is given. @returns {Setup} */
+const setupOf = (detail) => ({
   session, detail, aside, refresh, go, scene,
   get step() { return statusOf(shown); },
   on: (type, handler) => { releases.push(listen(type, (event) => { if (event.session === session) handler(event); })); },

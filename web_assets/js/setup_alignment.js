@@ -8,9 +8,9 @@ import { complain } from "./messages.js";
 const WHY = "A tripod that was touched after the calibration turns a camera by a degree, which is twenty pixels. Silhouettes show it, without a board.";
 const pixels = (value) => (value === null ? "–" : `${value.toFixed(1)} px`);
 
-/** The box in `place`; `changed()` is called when the session has other cameras. Returns {load, measure, stop}. @param {import("./way.js").Way} way */
-export function alignmentBox(way, place, changed) {
-  const here = /** @type {const} */ (`${sessionPath(way.session)}/alignment`);
+/** The box in `place`; `changed()` is called when the session has other cameras. Returns {load, measure, stop}. @param {import("./setup.js").Setup} setup */
+export function alignmentBox(setup, place, changed) {
+  const here = /** @type {const} */ (`${sessionPath(setup.session)}/alignment`);
   /** @type {import("./api_types").Schemas["AlignmentAnswer"]} */
   let alignment = null;
   let failed = null;
@@ -73,11 +73,11 @@ export function alignmentBox(way, place, changed) {
     draw();
   }
 
-  way.on("alignment", (job) => {
+  setup.on("alignment", (job) => {
     if (!alignment) return;
     alignment = { ...alignment, job };
     draw();
-    if (job.state !== "running") way.refresh().catch(complain);
+    if (job.state !== "running") setup.refresh().catch(complain);
   });
 
   return { load, measure, stop: () => { stopped = true; } };

@@ -10,13 +10,13 @@ import { isUnsure } from "./start_pose.js";
 const PICTURE_HEIGHT = 360;
 const REDRAW_MILLISECONDS = 250;
 
-/** @param {HTMLElement} place @param {import("./way.js").Way} way */
-export function mount(place, way) {
-  const here = sessionPath(way.session);
-  const last = Math.max(0, (way.detail.frame_count ?? 1) - 1);
+/** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
+export function mount(place, setup) {
+  const here = sessionPath(setup.session);
+  const last = Math.max(0, (setup.detail.frame_count ?? 1) - 1);
   /** @type {import("./api_types").Schemas["PoseView"]} */
   let pose = null;
-  let frame = Math.min(last, way.detail.start_pose_frame ?? 0);
+  let frame = Math.min(last, setup.detail.start_pose_frame ?? 0);
   let found = null;      // what the automatic search found
   let better = null;     // what the search around the pose found
   let failed = null;
@@ -50,7 +50,7 @@ export function mount(place, way) {
     going = false;
     if (gone) return;
     await load();
-    way.refresh().catch(complain);
+    setup.refresh().catch(complain);
   }
 
   const find = () => during(async () => {
@@ -75,8 +75,8 @@ export function mount(place, way) {
   async function edit() {
     failed = null;
     try {
-      await way.scene({ frame });
-      await post("/api/scene/edit", { session: way.session, frame });
+      await setup.scene({ frame });
+      await post("/api/scene/edit", { session: setup.session, frame });
       editing = true;
       begun = false;
     } catch (error) { failed = error; }
@@ -95,7 +95,7 @@ export function mount(place, way) {
       await remove("/api/scene/edit");
     } catch (error) { failed = error; }
     await load();
-    way.refresh().catch(complain);
+    setup.refresh().catch(complain);
   }
 
   // The panel.
@@ -140,7 +140,7 @@ export function mount(place, way) {
     const act = (label, work, className = "") => button(label, work, className, { disabled: going });
     return [
       ...(pose.has_sides ? [element("h2", {}, "Left and right"), element("p", { className: "side-check" }, swatch("left"), "the person's left, ", swatch("right"), "the person's right. Is it so in every picture?")] : []),
-      actions(act("Yes, track from here", () => way.go("track"), "primary"),
+      actions(act("Yes, track from here", () => setup.go("track"), "primary"),
         pose.has_sides && [act("No: facing the other way", () => exchange("turned round")), act("Mirror", () => exchange("in place"))], act("Refine from here", refine)),
     ];
   }
@@ -152,7 +152,7 @@ export function mount(place, way) {
     timer = setTimeout(() => {
       if (gone || editing) return;
       const stored = Boolean(pose?.stored);
-      fill(way.aside, element("div", { className: "pictures" }, way.detail.cameras.map(({ name }) => picture(element("img", {
+      fill(setup.aside, element("div", { className: "pictures" }, setup.detail.cameras.map(({ name }) => picture(element("img", {
         alt: `${name}, frame ${frame}${stored ? ", start pose" : ""}`, loading: "lazy",
         src: `${here}/frames/${frame}/views/${encodeURIComponent(name)}.jpg?show=outline&height=${PICTURE_HEIGHT}${stored ? "&pose=start" : ""}&age=${age}`,
       }), name))));
@@ -170,7 +170,7 @@ export function mount(place, way) {
   }
 
   // The editor may be left in the scene itself.
-  way.on("scene", (event) => {
+  setup.on("scene", (event) => {
     if (!editing) return;
     if (event.editing) begun = true;
     else if (begun) { editing = begun = false; load(); }

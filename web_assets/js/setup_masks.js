@@ -6,16 +6,16 @@ import { button, check, element, fill, percent, spring } from "./elements.js";
 const HEIGHT = 420;
 const SPREAD = 5;
 
-/** Pictures in `way.aside`; `paint(camera)` opens the brush. @param {import("./way.js").Way} way */
-export function maskPictures(way, paint) {
-  const here = sessionPath(way.session);
+/** Pictures in `setup.aside`; `paint(camera)` opens the brush. @param {import("./setup.js").Setup} setup */
+export function maskPictures(setup, paint) {
+  const here = sessionPath(setup.session);
   const state = { frame: 0, settings: {}, quality: null, views: [], age: 0, bare: false };
   const bar = element("div", { className: "mask-bar" });
   const grid = element("div", { className: "pictures masks" });
 
   /** Before the first mask the picture alone, as it is recorded: a session's first masks take their time. */
   function first(camera) {
-    const lens = way.detail.cameras.find((one) => one.name === camera);
+    const lens = setup.detail.cameras.find((one) => one.name === camera);
     return lens?.quarter_turns ? "" : `${here}/footage/${encodeURIComponent(camera)}/${state.frame}.jpg?height=${HEIGHT}`;
   }
 
@@ -78,7 +78,7 @@ export function maskPictures(way, paint) {
   }
 
   function show() {
-    fill(way.aside, bar, grid);
+    fill(setup.aside, bar, grid);
     state.age += 1;
     draw();
   }

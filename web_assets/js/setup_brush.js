@@ -12,8 +12,8 @@ const HELP = "Paint what is not the person. Keys: arrows move, space paints, x p
 /** Edit what is excluded of `lens` (name, picture_width, picture_height, quarter_turns, frame, excluded: whether there is
  * something already, shown before a stroke can be made: one that came after would undo what was painted meanwhile);
  * `done(saved)` when left. */
-export async function brush(way, lens, done) {
-  const place = `${sessionPath(way.session)}/exclusions/${encodeURIComponent(lens.name)}`;
+export async function brush(setup, lens, done) {
+  const place = `${sessionPath(setup.session)}/exclusions/${encodeURIComponent(lens.name)}`;
   const turns = ((lens.quarter_turns % 4) + 4) % 4;
   const stored = [lens.picture_width, lens.picture_height];
   const [width, height] = turns % 2 ? [stored[1], stored[0]] : stored;
@@ -25,7 +25,7 @@ export async function brush(way, lens, done) {
   const ring = element("div", { className: "brush-ring" });
 
   const photo = element("img", { alt: `Picture of ${lens.name}`, className: "brush-photo", draggable: false,
-    src: `${sessionPath(way.session)}/frames/${lens.frame}/views/${encodeURIComponent(lens.name)}.jpg?show=mask&height=${turns % 2 ? stored[1] : Math.min(PICTURE_HEIGHT, stored[1])}` });
+    src: `${sessionPath(setup.session)}/frames/${lens.frame}/views/${encodeURIComponent(lens.name)}.jpg?show=mask&height=${turns % 2 ? stored[1] : Math.min(PICTURE_HEIGHT, stored[1])}` });
   const sheet = element("div", { className: "brush-sheet" }, photo, canvas, ring);
   sheet.style.aspectRatio = `${width} / ${height}`;
   sheet.style.setProperty("--sheet-ratio", String(width / height));
@@ -165,7 +165,7 @@ export async function brush(way, lens, done) {
     await done(false);
     return;
   }
-  fill(way.aside, tools, element("div", { className: "brush-room" }, sheet), element("p", { className: "hint brush-help" }, HELP));
+  fill(setup.aside, tools, element("div", { className: "brush-room" }, sheet), element("p", { className: "hint brush-help" }, HELP));
   canvas.focus();
   drawRing();
 }

@@ -8,8 +8,8 @@ import { uploadFiles } from "./uploading.js";
 
 const MOST_FOLDERS = 60;
 
-/** Draw the form in `place` (a details element); `done(job)` is called when footage was taken in. @param {import("./way.js").Way} way */
-export function adder(place, way, done) {
+/** Draw the form in `place` (a details element); `done(job)` is called when footage was taken in. @param {import("./setup.js").Setup} setup */
+export function adder(place, setup, done) {
   let abort = null;
   let stopped = false;
   const going = optional();
@@ -53,7 +53,7 @@ export function adder(place, way, done) {
     const checked = (box) => box.querySelector("input").checked;
     try {
       const request = { copy: !checked(refer), replace: checked(replace), fps: fps.value ? Number(fps.value) : null, trial: trial.value.trim() || null };
-      const { identifier } = await post(`${sessionPath(way.session)}/footage`, { ...request, ...await chosenSource() });
+      const { identifier } = await post(`${sessionPath(setup.session)}/footage`, { ...request, ...await chosenSource() });
       const cancel = () => remove(`/api/imports/${identifier}`).catch(complain);
       const job = await jobDone(`/api/imports/${identifier}`, (state) => drawProgress(going, { words: standing(state, "beginning"), share: shareOf(state), cancel }), () => stopped);
       if (job) { videos.value = folder.value = ""; place.open = false; await done(job); }

@@ -7,7 +7,7 @@ import { actions, button, check, dotted, drawProgress, element, failure, field, 
 import { timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 import { uploadFiles } from "./uploading.js";
-import { boardForm } from "./way_boards.js";
+import { boardForm } from "./setup_boards.js";
 
 /** @import { Schemas } from "./api_types" */
 
@@ -18,9 +18,9 @@ const UNITS = [["", "as the file says"], ["mm", "millimetres"], ["m", "metres"]]
 const AXES = [["z", "Z"], ["y", "Y"], ["x", "X"], ["-z", "−Z"], ["-y", "−Y"], ["-x", "−X"]];
 const savedAt = (name) => `replaced ${name.slice(0, 4)}-${name.slice(4, 6)}-${name.slice(6, 8)} ${name.slice(9, 11)}:${name.slice(11, 13)} UTC`;
 
-/** The step. @param {HTMLElement} place @param {import("./way.js").Way} way */
-export function mount(place, way) {
-  const here = /** @type {const} */ (`${sessionPath(way.session)}/calibration`);
+/** The step. @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
+export function mount(place, setup) {
+  const here = /** @type {const} */ (`${sessionPath(setup.session)}/calibration`);
   const progress = optional();
   /** @type {Schemas["CalibrationView"]} */
   let view = null;
@@ -76,7 +76,7 @@ export function mount(place, way) {
     ];
   }
 
-  const boards = () => boardForm(way.session, { cameras: view.footage, inputs: fromBoard, hasFootage: view.board_footage, isChief: !proposal, uploaded, solve });
+  const boards = () => boardForm(setup.session, { cameras: view.footage, inputs: fromBoard, hasFootage: view.board_footage, isChief: !proposal, uploaded, solve });
 
   async function solve(request) {
     failed = proposal = null;
@@ -133,7 +133,7 @@ export function mount(place, way) {
       view = await post(`${here}/proposals/${proposal.identifier}/apply`, { anyway });
       failed = proposal = null;
       tab = "used";
-      await way.refresh();
+      await setup.refresh();
     } catch (error) { failed = error; }
     draw();
   }
@@ -155,7 +155,7 @@ export function mount(place, way) {
 
   function startClicking() {
     const end = () => { stopClicking = null; draw(); };
-    stopClicking = clickFloor(way.aside, {
+    stopClicking = clickFloor(setup.aside, {
       cameras: shown().cameras,
       picture: (camera) => `${here}/proposals/${identifier()}/views/${encodeURIComponent(camera)}.jpg?height=720&board=${showsBoard}&axes=false`,
       send: async (points) => { proposal = await post(`${here}/floor`, { proposal: proposal?.identifier ?? "", points }); end(); },
@@ -165,7 +165,7 @@ export function mount(place, way) {
 
   function drawAside() {
     const rig = shown();
-    if (!rig) return fill(way.aside, element("div", { className: "aside-empty" }, element("p", {}, "The cameras are drawn here once there is a calibration.")));
+    if (!rig) return fill(setup.aside, element("div", { className: "aside-empty" }, element("p", {}, "The cameras are drawn here once there is a calibration.")));
     const address = `${here}/proposals/${identifier()}`;
     /** @type {any[]} */
     const lenses = /** @type {any} */ (rig.report)?.cameras ?? [];
@@ -178,23 +178,23 @@ export function mount(place, way) {
     const coverage = lenses.filter((lens) => lens.pictures.length).map((lens) => element("figure", { className: "picture coverage" },
       element("img", { alt: `Where the board was seen by ${lens.name}`, src: `${address}/coverage/${encodeURIComponent(lens.name)}.png` }),
       element("figcaption", {}, element("b", {}, `${lens.name}: ${Math.round(100 * lens.coverage)} % covered`), residualBars(lens), element("span", {}, lens.verdict))));
-    fill(way.aside, element("div", { className: "calibrated" },
+    fill(setup.aside, element("div", { className: "calibrated" },
       element("div", { className: "aside-actions" }, rig.cameras.length > 1 && button("Set the floor by clicks", startClicking, "small"),
-        proposal && lenses.length > 0 && way.detail.cameras.length > 0 && button(showsBoard ? "Show the recording" : "Show the board", () => { showsBoard = !showsBoard; drawAside(); }, "small quiet")),
+        proposal && lenses.length > 0 && setup.detail.cameras.length > 0 && button(showsBoard ? "Show the recording" : "Show the board", () => { showsBoard = !showsBoard; drawAside(); }, "small quiet")),
       rig.cameras.length > 0 && rigFromAbove(rig), element("div", { className: "pictures" }, figures),
       coverage.length > 0 && element("h2", {}, "What the board shows"), element("div", { className: "pictures" }, coverage)));
   }
 
   function draw() {
     if (gone || !view) return;
-    const tabs = element("div", { className: "ways", role: "tablist" }, Object.entries(TABS).map(([name, words]) => button(words, () => { tab = name; failed = null; draw(); }, "toggle",
+    const tabs = element("div", { className: "group", role: "tablist" }, Object.entries(TABS).map(([name, words]) => button(words, () => { tab = name; failed = null; draw(); }, "toggle",
       { role: "tab", ariaSelected: String(tab === name), ariaPressed: String(tab === name) })));
     const rig = shown();
-    fill(place, tabs, { file: fileForm, boards, used: usedForm }[tab](), progress, failure(failed), proposal && proposalBox(), rig && (proposal || rig.findings.length || !way.step?.why) && findingList(rig));
+    fill(place, tabs, { file: fileForm, boards, used: usedForm }[tab](), progress, failure(failed), proposal && proposalBox(), rig && (proposal || rig.findings.length || !setup.step?.why) && findingList(rig));
     if (!stopClicking) drawAside();
   }
 
-  way.on("calibration", hear);
+  setup.on("calibration", hear);
   load().catch((error) => {
     view = /** @type {any} */ ({ present: null, earlier: [], formats: {}, footage: [], notes: [], stale_runs: [] });
     tab = "file";

@@ -5,10 +5,10 @@ import { actions, button, check, drawProgress, element, failure, field, files, f
 import { progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 import { uploadFiles } from "./uploading.js";
-import { alignmentBox } from "./way_alignment.js";
-import { brush } from "./way_brush.js";
-import { maskPictures } from "./way_masks.js";
-import { qualityList } from "./way_quality.js";
+import { alignmentBox } from "./setup_alignment.js";
+import { brush } from "./setup_brush.js";
+import { maskPictures } from "./setup_masks.js";
+import { qualityList } from "./setup_quality.js";
 
 /** @import { Schemas } from "./api_types" */
 
@@ -24,9 +24,9 @@ const SOURCES = {
 const MISSING = { plate: "Give a picture for every camera below.", clip: "Give a clip for every camera below." };
 const FIRST = ["mask_threshold", "mask_gain_fit", "mask_shadow_test", "mask_shadow_darkest", "mask_shadow_colour", "mask_opening", "mask_closing", "mask_keep_components"];
 
-/** @param {HTMLElement} place @param {import("./way.js").Way} way */
-export function mount(place, way) {
-  const here = sessionPath(way.session);
+/** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
+export function mount(place, setup) {
+  const here = sessionPath(setup.session);
   /** @type {Schemas["BackgroundAnswer"]} */
   let background = null;
   /** @type {Schemas["BackgroundWish"]["source"]} */
@@ -47,13 +47,13 @@ export function mount(place, way) {
   const cameras = element("section", { className: "background-quality", hidden: true });
   const knobs = element("details", { className: "background-knobs" });
   place.append(make, agreement, cameras, knobs);
-  const alignment = alignmentBox(way, cameras, () => {
+  const alignment = alignmentBox(setup, cameras, () => {
     quality = null;
     drawQuality();
     pictures.show();
-    way.refresh().catch(complain);
+    setup.refresh().catch(complain);
   });
-  const pictures = maskPictures(way, paint);
+  const pictures = maskPictures(setup, paint);
 
   async function load() {
     background = await fetchJson(`${here}/background`);
@@ -142,7 +142,7 @@ export function mount(place, way) {
         changed = {};
         pictures.preview(changed);
         drawKnobs();
-        way.refresh().catch(complain);
+        setup.refresh().catch(complain);
         if (background.cameras.length > 1) alignment.measure();
       }
       drawQuality();
@@ -155,7 +155,7 @@ export function mount(place, way) {
   function drawQuality() {
     const measure = button("Measure", async () => {
       agreement.querySelector(".hint").textContent = "Comparing the masks of five frames…";
-      try { quality = await post(`${here}/masks/quality`); way.refresh().catch(complain); } catch (error) { complain(error); }
+      try { quality = await post(`${here}/masks/quality`); setup.refresh().catch(complain); } catch (error) { complain(error); }
       drawQuality();
     }, "small", { hidden: background.cameras.length < 2 });
     fill(agreement, element("div", { className: "head-line" }, element("h2", {}, "Agreement of the views"), measure), qualityList(quality, paint, background.measured));
@@ -195,7 +195,7 @@ export function mount(place, way) {
       drawKnobs();
       drawMake();
       pictures.preview(changed);
-      way.refresh().catch(complain);
+      setup.refresh().catch(complain);
     } catch (error) { complain(error); }
   }, "small");
   const reset = button("Reset", () => { changed = {}; drawKnobs(); pictures.preview(changed); }, "quiet small");
@@ -211,16 +211,16 @@ export function mount(place, way) {
 
   /** Paint what does not count of a camera, over its picture. */
   function paint(camera) {
-    const lens = way.detail.cameras.find((one) => one.name === camera);
+    const lens = setup.detail.cameras.find((one) => one.name === camera);
     const { excluded } = background.cameras.find((one) => one.name === camera);
-    brush(way, { ...lens, frame: pictures.frame, excluded }, async (saved) => {
+    brush(setup, { ...lens, frame: pictures.frame, excluded }, async (saved) => {
       if (!saved) return pictures.show();
       quality = null;
       await load().catch(complain);
       pictures.mark(background.cameras);
       pictures.show();
       drawQuality();
-      way.refresh().catch(complain);
+      setup.refresh().catch(complain);
     });
   }
 
