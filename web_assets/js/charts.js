@@ -2,7 +2,7 @@
 
 import * as echarts from "../vendor/echarts.esm.min.js";
 import { emptyLook, look } from "./chart_looks.js";
-import { drawSoon } from "./drawing.js";
+import { drawSoon } from "./pacing.js";
 import { byId } from "./elements.js";
 import { onTheme, theme } from "./theme.js";
 

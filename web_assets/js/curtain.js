@@ -1,6 +1,8 @@
-// What lies over the scene when there is nothing to look at yet, or the studio does not answer.
+// What lies over the scene: that there is nothing to look at yet, that the studio does not answer, that a frame was annealed
+// again and is shown but not stored.
 
 import { post, runPath } from "./api.js";
+import { openForm } from "./dialogs.js";
 import { bar, button, byId, element, fill } from "./elements.js";
 import { importForm } from "./importing.js";
 import { complain } from "./messages.js";
@@ -62,7 +64,25 @@ function draw() {
   if (entry && !entry.runs.length) invite(entry);
 }
 
-/** Wire the curtain. */
+function keepForm(frame) {
+  const path = runPath(get("session"), get("run"));
+  openForm({
+    heading: `Keep the new result of frame ${frame}?`, action: "Keep it", rows: [],
+    intro: "It replaces the stored one. The frames after it followed from the old result and are dropped; tracking on computes them again.",
+    send: () => post(`${path}/reanneal`, { frame, keep: true }),
+  });
+}
+
+/** A frame that was annealed again: whether it is kept is the question. */
+function drawWhatIf() {
+  const line = byId("what-if");
+  const frame = get("whatIf")?.[0].frame;
+  line.hidden = frame === undefined;
+  if (!line.hidden) fill(line, element("span", {}, `Frame ${frame} re-annealed, not stored; the stored result stays beside it in grey.`), button("Keep…", () => keepForm(frame), "small"));
+}
+
+/** Wire what lies over the scene. */
 export function startCurtain() {
   watch(["sessions", "session", "run", "work", "connected", "stranger"], draw);
+  watch(["whatIf"], drawWhatIf);
 }

@@ -3,9 +3,9 @@
 import { fetchJson, post, runPath } from "./api.js";
 import { onEvent } from "./live.js";
 import { complain } from "./messages.js";
-import { paced } from "./pace.js";
+import { paced } from "./pacing.js";
 import { dressScene } from "./scene_window.js";
-import { isWatched } from "./search_speed.js";
+import { isWatched } from "./header.js";
 import { refreshSessions } from "./sessions.js";
 import { get, set, watch } from "./state.js";
 

@@ -1,6 +1,6 @@
 // The header: which run, what the tracking process does, how far, how long still; and the buttons that command it.
 
-import { post, runPath } from "./api.js";
+import { fetchJson, post, runPath } from "./api.js";
 import { byId, element, fill } from "./elements.js";
 import { complain } from "./messages.js";
 import { get, set, watch } from "./state.js";
@@ -82,6 +82,37 @@ export function reanneal() {
   if (!byId("reanneal").disabled) command("reanneal", { frame: get("frame") });
 }
 
+// How slowly the search goes for whoever watches it. The choices and their words are the server's, the speed in use is the
+// tracking process's own.
+
+/** @type {HTMLSelectElement} */
+const speed = byId("search-speed");
+let asking = false;
+
+const speedInUse = () => String(get("work")?.seconds_a_layer ?? 0);
+const isOffered = () => [...speed.options].some((option) => option.value === speedInUse());
+
+/** Whether each layer is given time to be looked at. */
+export const isWatched = () => (get("work")?.seconds_a_layer ?? 0) > 0;
+
+async function loadSpeeds() {
+  if (asking) return;
+  asking = true;
+  try {
+    const { choices } = await fetchJson("/api/worker/pace");
+    speed.replaceChildren(...choices.map((one) => new Option(one.label, String(one.seconds_a_layer))));
+  } catch (error) { complain(error); } finally { asking = false; }
+  if (isOffered()) showSpeed();
+}
+
+/** Show the speed in use; one that is none of the choices (set by a script) becomes one. */
+function showSpeed() {
+  speed.disabled = !get("connected");
+  if (speed.disabled) return;
+  if (!isOffered()) loadSpeeds();
+  else if (speed.value !== speedInUse()) speed.value = speedInUse();
+}
+
 /** Wire the header. */
 export function startHeader() {
   byId("track-toggle").onclick = () => {
@@ -99,4 +130,6 @@ export function startHeader() {
     fill(byId("crumbs"), session && [element("b", {}, session), run && ` / ${run}`, summary && ` · ${summary.describe ?? ""}`]);
     if (session) document.title = `${session} – Capture studio`;
   });
+  speed.onchange = () => post("/api/worker/pace", { seconds_a_layer: Number(speed.value) }).catch((error) => { complain(error); showSpeed(); });
+  watch(["work", "connected"], showSpeed);
 }

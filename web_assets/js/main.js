@@ -12,7 +12,6 @@ import { startLog } from "./log.js";
 import { startPlayback } from "./playback.js";
 import { startRail } from "./rail.js";
 import { startSceneFrame } from "./scene_frame.js";
-import { startSearchSpeed } from "./search_speed.js";
 import { openSession, refreshSessions } from "./sessions.js";
 import { get } from "./state.js";
 import { startSurvival } from "./survival.js";
@@ -22,13 +21,11 @@ import { startTimeline } from "./timeline.js";
 import { startTracks } from "./tracks.js";
 import { startVariance } from "./variance.js";
 import { startWeights } from "./weights.js";
-import { startWhatIf } from "./what_if.js";
 
 async function start() {
   startTheme();
   startLive();
   startHeader();
-  startSearchSpeed();
   startRail();
   startTimeline();
   startPlayback();
@@ -41,7 +38,6 @@ async function start() {
   startTabs();
   startKeys();
   startCurtain();
-  startWhatIf();
   startData();
   startTracks();
   startCorrecting();

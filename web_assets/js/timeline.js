@@ -1,6 +1,6 @@
 // The timeline: what is tracked, weight and error over the frames, lost spans, settings changes, the cursor.
 
-import { drawSoon } from "./drawing.js";
+import { drawSoon } from "./pacing.js";
 import { byId, dotted, element, fill } from "./elements.js";
 import { say } from "./messages.js";
 import { get, set, watch } from "./state.js";

@@ -1,5 +1,4 @@
-// When the page's canvases are drawn: together, before a frame of the screen, the newest request only. However often they are
-// requested, every other frame and a pause are left to everything else, so a machine that draws slowly still answers.
+// Doing again what changes often, at a pace that leaves room for everything else.
 
 const LEAST_PAUSE_MILLISECONDS = 100;
 const LONGEST_PAUSE_MILLISECONDS = 500;
@@ -32,8 +31,28 @@ async function serve() {
   busy = false;
 }
 
-/** Call `draw` soon; requests for the same function that come before it are one. */
+/**
+ * Call `draw` soon: all drawings together, before a frame of the screen, the newest request of each only. However often they
+ * are requested, every other frame and a pause are left to everything else, so a machine that draws slowly still answers.
+ */
 export function drawSoon(draw) {
   requested.add(draw);
   if (!busy) serve();
+}
+
+/** A function that requests `work` (may be asynchronous): never twice at once, not more often than allowed, the last request always served. */
+export function paced(work, milliseconds) {
+  let wanted = false;
+  let busy = false;
+  let last = -Infinity;
+  const again = async () => {
+    if (busy || !wanted) return;
+    busy = true;
+    await pause(Math.max(0, last + milliseconds - performance.now()));
+    wanted = false;
+    last = performance.now();
+    try { await work(); } finally { busy = false; }
+    again();
+  };
+  return () => { wanted = true; again(); };
 }
