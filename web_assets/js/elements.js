@@ -109,10 +109,23 @@ export const text = (properties = {}) => element("input", { type: "text", ...pro
 /** A number of 0 or more. @param {Properties} [properties] */
 export const number = (value, properties = {}) => element("input", { type: "number", value, step: "any", min: 0, ...properties });
 /** A choice. @param {([string, string] | string)[]} options values with their words, or words alone @param {Properties} [properties] */
-export const select = (options, value = undefined, properties = {}) => element("select", properties, options.map((one) => {
-  const [own, words] = Array.isArray(one) ? one : [one, one];
-  return new Option(words, own, false, own === value);
-}));
+export const select = (options, value = undefined, properties = {}) => offer(element("select", properties), options, value);
+
+/** Offer other options in a choice. @param {HTMLSelectElement} choice @param {([string, string] | string)[]} options */
+export function offer(choice, options, value = undefined) {
+  choice.replaceChildren(...options.map((one) => {
+    const [own, words] = Array.isArray(one) ? one : [one, one];
+    return new Option(words, own, false, own === value);
+  }));
+  return choice;
+}
+
+/** Let the browser keep bytes as a file. */
+export function download(name, content) {
+  const link = element("a", { href: URL.createObjectURL(content), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
 /** Files to be uploaded; `folder`: a whole one. @param {Properties} [properties] */
 export function files({ folder = false, ...properties } = {}) {
   const made = element("input", { type: "file", ...properties });

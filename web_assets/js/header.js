@@ -1,7 +1,7 @@
 // The header: which run, what the tracking process does, how far, how long still; and the buttons that command it.
 
 import { fetchJson, post, runPath } from "./api.js";
-import { byId, element, fill } from "./elements.js";
+import { byId, element, fill, offer } from "./elements.js";
 import { complain } from "./messages.js";
 import { get, set, watch } from "./state.js";
 
@@ -100,7 +100,7 @@ async function loadSpeeds() {
   asking = true;
   try {
     const { choices } = await fetchJson("/api/worker/pace");
-    speed.replaceChildren(...choices.map((one) => new Option(one.label, String(one.seconds_a_layer))));
+    offer(speed, choices.map((one) => [String(one.seconds_a_layer), one.label]));
   } catch (error) { complain(error); } finally { asking = false; }
   if (isOffered()) showSpeed();
 }

@@ -2,7 +2,7 @@
 
 import { fetchJson, post, runPath, sessionPath } from "./api.js";
 import { openForm } from "./dialogs.js";
-import { byId, dotted } from "./elements.js";
+import { byId, dotted, offer } from "./elements.js";
 import { openSession, refreshSessions } from "./sessions.js";
 import { findStartPose, sayFound } from "./start_pose.js";
 import { set } from "./state.js";
@@ -63,7 +63,7 @@ export async function newRunForm(entry, like = null) {
       if (["tracker", "weighting"].includes(name)) {
         knobs = await knobsOf(tracker.value, weighting.value);
         const before = preset.value;
-        preset.replaceChildren(...presetChoices(presets, knobs).map((one) => new Option(one.label, one.value, false, one.value === before)));
+        offer(preset, presetChoices(presets, knobs).map((one) => [one.value, one.label]), before);
       }
       showBehaviour(form, knobs, trackers);
     },

@@ -1,7 +1,7 @@
 // Live cameras: which, what they show now, how far apart their pictures come; record them, or track what they see.
 
 import { fetchJson, post } from "./api.js";
-import { button, byId, card, check, dotted, element, failure, field, fill, number, pageHead, text } from "./elements.js";
+import { button, byId, card, check, dotted, element, failure, field, fill, number, offer, pageHead, text } from "./elements.js";
 import { complain } from "./messages.js";
 import { sessionWords, studioPath } from "./sessions.js";
 import { startTheme } from "./theme.js";
@@ -157,7 +157,7 @@ async function look() {
 async function start() {
   startTheme();
   const { sessions } = await fetchJson("/api/sessions");
-  session.replaceChildren(...sessions.filter((one) => one.cameras && !one.problem).map((one) => new Option(sessionWords(one), one.name)));
+  offer(session, sessions.filter((one) => one.cameras && !one.problem).map((one) => [one.name, sessionWords(one)]));
   session.value = new URLSearchParams(location.search).get("session") ?? session.value;
   const taken = new Set(sessions.map((one) => one.name));
   let free = 1;

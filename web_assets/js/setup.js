@@ -6,7 +6,7 @@
 
 import { fetchJson, post, sessionPath } from "./api.js";
 import { closeDialog, openForm } from "./dialogs.js";
-import { actions, button, byId, element, failure, fill, lead, NAME, nothing, notice, spring } from "./elements.js";
+import { actions, button, byId, element, failure, fill, lead, NAME, nothing, notice, offer, spring } from "./elements.js";
 import { listen, startEvents } from "./events.js";
 import { complain } from "./messages.js";
 import { loadScene } from "./scene_window.js";
@@ -145,7 +145,7 @@ async function open(name, wanted = "") {
 /** The sessions of the workspace in the bar's list; which there are. */
 async function drawSessions() {
   const { sessions } = await fetchJson("/api/sessions");
-  which.replaceChildren(...sessions.map((one) => new Option(sessionWords(one), one.name, false, one.name === session)));
+  offer(which, sessions.map((one) => [one.name, sessionWords(one)]), session);
   which.hidden = !sessions.length;
   return sessions.map((one) => one.name);
 }

@@ -3,7 +3,7 @@
 import { accepted, fetchJson, post, remove, sessionPath } from "./api.js";
 import { findingList, plainNumbers, residualBars, rigFromAbove } from "./calibration_drawing.js";
 import { clickFloor } from "./calibration_points.js";
-import { actions, button, check, dotted, drawProgress, element, failure, field, files, fill, hint, notice, optional, picture, select, text } from "./elements.js";
+import { actions, button, check, dotted, download, drawProgress, element, failure, field, files, fill, hint, notice, optional, picture, select, text } from "./elements.js";
 import { timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 import { uploadFiles } from "./uploading.js";
@@ -101,12 +101,10 @@ export function mount(place, setup) {
     draw();
   }
 
-  async function download(format) {
+  async function save(format) {
     const answer = await accepted(await fetch(`${here}/export?format=${format}`));
     const name = answer.headers.get("content-disposition").match(/filename="([^"]+)"/)[1];
-    const link = element("a", { href: URL.createObjectURL(await answer.blob()), download: name });
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    download(name, await answer.blob());
     const notes = decodeURIComponent(answer.headers.get("x-studio-notes") ?? "");
     failed = notes ? { message: notes } : null;
     if (notes) draw();
@@ -121,7 +119,7 @@ export function mount(place, setup) {
     return [
       element("p", {}, element("b", {}, present.source || "imported with the footage"), changed && element("span", { className: "quiet-text" }, ` · since ${new Date(changed).toLocaleString()}`)),
       ...notes.map((note) => notice(note)), !notes.length && stale.length > 0 && notice(`Tracked with another calibration: ${stale.join(", ")}.`),
-      row("Export for other tools", format, button("Download", () => download(format.value).catch(complain))),
+      row("Export for other tools", format, button("Download", () => save(format.value).catch(complain))),
       earlier.length > 0 && row("Earlier ones", back, button("Look at it", () => propose(() => post(`${here}/proposals`, { earlier: back.value })))),
     ];
   }

@@ -1,22 +1,16 @@
 // The tabs under the timeline: one panel at a time, each with its tools; all of it can be folded away.
 
 import { cameraTools } from "./cameras.js";
-import { button, byId, fill } from "./elements.js";
+import { button, byId, download, fill } from "./elements.js";
 import { get } from "./state.js";
 import { varianceCsv } from "./variance.js";
-
-function download(name, text) {
-  const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(new Blob([text], { type: "text/csv" })), download: name });
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-}
 
 function toolsOf(panel) {
   if (panel === "cameras") return cameraTools();
   if (panel !== "variance") return [];
   return [button("CSV", () => {
     const detail = get("detail");
-    if (detail) download(`${get("session")}-${get("run")}-frame${detail.frame}-variance.csv`, varianceCsv(detail, get("whatIf") ?? detail.layers));
+    if (detail) download(`${get("session")}-${get("run")}-frame${detail.frame}-variance.csv`, new Blob([varianceCsv(detail, get("whatIf") ?? detail.layers)], { type: "text/csv" }));
   }, "quiet small", { title: "This frame's variances as CSV" })];
 }
 

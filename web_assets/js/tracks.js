@@ -2,7 +2,7 @@
 
 import { fetchJson, post, remove, runPath } from "./api.js";
 import { openForm, whileOpen } from "./dialogs.js";
-import { byId, NAME } from "./elements.js";
+import { byId, NAME, offer } from "./elements.js";
 import { followJob, standing } from "./jobs.js";
 import { onEvent } from "./live.js";
 import { complain, say } from "./messages.js";
@@ -25,7 +25,7 @@ async function loadTracks() {
   try {
     const { tracks } = await fetchJson(`${runPath(session, run)}/tracks`);
     if (session !== get("session") || run !== get("run")) return;
-    choice.replaceChildren(...tracks.map((track) => new Option(named(track), track.name, false, track.name === get("track"))));
+    offer(choice, tracks.map((track) => [track.name, named(track)]), get("track"));
     choice.hidden = tracks.length < 2;
     if (!tracks.some((track) => track.name === get("track"))) set({ track: RAW });
   } catch (error) { if (error.status !== 404) complain(error); }
