@@ -21,7 +21,7 @@ async function call(method, path, body, options = {}) {
   const request = { method, headers: { "x-studio-window": windowName, ...(body === undefined ? {} : { "content-type": "application/json" }) }, ...options };
   if (body !== undefined) request.body = JSON.stringify(body);
   const answer = await fetch(path, request).catch((cause) => {
-    throw cause.name === "AbortError" ? cause : fault("The studio does not answer.", "Look whether it still runs in its terminal.");
+    throw cause.name === "AbortError" ? cause : fault("The studio does not answer.", "Check in its terminal whether it still runs.");
   });
   const kind = (await accepted(answer)).headers.get("content-type") ?? "";
   const text = await answer.text();

@@ -47,7 +47,7 @@ export function showLearningForm(content, { choices, sessions, started }) {
     card("", element("div", { className: "fields" }, field("Name of the model", name), field("Body", select(choices.bodies, choices.default_body, { name: "body" })),
       field("Frames per second", number(choices.fps, { name: "fps", min: 5, max: 240, required: true })))),
     card("Learnt from", field(`Motion files (${choices.endings.join(" ")}); an .amc comes with its .asf`, motions), runRows(sessions),
-      hint("Where nothing is chosen for the test, the last fifth of each source is.")),
+      hint("If no run is chosen for the test, the last fifth of each source is used.")),
     knobGroups(choices.knobs), wrong, element("div", { className: "form-foot" }, submit, element("span", { className: "hint" }, "In the background; the studio can be used meanwhile.")));
   sends(form, submit, wrong, async (report) => {
     const request = read(form, choices.knobs);

@@ -13,7 +13,7 @@ export function walkCard(path, model) {
   const again = button("Generate", generate, "primary");
   const play = button("Pause", () => run(!playing), "", { disabled: true });
   const slider = element("input", { type: "range", min: 0, max: FRAMES - 1, value: 0, disabled: true, ariaLabel: "Frame" });
-  const words = lead("A walk from state to state by the automaton's probabilities, and the smooth movement that suits its clusters best; global position and orientation rest.");
+  const words = lead("A random walk through the automaton's states, and the smooth movement that fits its clusters best; global position and orientation stay fixed.");
   const box = card("Generated movement", element("div", { className: "walk" }, canvas, element("div", { className: "walk-side" }, words, element("div", { className: "form-foot" }, again, play), slider)));
   /** @type {import("./api_types").Schemas["GeneratedWalk"]} */
   let walk = null;

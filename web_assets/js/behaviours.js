@@ -81,7 +81,7 @@ async function show(name) {
       cards.grid, cards.more),
     walk.box,
     element("div", { className: "pair" },
-      card("What follows what", lead("One dot a cluster, as large as it is frequent; a line as strong as the transition is probable once the cluster is left. Choose a dot to see its pose."), automaton),
+      card("What follows what", lead("One dot a cluster, as large as it is frequent; a line the stronger, the more probable the transition once the cluster is left. Choose a dot to see its pose."), automaton),
       entropyCard(entropies, detail)));
   releases.push(walk.close, drawAutomaton(automaton, detail, echarts, cards.choose), cards.close);
   await drawEntropies(entropies, name);
@@ -90,7 +90,7 @@ async function show(name) {
 function entropyCard(figure, { context_lengths: lengths }) {
   const words = lengths.map((count, length) => `${count} of ${length}`).filter((_, length) => lengths[length]);
   return card("Memory and entropy",
-    lead("The automaton learnt again from four fifths of the recordings, and how many bits a frame it needs for them and for the rest. A memory is long enough where the lines end falling, too long where that of the test rises."), figure,
+    lead("The automaton learnt again from four fifths of the recordings, and how many bits a frame it needs for them and for the rest. A memory is long enough where the lines stop falling, too long where the test's rises."), figure,
     lead(`States by the length of their history, frames: ${words.join(", ")}.`));
 }
 

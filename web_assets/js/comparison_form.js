@@ -13,7 +13,7 @@ function readKnobs(text) {
   const knobs = {};
   for (const part of text.split(/[,\n]/).map((one) => one.trim()).filter(Boolean)) {
     const [name, ...rest] = part.split("=");
-    if (!name.trim() || !rest.join("=").trim()) throw fault(`“${part}” changes nothing.`, "Write knob=value, several with commas between.");
+    if (!name.trim() || !rest.join("=").trim()) throw fault(`“${part}” changes nothing.`, "Write knob=value, separate several with commas.");
     knobs[name.trim()] = rest.join("=").trim();
   }
   return knobs;

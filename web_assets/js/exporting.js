@@ -92,7 +92,7 @@ function fileLine(made) {
   const drop = button("×", () => remove(address).then(refresh).catch(complain), "icon quiet", { ariaLabel: `Delete ${made.file}`, title: "Delete this file (the run stays)" });
   const facts = (className, words) => element("p", { className }, words);
   return element("li", {}, element("div", {}, link, facts("facts", dotted(megabytes(made.bytes), made.track && `track ${made.track}`, made.frames && `${made.frames} frames`, made.checked)),
-    made.notes.map((note) => facts("facts note", note)), made.stale && facts("stale-file", `Old: ${made.stale}. Export it again.`)), drop);
+    made.notes.map((note) => facts("facts note", note)), made.stale && facts("stale-file", `Out of date: ${made.stale}. Export it again.`)), drop);
 }
 
 function fileList() {

@@ -165,7 +165,7 @@ async function start() {
   name.placeholder = `recording-${free}`;
   addRow();
   fill(byId("content"), element("div", { className: "column live-cameras" },
-    pageHead("Live cameras", "Cameras of this machine or network, recorded all at once with the time at which each picture came. Name each as its calibration does."),
+    pageHead("Live cameras", "Cameras of this machine or network, recorded together with a timestamp for every picture. Give each the name that it has in the calibration."),
     card("Cameras", rows, element("div", {}, open)), spread, grid, card("Recording", form, outcome)));
   await look();
 }

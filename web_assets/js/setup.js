@@ -28,7 +28,7 @@ import { startTheme } from "./theme.js";
 
 const STEPS = {
   footage: { name: "Footage", lead: "One video, or one folder of pictures, per camera, all of the same recording." },
-  calibration: { name: "Calibration", lead: "Where the cameras stand and how their lenses draw, and whether that is right." },
+  calibration: { name: "Calibration", lead: "Where the cameras stand and how their lenses project, and whether that is right." },
   background: { name: "Background", lead: "What of each picture is the person, and how far the views agree on it." },
   subject: { name: "Subject", lead: "The body that is tracked, and its measures." },
   "start-pose": { name: "Start pose", lead: "How the person stands in the frame where tracking begins." },

@@ -21,7 +21,7 @@ export function alignmentBox(setup, place, changed) {
   function verdict(job) {
     if (job.kept) return "The session uses the turned cameras.";
     if (!job.needed) return "The cameras agree: nothing has to be turned.";
-    return job.better ? `${job.words} Lenses and places stay as they are.` : job.words;
+    return job.better ? `${job.words} Lenses and positions stay as they are.` : job.words;
   }
 
   function turning(job) {

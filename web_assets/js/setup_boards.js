@@ -70,7 +70,7 @@ function moreFields(cameras, inputs) {
     { title: "Frame of this camera's common board footage that the others' frame 0 belongs to" })));
   return element("details", { className: "more-board", open: Boolean(inputs.open) }, element("summary", { onclick: () => { inputs.open = !inputs.open; } }, "More"), element("div", { className: "more-fields" },
     field("Lenses from", place("intrinsics", "a folder, or a calibration file"), { title: "Board footage for the lenses, a video or folder of pictures a camera; or a calibration file that has them. Instead of intrinsics/" }),
-    field("Places from", place("extrinsics", "a folder"), { title: "Board footage of all cameras at once, in step. Instead of extrinsics/" }),
+    field("Positions from", place("extrinsics", "a folder"), { title: "Synchronised board footage of all cameras at once. Instead of extrinsics/" }),
     field("Floor from pictures in", place("floorFolder", "a folder"), { title: "A picture a camera of the board that lies on the floor, face up; instead of a frame of the common footage" }),
     cameras.length > 1 && [distanceRows(cameras, inputs.distances),
       check("The board was recorded without stopping: use the session's offsets", { checked: Boolean(inputs.own), onchange: ({ target }) => { inputs.own = shifts.hidden = target.checked; } }, "Only where the board and the motion are one recording"), shifts],

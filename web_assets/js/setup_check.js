@@ -122,7 +122,7 @@ export function mount(place, setup) {
     const has = (name) => tracks.some((line) => line.name === name);
     const act = (verb, words, name) => button(words, () => begin(verb, { replace: has(name) }), "small", { disabled: Boolean(job) });
     const truth = setup.detail.has_truth;
-    fill(better, element("h2", {}, "Make it better"),
+    fill(better, element("h2", {}, "Improve the track"),
       table(["track", "jitter", ...(truth ? ["from truth"] : [])], tracks.map((line) => [
         element("td", {}, element("label", { className: "check" }, element("input", { type: "radio", name: "setup-track", value: line.name, checked: line.name === track, ariaLabel: `Look at ${line.name}`, onchange: () => choose(line.name).catch(complain) }),
           line.name === "raw" ? "raw (as searched)" : line.name), line.made_by.exchanged && hint(/** @type {any} */ (line.made_by.exchanged).join("; ")),

@@ -110,7 +110,7 @@ export function mount(place, setup) {
     };
     const disabled = going || editing;
     fill(steps, field("In frame", which),
-      hint("The frame in which tracking begins: the whole person in view, arms off the trunk if you can choose. Frames before it can be tracked backwards from it."),
+      hint("The frame in which tracking begins: the whole person in view, arms away from the trunk if you can choose. Frames before it can be tracked backwards from it."),
       editing ? editingBox() : actions(button("Find it automatically", find, pose?.stored ? "" : "primary", { disabled }), button("Edit by hand", edit, "", { disabled })), failure(failed));
     drawVerdicts();
     if (!editing) drawPictures();
@@ -125,7 +125,7 @@ export function mount(place, setup) {
   /** How sure the pose is, in words. */
   function verdict() {
     const words = [found && `Found in frame ${found.frame}, confidence ${percent(found.confidence)}.`, better && (better.gain > 0 && better.overlap !== null
-      ? `Made better: overlap with the masks ${percent(better.overlap_before)} → ${percent(better.overlap)}.` : "The search found nothing better around it.")];
+      ? `Improved: overlap with the masks ${percent(better.overlap_before)} → ${percent(better.overlap)}.` : "The search found nothing better around it.")];
     const unsure = found && isUnsure(found);
     return element("div", { className: "start-pose-verdict" }, element("p", { className: unsure ? "notice" : "" }, words.filter(Boolean).join(" ") || `The session has a start pose, of frame ${pose.frame}.`),
       unsure && notice("It may face the other way: look at left and right before you track."), found?.note && hint(found.note));

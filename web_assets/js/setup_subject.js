@@ -99,7 +99,7 @@ export function mount(place, setup) {
     /** @type {[string, string][]} */
     const runs = setup.detail.runs.filter((run) => run.done).map((run) => [run.name, `of ${run.name}`]);
     fill(fitting, element("h2", {}, "Fit the subject to the footage"),
-      hint(isReady ? "Lengths and radii are found together with the poses of a few frames, on the silhouettes. Frames without a pose are searched first, which takes longest." : "Set the height first: it is the one measure that pictures cannot show by themselves."),
+      hint(isReady ? "Lengths and radii are found together with the poses of a few frames, on the silhouettes. Frames without a pose are searched first, which takes longest." : "Set the height first: it is the one measure that the pictures alone cannot give."),
       element("div", { className: "step-row" },
         field("How many frames", number(options.count, { min: 1, max: 24, step: 1, onchange: ({ target }) => { options.count = Number(target.value) || 5; } })),
         field("or these frames", text({ value: options.frames, placeholder: "chosen for variety", pattern: "[0-9, ]*", onchange: ({ target }) => { options.frames = target.value; } }))),
@@ -149,7 +149,7 @@ export function mount(place, setup) {
   function results() {
     const frames = fit.frames.length > 1 ? `frames ${fit.frames.slice(0, -1).join(", ")} and ${fit.frames.at(-1)}` : `frame ${fit.frames[0]}`;
     return element("div", { className: "background-quality" },
-      element("p", {}, `The body covers ${percent(mean(fit.overlap))} of the silhouettes and they it (${percent(mean(fit.overlap_before))} before), in ${frames}; first poses ${fit.poses_from.startsWith("run") ? `of ${fit.poses_from}` : fit.poses_from}.`),
+      element("p", {}, `Body and silhouettes overlap by ${percent(mean(fit.overlap))} (${percent(mean(fit.overlap_before))} before), in ${frames}; first poses ${fit.poses_from.startsWith("run") ? `of ${fit.poses_from}` : fit.poses_from}.`),
       fit.file ? hint("Saved. What was there before stays beside it as subject-before.") : actions(button("Save as the subject", keep, "primary")),
       sizeTable("length"), sizeTable("radius"), hint("± is one standard deviation: two limbs in three, about, lie within it. Wrists and shoulders show least."));
   }

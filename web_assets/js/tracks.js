@@ -12,7 +12,7 @@ import { get, set, watch } from "./state.js";
 const choice = byId("track-choice");
 const RAW = "raw";
 const VERBS = {
-  refine: { action: "Refine", going: "Refining…", made: "refined", intro: "A local search on the silhouettes, frame by frame; no frame gets worse in the eyes of the run's likelihood." },
+  refine: { action: "Refine", going: "Refining…", made: "refined", intro: "A local search on the silhouettes, frame by frame; no frame gets worse by the run's own likelihood." },
   smooth: { action: "Smooth", going: "Smoothing…", made: "smoothed", intro: "A filter over time; frames that cannot be believed are left out, gaps filled and marked." },
 };
 const trackWords = (name) => (name === RAW ? "as searched" : name);

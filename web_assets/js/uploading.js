@@ -28,7 +28,7 @@ async function sendFile(identifier, file, path, arrived, signal) {
     } catch (cause) {
       failures += 1;
       if (cause.name === "AbortError") throw cause;
-      if (failures === TRIES) throw fault(`The upload of ${path} broke off.`, "Look whether the studio still runs, and try again.");
+      if (failures === TRIES) throw fault(`The upload of ${path} broke off.`, "Check whether the studio still runs, and try again.");
       await pause(PAUSE_MILLISECONDS * failures);
       offset = await arrivedOf(identifier, path).catch(() => 0);
       continue;
