@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Locator, expect
+from playwright.sync_api import Browser, Locator
 from scene_wire import until
 from studio_page import StudioPage
 from studio_server import StudioServer
@@ -157,7 +157,7 @@ def test_a_run_is_renamed_and_deleted(imported: StudioPage) -> None:
     page, studio = imported.page, imported.studio
     studio.post("/api/sessions/arm/runs", {"name": "spare", "last": 2})
     row = page.locator('.run[data-key="arm/spare"]')
-    expect(row.locator(".figure")).to_have_text("0/2")
+    assert row.locator(".figure").inner_text() == "0/2"
     row.click()
     imported.until("get('run') === 'spare'")
     row.hover()
