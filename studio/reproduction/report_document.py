@@ -14,7 +14,7 @@ from studio.errors import StudioError
 from studio.runs.colour_tokens import tokens_file
 
 # Each may import those before it.
-MODULES = ("findings_options.js", "findings_charts.js", "findings.js")
+MODULES = ("elements.js", "chart_looks.js", "findings_options.js", "findings_charts.js", "findings.js")
 ECHARTS = "vendor/echarts.esm.min.js"
 TYPE = "vendor/inter.woff2"
 

@@ -5,41 +5,33 @@ from dataclasses import dataclass
 from fastapi import APIRouter
 from starlette.responses import HTMLResponse
 
-from studio.web.pages import NAME, html_page
+from studio.web.pages import NAME, PLACES, html_page
 
 router = APIRouter(tags=["page"], include_in_schema=False)
 
 TEMPLATE = "document.html"
 RAIL = (
-    '<nav class="rail" aria-label="{title}">\n    <div class="rail-head">\n      <h2>{title}</h2>\n      {button}'
-    '\n    </div>\n    <div class="entries" id="entries"></div>\n  </nav>'
+    '<nav class="rail" aria-label="{title}">\n    <div class="rail-head">\n      <h2>{title}</h2>\n      '
+    '<button class="quiet small" id="new">+ New</button>\n    </div>'
+    '\n    <div class="entries" id="entries"></div>\n  </nav>'
 )
-NEW = '<button class="quiet small" id="new">+ New</button>'
 
 
 @dataclass(frozen=True, slots=True)
 class DocumentPage:
-    """A page. name : its address and its module. rail : whether it has a list at the left; new : and a button that
-    makes something.
+    """A page. name : its address and its module. rail : whether it has a list at the left, and a button that makes
+    something.
     """
 
     name: str
-    title: str
     rail: bool = False
-    new: bool = False
 
 
 PAGES = (
-    DocumentPage("comparisons", "Comparisons", rail=True, new=True),
-    DocumentPage("behaviours", "Behaviours", rail=True, new=True),
-    DocumentPage("recording", "Live cameras"),
-    DocumentPage("reports", "Reports"),
-)
-PLACES = (
-    ("/", "Studio"),
-    ("/way", "Guided way"),
-    *((f"/{page.name}", page.title) for page in PAGES),
-    ("/guide", "Guide"),
+    DocumentPage("comparisons", rail=True),
+    DocumentPage("behaviours", rail=True),
+    DocumentPage("recording"),
+    DocumentPage("reports"),
 )
 
 
@@ -69,17 +61,11 @@ def reports_page() -> HTMLResponse:
 
 def _answer(name: str) -> HTMLResponse:
     page = next(page for page in PAGES if page.name == name)
+    title = PLACES[f"/{name}"]
     own = {
-        "title": f"{page.title} · {NAME}",
-        "module": page.name,
+        "title": f"{title} · {NAME}",
+        "module": name,
         "columns": "" if page.rail else "wide",
-        "places": "".join(_link(address, title, page) for address, title in PLACES),
-        "rail": RAIL.format(title=page.title, button=NEW if page.new else "") if page.rail else "",
+        "rail": RAIL.format(title=title) if page.rail else "",
     }
-    return html_page(TEMPLATE, own)
-
-
-def _link(address: str, title: str, page: DocumentPage) -> str:
-    """A place in the bar, marked where it is the page itself."""
-    mark = ' aria-current="page"' if address == f"/{page.name}" else ""
-    return f'<a href="{address}"{mark}>{title}</a>'
+    return html_page(TEMPLATE, f"/{name}", own)

@@ -16,7 +16,7 @@ from studio.tracking.catalogue import TRACKERS
 from studio.tracking.frame_refinement import FrameRefinementSettings
 from studio.tracking.recovery_settings import RecoverySettings
 from studio.training.oversampling import OversamplingSettings
-from studio.web.pages import assets_folder
+from studio.web.pages import NAME, assets_folder, page_text
 from studio.weighting.catalogue import WEIGHTINGS
 
 router = APIRouter(tags=["page"], include_in_schema=False)
@@ -24,16 +24,6 @@ router = APIRouter(tags=["page"], include_in_schema=False)
 PLACE_OF_KNOBS = "{{knobs}}"
 # The summary.md of a full `studio reproduce all`, as it was written.
 PLACE_OF_SUMMARY, SUMMARY = "{{reproduction}}", "reproduction.md"
-PAGE = (
-    '<!doctype html>\n<html lang="en">\n<head><meta charset="utf-8"><title>{title} · Capture studio</title>\n'
-    '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-    '<link rel="icon" href="/assets/icon.svg" type="image/svg+xml">\n'
-    '<link rel="stylesheet" href="/assets/tokens.css"><link rel="stylesheet" href="/assets/page.css">\n'
-    '<link rel="stylesheet" href="/assets/guide.css">\n'
-    '<script type="module" src="/assets/js/guide.js"></script></head>\n'
-    '<body class="guide"><nav class="contents" aria-label="Contents">{contents}</nav>\n'
-    "<main>{content}</main></body></html>"
-)
 COLUMNS = ("Name", "What it does", "Range", "Default", "Unit", "Takes effect")
 
 
@@ -74,8 +64,8 @@ def rendered(name: str, title: str) -> str:
     content = markdown.renderer.render(tokens, markdown.options, {}).replace("&lt;br&gt;", "<br>")
     if PLACE_OF_KNOBS in text:
         content = content.replace(f"<p>{PLACE_OF_KNOBS}</p>", all_knob_tables())
-    page = PAGE.replace("{title}", title).replace("{contents}", "".join(contents))
-    return page.replace("{content}", content)
+    own = {"title": f"{title} · {NAME}", "contents": "".join(contents), "content": content}
+    return page_text("guide.html", "/guide", own)
 
 
 def anchor_of(heading: str) -> str:

@@ -36,7 +36,7 @@ class PreferencesError(StudioError):
 @router.get("/", include_in_schema=False)
 def page() -> Response:
     """The studio's page."""
-    return html_page("index.html", {"title": NAME})
+    return html_page("index.html", "/", {"title": NAME})
 
 
 @router.get("/api/preferences")

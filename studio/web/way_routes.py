@@ -14,7 +14,7 @@ from studio.sessions.workspace import begin_session
 from studio.tracking.catalogue import knobs_for_evaluations
 from studio.web.doors import Door, Doors
 from studio.web.job_kinds import BACKGROUND, EXPORT, START_POSE, SUBJECT, TRACK
-from studio.web.pages import NAME, html_page
+from studio.web.pages import NAME, PLACES, html_page
 from studio.web.schemas import NewName
 from studio.web.session_routes import OpenSession
 from studio.web.way_schemas import NewSession, WayAnswer
@@ -24,8 +24,8 @@ router = APIRouter(tags=["way"])
 
 @router.get("/way", include_in_schema=False)
 def page() -> Response:
-    """The page of the guided way."""
-    return html_page("way.html", {"title": f"Guided way · {NAME}"})
+    """The page of the guided set-up."""
+    return html_page("setup.html", "/way", {"title": f"{PLACES['/way']} · {NAME}"})
 
 
 @router.post("/api/sessions", status_code=201)

@@ -33,9 +33,9 @@ def chromium(playwright: Playwright) -> str:
     return found or own
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
-    """Chromium, drawing in software."""
+    """Chromium, drawing in software: one for all files, each window in a context of its own."""
     with sync_playwright() as playwright:
         launched = playwright.chromium.launch(
             executable_path=chromium(playwright), headless=True, args=ARGUMENTS

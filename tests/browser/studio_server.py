@@ -105,7 +105,7 @@ class StudioServer:
         )
         self.process.send_signal(signal.SIGINT)
         try:
-            self.process.wait(30.0)
+            self.process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()

@@ -59,6 +59,9 @@ def test_a_model_is_learnt_from_a_file_and_opens(window: StudioPage, artefacts: 
     (model,) = window.studio.get("/api/behaviours")["models"]
     assert (model["name"], model["memory"], model["sources"]) == ("sway", 3, ["sway"])
     shoot(window, artefacts, "model")
+    page.get_by_role("button", name="Generate").click()
+    for label in ("Pause", "Play", "Pause"):
+        page.get_by_role("button", name=label, exact=True).click()
 
 
 def test_it_gets_another_name_goes_and_comes_back(window: StudioPage) -> None:

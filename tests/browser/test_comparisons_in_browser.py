@@ -127,7 +127,7 @@ def test_a_small_one_is_shown_when_it_is_done(idle: StudioPage) -> None:
     form.get_by_text("6 trials of 10 frames").wait_for()
     form.get_by_role("button", name="Compare", exact=True).click()
     page.get_by_role("heading", name="annealed:mine, swarm, condensation on walk").wait_for()
-    page.get_by_role("heading", name="Who is nearer").wait_for(timeout=120_000)
+    page.get_by_role("heading", name="Which is nearer").wait_for(timeout=120_000)
     told = window.studio.get(FIRST)
     assert told["comparison"]["status"] == "finished"
     assert told["settings"]["annealed:mine"]["survival"] == 0.4
@@ -180,7 +180,7 @@ def test_it_is_listed_with_its_session_thrown_away_and_restored(window: StudioPa
     page.get_by_role("link", name="Studio", exact=True).click()
     window.until("get('session') === 'walk'")
     page.get_by_role("link", name="2 comparisons").click()
-    page.get_by_role("heading", name="Who is nearer").wait_for()
+    page.get_by_role("heading", name="Which is nearer").wait_for()
     page.get_by_role("button", name="Delete…", exact=True).click()
     page.locator("dialog form").get_by_role("button", name="Delete", exact=True).click()
     page.get_by_role("heading", name="annealed, swarm, condensation on walk").wait_for()
@@ -188,7 +188,7 @@ def test_it_is_listed_with_its_session_thrown_away_and_restored(window: StudioPa
     page.get_by_role("link", name="Studio", exact=True).click()
     line = page.locator("#trash-line")
     window.choose(line.get_by_role("button", name="Restore…", exact=True), "walk / small (comparison)")
-    page.get_by_role("heading", name="Who is nearer").wait_for()
+    page.get_by_role("heading", name="Which is nearer").wait_for()
 
 
 def test_reports_are_empty_until_something_was_reproduced(

@@ -32,7 +32,9 @@ def studio(tmp_path: Path) -> Iterator[StudioServer]:
 def test_a_killed_process_is_said_and_the_run_resumes_bit_for_bit(
     browser: Browser, studio: StudioServer, artefacts: Path
 ) -> None:
-    window = StudioPage(browser, studio, open_at=f"{studio.address}&session=walk&run=broken")
+    window = StudioPage(
+        browser, studio, open_at=f"{studio.address}&session=walk&run=broken", with_scene=False
+    )
     window.until("get('run') === 'broken' && get('connected') === true && get('summary') !== null")
     studio.pace(PACE)
     window.page.click("#track-toggle")
@@ -42,7 +44,7 @@ def test_a_killed_process_is_said_and_the_run_resumes_bit_for_bit(
     window.until("get('work').state === 'lost'")
     card = window.page.locator("#curtain .card")
     card.get_by_role("heading", name="The tracking process ended").wait_for()
-    assert "worker lost" in window.page.locator("#state-text").inner_text()
+    assert "tracking process lost" in window.page.locator("#state-text").inner_text()
     done = len(studio.get(f"{RUNS}/broken/frames")["frames"])
     assert 2 <= done < FRAMES
     window.shoot(artefacts / "page-worker-lost-dark-1280x800.png")

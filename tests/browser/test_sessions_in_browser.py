@@ -157,6 +157,7 @@ def test_a_run_is_renamed_and_deleted(imported: StudioPage) -> None:
     page, studio = imported.page, imported.studio
     studio.post("/api/sessions/arm/runs", {"name": "spare", "last": 2})
     row = page.locator('.run[data-key="arm/spare"]')
+    assert row.locator(".figure").inner_text() == "0/2"
     row.click()
     imported.until("get('run') === 'spare'")
     row.hover()
@@ -177,7 +178,7 @@ def test_a_studio_that_is_gone_is_said_and_the_last_state_stays(
 ) -> None:
     studio = StudioServer("serve", tmp_path / "workspace", footage)
     studio.post("/api/samples", {"name": "walk"})
-    window = StudioPage(browser, studio)
+    window = StudioPage(browser, studio, with_scene=False)
     window.until("get('connected') === true && get('session') === 'walk'")
     studio.stop()
     window.until("get('connected') === false")

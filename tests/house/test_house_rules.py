@@ -26,6 +26,9 @@ def test_no_committed_file_names_an_address_to_download_from_or_a_machine() -> N
     lock = (ROOT / "requirements.lock").read_text()
     assert "://" not in lock
     assert "--hash=sha256:" in lock
+    tools = (ROOT / "package-lock.json").read_text()
+    assert '"integrity": "sha512-' in tools
+    assert '"resolved"' not in tools
     for name in listed.split():
         path = ROOT / name
         if (

@@ -2,7 +2,6 @@
 
 import dataclasses
 import itertools
-import re
 from importlib import resources
 
 import numpy as np
@@ -204,9 +203,8 @@ def test_a_body_of_the_workspaces_own_is_found(learnt: Studio, model: BehaviourM
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_every_page_marks_its_own_place(studio: Studio, page) -> None:
+def test_every_page_has_its_module_and_its_list(studio: Studio, page) -> None:
     text = studio.client.get(f"/{page.name}").text
     assert "{{" not in text
-    assert re.findall(r'<a href="([^"]+)" aria-current="page">', text) == [f"/{page.name}"]
     assert f"/assets/js/{page.name}.js" in text
     assert ('id="entries"' in text) == page.rail

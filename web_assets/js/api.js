@@ -1,34 +1,47 @@
 // The JSON API. Errors carry the server's cause and remedy; every call names the window, whose scene it may concern.
+// What an address takes and answers is known from the API's own description (api_types.d.ts).
 
 import { windowName } from "./window.js";
 
+/** @import { Address, Answer, Body } from "./api_types" */
+
+/** An error that says what to do. */
+export const fault = (message, hint = "", more = {}) => Object.assign(new Error(message), { hint, ...more });
+
+/** An answer, or the error that it says. */
+export async function accepted(answer) {
+  if (answer.ok) return answer;
+  const { message = `The studio answered ${answer.status}.`, hint = "" } = await answer.json().catch(() => ({}));
+  throw fault(message, hint, { status: answer.status });
+}
+
+/** @param {RequestInit} [options] */
 async function call(method, path, body, options = {}) {
-  const request = { method, headers: { "x-studio-window": windowName }, ...options };
-  if (body !== undefined) {
-    request.body = JSON.stringify(body);
-    request.headers["content-type"] = "application/json";
-  }
-  let answer;
-  try {
-    answer = await fetch(path, request);
-  } catch (cause) {
-    if (cause.name === "AbortError") throw cause;
-    throw Object.assign(new Error("The studio does not answer."), { hint: "Look whether it still runs in its terminal." });
-  }
-  if (!answer.ok) {
-    const told = await answer.json().catch(() => ({}));
-    throw Object.assign(new Error(told.message ?? `The studio answered ${answer.status}.`), { hint: told.hint ?? "", status: answer.status });
-  }
-  const kind = answer.headers.get("content-type") ?? "";
+  /** @type {RequestInit} */
+  const request = { method, headers: { "x-studio-window": windowName, ...(body === undefined ? {} : { "content-type": "application/json" }) }, ...options };
+  if (body !== undefined) request.body = JSON.stringify(body);
+  const answer = await fetch(path, request).catch((cause) => {
+    throw cause.name === "AbortError" ? cause : fault("The studio does not answer.", "Check in its terminal whether it still runs.");
+  });
+  const kind = (await accepted(answer)).headers.get("content-type") ?? "";
   const text = await answer.text();
   return kind.includes("json") && text ? JSON.parse(text) : text;
 }
 
+/** @type {<const P extends string>(path: Address<P, "get">, options?: RequestInit) => Promise<Answer<P, "get">>} */
 export const fetchJson = (path, options) => call("GET", path, undefined, options);
-export const post = (path, body = {}) => call("POST", path, body);
-export const put = (path, body) => (body instanceof Blob || typeof body === "string" ? call("PUT", path, undefined, { body }) : call("PUT", path, body));
+/** @type {<const P extends string>(path: Address<P, "post">, body?: Body<P, "post">) => Promise<Answer<P, "post">>} */
+export const post = (path, body) => call("POST", path, body ?? {});
+/** @type {<const P extends string>(path: Address<P, "put">, body: Body<P, "put">) => Promise<Answer<P, "put">>} */
+export const put = (path, body) => call("PUT", path, body);
+/** @type {<const P extends string>(path: Address<P, "patch">, body: Body<P, "patch">) => Promise<Answer<P, "patch">>} */
 export const patch = (path, body) => call("PATCH", path, body);
+/** @type {<const P extends string>(path: Address<P, "delete">) => Promise<Answer<P, "delete">>} */
 export const remove = (path) => call("DELETE", path);
+/** Send bytes as they are. */
+export const putBytes = (path, bytes) => call("PUT", path, undefined, { body: bytes });
 
-export const runPath = (session, run) => `/api/sessions/${encodeURIComponent(session)}/runs/${encodeURIComponent(run)}`;
+/** @returns {`/api/sessions/${string}`} */
 export const sessionPath = (session) => `/api/sessions/${encodeURIComponent(session)}`;
+/** @returns {`/api/sessions/${string}/runs/${string}`} */
+export const runPath = (session, run) => `/api/sessions/${encodeURIComponent(session)}/runs/${encodeURIComponent(run)}`;

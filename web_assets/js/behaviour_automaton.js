@@ -1,5 +1,6 @@
 // Which cluster follows which, as dots and lines.
 
+import { look, tooltip } from "./chart_looks.js";
 import { onTheme, token } from "./theme.js";
 
 const LARGEST = 34;
@@ -12,14 +13,12 @@ export function drawAutomaton(box, { clusters, transitions }, echarts, choose) {
   const most = Math.max(...clusters.map((cluster) => cluster.share));
   const strongest = [...transitions].sort((one, two) => two.probability - one.probability).slice(0, SHOWN_LINES);
   const draw = () => chart.setOption({
-    animation: false,
-    textStyle: { fontFamily: "Inter, system-ui, sans-serif" },
-    tooltip: {
-      backgroundColor: token("surface-raised"), borderColor: token("line-strong"), textStyle: { color: token("text"), fontSize: 12 },
+    ...look(),
+    tooltip: tooltip({
       formatter: ({ dataType, data }) => (dataType === "edge"
         ? `${data.source} → ${data.target}: ${Math.round(100 * data.value)} %`
         : `cluster ${data.name}: ${(100 * data.value).toFixed(1)} % of the time`),
-    },
+    }),
     series: [{
       type: "graph", layout: "circular", circular: { rotateLabel: false }, roam: false, top: 24, bottom: 24,
       label: { show: clusters.length <= 48, color: token("text"), fontSize: 10, position: "inside" },

@@ -2,21 +2,20 @@
 
 import { fetchJson } from "./api.js";
 import { BodyDrawing } from "./body_drawing.js";
-import { element } from "./elements.js";
+import { button, card, element, lead } from "./elements.js";
 import { complain } from "./messages.js";
 
 const FRAMES = 600;
 
-/** The card that generates and plays. Returns {box, close}. */
-export function walkCard(path, told) {
+/** The card that generates and plays. Returns {box, close}. @param {`/api/behaviours/${string}`} path */
+export function walkCard(path, model) {
   const canvas = element("canvas", { role: "img", ariaLabel: "The generated movement" });
-  const again = element("button", { type: "button", className: "primary", textContent: "Generate" });
-  const play = element("button", { type: "button", textContent: "Pause", disabled: true });
+  const again = button("Generate", generate, "primary");
+  const play = button("Pause", () => run(!playing), "", { disabled: true });
   const slider = element("input", { type: "range", min: 0, max: FRAMES - 1, value: 0, disabled: true, ariaLabel: "Frame" });
-  const words = element("p", { className: "lead", textContent: "A walk from state to state by the automaton's probabilities, and the smooth movement that suits its clusters best; global position and orientation rest." });
-  const box = element("section", { className: "card-box" }, element("h2", { textContent: "Generated movement" }),
-    element("div", { className: "walk" }, canvas, element("div", { className: "walk-side" }, words,
-      element("div", { className: "form-foot" }, again, play), slider)));
+  const words = lead("A random walk through the automaton's states, and the smooth movement that fits its clusters best; global position and orientation stay fixed.");
+  const box = card("Generated movement", element("div", { className: "walk" }, canvas, element("div", { className: "walk-side" }, words, element("div", { className: "form-foot" }, again, play), slider)));
+  /** @type {import("./api_types").Schemas["GeneratedWalk"]} */
   let walk = null;
   let drawing = null;
   let frame = 0;
@@ -27,7 +26,7 @@ export function walkCard(path, told) {
 
   const show = () => {
     drawing.show(walk.frames[frame]);
-    slider.value = frame;
+    slider.value = String(frame);
     const history = walk.histories[frame];
     words.textContent = `Seed ${walk.seed}, frame ${frame} of ${walk.frames.length} (${(frame / walk.fps).toFixed(1)} s): cluster ${walk.clusters[frame]}, `
       + `predicted from ${history.length === 1 ? "the last frame" : `the last ${history.length} frames`}.`;
@@ -48,21 +47,19 @@ export function walkCard(path, told) {
     last = performance.now();
     if (on) requestAnimationFrame(step);
   };
-  again.onclick = async () => {
-    again.disabled = true;
+  async function generate() {
     try {
       walk = await fetchJson(`${path}/walk?frames=${FRAMES}&seed=${seed}`);
       seed += 1;
       frame = 0;
       drawing?.close();
-      drawing = new BodyDrawing(canvas, told.limbs, walk.frames.flat());
-      [play.disabled, slider.disabled] = [false, false];
+      drawing = new BodyDrawing(canvas, model.limbs, walk.frames.flat());
+      play.disabled = slider.disabled = false;
       again.textContent = "Another one";
       show();
       run(true);
-    } catch (error) { complain(error); } finally { again.disabled = false; }
-  };
-  play.onclick = () => run(!playing);
+    } catch (error) { complain(error); }
+  }
   slider.oninput = () => { run(false); frame = Number(slider.value); show(); };
   return { box, close: () => { closed = true; drawing?.close(); } };
 }

@@ -1,9 +1,8 @@
 // What a calibration says, drawn: the cameras from above, findings, residuals.
 
-import { element } from "./elements.js";
+import { element, shape } from "./elements.js";
 import { seriesColour, token } from "./theme.js";
 
-const NS = "http://www.w3.org/2000/svg";
 const PERSON_MM = 250;
 const STEPS = [100, 250, 500, 1000, 2000, 5000, 10000, 20000, 50000];
 const ARROW = 16;
@@ -11,13 +10,6 @@ const side = (across) => (Math.abs(across) < 0.4 ? "middle" : across < 0 ? "star
 
 /** A number with digits after the point; "–" for none. */
 export const plainNumbers = (value, digits = 1) => (value === null || value === undefined ? "–" : value.toFixed(digits));
-
-function shape(name, attributes, ...children) {
-  const made = document.createElementNS(NS, name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  made.append(...children);
-  return made;
-}
 
 /** The cameras seen from above: where they look, how high they stand, the axes, a person for scale. */
 export function rigFromAbove(rig) {
@@ -44,8 +36,8 @@ export function rigFromAbove(rig) {
     const [ux, uy] = flat > 0.05 ? [fx / flat, fy / flat] : [0, 0];
     const half = Math.atan(camera.width / 2 / camera.focal_px[0]);
     const ray = (turn) => `${x + 34 * (ux * Math.cos(turn) - uy * Math.sin(turn))},${y + 34 * (ux * Math.sin(turn) + uy * Math.cos(turn))}`;
-    const told = shape("title", {}, `${camera.name}: ${(camera.position[2] / 1000).toFixed(2)} m over the floor`);
-    return [shape("polygon", { points: `${x},${y} ${ray(-half)} ${ray(half)}`, fill: seriesColour(index), "fill-opacity": 0.28, stroke: seriesColour(index) }, told),
+    const title = shape("title", {}, `${camera.name}: ${(camera.position[2] / 1000).toFixed(2)} m over the floor`);
+    return [shape("polygon", { points: `${x},${y} ${ray(-half)} ${ray(half)}`, fill: seriesColour(index), "fill-opacity": 0.28, stroke: seriesColour(index) }, title),
       shape("circle", { cx: x, cy: y, r: 4, fill: seriesColour(index) }),
       shape("text", { x: x - ux * 10, y: y - uy * ARROW, "text-anchor": side(ux), class: "name" }, camera.name),
       shape("text", { x: x - ux * 10, y: y - uy * ARROW + 12, "text-anchor": side(ux), class: "quiet" }, `${(camera.position[2] / 1000).toFixed(2)} m high`)];
@@ -55,18 +47,15 @@ export function rigFromAbove(rig) {
   const bar = [shape("line", { x1: 14, x2: 14 + step * scale, y1: height - 12, y2: height - 12, class: "bar" }), shape("text", { x: 14, y: height - 18, class: "quiet" }, step >= 1000 ? `${step / 1000} m` : `${step} mm`)];
   const drawn = shape("svg", { viewBox: `0 0 ${width} ${height}`, class: "rig", role: "img", "aria-label": `${rig.cameras.length} cameras from above` },
     ...lines, ...person, ...axis(30, 0, "X", "x"), ...axis(0, -30, "Y", "y"), ...cameras, ...bar);
-  return element("figure", { className: "picture rig-picture" }, drawn, element("figcaption", {}, element("b", { textContent: "From above" }),
+  return element("figure", { className: "picture rig-picture" }, drawn, element("figcaption", {}, element("b", {}, "From above"),
     `${rig.floor ? `Floor: ${rig.floor}. ` : ""}The shape at the origin is a person's shoulders and head.`));
 }
 
-/** What speaks against a calibration, what blocks first, each with its remedy. */
-export function findingList(rig) {
-  if (!rig.findings.length) return element("p", { className: "all-well", textContent: "✓ Nothing speaks against this calibration." });
-  return element("ul", { className: "findings" }, ...rig.findings.map((one) => {
-    const row = element("li", { className: one.severity }, element("b", { textContent: one.severity === "blocks" ? "Wrong" : "Doubtful" }), element("p", { textContent: one.message }), element("p", { className: "remedy", textContent: one.remedy }));
-    row.dataset.code = one.code;
-    return row;
-  }));
+/** What speaks against a calibration, what blocks first, each with its remedy. @param {{ findings?: any[] }} what */
+export function findingList({ findings }) {
+  if (!findings.length) return element("p", { className: "all-well" }, "✓ Nothing speaks against this calibration.");
+  return element("ul", { className: "findings" }, findings.map((one) => element("li", { className: one.severity, dataset: { code: one.code } },
+    element("b", {}, one.severity === "blocks" ? "Wrong" : "Doubtful"), element("p", {}, one.message), element("p", { className: "remedy" }, one.remedy))));
 }
 
 /** A bar a picture: pixels that its corners are off; those left out are red. */

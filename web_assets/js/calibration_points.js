@@ -1,11 +1,11 @@
 // The same points of the floor clicked in two views or more.
 
-import { button, element } from "./elements.js";
+import { button, element, failure, fill, hint, optional, picture as pictureOf } from "./elements.js";
 
 const FEWEST = 3;
 
 /** Pixels of the stored picture under a point of the upright image: shares x, y (0..1) from its top left corner. */
-export function storedPixel(camera, x, y) {
+function storedPixel(camera, x, y) {
   const turned = [[x, y], [y, 1 - x], [1 - x, 1 - y], [1 - y, x]][camera.quarter_turns % 4];
   return [turned[0] * camera.width - 0.5, turned[1] * camera.height - 0.5];
 }
@@ -16,17 +16,17 @@ export function shownAt(camera, [u, v]) {
   return [[a, b], [1 - b, a], [1 - a, 1 - b], [b, 1 - a]][camera.quarter_turns % 4];
 }
 
-/** Let a person click in `aside`; returns what lets go. */
+/** Let a person click in `aside`; returns what ends that. */
 export function clickFloor(aside, { cameras, picture, send, stop }) {
   const points = [{ pixels: {} }];
   let chosen = 0;
   const list = element("div", { className: "point-list" });
-  const said = element("p", { className: "wrong", role: "alert" });
+  const wrong = optional();
   const complete = () => points.filter((point) => Object.keys(point.pixels).length > 1);
 
   const done = button("Set the floor", async () => {
-    said.textContent = "";
-    try { await send(complete()); } catch (error) { said.textContent = `${error.message} ${error.hint ?? ""}`; }
+    fill(wrong);
+    try { await send(complete()); } catch (error) { fill(wrong, failure(error)); }
   }, "primary");
 
   const views = cameras.map((camera) => {
@@ -40,7 +40,7 @@ export function clickFloor(aside, { cameras, picture, send, stop }) {
       points[chosen].pixels[camera.name] = storedPixel(camera, x, y);
       draw();
     };
-    return { camera, marks, figure: element("figure", { className: "picture" }, box, element("figcaption", {}, element("b", { textContent: camera.name }))) };
+    return { camera, marks, figure: pictureOf(box, camera.name) };
   });
 
   function draw() {
@@ -49,26 +49,21 @@ export function clickFloor(aside, { cameras, picture, send, stop }) {
       marks.replaceChildren(...points.flatMap((point, index) => {
         if (!point.pixels[camera.name]) return [];
         const [x, y] = shownAt(camera, point.pixels[camera.name]);
-        const mark = element("i", { className: index === chosen ? "mark chosen" : "mark", textContent: index + 1 });
-        mark.style.left = `${100 * x}%`;
-        mark.style.top = `${100 * y}%`;
-        return [mark];
+        return [element("i", { className: index === chosen ? "mark chosen" : "mark", style: `left: ${100 * x}%; top: ${100 * y}%` }, index + 1)];
       }));
     }
-    list.replaceChildren(...points.map((point, index) => {
+    fill(list, points.map((point, index) => {
       const seen = Object.keys(point.pixels).length;
-      const row = button(`${index + 1} · ${seen > 1 ? `${seen} views` : seen ? "one view" : "new"}`, () => { chosen = index; draw(); }, "toggle small");
-      row.setAttribute("aria-pressed", String(index === chosen));
-      return row;
+      return button(`${index + 1} · ${seen > 1 ? `${seen} views` : seen ? "one view" : "new"}`, () => { chosen = index; draw(); }, "toggle small", { ariaPressed: String(index === chosen) });
     }));
     done.disabled = complete().length < FEWEST;
     done.title = done.disabled ? `Three points in two views each are needed (there are ${complete().length}).` : "";
   }
 
-  aside.replaceChildren(element("div", { className: "calibrated" },
+  fill(aside, element("div", { className: "calibrated" },
     element("div", { className: "aside-actions" }, done, button("Cancel", stop, "quiet")),
-    element("p", { className: "hint", textContent: "Click a point of the floor in one view and the same point in another; then choose the next number. The first becomes the origin, the second lies on X. Points far apart are best." }),
-    list, said, element("div", { className: "pictures click-views" }, ...views.map((one) => one.figure))));
+    hint("Click a point of the floor in one view and the same point in another; then choose the next number. The first becomes the origin, the second lies on X. Points far apart are best."),
+    list, wrong, element("div", { className: "pictures click-views" }, views.map((one) => one.figure))));
   draw();
-  return () => aside.replaceChildren();
+  return () => fill(aside);
 }

@@ -2,11 +2,12 @@
 
 import { fetchJson, post, runPath, sessionPath } from "./api.js";
 import { openPicture } from "./dialogs.js";
+import { byId, check, element, fill, showPicture } from "./elements.js";
 import { onEvent } from "./live.js";
 import { complain } from "./messages.js";
 import { get, watch } from "./state.js";
 
-const panel = document.getElementById("panel-cameras");
+const panel = byId("panel-cameras");
 const LAYERS = [["outline", "outlines"], ["truth", "truth"], ["mask", "mask"], ["edges", "edge map"], ["samples", "sample points"], ["particles", "particles"]];
 const shown = new Set(JSON.parse(localStorage.getItem("overlays") ?? '["outline"]'));
 let cameras = [];
@@ -18,48 +19,15 @@ function source(camera, height) {
   return `${place}/views/${encodeURIComponent(camera.name)}.jpg?show=${[...shown].join(",")}&height=${height}${get("run") && get("track") !== "raw" ? `&track=${encodeURIComponent(get("track"))}` : ""}${age ? `&age=${age}` : ""}`;
 }
 
-/** Swap a picture only when the next one is decoded, so that nothing flickers; the newest wish wins. */
-function swap(image, address) {
-  if (image.wanted === address) return;
-  image.wanted = address;
-  if (image.busy) return;
-  image.busy = true;
-  const next = new Image();
-  const done = () => {
-    image.busy = false;
-    if (image.wanted !== address) { const wish = image.wanted; image.wanted = null; swap(image, wish); }
-  };
-  next.onload = () => { image.src = address; done(); };
-  next.onerror = done;
-  next.src = address;
-}
-
 function refresh() {
   if (panel.hidden || !get("session") || (get("run") && get("frame") === null)) return;
-  for (const view of panel.querySelectorAll(".view")) swap(view.querySelector("img"), source(cameras[Number(view.dataset.at)], 400));
+  for (const view of panel.querySelectorAll(".view")) showPicture(view.querySelector("img"), source(cameras[Number(view.dataset.at)], 400));
 }
 
 function build() {
-  panel.replaceChildren(...cameras.map((camera, at) => {
-    const view = document.createElement("button");
-    view.className = "view";
-    view.dataset.at = at;
-    view.title = "Enlarge";
-    const image = document.createElement("img");
-    image.alt = `View of ${camera.name}`;
-    const caption = document.createElement("span");
-    caption.className = "caption";
-    caption.textContent = `${at + 1} ${camera.name}`;
-    view.append(image, caption);
-    if (camera.quarter_turns) {
-      const turn = document.createElement("span");
-      turn.className = "turn";
-      turn.textContent = `↻ ${camera.quarter_turns * 90}°`;
-      view.append(turn);
-    }
-    view.onclick = () => openPicture(camera.name, source(camera, 1080));
-    return view;
-  }));
+  fill(panel, cameras.map((camera, at) => element("button", { className: "view", title: "Enlarge", dataset: { at }, onclick: () => openPicture(camera.name, source(camera, 1080)) },
+    element("img", { alt: `View of ${camera.name}` }), element("span", { className: "caption" }, `${at + 1} ${camera.name}`),
+    camera.quarter_turns > 0 && element("span", { className: "turn" }, `↻ ${camera.quarter_turns * 90}°`))));
   refresh();
 }
 
@@ -71,18 +39,13 @@ export function lookThrough(at) {
 
 /** The check boxes that stand in the tab line while this panel is open. */
 export function cameraTools() {
-  return LAYERS.map(([name, label]) => {
-    const box = document.createElement("label");
-    box.className = "check";
-    const input = Object.assign(document.createElement("input"), { type: "checkbox", checked: shown.has(name) });
-    input.onchange = () => {
-      if (input.checked) shown.add(name); else shown.delete(name);
+  return LAYERS.map(([name, label]) => check(label, {
+    checked: shown.has(name), onchange: ({ target }) => {
+      if (target.checked) shown.add(name); else shown.delete(name);
       localStorage.setItem("overlays", JSON.stringify([...shown]));
       refresh();
-    };
-    box.append(input, label);
-    return box;
-  });
+    },
+  }));
 }
 
 /** Wire the views to the state. */
@@ -90,8 +53,7 @@ export function startCameras() {
   watch(["session"], async () => {
     cameras = [];
     if (get("session")) {
-      const told = await fetchJson(sessionPath(get("session"))).catch((error) => { complain(error); return { cameras: [] }; });
-      cameras = told.cameras;
+      try { ({ cameras } = await fetchJson(sessionPath(get("session")))); } catch (error) { complain(error); }
     }
     build();
   });

@@ -1,169 +1,123 @@
-// The form of a new comparison: who takes part, with how many evaluations, on which frames.
+// The form of a new comparison: which trackers take part, with how many evaluations, on which frames.
 
-import { post } from "./api.js";
-import { button, element } from "./elements.js";
+import { fault, post } from "./api.js";
+import { button, card, element, field, fill, nothing, number, optional, pageHead, select, sends, spring } from "./elements.js";
+import { sessionWords } from "./sessions.js";
 import { seriesColour } from "./theme.js";
 
 const MOST_ROWS = 8;
 const USUAL = ["annealed", "swarm", "condensation"];
 
-const option = (value, label, selected) => new Option(label, value, false, value === selected);
-const labelled = (words, input, hint = "") => element("label", {}, words, input, hint && element("span", { className: "hint", textContent: hint }));
-const number = (name, value, more = {}) => element("input", { type: "number", name, value, min: 0, required: true, ...more });
-
 /** "a=1, b=two" as an object. Throws words that can be shown. */
-export function readKnobs(text) {
+function readKnobs(text) {
   const knobs = {};
   for (const part of text.split(/[,\n]/).map((one) => one.trim()).filter(Boolean)) {
     const [name, ...rest] = part.split("=");
-    if (!rest.length || !name.trim() || !rest.join("=").trim()) throw Object.assign(new Error(`“${part}” changes nothing.`), { hint: "Write knob=value, several with commas between." });
+    if (!name.trim() || !rest.join("=").trim()) throw fault(`“${part}” changes nothing.`, "Write knob=value, separate several with commas.");
     knobs[name.trim()] = rest.join("=").trim();
   }
   return knobs;
 }
 
-const writeKnobs = (settings) => Object.entries(settings ?? {}).map(([name, value]) => `${name}=${value}`).join(", ");
+const writeKnobs = (settings) => Object.entries(settings).map(([name, value]) => `${name}=${value}`).join(", ");
 
-/** The rows of trackers. */
-class Entrants {
-  constructor(choices, changed) {
-    this.choices = choices;
-    this.changed = changed;
-    this.list = element("div", { className: "entrants" });
-    this.add = button("+ Tracker", () => this.append({ name: this.unused() }), "quiet small");
-  }
+/** The rows of trackers: `box` and `lineUp` are put on the page, `fill(trackers)` and `read()` as the API has them. */
+function candidates({ entrants, weightings, lineups }, changed) {
+  let rows = [];
+  const list = element("div", { className: "entrants" });
+  const more = button("+ Tracker", () => add({ name: entrants.find((one) => !rows.some((row) => row.who.value === one.name))?.name ?? entrants[0].name }), "quiet small");
+  const helpOf = (name) => (name.includes(":") ? entrants.find((one) => one.name === name)?.help ?? "" : "");
 
-  get rows() { return [...this.list.querySelectorAll(".entrant")]; }
-
-  unused() {
-    const taken = new Set(this.rows.map((row) => row.chosen()));
-    return this.choices.entrants.find((one) => !taken.has(one.name))?.name ?? this.choices.entrants[0].name;
-  }
-
-  fill(wishes) {
-    this.list.replaceChildren();
-    for (const wish of wishes) this.append(wish);
-  }
-
-  /** wish: {name, settings, weighting} as the API takes them. */
-  append({ name, settings = {}, weighting = null }) {
-    const { entrants, weightings } = this.choices;
+  function add({ name, settings = {}, weighting = "" }) {
     const known = entrants.find((one) => one.name === name) ?? entrants.find((one) => one.name === name.split(":")[0]);
-    const who = element("select", { ariaLabel: "Tracker" }, ...entrants.map((one) => option(one.name, one.name, known.name)));
+    const help = element("p", { className: "entrant-help" }, helpOf(known.name));
+    const who = select(entrants.map((one) => one.name), known.name, { ariaLabel: "Tracker", onchange: () => { help.textContent = helpOf(who.value); draw(); } });
     const label = element("input", { placeholder: "own label", ariaLabel: "Label", pattern: "[A-Za-z0-9_\\-]{1,40}", title: "Letters, digits, - and _", value: known.name === name ? "" : name.split(":")[1] ?? "" });
-    const weigh = element("select", { ariaLabel: "Weighting" }, option("", "weighting of all", weighting ?? ""), ...weightings.map((one) => option(one, one, weighting)));
+    const likelihood = select([["", "likelihood of all"], ...weightings], weighting ?? "", { ariaLabel: "Likelihood" });
     const knobs = element("input", { placeholder: "knobs: survival=0.5, crossover=0", ariaLabel: "Knobs", value: writeKnobs(settings) });
-    const remove = button("×", () => { row.remove(); this.redraw(); }, "icon quiet");
-    remove.ariaLabel = "Leave this one out";
+    const remover = button("×", () => { rows = rows.filter((one) => one !== row); draw(); }, "icon quiet", { ariaLabel: "Leave this one out" });
     const swatch = element("i", { className: "swatch" });
-    const help = element("p", { className: "entrant-help" });
-    const row = element("div", { className: "entrant" }, swatch, who, label, weigh, knobs, remove, help);
-    row.chosen = () => who.value;
-    row.read = () => {
+    const read = () => {
       const choice = entrants.find((one) => one.name === who.value);
       const own = readKnobs(knobs.value);
       const named = label.value.trim();
-      return { name: named ? `${choice.tracker}:${named}` : choice.name, settings: named ? { ...choice.changes, ...own } : own, weighting: weigh.value || null };
+      return { name: named ? `${choice.tracker}:${named}` : choice.name, settings: named ? { ...choice.changes, ...own } : own, weighting: likelihood.value || null };
     };
-    row.swatch = swatch;
-    row.remover = remove;
-    who.onchange = () => { help.textContent = helpOf(entrants, who.value); this.redraw(); };
-    help.textContent = helpOf(entrants, known.name);
-    this.list.append(row);
-    this.redraw();
+    const row = { who, swatch, remover, read, line: element("div", { className: "entrant" }, swatch, who, label, likelihood, knobs, remover, help) };
+    rows.push(row);
+    draw();
   }
 
-  redraw() {
-    this.rows.forEach((row, at) => { row.swatch.style.background = seriesColour(at); row.remover.disabled = this.rows.length < 2; });
-    this.add.disabled = this.rows.length >= MOST_ROWS;
-    this.changed();
+  function draw() {
+    fill(list, rows.map((row) => row.line));
+    for (const [at, row] of rows.entries()) { row.swatch.style.background = seriesColour(at); row.remover.disabled = rows.length < 2; }
+    more.disabled = rows.length >= MOST_ROWS;
+    changed();
   }
 
-  read() { return this.rows.map((row) => row.read()); }
-}
-
-const helpOf = (entrants, name) => (name.includes(":") ? entrants.find((one) => one.name === name)?.help ?? "" : "");
-
-/** The wish of the form as `POST /api/comparisons` takes it. */
-function read(form, entrants) {
-  const value = (name) => form.elements[name].value;
-  return {
-    session: value("session"), name: value("name") || null, trackers: entrants.read(), evaluations: Number(value("evaluations")), seeds: Number(value("seeds")),
-    weighting: value("weighting") || null, body: value("body") || null, first: Number(value("first")), last: Number(value("last")) + 1, layers: Number(value("layers")),
+  const replace = (wanted) => { rows = []; for (const each of wanted) add(each); };
+  const lineUp = select([["", "Line-up…"], ...lineups.map((one) => /** @type {[string, string]} */ ([one.name, `${one.name}: ${one.trackers.join(", ")}`]))], "", { ariaLabel: "Line-up" });
+  lineUp.onchange = () => {
+    replace(lineups.find((one) => one.name === lineUp.value)?.trackers.map((name) => ({ name })) ?? []);
+    lineUp.value = "";
   };
+  return { list, more, lineUp, fill: replace, count: () => rows.length, read: () => rows.map((row) => row.read()) };
 }
 
-/** Show the form in `content`. wish: what it is filled with, as the API takes it. started: called with the line of what was begun. */
-export function showForm(content, { sessions, choices, bodies, wish, started }) {
+/** Show the form in `content`. initial: what it is filled with, as the API takes it. started: called with the line of what was begun. */
+export function showForm(content, { sessions, choices, bodies, initial, started }) {
   const able = sessions.filter((one) => one.has_truth && !one.problem);
-  if (!able.length) return content.replaceChildren(nothingToCompare());
-  const chosen = able.find((one) => one.name === wish.session) ?? able[0];
-  const sum = element("span", { className: "hint" });
-  const wrong = element("p", { className: "wrong", hidden: true });
-  const remedy = element("p", { className: "hint", hidden: true });
-  const entrants = new Entrants(choices, () => tell());
-  const session = element("select", { name: "session" }, ...able.map((one) => option(one.name, one.title && one.title !== one.name ? `${one.name} · ${one.title}` : one.name, chosen.name)));
-  const weighting = element("select", { name: "weighting" });
-  const body = element("select", { name: "body" });
-  const first = number("first", wish.first ?? 0);
-  const last = number("last", 0);
-  const submit = element("button", { className: "primary", textContent: "Compare" });
-  const fields = element("div", { className: "fields" },
-    labelled("Session", session), labelled("Evaluations a frame, each", number("evaluations", wish.evaluations ?? 1000, { min: 1 })),
-    labelled("Seeds", number("seeds", wish.seeds ?? 5, { min: 1, max: 1000 })), labelled("Weighting of all", weighting),
-    labelled("Frames", element("span", { className: "two" }, first, element("span", { textContent: "to" }), last)),
-    labelled("Layers, where they can be chosen", number("layers", wish.layers ?? 10, { min: 1, max: 60 })),
-    labelled("Body", body), labelled("Name", element("input", { name: "name", placeholder: "numbered", pattern: "[A-Za-z0-9_\\-]{0,64}" })));
-  const lineup = element("select", { ariaLabel: "Line-up" }, option("", "Line-up…", ""), ...choices.lineups.map((one) => option(one.name, `${one.name}: ${one.trackers.join(", ")}`)));
-  lineup.onchange = () => { const found = choices.lineups.find((one) => one.name === lineup.value); if (found) entrants.fill(found.trackers.map((name) => ({ name }))); lineup.value = ""; };
-  const form = element("form", { className: "compare-form", noValidate: false },
-    element("div", { className: "card-box" }, fields),
-    element("div", { className: "card-box" },
-      element("div", { className: "form-foot" }, element("h2", { textContent: "Trackers" }), element("span", { className: "spring" }), element("span", { style: "width: 130px" }, lineup)),
-      entrants.list, element("div", {}, entrants.add)),
-    wrong, remedy, element("div", { className: "form-foot" }, submit, sum));
-
-  const takeSession = () => {
-    const entry = able.find((one) => one.name === session.value);
-    first.max = last.max = entry.frame_count - 1;
-    last.value = Math.min((wish.session === entry.name && wish.last ? wish.last : entry.frame_count) - 1, entry.frame_count - 1);
-    weighting.replaceChildren(option("", `the session's (${entry.weighting})`, wish.weighting ?? ""), ...choices.weightings.map((one) => option(one, one, wish.weighting)));
-    body.replaceChildren(option("", `the session's (${entry.body})`, wish.body ?? ""), ...bodies.map((one) => option(one.name, one.name, wish.body)));
-    tell();
-  };
-  function tell() {
-    const value = (name) => Number(form.elements[name]?.value ?? 0);
-    const frames = value("last") - value("first") + 1;
-    const trials = entrants.rows.length * value("seeds");
-    const poses = trials * frames * value("evaluations");
-    sum.textContent = poses > 0 ? `${trials} trials of ${frames} frames: ${poses >= 1e6 ? `${(poses / 1e6).toPrecision(3)} million` : poses.toLocaleString("en")} poses to weigh, in the background.` : "";
+  if (!able.length) {
+    return fill(content, nothing("No session with a truth",
+      element("p", {}, "Trackers are compared by their distance from true markers. Import a session with truth/*.trc, open the bundled walk in the studio, or render footage:"), element("code", {}, "studio synthesize walk")));
   }
-  session.onchange = takeSession;
-  form.oninput = tell;
-  form.onsubmit = async (event) => {
-    event.preventDefault();
-    submit.disabled = true;
-    wrong.hidden = remedy.hidden = true;
-    try {
-      started(await post("/api/comparisons", read(form, entrants)));
-    } catch (error) {
-      wrong.textContent = error.message;
-      remedy.textContent = error.hint ?? "";
-      wrong.hidden = false;
-      remedy.hidden = !error.hint;
-    } finally { submit.disabled = false; }
-  };
-  const known = new Set(choices.entrants.map((one) => one.name));
-  entrants.fill(wish.trackers ?? USUAL.filter((name) => known.has(name)).map((name) => ({ name })));
-  takeSession();
-  content.replaceChildren(element("div", { className: "column" },
-    element("header", { className: "head" }, element("div", {}, element("h1", { textContent: "Compare trackers" }),
-      element("p", { className: "lead", textContent: "Same evidence, weighting, start and seeds, and as many poses weighed in every frame: what differs is the search. Errors are measured against the session's truth." }))),
-    form));
-}
+  const chosen = able.find((one) => one.name === initial.session) ?? able[0];
+  const sum = element("span", { className: "hint" });
+  const wrong = optional();
+  const rows = candidates(choices, () => count());
+  const whole = (name, value, more = {}) => number(value, { name, step: 1, required: true, ...more });
+  const session = select(able.map((one) => [one.name, sessionWords(one)]), chosen.name, { name: "session", onchange: takeSession });
+  const likelihood = element("span", {});
+  const body = element("span", {});
+  const first = whole("first", initial.first ?? 0);
+  const last = whole("last", 0);
+  const submit = element("button", { className: "primary" }, "Compare");
+  const form = element("form", { className: "compare-form" },
+    card("", element("div", { className: "fields" },
+      field("Session", session), field("Evaluations a frame, each", whole("evaluations", initial.evaluations ?? 1000, { min: 1 })),
+      field("Seeds", whole("seeds", initial.seeds ?? 5, { min: 1, max: 1000 })), field("Likelihood of all", likelihood),
+      field("Frames", element("span", { className: "two" }, first, element("span", {}, "to"), last)),
+      field("Layers, where they can be chosen", whole("layers", initial.layers ?? 10, { min: 1, max: 60 })),
+      field("Body", body), field("Name", element("input", { name: "name", placeholder: "numbered", pattern: "[A-Za-z0-9_\\-]{0,64}" })))),
+    card("", element("div", { className: "form-foot" }, element("h2", {}, "Trackers"), spring(), element("span", { style: "width: 130px" }, rows.lineUp)), rows.list, element("div", {}, rows.more)),
+    wrong, element("div", { className: "form-foot" }, submit, sum));
+  const value = (name) => /** @type {any} */ (form.elements).namedItem(name)?.value ?? "";
 
-function nothingToCompare() {
-  return element("div", { className: "nothing" }, element("h1", { textContent: "No session with a truth" }),
-    element("p", { textContent: "Trackers are compared by their distance from true markers. Import a session with truth/*.trc, open the bundled walk in the studio, or render footage:" }),
-    element("code", { textContent: "studio synthesize walk" }));
+  function takeSession() {
+    const entry = able.find((one) => one.name === session.value);
+    first.max = last.max = String(entry.frame_count - 1);
+    last.value = String(Math.min((initial.session === entry.name && initial.last ? initial.last : entry.frame_count) - 1, entry.frame_count - 1));
+    fill(likelihood, select([["", `the session's (${entry.weighting})`], ...choices.weightings], initial.weighting ?? "", { name: "weighting" }));
+    fill(body, select([["", `the session's (${entry.body})`], ...bodies.map((one) => one.name)], initial.body ?? "", { name: "body" }));
+    count();
+  }
+
+  /** How much work it is. */
+  function count() {
+    const frames = value("last") - value("first") + 1;
+    const trials = rows.count() * value("seeds");
+    const poses = trials * frames * value("evaluations");
+    sum.textContent = poses > 0 ? `${trials} trials of ${frames} frames: ${poses >= 1e6 ? `${(poses / 1e6).toPrecision(3)} million` : poses.toLocaleString("en")} poses to evaluate, in the background.` : "";
+  }
+
+  form.oninput = count;
+  sends(form, submit, wrong, async () => started(await post("/api/comparisons", {
+    session: value("session"), name: value("name") || null, trackers: rows.read(), evaluations: Number(value("evaluations")), seeds: Number(value("seeds")),
+    weighting: value("weighting") || null, body: value("body") || null, first: Number(value("first")), last: Number(value("last")) + 1, layers: Number(value("layers")),
+  })));
+  const known = new Set(choices.entrants.map((one) => one.name));
+  rows.fill(initial.trackers ?? USUAL.filter((name) => known.has(name)).map((name) => ({ name })));
+  takeSession();
+  fill(content, element("div", { className: "column" },
+    pageHead("Compare trackers", "Same evidence, likelihood, start and seeds, and as many poses evaluated in every frame: what differs is the search. Errors are measured against the session's truth."), form));
 }

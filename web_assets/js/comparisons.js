@@ -2,31 +2,33 @@
 
 import { fetchJson, post, remove } from "./api.js";
 import { showForm } from "./comparison_form.js";
-import { badge, clearComparison, showComparison, updateProgress } from "./comparison_result.js";
+import { badge, clearComparison, isGoing, shareOf, showComparison, sizeWords, updateProgress } from "./comparison_result.js";
 import { openForm } from "./dialogs.js";
-import { element } from "./elements.js";
+import { bar, byId, element, fill } from "./elements.js";
 import { complain } from "./messages.js";
 import { onTheme, startTheme } from "./theme.js";
 
+/** @import { Schemas } from "./api_types" */
+
 const POLL_MILLISECONDS = 1000;
-const GOING = ["running", "cancelling"];
 
-const list = document.getElementById("entries");
-const content = document.getElementById("content");
+const content = byId("content");
 
+/** @type {Schemas["ComparisonLine"][]} */
 let lines = [];        // of all comparisons
 let sessions = [];
 let open = null;       // {session, name} of the shown one, null while the form is shown
+/** @type {Schemas["ComparisonDetail"]} */
 let detail = null;
-let timer = null;
+/** @type {Schemas["ComparisonChoices"]} */
+let choices = null;
+let bodies = [];
+let timer = 0;
 
+/** @returns {`/api/comparisons/${string}/${string}`} */
 const pathOf = ({ session, name }) => `/api/comparisons/${encodeURIComponent(session)}/${encodeURIComponent(name)}`;
 const same = (a, b) => a && b && a.session === b.session && a.name === b.name;
-
-function address(query) {
-  const text = new URLSearchParams(query).toString();
-  history.replaceState(null, "", text ? `?${text}` : location.pathname);
-}
+const address = (query) => history.replaceState(null, "", `?${new URLSearchParams(query)}`);
 
 async function refresh() {
   lines = (await fetchJson("/api/comparisons")).comparisons;
@@ -34,24 +36,16 @@ async function refresh() {
 }
 
 function entryOf(line) {
-  const going = GOING.includes(line.status);
-  const mark = line.status === "finished" && line.best
-    ? element("span", { className: "mark", textContent: `${line.best_mm.toFixed(1)} mm`, title: line.best })
-    : element("span", { className: "mark" }, badge(line.status));
-  const row = element("button", { type: "button", className: "entry", title: line.trackers.join(", ") },
-    element("span", { className: "name", textContent: line.name }), mark,
-    element("span", { className: "facts", textContent: `${line.trackers.length} trackers · ${line.evaluations} poses · ${line.seeds} ${line.seeds === 1 ? "seed" : "seeds"}` }),
-    going && element("span", { className: "progress" }, element("i", { style: `width: ${(100 * line.done) / Math.max(1, line.total)}%` })));
-  if (same(line, open)) row.setAttribute("aria-current", "true");
-  row.onclick = () => openComparison(line).catch(complain);
+  const mark = line.status === "finished" && line.best ? element("span", { className: "mark", title: line.best }, `${line.best_mm.toFixed(1)} mm`) : element("span", { className: "mark" }, badge(line.status));
+  const row = element("button", { type: "button", className: "entry", title: line.trackers.join(", "), dataset: { key: `${line.session}/${line.name}` }, onclick: () => openComparison(line).catch(complain) },
+    element("span", { className: "name" }, line.name), mark, element("span", { className: "facts" }, sizeWords(line)), isGoing(line) && bar(shareOf(line)));
+  if (same(line, open)) row.ariaCurrent = "true";
   return row;
 }
 
 function drawList() {
-  const groups = new Map();
-  for (const line of lines) groups.set(line.session, [...(groups.get(line.session) ?? []), line]);
-  const blocks = [...groups].flatMap(([session, members]) => [element("h3", { textContent: session }), ...members.map(entryOf)]);
-  list.replaceChildren(...(blocks.length ? blocks : [element("p", { className: "empty", textContent: "No comparison yet." })]));
+  const groups = Map.groupBy(lines, (line) => line.session);
+  fill(byId("entries"), lines.length ? [...groups].flatMap(([session, members]) => [element("h3", {}, session), ...members.map(entryOf)]) : element("p", { className: "empty" }, "No comparison yet."));
 }
 
 async function openComparison({ session, name }) {
@@ -67,7 +61,7 @@ async function openComparison({ session, name }) {
 function show() {
   showComparison(content, detail, {
     cancel: () => act(() => post(`${pathOf(open)}/cancel`)), resume: () => act(() => post(`${pathOf(open)}/resume`)),
-    again: () => openNew(wishLike(detail)), remove: () => askToRemove(detail.comparison),
+    again: () => openNew(initialLike(detail)), remove: () => removeForm(detail.comparison),
   });
 }
 
@@ -79,7 +73,7 @@ async function act(doing) {
   } catch (error) { complain(error); }
 }
 
-function askToRemove(line) {
+function removeForm(line) {
   openForm({
     heading: `Delete ${line.name}?`, action: "Delete", danger: true, rows: [], intro: "It goes to the trash of the studio, where it can be restored.",
     send: async () => {
@@ -87,15 +81,15 @@ function askToRemove(line) {
       open = null;
       await refresh();
       if (lines.length) await openComparison(lines.find((one) => one.session === line.session) ?? lines[0]);
-      else await openNew({});
+      else openNew({});
     },
   });
 }
 
-/** What the form has to be filled with to ask for the same again. */
-function wishLike({ comparison: line, settings, body }) {
-  const first = settings[line.trackers[0]].weighting;
-  const common = line.trackers.every((name) => settings[name].weighting === first) ? first : null;
+/** What the form has to be filled with to compare the same again. */
+function initialLike({ comparison: line, settings, body }) {
+  const weightings = new Set(line.trackers.map((name) => settings[name].weighting));
+  const common = weightings.size === 1 ? [...weightings][0] : null;
   const trackers = line.trackers.map((name) => {
     const { weighting, ...knobs } = settings[name];
     const known = choices.entrants.find((one) => one.name === name)?.changes ?? {};
@@ -107,26 +101,20 @@ function wishLike({ comparison: line, settings, body }) {
   return { session: line.session, trackers, evaluations: line.evaluations, seeds: line.seeds, weighting: common, body, first: line.first, last: line.last, layers };
 }
 
-let choices = null;
-let bodies = [];
-
-async function openNew(wish) {
+function openNew(initial) {
   clearTimeout(timer);
   clearComparison();
   open = detail = null;
-  address({ new: "", ...(wish.session ? { session: wish.session } : {}) });
+  address({ new: "", ...(initial.session ? { session: initial.session } : {}) });
   document.title = "New comparison · Capture studio";
-  showForm(content, {
-    sessions, choices, bodies, wish,
-    started: (line) => { refresh().then(() => openComparison(line)).catch(complain); },
-  });
+  showForm(content, { sessions, choices, bodies, initial, started: (line) => { refresh().then(() => openComparison(line)).catch(complain); } });
   drawList();
 }
 
 /** Ask once a second while something is going on. */
 function watchProgress() {
   clearTimeout(timer);
-  if (!lines.some((line) => GOING.includes(line.status)) && !GOING.includes(detail?.comparison.status)) return;
+  if (![...lines, detail?.comparison].some(isGoing)) return;
   timer = setTimeout(async () => {
     try {
       await refresh();
@@ -141,16 +129,16 @@ function watchProgress() {
 async function start() {
   startTheme();
   onTheme(() => detail?.result && show());
-  document.getElementById("new").onclick = () => openNew({ session: open?.session });
+  byId("new").onclick = () => openNew({ session: open?.session });
   try {
-    const [told, known, made] = await Promise.all([fetchJson("/api/sessions"), fetchJson("/api/choices"), fetchJson("/api/comparisons/choices")]);
-    [sessions, bodies, choices] = [told.sessions, known.bodies, made];
+    const [listed, known, made] = await Promise.all([fetchJson("/api/sessions"), fetchJson("/api/choices"), fetchJson("/api/comparisons/choices")]);
+    [sessions, bodies, choices] = [listed.sessions, known.bodies, made];
     await refresh();
-    const wish = new URLSearchParams(location.search);
-    const asked = lines.find((line) => line.session === wish.get("session") && line.name === wish.get("name"));
-    const newest = lines.find((line) => line.session === wish.get("session")) ?? lines[0];
-    if (wish.has("new") || !newest) await openNew({ session: wish.get("session") ?? undefined });
-    else await openComparison(asked ?? newest);
+    const query = new URLSearchParams(location.search);
+    const wanted = lines.find((line) => line.session === query.get("session") && line.name === query.get("name"));
+    const newest = lines.find((line) => line.session === query.get("session")) ?? lines[0];
+    if (query.has("new") || !newest) openNew({ session: query.get("session") ?? undefined });
+    else await openComparison(wanted ?? newest);
   } catch (error) { complain(error); }
 }
 

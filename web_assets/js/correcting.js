@@ -1,32 +1,32 @@
 // A frame corrected by hand: its pose is edited in the scene, then the run is tracked on from it, or backwards; the new
 // run is opened and the old one stays.
 
-import { fetchJson, post, remove, runPath } from "./api.js";
-import { button, element } from "./elements.js";
+import { fault, fetchJson, post, remove, runPath } from "./api.js";
+import { bar, button, byId, element, fill } from "./elements.js";
 import { followJob } from "./jobs.js";
 import { onEvent } from "./live.js";
 import { complain, say } from "./messages.js";
-import { openSession, refreshSessions } from "./rail.js";
+import { openSession, refreshSessions } from "./sessions.js";
 import { get, set, watch } from "./state.js";
 
-const bar = document.getElementById("correcting");
-const opener = document.getElementById("correct");
+const line = byId("correcting");
+const opener = byId("correct");
 const POSE_PATH = "/api/scene/edit";
 
 let frame = null;      // that is being corrected, null while none is
-let begun = false;     // whether the scene has said that it lets it be edited
+let begun = false;     // whether the scene lets it be edited already
 let going = null;      // work in the background: its last state
 
 const busy = () => ["tracking", "compiling", "reannealing"].includes(get("work")?.state) && get("work")?.run === get("run");
 
 /** Let the shown frame be corrected in the scene. */
-export async function correctFrame() {
-  const [session, run, wish] = [get("session"), get("run"), get("frame")];
-  if (!run || wish === null) return;
+async function correctFrame() {
+  const [session, run, shown] = [get("session"), get("run"), get("frame")];
+  if (!run || shown === null) return;
   try {
-    await post(POSE_PATH, { session, run, frame: wish });
+    await post(POSE_PATH, { session, run, frame: shown });
     set({ follow: false });
-    frame = wish;
+    frame = shown;
     begun = false;
     draw();
   } catch (error) { complain(error); }
@@ -43,11 +43,11 @@ async function track(back) {
   const [session, run] = [get("session"), get("run")];
   try {
     const edited = await fetchJson(POSE_PATH);
-    if (!edited.editing || edited.frame === null) throw Object.assign(new Error("The editing was ended in the scene."), { hint: "Correct the frame again." });
+    if (!edited.editing || edited.frame === null) throw fault("The editing was ended in the scene.", "Correct the frame again.");
     const begunJob = await post(`${runPath(session, run)}/correct`, { frame: edited.frame, pose: edited.pose, back_to: back });
     going = begunJob;
     draw();
-    const ended = await followJob(`/api/track-jobs/${begunJob.identifier}`, (told) => { going = told; draw(); });
+    const ended = await followJob(`/api/track-jobs/${begunJob.identifier}`, (job) => { going = job; draw(); });
     const at = edited.frame;
     frame = going = null;
     draw();
@@ -73,18 +73,15 @@ function backwards() {
 }
 
 function draw() {
-  bar.hidden = frame === null;
+  line.hidden = frame === null;
   opener.disabled = !get("run") || get("frame") === null || !get("summary")?.frames.length || busy() || frame !== null;
-  if (frame === null) return bar.replaceChildren();
+  if (frame === null) return fill(line);
   if (going) {
-    const share = going.total ? going.done / going.total : 0;
-    const line = element("div", { className: "progress" }, element("i"));
-    line.firstChild.style.width = `${Math.round(100 * share)}%`;
-    return bar.replaceChildren(element("span", { role: "status", textContent: going.total ? `tracking backwards, ${going.done} of ${going.total} frames` : "making the corrected run" }), line,
+    return fill(line, element("span", { role: "status" }, going.total ? `tracking backwards, ${going.done} of ${going.total} frames` : "making the corrected run"), bar(going.total ? going.done / going.total : 0),
       button("Cancel", () => remove(`/api/track-jobs/${going.identifier}`).catch(complain), "quiet small"));
   }
-  const title = element("span", {}, "Correcting frame ", element("b", { textContent: String(frame) }), ": drag the balls on the limbs");
-  return bar.replaceChildren(title, button("Track on from here", () => track(null), "primary small"), ...backwards(), button("Leave", leave, "quiet small"));
+  const words = element("span", {}, "Correcting frame ", element("b", {}, frame), ": drag the balls on the limbs");
+  fill(line, words, button("Track on from here", () => track(null), "primary small"), backwards(), button("Leave", leave, "quiet small"));
 }
 
 /** Wire the button, the bar, and what the scene says. */

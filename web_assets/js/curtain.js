@@ -1,58 +1,44 @@
-// What lies over the scene when there is nothing to look at yet, or nobody to talk to.
+// What lies over the scene: that there is nothing to look at yet, that the studio does not answer, that a frame was annealed
+// again and is shown but not stored.
 
 import { post, runPath } from "./api.js";
+import { openForm } from "./dialogs.js";
+import { bar, button, byId, element, fill } from "./elements.js";
 import { importForm } from "./importing.js";
 import { complain } from "./messages.js";
 import { newRunForm } from "./new_run.js";
-import { lacks, openSession, refreshSessions, wayPath } from "./rail.js";
+import { lacks, openSession, refreshSessions, setupPath } from "./sessions.js";
 import { get, watch } from "./state.js";
 
-const curtain = document.getElementById("curtain");
-const invitation = document.getElementById("invitation");
+const curtain = byId("curtain");
+const invitation = byId("invitation");
 
-function card(heading, text, actions = [], { bar = false } = {}) {
-  const box = document.createElement("div");
-  box.className = "card";
-  const title = Object.assign(document.createElement("h2"), { textContent: heading });
-  const words = Object.assign(document.createElement("p"), { textContent: text });
-  box.append(title, words);
-  if (bar) {
-    const progress = Object.assign(document.createElement("div"), { className: "progress unknown" });
-    progress.append(document.createElement("i"));
-    box.append(progress);
-  }
-  const row = Object.assign(document.createElement("div"), { className: "group" });
-  for (const [label, act, primary] of actions) row.append(Object.assign(document.createElement("button"), { textContent: label, className: primary ? "primary" : "", onclick: act }));
-  if (actions.length) box.append(row);
-  curtain.replaceChildren(box);
+function cover(heading, text, ...below) {
+  fill(curtain, element("div", { className: "card" }, element("h2", {}, heading), element("p", {}, text), ...below));
   curtain.hidden = false;
 }
 
+const group = (...buttons) => element("div", { className: "group" }, ...buttons);
+
 /** A line above the scene that leaves the scene in view. */
 function banner(text) {
-  curtain.replaceChildren(Object.assign(document.createElement("p"), { textContent: text }));
+  fill(curtain, element("p", {}, text));
   curtain.classList.add("banner");
   curtain.hidden = false;
 }
 
 /** A session without runs: the scene stays free, because its start pose is set there. */
 function invite(entry) {
-  if (entry.next_step) {
-    const go = Object.assign(document.createElement("button"), { textContent: "Guided way", className: "primary small", onclick: () => { location.href = wayPath(entry); } });
-    invitation.replaceChildren(`${entry.name}: ${lacks(entry)}.`, go);
-    invitation.hidden = false;
-    return;
-  }
-  const button = Object.assign(document.createElement("button"), { textContent: "New run", className: "primary small", onclick: () => newRunForm(entry) });
-  invitation.replaceChildren("No run yet. Set where the search begins under “Pose” if the session has no start pose, then", button);
+  if (entry.next_step) fill(invitation, `${entry.name}: ${lacks(entry)}.`, button("Guided set-up", () => { location.href = setupPath(entry); }, "primary small"));
+  else fill(invitation, "No run yet. Set where the search begins under “Pose” if the session has no start pose, then", button("New run", () => newRunForm(entry), "primary small"));
   invitation.hidden = false;
 }
 
 async function addSample() {
   try {
-    const told = await post("/api/samples", { name: "walk" });
+    const { name } = await post("/api/samples", { name: "walk" });
     await refreshSessions();
-    openSession(told.name);
+    openSession(name);
   } catch (error) { complain(error); }
 }
 
@@ -63,19 +49,40 @@ function draw() {
   curtain.classList.remove("banner");
   invitation.hidden = true;
   document.body.classList.toggle("disconnected", get("connected") === false);
-  if (get("stranger")) return card("The studio was started again", "This page belongs to the one before. Open the address that the new one printed in its terminal.");
+  if (get("stranger")) return cover("The studio was started again", "This page belongs to the one before. Open the address that the new one printed in its terminal.");
   if (get("connected") === false) return banner("Disconnected. What is shown is the last state; trying to reach the studio again …");
-  if (sessions?.length === 0) return card("Nothing here yet", "Import the footage of your cameras, or start with the bundled walk.", [["Open the sample", addSample, true], ["From my own cameras", () => { location.href = "/way?new"; }], ["Import footage", importForm]]);
+  if (sessions?.length === 0) {
+    return cover("Nothing here yet", "Import the footage of your cameras, or start with the bundled walk.",
+      group(button("Open the sample", addSample, "primary"), button("From my own cameras", () => { location.href = "/way?new"; }), button("Import footage", importForm)));
+  }
   if (work?.state === "lost" && work.session === get("session")) {
     const resume = () => post(`${runPath(work.session, work.run)}/start`).catch(complain);
-    return card("The tracking process ended", `${work.message} What was tracked is kept. ${work.hint}`, [["Resume", resume, true]]);
+    return cover("The tracking process ended", `${work.message} What was tracked is kept. ${work.hint}`, group(button("Resume", resume, "primary")));
   }
-  if (work?.state === "compiling" && work.session === get("session")) return card("Compiling the kernels, once", "The first run on this machine takes about half a minute longer.", [], { bar: true });
+  if (work?.state === "compiling" && work.session === get("session")) return cover("Compiling the kernels, once", "The first run on this machine takes about half a minute longer.", bar(0, "progress unknown"));
   curtain.hidden = true;
   if (entry && !entry.runs.length) invite(entry);
 }
 
-/** Wire the curtain. */
+function keepForm(frame) {
+  const path = runPath(get("session"), get("run"));
+  openForm({
+    heading: `Keep the new result of frame ${frame}?`, action: "Keep it", rows: [],
+    intro: "It replaces the stored one. The frames after it followed from the old result and are dropped; tracking on computes them again.",
+    send: () => post(`${path}/reanneal`, { frame, keep: true }),
+  });
+}
+
+/** A frame that was annealed again: whether it is kept is the question. */
+function drawWhatIf() {
+  const line = byId("what-if");
+  const frame = get("whatIf")?.[0].frame;
+  line.hidden = frame === undefined;
+  if (!line.hidden) fill(line, element("span", {}, `Frame ${frame} re-annealed, not stored; the stored result stays beside it in grey.`), button("Keep…", () => keepForm(frame), "small"));
+}
+
+/** Wire what lies over the scene. */
 export function startCurtain() {
   watch(["sessions", "session", "run", "work", "connected", "stranger"], draw);
+  watch(["whatIf"], drawWhatIf);
 }

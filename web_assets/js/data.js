@@ -3,10 +3,10 @@
 import { fetchJson, post, runPath } from "./api.js";
 import { onEvent } from "./live.js";
 import { complain } from "./messages.js";
-import { paced } from "./pace.js";
-import { refreshSessions } from "./rail.js";
+import { paced } from "./pacing.js";
 import { dressScene } from "./scene_window.js";
-import { isWatched } from "./search_speed.js";
+import { isWatched } from "./header.js";
+import { refreshSessions } from "./sessions.js";
 import { get, set, watch } from "./state.js";
 
 const SUMMARY_MILLISECONDS = 1500;
@@ -20,10 +20,10 @@ const PATIENCE_MILLISECONDS = 700;
 const searching = () => ["tracking", "compiling"].includes(get("work")?.state);
 const isShown = (session, run) => session === get("session") && run === get("run");
 
-let arrived = [];      // lines of frames that finished since the summary was last asked for
+let arrived = [];      // lines of frames that finished since the summary was last loaded
 let layers = [];       // of the frame that is being searched
 let drawnAt = 0;       // when live layers were last shown
-let scene = {};        // what the scene was last told, or told itself
+let scene = {};        // what the scene last showed
 
 /** The run's frames; those that finish while the answer is on its way are kept. */
 async function loadSummary() {
@@ -42,14 +42,14 @@ async function loadSummary() {
   } catch (error) { complain(error); }
 }
 
-/** What the run was asked to do, and its parameters' names. */
+/** The run: its parameters and its layers. */
 async function loadRun() {
   const [session, run] = [get("session"), get("run")];
   layers = [];
   if (!run) return;
   try {
-    const told = await fetchJson(runPath(session, run));
-    if (isShown(session, run)) set({ parameters: told.parameters, layerCount: get("layerCount") ?? layersOf(told.settings) });
+    const { parameters, settings } = await fetchJson(runPath(session, run));
+    if (isShown(session, run)) set({ parameters, layerCount: get("layerCount") ?? layersOf(settings) });
   } catch (error) { complain(error); }
 }
 
@@ -70,10 +70,10 @@ async function showInScene() {
   if (!session) return;
   const follow = get("follow") && searching();
   const frame = follow ? null : get("frame");
-  const wish = { session, run, layer, frame, follow: get("follow") };
-  if (Object.keys(wish).every((name) => wish[name] === scene[name])) return;
-  scene = wish;
-  await post("/api/scene/show", wish).catch(complain);
+  const shown = { session, run, layer, frame, follow: get("follow") };
+  if (Object.keys(shown).every((name) => shown[name] === scene[name])) return;
+  scene = shown;
+  await post("/api/scene/show", shown).catch(complain);
 }
 
 /** The scene's own controls moved, or it plays: follow them, and do not send it back what it said. */
@@ -81,6 +81,7 @@ function takeScene(event) {
   if (!isShown(event.session, event.run)) return;
   if (event.follow && get("follow") && searching()) return;
   const stored = get("summary")?.frames.some((line) => line.frame === event.frame);
+  /** @type {Record<string, any>} */
   const changes = { layer: event.layer, follow: event.follow, ...(stored ? { frame: event.frame } : {}) };
   scene = { session: event.session, run: event.run, layer: event.layer, frame: stored ? event.frame : scene.frame, follow: event.follow };
   if (stored && event.frame !== get("frame") && get("whatIf")) changes.whatIf = null;

@@ -1,12 +1,15 @@
 // The run's export: which format, with which options; how far it is; the files that came of it, to be downloaded.
 
 import { fetchJson, post, remove, runPath } from "./api.js";
-import { button, duration, element } from "./elements.js";
+import { bar, button, byId, check, dotted, element, failure, field, fill, hint, number, select } from "./elements.js";
+import { standing, timeLeft } from "./jobs.js";
 import { onEvent } from "./live.js";
 import { complain } from "./messages.js";
 import { get, watch } from "./state.js";
 
-const panel = document.getElementById("panel-export");
+/** @import { Schemas } from "./api_types" */
+
+const panel = byId("panel-export");
 const WORDS = {
   auto: "auto", own: "the body's own", halpe26: "HALPE-26", mixamo: "Mixamo", opensim: "OpenSim", tpose: "T-pose", neutral: "neutral pose",
   gap: "become gaps", keep: "keep the held pose", y: "y", z: "z", pose2sim: "Pose2Sim", aniposelib: "anipose", opencv: "OpenCV",
@@ -14,147 +17,127 @@ const WORDS = {
 const EMPTY = { first: "first", last: "end", fps: "as tracked", height: "as recorded" };
 const DOWNLOAD = '<svg viewBox="0 0 16 16"><path d="M7.2 2h1.6v6l2.1-2.1 1.1 1.1L8 11 4 7l1.1-1.1L7.2 8zM3 12.4h10V14H3z"/></svg>';
 
+/** @type {Schemas["ExportChoices"]} */
 let choices = null;
-let listing = { exports: [], running: [], tracks: [], best: "raw", note: "", cameras: [] };
+/** @type {Schemas["ExportList"]} */
+let listing = null;
 let format = localStorage.getItem("export-format") || "bvh";
-const state = { wish: {}, going: null, failed: null };
+let changed = {};         // options that are not at their defaults
+let going = null;      // the export that is being made
+let failed = null;     // what went wrong last
 
 const megabytes = (bytes) => (bytes < 1e5 ? `${(bytes / 1e3).toFixed(1)} kB` : `${(bytes / 1e6).toFixed(1)} MB`);
 const here = () => runPath(get("session"), get("run"));
-const isHere = (told) => told.session === get("session") && told.run === get("run");
 
-/** What a select offers for an option: [value, words]. */
+/** What a select offers for an option: [value, words]. @returns {[string, string][]} */
 function offered(option, form) {
-  if (option.name === "track") return [["best", `best (${listing.best})`], ...listing.tracks.map((name) => [name, name === "raw" ? "raw (as searched)" : name])];
-  if (option.name === "camera") return [["", "all cameras"], ...listing.cameras.map((name) => [name, name])];
-  if (option.name === "calibration") return [["", "usual"], ...(choices.calibrations[`.${form.name}`] ?? []).map((name) => [name, WORDS[name] ?? name])];
+  if (option.name === "track") return [["best", `best (${listing.best})`], ...listing.tracks.map((name) => /** @type {[string, string]} */ ([name, name === "raw" ? "raw (as searched)" : name]))];
+  if (option.name === "camera") return [["", "all cameras"], ...listing.cameras.map((name) => /** @type {[string, string]} */ ([name, name]))];
+  if (option.name === "calibration") return [["", "usual"], ...(choices.calibrations[`.${form.name}`] ?? []).map((name) => /** @type {[string, string]} */ ([name, WORDS[name] ?? name]))];
   return option.choices.map((value) => [value, value === "auto" ? `auto (${form[option.name]})` : WORDS[value] ?? value]);
 }
 
-/** One option's field; what it holds goes to `wish` where it is not the usual. */
-function field(option, form) {
+/** One option's field; what it holds goes to `changed` where it is not the default. */
+function optionField(option, form) {
   const label = option.label[0].toUpperCase() + option.label.slice(1);
-  const keep = (value) => { if (value === option.default || value === "") delete state.wish[option.name]; else state.wish[option.name] = value; };
-  const asked = state.wish[option.name];
-  if (option.kind === "bool") {
-    const input = element("input", { type: "checkbox", checked: Boolean(asked) });
-    input.onchange = () => keep(input.checked);
-    return element("label", { className: "check", title: option.help }, input, label);
-  }
-  if (option.kind === "str") {
-    const input = element("select", { ariaLabel: label }, ...offered(option, form).map(([value, words]) => new Option(words, value, false, value === (asked ?? option.default))));
-    input.onchange = () => keep(input.value);
-    return element("label", { title: option.help }, label, input);
-  }
-  const input = element("input", { type: "number", ariaLabel: label, min: option.low, max: option.high, step: option.kind === "int" ? 1 : "any", value: asked ?? "", placeholder: EMPTY[option.name] ?? String(option.default) });
-  input.onchange = () => keep(input.value === "" ? "" : Number(input.value));
-  return element("label", { title: option.help }, option.unit ? `${label} (${option.unit})` : label, input);
+  const keep = (value) => { if (value === option.default || value === "") delete changed[option.name]; else changed[option.name] = value; };
+  const chosen = changed[option.name];
+  if (option.kind === "bool") return check(label, { checked: Boolean(chosen), onchange: ({ target }) => keep(target.checked) }, option.help);
+  if (option.kind === "str") return field(label, select(offered(option, form), chosen ?? option.default, { ariaLabel: label, onchange: ({ target }) => keep(target.value) }), { title: option.help });
+  const made = number(chosen ?? "", {
+    ariaLabel: label, min: option.low, max: option.high, step: option.kind === "int" ? 1 : "any", placeholder: EMPTY[option.name] ?? String(option.default),
+    onchange: ({ target }) => keep(target.value === "" ? "" : Number(target.value)),
+  });
+  return field(option.unit ? `${label} (${option.unit})` : label, made, { title: option.help });
 }
 
 function formatList() {
-  const rows = choices.formats.map((form) => {
-    const row = element("button", { type: "button", className: "format", title: form.opens }, element("b", { textContent: `.${form.name}` }), form.title);
-    row.setAttribute("role", "radio");
-    row.setAttribute("aria-checked", String(form.name === format));
-    row.onclick = () => { format = form.name; localStorage.setItem("export-format", format); state.failed = null; draw(); panel.querySelector('[aria-checked="true"]').focus(); };
-    return row;
-  });
-  const list = element("div", { className: "formats" }, ...rows);
-  list.setAttribute("role", "radiogroup");
-  list.setAttribute("aria-label", "Format");
-  return list;
+  const choose = (name) => {
+    format = name;
+    localStorage.setItem("export-format", format);
+    failed = null;
+    draw();
+  };
+  return element("div", { className: "formats", role: "radiogroup", ariaLabel: "Format" }, choices.formats.map((form) => element("button", {
+    type: "button", className: "format", title: form.opens, role: "radio", ariaChecked: String(form.name === format), dataset: { key: form.name }, onclick: () => choose(form.name),
+  }, element("b", {}, `.${form.name}`), form.title)));
 }
 
 async function begin() {
-  const form = choices.formats.find((one) => one.name === format);
-  const options = Object.fromEntries(Object.entries(state.wish).filter(([name]) => form.takes.includes(name)));
-  state.failed = null;
+  const { takes } = choices.formats.find((one) => one.name === format);
+  failed = null;
   try {
-    state.going = await post(`${here()}/exports`, { format, options });
-  } catch (error) { state.failed = error; }
+    going = await post(`${here()}/exports`, { format, options: Object.fromEntries(Object.entries(changed).filter(([name]) => takes.includes(name))) });
+  } catch (error) { failed = error; }
   draw();
 }
 
 /** The line over the options: the button, or how far it is; and what went wrong. */
-function actions() {
-  const line = element("div", { className: "export-actions" });
-  if (!state.going) {
-    line.append(button("Export", begin, "primary"));
-    if (state.failed) line.append(element("p", { className: "wrong", role: "alert" }, state.failed.message, element("span", { className: "hint", textContent: state.failed.hint ?? "" })));
-    return line;
-  }
-  const { step, done, total, seconds_left: left } = state.going;
-  const share = total ? Math.round((100 * done) / total) : 0;
-  const bar = element("div", { className: "progress" }, element("i"));
-  bar.firstChild.style.width = `${share}%`;
-  const words = [step || "beginning", total > 1 ? `${share} %` : "", left > 2 ? `${duration(left)} left` : ""].filter(Boolean).join(" · ");
-  line.append(bar, element("span", { className: "hint export-step", textContent: words, role: "status" }), button("Cancel", () => remove(`/api/exports/${state.going.identifier}`).catch(complain), "quiet small"));
-  return line;
+function exportActions() {
+  const line = (...children) => element("div", { className: "export-actions" }, ...children);
+  if (!going) return line(button("Export", begin, "primary"), failure(failed));
+  return line(bar(going.total ? going.done / going.total : 0), element("span", { className: "hint export-step", role: "status" }, dotted(standing(going, "beginning"), timeLeft(going.seconds_left))),
+    button("Cancel", () => remove(`/api/exports/${going.identifier}`).catch(complain), "quiet small"));
 }
 
 function optionsForm() {
   const form = choices.formats.find((one) => one.name === format);
-  const fields = choices.options.filter((option) => form.takes.includes(option.name)).map((option) => field(option, form));
-  return element("div", { className: "export-form" }, element("p", { className: "hint", textContent: form.opens }), form.takes.includes("track") && listing.note ? element("p", { className: "hint", textContent: listing.note }) : "", actions(), element("div", { className: "export-options" }, ...fields));
+  return element("div", { className: "export-form" }, hint(form.opens), form.takes.includes("track") && listing.note && hint(listing.note), exportActions(),
+    element("div", { className: "export-options" }, choices.options.filter((option) => form.takes.includes(option.name)).map((option) => optionField(option, form))));
 }
 
 function fileLine(made) {
   const address = `${here()}/exports/${encodeURIComponent(made.file)}`;
-  const link = element("a", { href: address, download: made.file, title: "Download" });
-  link.innerHTML = DOWNLOAD;
-  link.append(element("span", { textContent: made.file }));
-  const facts = [megabytes(made.bytes), made.track && `track ${made.track}`, made.frames ? `${made.frames} frames` : "", made.checked].filter(Boolean).join(" · ");
-  const drop = button("×", async () => { try { await remove(address); await refresh(); } catch (error) { complain(error); } }, "icon quiet");
-  drop.setAttribute("aria-label", `Delete ${made.file}`);
-  drop.title = "Delete this file (the run stays)";
-  return element("li", {}, element("div", {}, link, element("p", { className: "facts", textContent: facts }), ...made.notes.map((note) => element("p", { className: "facts note", textContent: note })),
-    made.stale && element("p", { className: "stale-file", textContent: `Old: ${made.stale}. Export it again.` })), drop);
+  const link = element("a", { href: address, download: made.file, title: "Download", innerHTML: DOWNLOAD }, element("span", {}, made.file));
+  const drop = button("×", () => remove(address).then(refresh).catch(complain), "icon quiet", { ariaLabel: `Delete ${made.file}`, title: "Delete this file (the run stays)" });
+  const facts = (className, words) => element("p", { className }, words);
+  return element("li", {}, element("div", {}, link, facts("facts", dotted(megabytes(made.bytes), made.track && `track ${made.track}`, made.frames && `${made.frames} frames`, made.checked)),
+    made.notes.map((note) => facts("facts note", note)), made.stale && facts("stale-file", `Out of date: ${made.stale}. Export it again.`)), drop);
 }
 
 function fileList() {
-  if (!listing.exports.length) return element("div", { className: "export-files" }, element("p", { className: "empty", textContent: "No files yet. Each is read back and compared before it is offered here." }));
-  return element("ul", { className: "export-files" }, ...listing.exports.map(fileLine));
+  if (!listing.exports.length) return element("div", { className: "export-files" }, element("p", { className: "empty" }, "No files yet. Each is read back and compared before it is offered here."));
+  return element("ul", { className: "export-files" }, listing.exports.map(fileLine));
 }
 
 function draw() {
-  if (!get("run")) return panel.replaceChildren(element("p", { className: "empty", textContent: "Open a run to export it." }));
-  if (!choices) return;
+  if (!get("run")) return fill(panel, element("p", { className: "empty" }, "Open a run to export it."));
+  if (!choices || !listing) return;
   if (!choices.formats.some((one) => one.name === format)) format = choices.formats[0].name;
-  const at = panel.querySelector(".formats")?.scrollTop ?? 0;
-  panel.replaceChildren(formatList(), optionsForm(), fileList());
-  panel.querySelector(".formats").scrollTop = at;
+  const scrolled = panel.querySelector(".formats")?.scrollTop ?? 0;
+  fill(panel, formatList(), optionsForm(), fileList());
+  panel.querySelector(".formats").scrollTop = scrolled;
 }
 
 async function refresh() {
   if (panel.hidden || !get("run")) return draw();
-  const asked = here();
+  const address = here();
   try {
     choices ??= await fetchJson("/api/exports/choices");
-    const told = await fetchJson(`${asked}/exports`);
-    if (asked !== here()) return;
-    listing = told;
-    state.going = told.running[0] ?? null;
+    const found = await fetchJson(`${address}/exports`);
+    if (address !== here()) return;
+    listing = found;
+    going = found.running[0] ?? null;
   } catch (error) { complain(error); }
   draw();
 }
 
 /** An export of this run got further, or ended. */
-function hear(told) {
-  if (!isHere(told)) return;
-  if (told.state === "running") {
-    if (state.going && state.going.identifier !== told.identifier) return;
-    state.going = told;
-    panel.querySelector(".export-actions")?.replaceWith(actions());
+function hear(job) {
+  if (job.state === "running") {
+    if (going && going.identifier !== job.identifier) return;
+    going = job;
+    panel.querySelector(".export-actions")?.replaceWith(exportActions());
     return;
   }
-  state.going = null;
-  if (told.state === "failed") state.failed = told;
+  going = null;
+  if (job.state === "failed") failed = job;
   refresh();
 }
 
 /** Wire the panel. */
 export function startExporting() {
-  watch(["session", "run"], () => { state.going = state.failed = null; state.wish = {}; refresh(); });
+  watch(["session", "run"], () => { going = failed = null; changed = {}; refresh(); });
   document.addEventListener("panel", refresh);
-  onEvent("export", hear);
+  onEvent("export", (job, isHere) => { if (isHere) hear(job); });
 }

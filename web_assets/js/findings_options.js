@@ -1,24 +1,13 @@
 // A chart's plain values as ECharts' option, in the colours of tokens.css.
 
-const FAMILY = "Inter, system-ui, sans-serif";
-const SERIES_COLOURS = 8;
+import { figure, axis as plainAxis, look, seriesToken, token, tooltip } from "./chart_looks.js";
+
 const MOST_DECIMALS = 6;
 const MOST_WHISKERS = 40;
 const MOST_LABELLED_CELLS = 160;
 const MARKS = ["circle", "diamond", "rect", "triangle", "roundRect"];
 
 const root = document.documentElement;
-
-/** A token's colour in the theme in use. */
-const token = (name) => getComputedStyle(root).getPropertyValue(`--${name}`).trim();
-
-/** Three significant figures, all of those before the point. */
-export function figure(value) {
-  if (typeof value !== "number" || !Number.isFinite(value)) return "–";
-  const size = Math.abs(value);
-  if (size >= 1e7 || (size > 0 && size < 1e-3)) return value.toExponential(1);
-  return size >= 100 ? String(Math.round(value)) : String(Number(value.toPrecision(3)));
-}
 
 /** Ours, the interval's ends and the paper's value of a number in words, as `figures` of findings_files.py has them. */
 export function figures(number) {
@@ -44,7 +33,7 @@ function groups(chart) {
   }
   let place = 0;
   for (const group of found.values()) {
-    group.colour = group.dashed ? "text-quiet" : `series-${place % SERIES_COLOURS}`;
+    group.colour = group.dashed ? "text-quiet" : seriesToken(place);
     group.place = group.dashed ? -1 : place++;
   }
   return found;
@@ -73,28 +62,10 @@ function legendName(chart, series) {
 
 const usable = (value, log) => (value === null || (log && value <= 0) ? null : value);
 
-function look() {
-  return {
-    animation: false,
-    backgroundColor: "transparent",
-    textStyle: { fontFamily: FAMILY, fontSize: 11, color: token("text") },
-    tooltip: {
-      backgroundColor: token("surface-raised"), borderColor: token("line-strong"), confine: true,
-      textStyle: { color: token("text"), fontFamily: FAMILY, fontSize: 12 },
-    },
-  };
-}
-
-function axis(name, more = {}) {
-  const quiet = token("text-quiet");
-  return {
-    name, nameTextStyle: { color: quiet, fontSize: 11 },
-    axisLine: { show: true, onZero: false, lineStyle: { color: token("line-strong") } }, axisTick: { show: false },
-    splitLine: { lineStyle: { color: token("line") } }, minorSplitLine: { show: false },
-    ...more,
-    axisLabel: { color: quiet, fontSize: 11, hideOverlap: true, ...(more.axisLabel ?? {}) },
-  };
-}
+/** @param {string} name @param {Record<string, any>} own */
+const axis = (name, { axisLabel = {}, ...more }) => plainAxis({
+  name, axisLine: { show: true, onZero: false, lineStyle: { color: token("line-strong") } }, minorSplitLine: { show: false }, ...more, axisLabel: { hideOverlap: true, ...axisLabel },
+});
 
 const below = { nameLocation: "middle", nameGap: 30 };
 const above = { nameLocation: "end", nameGap: 12, nameTextStyle: { align: "left", padding: [0, 0, 0, -28] } };
@@ -114,8 +85,8 @@ export function seriesOption(chart, width, selected) {
     legend: { show: false, selected },
     grid: { left: 52, right: 18, top: 34, bottom: bars ? labels.bottom : 46 },
     xAxis, yAxis,
-    tooltip: { ...look().tooltip, ...(chart.kind === "lines" ? axisTooltip(chart) : itemTooltip(chart)) },
-    series: [...ground(chart), ...chart.series.flatMap((series) => (bars ? barParts : lineParts)(chart, series, known.get(groupOf(series)), known))],
+    tooltip: tooltip(chart.kind === "lines" ? axisTooltip(chart) : itemTooltip(chart)),
+    series: [...ground(chart), ...chart.series.flatMap((series) => (bars ? barParts : lineParts)(chart, series, known.get(groupOf(series))))],
   };
 }
 
@@ -225,7 +196,7 @@ function lineParts(chart, series, group) {
 const triples = (chart, series) => series.x.map((x, index) => [usable(x, chart.log_x), usable(series.low[index], chart.log_y), usable(series.high[index], chart.log_y)]);
 
 /** An interval with caps at each point. shift : of the point's place along x, px. */
-function whiskers(chart, series, name, colour, shift = () => 0) {
+function whiskers(chart, series, name, colour, shift = (_api) => 0) {
   return {
     type: "custom", name, data: triples(chart, series), encode: { x: 0, y: [1, 2] }, silent: true, z: 5, tooltip: { show: false },
     renderItem: (_, api) => {
@@ -254,7 +225,7 @@ function band(chart, series, name, colour) {
 }
 
 /** Bars stand side by side; a thin series is dots on its group's bar; what the paper printed a dashed stroke over it. */
-function barParts(chart, series, group, known) {
+function barParts(chart, series, group) {
   const colour = token(group.colour);
   const name = legendName(chart, series);
   const standing = chart.series.filter((other) => !other.thin && !other.dashed);
@@ -333,7 +304,7 @@ export function heatOption(chart) {
       text: [figure(most), figure(least)], textStyle: { color: token("text-quiet"), fontSize: 11 }, textGap: 6,
       inRange: { color: ["heat-lowest", "heat-low", "heat-middle", "heat-high"].map(token) },
     },
-    tooltip: { ...look().tooltip, formatter: (item) => escaped`${rows[item.value[1]]}, ${columns[item.value[0]]}: ` + `<b>${figure(item.value[2])}</b>` },
+    tooltip: tooltip({ formatter: (item) => escaped`${rows[item.value[1]]}, ${columns[item.value[0]]}: ` + `<b>${figure(item.value[2])}</b>` }),
     series: [{
       type: "heatmap", emphasis: { disabled: true }, itemStyle: { borderColor: token("surface"), borderWidth: 2, borderRadius: 3 },
       data: cells.map((cell) => ({ value: cell, label: { color: ink(cell[2]) } })),

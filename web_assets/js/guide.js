@@ -1,4 +1,5 @@
-// The guide takes the theme that the studio's page remembers.
+// The guide takes the theme that every page remembers.
 
-const system = matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark";
-document.documentElement.dataset.theme = localStorage.getItem("theme") ?? system;
+import { startTheme } from "./theme.js";
+
+startTheme();

@@ -1,13 +1,13 @@
-// The header: which run, what the worker does, how far, how long still; and the buttons that tell it what to do.
+// The header: which run, what the tracking process does, how far, how long still; and the buttons that command it.
 
-import { post, runPath } from "./api.js";
+import { fetchJson, post, runPath } from "./api.js";
+import { byId, element, fill, offer } from "./elements.js";
 import { complain } from "./messages.js";
 import { get, set, watch } from "./state.js";
 
-const byId = (id) => document.getElementById(id);
 const WORDS = {
   idle: "idle", compiling: "compiling kernels, once", tracking: "tracking", paused: "paused", reannealing: "re-annealing",
-  finished: "finished", cancelled: "cancelled", failed: "failed", lost: "worker lost",
+  finished: "finished", cancelled: "cancelled", failed: "failed", lost: "tracking process lost",
 };
 
 const isOpen = (work) => work && work.session === get("session") && work.run === get("run");
@@ -26,8 +26,8 @@ function liveLine(work, word) {
   return [...parts, `${dropped} dropped`, ...(incomplete ? [`${incomplete} incomplete`] : [])].join(" · ");
 }
 
-/** What the worker does, in one line. */
-export function stateLine(work) {
+/** What the tracking process does, in one line. */
+function stateLine(work) {
   if (!work) return "idle";
   const parts = [WORDS[work.state] ?? work.state];
   if (work.live) return liveLine(work, parts[0]);
@@ -43,56 +43,93 @@ function drawState() {
   const here = isOpen(work);
   const state = get("connected") === false ? "disconnected" : (work?.state ?? "idle");
   byId("state").dataset.state = state;
-  byId("state-text").textContent = state === "disconnected" ? "disconnected, reconnecting" : (work && !here && work.run && work.state === "tracking" ? `${work.session}: ` : "") + stateLine(work);
+  const elsewhere = work && !here && work.run && work.state === "tracking" ? `${work.session}: ` : "";
+  byId("state-text").textContent = state === "disconnected" ? "disconnected, reconnecting" : elsewhere + stateLine(work);
   byId("state").title = work?.message ? `${work.message} ${work.hint}` : "";
-  const bar = byId("run-progress");
-  bar.hidden = !here || !["tracking", "paused", "compiling"].includes(work.state);
-  bar.classList.toggle("unknown", work?.state === "compiling");
-  if (work && work.last > work.first) bar.firstElementChild.style.width = `${(100 * (work.live ? work.frame - work.first : work.done)) / (work.last - work.first)}%`;
+  const progress = byId("run-progress");
+  progress.hidden = !here || !["tracking", "paused", "compiling"].includes(work.state);
+  progress.classList.toggle("unknown", work?.state === "compiling");
+  if (work && work.last > work.first) progress.firstElementChild.style.width = `${(100 * (work.live ? work.frame - work.first : work.done)) / (work.last - work.first)}%`;
   drawButtons(work, here);
 }
 
+function toggleWord(work, here, complete) {
+  if (here && work.state === "tracking") return "Pause";
+  if (here && work.state === "lost") return "Resume";
+  if (!get("summary")?.frames.length) return "Track";
+  return complete ? "Tracked" : "Track on";
+}
+
 function drawButtons(work, here) {
-  const run = Boolean(get("run"));
+  const usable = get("run") && get("connected");
   const busy = here && ["tracking", "compiling", "reannealing"].includes(work.state);
-  const complete = get("summary") && (get("summary").frames.length >= get("summary").last - get("summary").first || (here && work.state === "finished"));
+  const summary = get("summary");
+  const complete = summary && (summary.frames.length >= summary.last - summary.first || (here && work.state === "finished"));
   const toggle = byId("track-toggle");
-  toggle.textContent = here && work.state === "tracking" ? "Pause" : here && work.state === "lost" ? "Resume" : get("summary")?.frames.length ? (complete ? "Tracked" : "Track on") : "Track";
-  toggle.classList.toggle("primary", !(complete && !busy));
-  toggle.disabled = !run || !get("connected") || (complete && !busy);
-  for (const id of ["step-layer", "step-frame"]) byId(id).disabled = !run || !get("connected") || busy || complete;
-  byId("reanneal").disabled = !run || !get("connected") || !get("summary")?.frames.length || get("frame") === null || (here && work.state === "tracking");
+  toggle.textContent = toggleWord(work, here, complete);
+  toggle.classList.toggle("primary", !complete || busy);
+  toggle.disabled = !usable || (complete && !busy);
+  for (const id of ["step-layer", "step-frame"]) byId(id).disabled = !usable || busy || complete;
+  byId("reanneal").disabled = !usable || !summary?.frames.length || get("frame") === null || (here && work.state === "tracking");
   byId("cancel").disabled = !here || !["tracking", "paused", "compiling"].includes(work.state);
 }
 
-const tell = (what, body) => post(`${runPath(get("session"), get("run"))}/${what}`, body).catch(complain);
+/** @param {"start" | "pause" | "cancel" | "step-layer" | "step-frame" | "reanneal"} what */
+const command = (what, body = undefined) => post(`${runPath(get("session"), get("run"))}/${what}`, body).catch(complain);
 
 /** Anneal the shown frame again with the knobs as they are. */
 export function reanneal() {
-  if (!byId("reanneal").disabled) tell("reanneal", { frame: get("frame") });
+  if (!byId("reanneal").disabled) command("reanneal", { frame: get("frame") });
+}
+
+// How slowly the search goes for whoever watches it. The choices and their words are the server's, the speed in use is the
+// tracking process's own.
+
+/** @type {HTMLSelectElement} */
+const speed = byId("search-speed");
+let asking = false;
+
+const speedInUse = () => String(get("work")?.seconds_a_layer ?? 0);
+const isOffered = () => [...speed.options].some((option) => option.value === speedInUse());
+
+/** Whether each layer is given time to be looked at. */
+export const isWatched = () => (get("work")?.seconds_a_layer ?? 0) > 0;
+
+async function loadSpeeds() {
+  if (asking) return;
+  asking = true;
+  try {
+    const { choices } = await fetchJson("/api/worker/pace");
+    offer(speed, choices.map((one) => [String(one.seconds_a_layer), one.label]));
+  } catch (error) { complain(error); } finally { asking = false; }
+  if (isOffered()) showSpeed();
+}
+
+/** Show the speed in use; one that is none of the choices (set by a script) becomes one. */
+function showSpeed() {
+  speed.disabled = !get("connected");
+  if (speed.disabled) return;
+  if (!isOffered()) loadSpeeds();
+  else if (speed.value !== speedInUse()) speed.value = speedInUse();
 }
 
 /** Wire the header. */
 export function startHeader() {
   byId("track-toggle").onclick = () => {
-    const work = get("work");
-    if (isOpen(work) && work.state === "tracking") return tell("pause");
+    if (isOpen(get("work")) && get("work").state === "tracking") return command("pause");
     set({ follow: true });
-    return tell("start");
+    return command("start");
   };
-  byId("step-layer").onclick = () => { set({ follow: true }); tell("step-layer"); };
-  byId("step-frame").onclick = () => { set({ follow: true }); tell("step-frame"); };
-  byId("cancel").onclick = () => tell("cancel");
+  for (const id of /** @type {const} */ (["step-layer", "step-frame"])) byId(id).onclick = () => { set({ follow: true }); command(id); };
+  byId("cancel").onclick = () => command("cancel");
   byId("reanneal").onclick = reanneal;
-  byId("rail-toggle").onclick = () => byId("rail-toggle").setAttribute("aria-expanded", String(document.body.classList.toggle("rail-open")));
+  byId("rail-toggle").onclick = () => { byId("rail-toggle").ariaExpanded = String(document.body.classList.toggle("rail-open")); };
   watch(["work", "run", "session", "connected", "summary", "frame"], drawState);
   watch(["session", "run", "summary"], () => {
-    const crumbs = byId("crumbs");
-    crumbs.replaceChildren();
-    if (!get("session")) return;
-    const name = document.createElement("b");
-    name.textContent = get("session");
-    crumbs.append(name, get("run") ? ` / ${get("run")}` : "", get("summary") ? ` · ${get("summary").describe ?? ""}` : "");
-    document.title = `${get("session")} – Capture studio`;
+    const [session, run, summary] = [get("session"), get("run"), get("summary")];
+    fill(byId("crumbs"), session && [element("b", {}, session), run && ` / ${run}`, summary && ` · ${summary.describe ?? ""}`]);
+    if (session) document.title = `${session} – Capture studio`;
   });
+  speed.onchange = () => post("/api/worker/pace", { seconds_a_layer: Number(speed.value) }).catch((error) => { complain(error); showSpeed(); });
+  watch(["work", "connected"], showSpeed);
 }

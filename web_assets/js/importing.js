@@ -2,9 +2,10 @@
 
 import { post } from "./api.js";
 import { openForm } from "./dialogs.js";
+import { NAME } from "./elements.js";
 import { jobDone, standing } from "./jobs.js";
 import { say } from "./messages.js";
-import { openSession, refreshSessions } from "./rail.js";
+import { openSession, refreshSessions } from "./sessions.js";
 import { uploadFiles } from "./uploading.js";
 
 /** Open the form. */
@@ -15,19 +16,16 @@ export function importForm() {
     rows: [
       [{ name: "source", label: "Folder on this computer", placeholder: "full path of the folder" }],
       [{ name: "files", label: "or upload a folder", kind: "file", webkitdirectory: true, multiple: true }],
-      [{ name: "name", label: "Session name", required: true, pattern: "[A-Za-z0-9_\\-]{1,64}", title: "Letters, digits, - and _, up to 64" },
-        { name: "fps", label: "Frames per second", kind: "number", min: 1, step: "any", hint: "needed for folders of pictures" }],
+      [{ name: "name", label: "Session name", ...NAME }, { name: "fps", label: "Frames per second", kind: "number", min: 1, step: "any", hint: "needed for folders of pictures" }],
       [{ name: "refer", kind: "check", label: "refer to the footage where it lies instead of copying it" }],
     ],
     send: async (values, report) => {
-      const body = { name: values.name, fps: values.fps ? Number(values.fps) : null, copy: !values.refer };
-      if (values.files.length) body.upload = await uploadFiles(values.files, report);
-      else body.source = values.source;
-      const { identifier } = await post("/api/imports", body);
-      const told = await jobDone(`/api/imports/${identifier}`, (going) => report(standing(going, "Importing…")));
+      const source = values.files.length ? { upload: await uploadFiles(values.files, report) } : { source: values.source };
+      const { identifier } = await post("/api/imports", { name: values.name, fps: values.fps ? Number(values.fps) : null, copy: !values.refer, ...source });
+      const { warnings } = await jobDone(`/api/imports/${identifier}`, (job) => report(standing(job, "Importing…")));
       await refreshSessions();
       openSession(values.name);
-      for (const warning of told.warnings ?? []) say(warning, { kind: "warning" });
+      for (const warning of warnings ?? []) say(warning, { kind: "warning" });
     },
   });
 }

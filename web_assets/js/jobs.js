@@ -1,50 +1,48 @@
 // Work in the background of the server: asked for its state until it has ended.
 
-import { fetchJson } from "./api.js";
-import { duration } from "./elements.js";
+import { fault, fetchJson } from "./api.js";
+import { dotted, duration } from "./elements.js";
 
 const POLL_MILLISECONDS = 350;
+const WORTH_SAYING = 2;
 
 /** The code of the error of what a person ended. */
 export const CANCELLED = "cancelled";
 
-/** What went wrong in a job, as an error with its remedy. */
-export const faultOf = (told) => Object.assign(new Error(told.message), { hint: told.hint, code: told.code });
-
 /**
- * Follow the job whose state is told under a path; resolves with its last state, "done" or "cancelled", and throws what
- * went wrong. `report` gets each state on the way; once `gone()` nobody waits any more: resolves with null.
+ * Follow the job at an address; resolves with its last state, "done" or "cancelled", and throws what went wrong.
+ * `report` gets each state on the way; once `gone()` nothing waits any more: resolves with null.
+ * @param {string} path
  */
-export async function followJob(path, report = () => {}, gone = () => false) {
+export async function followJob(path, report = (_job) => {}, gone = () => false) {
   for (;;) {
-    const told = await fetchJson(path);
+    const job = await fetchJson(path);
     if (gone()) return null;
-    if (told.state === "failed") throw faultOf(told);
-    if (told.state !== "running") return told;
-    report(told);
+    if (job.state === "failed") throw fault(job.message, job.hint, { code: job.code });
+    if (job.state !== "running") return job;
+    report(job);
     await new Promise((resolve) => setTimeout(resolve, POLL_MILLISECONDS));
     if (gone()) return null;
   }
 }
 
 /** Like `followJob` for work that nothing follows from when it was cancelled: that too is thrown. */
-export async function jobDone(path, report, gone) {
-  const told = await followJob(path, report, gone);
-  if (told?.state === "cancelled") throw faultOf({ ...told, code: CANCELLED });
-  return told;
+export async function jobDone(path, report = undefined, gone = undefined) {
+  const job = await followJob(path, report, gone);
+  if (job?.state === "cancelled") throw fault(job.message, job.hint, { code: CANCELLED });
+  return job;
 }
 
 /** A job's share of its step, null where it cannot say. */
-export const shareOf = (told) => (told.total > 1 ? told.done / told.total : null);
+export const shareOf = (job) => (job.total > 1 ? job.done / job.total : null);
 
 /** Where a job stands, in words. */
-export function standing(told, otherwise) {
-  const share = shareOf(told);
-  return [told.step || otherwise, share === null ? "" : `${Math.round(100 * share)} %`].filter(Boolean).join(" · ");
-}
+export const standing = (job, otherwise) => dotted(job.step || otherwise, shareOf(job) === null ? "" : `${Math.round(100 * shareOf(job))} %`);
 
-/** The same with the time that the step will still take. */
-export function withTimeLeft(told, otherwise) {
-  const left = told.seconds_left > 2 ? `${duration(told.seconds_left)} left of this step` : "";
-  return [standing(told, otherwise), left].filter(Boolean).join(" · ");
-}
+/** How long a step still takes, in words; nothing where that is hardly any time, or not known. */
+export const timeLeft = (seconds) => (seconds > WORTH_SAYING ? `${duration(seconds)} left` : "");
+
+/** Where a job stands, with the time that its step still takes; as `drawProgress` takes it. */
+export const progressOf = (job, otherwise, cancel) => ({
+  words: dotted(standing(job, otherwise), timeLeft(job.seconds_left) && `${timeLeft(job.seconds_left)} of this step`), share: shareOf(job), cancel,
+});

@@ -2,12 +2,14 @@
 
 import { lookThrough } from "./cameras.js";
 import { openList } from "./dialogs.js";
+import { byId } from "./elements.js";
 import { reanneal } from "./header.js";
 import { togglePlay, toggleLoop } from "./playback.js";
 import { enterScene } from "./scene_frame.js";
 import { get } from "./state.js";
 import { goTo, goToMark, stepLayer } from "./timeline.js";
 
+/** @type {[string, string, (event: KeyboardEvent) => boolean, (event: KeyboardEvent) => void][]} */
 const KEYS = [
   ["Space", "play or pause what is stored", (event) => event.key === " ", togglePlay],
   ["←", "frame before", (event) => event.key === "ArrowLeft" && !event.shiftKey, () => goTo(get("frame") - 1)],
@@ -21,7 +23,7 @@ const KEYS = [
   ["1 – 9", "look through a camera", (event) => /^[1-9]$/.test(event.key), (event) => lookThrough(Number(event.key) - 1)],
   ["0", "free view", (event) => event.key === "0", () => lookThrough(null)],
   ["r", "anneal this frame again", (event) => event.key === "r", reanneal],
-  ["c", "correct this frame by hand", (event) => event.key === "c", () => document.getElementById("correct").click()],
+  ["c", "correct this frame by hand", (event) => event.key === "c", () => byId("correct").click()],
   ["l", "loop", (event) => event.key === "l", toggleLoop],
   ["s", "into the scene's panel; Escape leads back", (event) => event.key === "s", () => enterScene()],
   ["?", "this list", (event) => event.key === "?", () => showKeys()],

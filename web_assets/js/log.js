@@ -1,22 +1,16 @@
-// The run's log: what the worker says, newest below.
+// The run's log: what the tracking process says, newest below.
 
 import { fetchJson, runPath } from "./api.js";
+import { byId, element } from "./elements.js";
 import { get, watch } from "./state.js";
 
-const list = document.getElementById("log");
+const list = byId("log");
 const MOST_LINES = 500;
 
 /** Add a line {level, time (seconds), text}. */
 export function addLine({ level, time, text }) {
   const atEnd = list.scrollTop + list.clientHeight >= list.scrollHeight - 8;
-  const line = document.createElement("li");
-  line.className = level;
-  const clock = document.createElement("time");
-  clock.textContent = new Date(time * 1000).toLocaleTimeString();
-  const words = document.createElement("span");
-  words.textContent = text;
-  line.append(clock, words);
-  list.append(line);
+  list.append(element("li", { className: level }, element("time", {}, new Date(time * 1000).toLocaleTimeString()), element("span", {}, text)));
   while (list.children.length > MOST_LINES) list.firstChild.remove();
   if (atEnd) list.scrollTop = list.scrollHeight;
 }
@@ -25,11 +19,11 @@ export function addLine({ level, time, text }) {
 export function startLog() {
   watch(["session", "run"], async () => {
     list.replaceChildren();
-    if (!get("run")) return;
-    const asked = get("run");
-    const told = await fetchJson(`${runPath(get("session"), asked)}/log`).catch(() => ({ lines: [] }));
-    if (asked !== get("run")) return;
+    const run = get("run");
+    if (!run) return;
+    const { lines } = await fetchJson(`${runPath(get("session"), run)}/log`).catch(() => ({ lines: [] }));
+    if (run !== get("run")) return;
     list.replaceChildren();
-    for (const line of told.lines ?? []) addLine(line);
+    for (const line of lines) addLine(line);
   });
 }

@@ -6,14 +6,14 @@ import { startCurtain } from "./curtain.js";
 import { startData } from "./data.js";
 import { startExporting } from "./exporting.js";
 import { startHeader } from "./header.js";
-import { startKeys } from "./keys.js";
+import { startKeys, takeKey } from "./keys.js";
 import { startLive } from "./live.js";
 import { startLog } from "./log.js";
 import { startPlayback } from "./playback.js";
-import { openSession, refreshSessions, startRail } from "./rail.js";
+import { startRail } from "./rail.js";
 import { startSceneFrame } from "./scene_frame.js";
+import { openSession, refreshSessions } from "./sessions.js";
 import { get } from "./state.js";
-import { startSearchSpeed } from "./search_speed.js";
 import { startSurvival } from "./survival.js";
 import { startTabs } from "./tabs.js";
 import { startTheme } from "./theme.js";
@@ -21,12 +21,11 @@ import { startTimeline } from "./timeline.js";
 import { startTracks } from "./tracks.js";
 import { startVariance } from "./variance.js";
 import { startWeights } from "./weights.js";
-import { startWhatIf } from "./what_if.js";
 
 async function start() {
   startTheme();
+  startLive();
   startHeader();
-  startSearchSpeed();
   startRail();
   startTimeline();
   startPlayback();
@@ -39,17 +38,15 @@ async function start() {
   startTabs();
   startKeys();
   startCurtain();
-  startWhatIf();
   startData();
   startTracks();
   startCorrecting();
-  startLive();
-  startSceneFrame();
+  startSceneFrame(takeKey);
   await refreshSessions();
-  const wish = new URLSearchParams(location.search);
+  const query = new URLSearchParams(location.search);
   const sessions = get("sessions") ?? [];
-  const first = sessions.find((one) => one.name === wish.get("session")) ?? sessions.find((one) => one.runs.length) ?? sessions[0];
-  if (first) openSession(first.name, wish.get("run") ?? undefined);
+  const first = sessions.find((one) => one.name === query.get("session")) ?? sessions.find((one) => one.runs.length) ?? sessions[0];
+  if (first) openSession(first.name, query.get("run") ?? undefined);
 }
 
 start();

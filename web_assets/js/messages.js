@@ -1,28 +1,17 @@
 // Messages that pass: a cause and a remedy, never a traceback.
 
-const box = document.getElementById("toasts");
-const SECONDS_SHOWN = 9;
+import { byId, element, fill } from "./elements.js";
 
-/** Show a message; errors stay until closed. */
-export function say(text, { remedy = "", kind = "info" } = {}) {
-  const toast = document.createElement("div");
-  toast.className = `toast ${kind}`;
-  const cause = document.createElement("p");
-  cause.textContent = text;
-  const close = document.createElement("button");
-  close.className = "icon quiet small";
-  close.textContent = "×";
-  close.setAttribute("aria-label", "Close message");
-  close.onclick = () => toast.remove();
-  toast.append(cause, close);
-  if (remedy) {
-    const line = document.createElement("p");
-    line.className = "remedy";
-    line.textContent = remedy;
-    toast.append(line);
-  }
-  box.append(toast);
-  while (box.children.length > 4) box.firstChild.remove();
+const SECONDS_SHOWN = 9;
+const MOST_SHOWN = 4;
+
+/** Show a message; errors stay until closed. act: a button that follows from it. */
+export function say(text, { remedy = "", kind = "info", act = null } = {}) {
+  const box = byId("toasts");
+  const close = element("button", { className: "icon quiet small", textContent: "×", ariaLabel: "Close message", onclick: () => toast.remove() });
+  const toast = element("div", { className: `toast ${kind}` }, element("p", {}, text), close, remedy && element("p", { className: "remedy" }, remedy), act);
+  act?.addEventListener("click", () => toast.remove());
+  fill(box, [...box.children, toast].slice(-MOST_SHOWN));
   if (kind !== "error") setTimeout(() => toast.remove(), SECONDS_SHOWN * 1000);
 }
 

@@ -1,72 +1,60 @@
 // Sessions and their runs: list, open, import, new run, rename, duplicate, delete to the trash.
 
 import { fetchJson, patch, post, remove, runPath, sessionPath } from "./api.js";
-import { figure } from "./charts.js";
+import { figure } from "./chart_looks.js";
 import { openForm, openMenu } from "./dialogs.js";
+import { button, byId, element, fill, NAME } from "./elements.js";
 import { importForm } from "./importing.js";
 import { complain, say } from "./messages.js";
 import { newRunForm } from "./new_run.js";
+import { lacks, openSession, refreshSessions, setupPath } from "./sessions.js";
 import { startPoseForm } from "./start_pose.js";
-import { get, set, watch } from "./state.js";
+import { get, watch } from "./state.js";
 import { showPanel } from "./tabs.js";
 import { makeTrackForm } from "./tracks.js";
 
-const list = document.getElementById("sessions");
-
-function element(tag, className, text = "") {
-  const made = document.createElement(tag);
-  made.className = className;
-  made.textContent = text;
-  return made;
-}
-
-/** Ask the server for the list again. */
-export async function refreshSessions() {
-  try {
-    const told = await fetchJson("/api/sessions");
-    // An answer that says nothing new leaves the list (and the focus in it) alone.
-    if (JSON.stringify(told.sessions) !== JSON.stringify(get("sessions"))) set({ sessions: told.sessions });
-  } catch (error) { complain(error); }
-}
-
-/** Open a session and one of its runs (the newest unless told). */
-export function openSession(session, run) {
-  const entry = get("sessions")?.find((one) => one.name === session);
-  const chosen = run || entry?.runs?.[0]?.name || null;
-  if (session === get("session") && chosen === get("run")) return;
-  set({ session, run: chosen, track: "raw", summary: null, detail: null, parameters: null, layerCount: null, settings: null, whatIf: null, frame: null, layer: null, follow: true });
-  document.body.classList.remove("rail-open");
-}
-
-/** Open a session without any of its runs. */
-export function openSessionAlone(session) {
-  set({ session, run: null, track: "raw", summary: null, detail: null, parameters: null, layerCount: null, settings: null, whatIf: null, frame: null, layer: null, follow: true });
-  document.body.classList.remove("rail-open");
-}
-
-function renameForm(what, path, name, open, done) {
-  openForm({
-    heading: `Rename ${what}`, action: "Rename", rows: [[{ name: "name", label: "Name", value: name, required: true, pattern: "[A-Za-z0-9_\\-]{1,64}", title: "Letters, digits, - and _, up to 64" }]],
-    send: async (values) => {
-      if (values.name === name) return;
-      await whileClosed(open, () => patch(path, { name: values.name }));
-      await done(values.name);
-    },
-  });
-}
-
-function deleteForm(what, name, path, open, done) {
-  openForm({
-    heading: `Delete ${what} ${name}?`, intro: "It goes to the trash, from which it can be restored.", action: "Delete", danger: true, rows: [],
-    send: async () => { await whileClosed(open, () => remove(path)); await done(); },
-  });
-}
+const list = byId("sessions");
+const counted = (count, word) => `${count} ${count === 1 ? word : `${word}s`}`;
+const go = (address) => { location.href = address; };
 
 /** Do something to an open session or run that makes its name void: it is closed meanwhile, and opened again if that fails. */
 async function whileClosed(open, work) {
   const [session, run] = [get("session"), get("run")];
   if (open) openSession(null);
   try { await work(); } catch (error) { if (open) openSession(session, run ?? undefined); throw error; }
+}
+
+/** Rename what is at an API address; `done(name)` follows. */
+function renameForm(what, path, name, open, done) {
+  openForm({
+    heading: `Rename ${what}`, action: "Rename", rows: [[{ name: "name", label: "Name", value: name, ...NAME }]],
+    send: async (values) => {
+      if (values.name === name) return;
+      await whileClosed(open, () => patch(path, { name: values.name }));
+      await refreshSessions();
+      done(values.name);
+    },
+  });
+}
+
+/** Delete what is at an API address; `done()` follows. */
+function deleteForm(what, path, name, open, done) {
+  openForm({
+    heading: `Delete ${what} ${name}?`, intro: "It goes to the trash, from which it can be restored.", action: "Delete", danger: true, rows: [],
+    send: async () => {
+      await whileClosed(open, () => remove(path));
+      await refreshSessions();
+      done();
+    },
+  });
+}
+
+async function duplicate(entry) {
+  try {
+    const made = await post(`${sessionPath(entry.name)}/duplicate`);
+    await refreshSessions();
+    say(`${entry.name} is copied as ${made.name}.`);
+  } catch (error) { complain(error); }
 }
 
 /** A session or run that went away in another window is closed. */
@@ -81,102 +69,73 @@ function closeWhatIsGone() {
 /** The page of a session's comparisons; the form of a first one where there is none. */
 const comparisonsPath = (entry) => `/comparisons?session=${encodeURIComponent(entry.name)}${entry.comparisons ? "" : "&new"}`;
 
-/** The guided way of a session, at its next step. */
-export const wayPath = (entry) => `/way?session=${encodeURIComponent(entry.name)}`;
-
-/** What a session that cannot be tracked yet says of itself. */
-export const lacks = (entry) => ({ footage: "no footage yet", calibration: "not calibrated yet" })[entry.next_step] ?? "";
-
-function sessionMenu(button, entry) {
+function sessionMenu(opener, entry) {
   const path = sessionPath(entry.name);
   const open = get("session") === entry.name;
   const run = get("run") ?? undefined;
-  openMenu(button, [
-    ["Guided way", () => { location.href = wayPath(entry); }],
-    ...(entry.next_step ? [] : [["New run…", () => newRunForm(entry)]]),
-    ...(entry.next_step ? [] : [["Find the start pose…", () => startPoseForm(entry)]]),
-    ...(entry.has_truth ? [["Compare trackers…", () => { location.href = comparisonsPath(entry); }]] : []),
-    ["Rename…", () => renameForm("session", path, entry.name, open, async (name) => { await refreshSessions(); if (open) openSession(name, run); })],
-    ["Duplicate", async () => { try { const made = await post(`${path}/duplicate`); await refreshSessions(); say(`${entry.name} is copied as ${made.name}.`); } catch (error) { complain(error); } }],
-    ["Delete…", () => deleteForm("session", entry.name, path, open, async () => { await refreshSessions(); say(`${entry.name} is in the trash.`); if (open) openSession(get("sessions")?.[0]?.name ?? null); })],
+  openMenu(opener, [
+    ["Guided set-up", () => go(setupPath(entry))],
+    ...(entry.next_step ? [] : [["New run…", () => newRunForm(entry)], ["Find the start pose…", () => startPoseForm(entry)]]),
+    ...(entry.has_truth ? [["Compare trackers…", () => go(comparisonsPath(entry))]] : []),
+    ["Rename…", () => renameForm("session", path, entry.name, open, (name) => { if (open) openSession(name, run); })],
+    ["Duplicate", () => duplicate(entry)],
+    ["Delete…", () => deleteForm("session", path, entry.name, open, () => { say(`${entry.name} is in the trash.`); if (open) openSession(get("sessions")?.[0]?.name ?? null); })],
   ]);
 }
 
-function runMenu(button, entry, run) {
+function runMenu(opener, entry, run) {
   const path = runPath(entry.name, run.name);
   const open = get("session") === entry.name && get("run") === run.name;
-  openMenu(button, [
+  openMenu(opener, [
     ["Refine…", () => makeTrackForm(entry.name, run.name, "refine")],
     ["Smooth…", () => makeTrackForm(entry.name, run.name, "smooth")],
     ["Export…", () => { openSession(entry.name, run.name); showPanel("export"); }],
-    ["Poses as CSV", () => { location.href = `${path}/poses.csv`; }],
+    ["Poses as CSV", () => go(`${path}/poses.csv`)],
     ["New run like this…", () => newRunForm(entry, run)],
-    ["Rename…", () => renameForm("run", path, run.name, open, async (name) => { await refreshSessions(); openSession(entry.name, name); })],
-    ["Delete…", () => deleteForm("run", run.name, path, open, async () => { await refreshSessions(); if (open) openSession(entry.name); })],
+    ["Rename…", () => renameForm("run", path, run.name, open, (name) => openSession(entry.name, name))],
+    ["Delete…", () => deleteForm("run", path, run.name, open, () => { if (open) openSession(entry.name); })],
   ]);
 }
 
-function runRow(entry, run) {
-  const row = element("div", "run");
-  row.setAttribute("role", "treeitem");
-  row.setAttribute("aria-selected", String(entry.name === get("session") && run.name === get("run")));
-  row.tabIndex = 0;
-  row.dataset.key = `${entry.name}/${run.name}`;
-  const words = element("div", "");
-  words.append(element("div", "name", run.name), element("div", "facts", run.describe ?? run.tracker));
-  const value = element("div", "figure");
-  if (run.mean_mm != null) { value.append(figure(run.mean_mm), " "); value.append(Object.assign(element("small", ""), { textContent: "mm" })); }
-  else value.append(element("small", "done", `${run.done}/${run.last - run.first}`));
-  if (run.damaged?.length) value.append(" ", Object.assign(element("small", "damaged", `${run.damaged.length} damaged`), { title: `Frames ${run.damaged.join(", ")} are damaged on the disk: resume the run to track them again.` }));
-  const more = element("button", "more", "⋯");
-  more.setAttribute("aria-label", `More for ${run.name}`);
-  more.onclick = (event) => { event.stopPropagation(); runMenu(more, entry, run); };
-  row.append(words, value, more);
-  row.onclick = () => openSession(entry.name, run.name);
-  row.onkeydown = (event) => { if (event.key === "Enter" && event.target === row) row.onclick(); };
+/** A line of the list: a click or Enter opens it, its button the menu. */
+function line(key, className, properties, open, menu, ...children) {
+  const more = element("button", { className: "more", ariaLabel: `More for ${key.split("/").at(-1)}`, onclick: (event) => { event.stopPropagation(); menu(more); } }, "⋯");
+  const row = element("div", { className, role: "treeitem", tabIndex: 0, dataset: { key }, onclick: open, ...properties }, ...children, more);
+  row.onkeydown = (event) => { if (event.key === "Enter" && event.target === row) open(); };
   return row;
 }
 
+const lineWords = (name, facts) => element("div", {}, element("div", { className: "name" }, name), element("div", { className: "facts" }, facts));
+
+function runRow(entry, run) {
+  const measured = run.mean_mm != null;
+  const figures = element("div", { className: "figure" },
+    measured ? [figure(run.mean_mm), " ", element("small", {}, "mm")] : element("small", { className: "done" }, `${run.done}/${run.last - run.first}`),
+    run.damaged?.length > 0 && [" ", element("small", { className: "damaged", title: `Frames ${run.damaged.join(", ")} are damaged on the disk: resume the run to track them again.` }, `${run.damaged.length} damaged`)]);
+  return line(`${entry.name}/${run.name}`, "run", { ariaSelected: String(entry.name === get("session") && run.name === get("run")) },
+    () => openSession(entry.name, run.name), (more) => runMenu(more, entry, run), lineWords(run.name, run.describe ?? run.tracker), figures);
+}
+
 function sessionBlock(entry) {
-  const block = element("div", entry.name === get("session") ? "session open" : "session");
-  const head = element("div", "head");
-  head.tabIndex = 0;
-  head.dataset.key = entry.name;
-  head.setAttribute("role", "treeitem");
-  head.setAttribute("aria-expanded", String(entry.name === get("session")));
-  const picture = entry.next_step === "footage" ? element("span", "no-picture") : Object.assign(document.createElement("img"), { src: `${sessionPath(entry.name)}/thumbnail.jpg`, alt: "", loading: "lazy" });
-  picture.onerror = () => picture.replaceWith(element("span", "no-picture"));
-  const words = element("div", "");
-  words.append(element("div", "name", entry.name), element("div", "facts", entry.problem || lacks(entry) || `${entry.cameras} ${entry.cameras === 1 ? "camera" : "cameras"} · ${entry.frame_count} frames`));
-  const more = element("button", "more", "⋯");
-  more.setAttribute("aria-label", `More for ${entry.name}`);
-  more.onclick = (event) => { event.stopPropagation(); sessionMenu(more, entry); };
-  head.append(picture, words, more);
-  head.onclick = () => openSession(entry.name);
-  head.onkeydown = (event) => { if (event.key === "Enter" && event.target === head) head.onclick(); };
-  const runs = element("div", "runs");
-  runs.setAttribute("role", "group");
-  const fresh = element("button", "new-run quiet small", entry.next_step ? "Go on in the guided way" : "+ New run");
-  fresh.onclick = entry.next_step ? () => { location.href = wayPath(entry); } : () => newRunForm(entry);
-  const compare = element("a", "compare", entry.comparisons ? `${entry.comparisons} ${entry.comparisons === 1 ? "comparison" : "comparisons"}` : "Compare trackers");
-  compare.href = comparisonsPath(entry);
-  const last = element("div", "last-line");
-  last.append(fresh, ...(entry.has_truth ? [compare] : []));
-  runs.append(...entry.runs.map((run) => runRow(entry, run)), last);
-  head.title = [entry.title, entry.problem || `${entry.frame_count} frames at ${figure(entry.fps)} per second, ${entry.body}`, ...(entry.warnings ?? [])].join("\n");
-  block.append(head, runs);
-  return block;
+  const isOpen = entry.name === get("session");
+  const empty = () => element("span", { className: "no-picture" });
+  const picture = entry.next_step === "footage" ? empty() : element("img", { src: `${sessionPath(entry.name)}/thumbnail.jpg`, alt: "", loading: "lazy" });
+  picture.onerror = () => picture.replaceWith(empty());
+  const title = [entry.title, entry.problem || `${entry.frame_count} frames at ${figure(entry.fps)} per second, ${entry.body}`, ...(entry.warnings ?? [])].join("\n");
+  const head = line(entry.name, "head", { ariaExpanded: String(isOpen), title }, () => openSession(entry.name), (more) => sessionMenu(more, entry),
+    picture, lineWords(entry.name, entry.problem || lacks(entry) || `${counted(entry.cameras, "camera")} · ${entry.frame_count} frames`));
+  const next = entry.next_step ? button("Go on in the guided set-up", () => go(setupPath(entry)), "new-run quiet small") : button("+ New run", () => newRunForm(entry), "new-run quiet small");
+  const compare = entry.has_truth && element("a", { className: "compare", href: comparisonsPath(entry) }, entry.comparisons ? counted(entry.comparisons, "comparison") : "Compare trackers");
+  return element("div", { className: isOpen ? "session open" : "session" }, head,
+    element("div", { className: "runs", role: "group" }, entry.runs.map((run) => runRow(entry, run)), element("div", { className: "last-line" }, next, compare)));
 }
 
 function draw() {
   const sessions = get("sessions");
-  if (sessions === null) { list.replaceChildren(element("p", "empty", "Loading…")); return; }
-  if (!sessions.length) { list.replaceChildren(element("p", "empty", "No sessions yet.")); return; }
-  const at = list.scrollTop;
-  const key = list.contains(document.activeElement) ? document.activeElement.dataset.key : undefined;
-  list.replaceChildren(...sessions.map(sessionBlock));
-  list.scrollTop = at;
-  if (key) list.querySelector(`[data-key="${CSS.escape(key)}"]`)?.focus();
+  const empty = (words) => fill(list, element("p", { className: "empty" }, words));
+  if (sessions === null) return empty("Loading…");
+  if (!sessions.length) return empty("No sessions yet.");
+  fill(list, sessions.map(sessionBlock));
   drawProgress();
 }
 
@@ -191,36 +150,39 @@ function drawProgress() {
 /** Up and down go from line to line. */
 function takeArrow(event) {
   const by = { ArrowDown: 1, ArrowUp: -1 }[event.key];
-  const lines = [...list.querySelectorAll("[role=treeitem]")].filter((line) => line.offsetParent);
+  const lines = [...list.querySelectorAll("[role=treeitem]")].filter((one) => one.offsetParent);
   const at = lines.indexOf(event.target);
   if (!by || at < 0) return;
   event.preventDefault();
   lines[Math.max(0, Math.min(lines.length - 1, at + by))].focus();
 }
 
+/** Open what came back from the trash. */
+function openRestored({ name, run = "", model = "", comparison = "" }) {
+  if (model) go(`/behaviours?name=${encodeURIComponent(model)}`);
+  else if (comparison) go(`/comparisons?${new URLSearchParams({ session: name, name: comparison })}`);
+  else openSession(name, run || undefined);
+}
+
 async function drawTrash() {
-  const line = document.getElementById("trash-line");
-  const told = await fetchJson("/api/trash").catch(() => ({ entries: [] }));
-  const entries = told.entries.filter((entry) => entry.restorable).reverse();
-  line.hidden = !entries.length;
-  line.replaceChildren(`${entries.length} in the trash`);
-  const button = element("button", "quiet small", "Restore…");
-  button.onclick = () => openMenu(button, entries.slice(0, 12).map((entry) => [`${entry.name} (${entry.kind})`, async () => {
+  const { entries } = await fetchJson("/api/trash").catch(() => ({ entries: [] }));
+  const restorable = entries.filter((entry) => entry.restorable).reverse();
+  const restore = async (entry) => {
     try {
-      const told = await post("/api/trash/restore", { entry: entry.id });
+      const restored = await post("/api/trash/restore", { entry: entry.id });
       await refreshSessions();
-      if (told.model) location.href = `/behaviours?name=${encodeURIComponent(told.model)}`;
-      else if (told.comparison) location.href = `/comparisons?session=${encodeURIComponent(told.name)}&name=${encodeURIComponent(told.comparison)}`;
-      else openSession(told.name, told.run || undefined);
+      openRestored(restored);
     } catch (error) { complain(error); }
-  }]));
-  line.append(button);
+  };
+  const opener = button("Restore…", () => openMenu(opener, restorable.slice(0, 12).map((entry) => [`${entry.name} (${entry.kind})`, () => restore(entry)])), "quiet small");
+  byId("trash-line").hidden = !restorable.length;
+  fill(byId("trash-line"), `${restorable.length} in the trash`, opener);
 }
 
 /** Wire the rail. */
 export function startRail() {
-  document.getElementById("import-open").onclick = importForm;
-  document.getElementById("way-new").onclick = () => { location.href = "/way?new"; };
+  byId("import-open").onclick = importForm;
+  byId("way-new").onclick = () => go("/way?new");
   list.addEventListener("keydown", takeArrow);
   watch(["sessions", "session", "run"], draw);
   watch(["sessions"], () => { closeWhatIsGone(); drawTrash(); });

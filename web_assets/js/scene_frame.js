@@ -1,10 +1,11 @@
 // The scene's frame: viser's own page, in the studio's type and colours, with the page's keys working in it.
 
-import { takeKey } from "./keys.js";
+import { byId } from "./elements.js";
 import { loadScene } from "./scene_window.js";
 import { onTheme, theme, token } from "./theme.js";
 
-const frame = document.getElementById("scene");
+/** @type {HTMLIFrameElement} */
+const frame = byId("scene");
 const FONT = "/assets/vendor/inter.woff2";
 const CONTROLS = "[role=slider], [role=tab], input, textarea, select";
 const style = document.createElement("style");
@@ -30,11 +31,12 @@ function look() {
 }
 
 async function dress() {
+  /** @type {any} */
   const page = frame.contentDocument;
   style.textContent = look();
   page.head.append(style);
   if (![...page.fonts].some((face) => face.family === "Inter")) {
-    const face = new frame.contentWindow.FontFace("Inter", await (await fetch(FONT)).arrayBuffer(), { weight: "100 900" });
+    const face = new page.defaultView.FontFace("Inter", await (await fetch(FONT)).arrayBuffer(), { weight: "100 900" });
     page.fonts.add(await face.load());
   }
 }
@@ -44,16 +46,16 @@ function keepToControls(event) {
   if (event.target.closest?.(CONTROLS)) event.stopPropagation();
 }
 
-/** The page's keys come first: arrows walk the timeline wherever the focus is, and do not turn the view as well. */
-function takeFirst(event) {
+/** The page's keys come first: arrows step through the timeline wherever the focus is, and do not turn the view as well. */
+const first = (takeKey) => (event) => {
   if (event.target.closest?.(CONTROLS)) return;
   takeKey(event);
   if (event.defaultPrevented) event.stopImmediatePropagation();
-}
+};
 
 /** Put the keyboard into the scene's panel: the frame is no stop of the page's own, for its many controls' sake. */
 export function enterScene() {
-  const tab = frame.contentDocument?.querySelector("[role=tab][aria-selected=true]");
+  const tab = /** @type {HTMLElement} */ (frame.contentDocument?.querySelector("[role=tab][aria-selected=true]"));
   (tab ?? frame).focus();
 }
 
@@ -61,19 +63,19 @@ export function enterScene() {
 function leaveScene(event) {
   if (event.key !== "Escape" || event.target.closest?.("[aria-expanded=true], [role=dialog]")) return;
   event.target.blur?.();
-  document.getElementById("track").focus();
+  byId("track").focus();
 }
 
-/** Load the scene, dressed as the page. */
-export function startSceneFrame() {
+/** Load the scene, dressed as the page; `takeKey` handles the page's keys in it. */
+export function startSceneFrame(takeKey) {
   frame.addEventListener("load", () => {
     if (frame.src.endsWith("about:blank")) return;
     dress();
     for (const kind of ["keydown", "keyup"]) frame.contentDocument.body.addEventListener(kind, keepToControls);
-    frame.contentWindow.addEventListener("keydown", takeFirst, true);
+    frame.contentWindow.addEventListener("keydown", first(takeKey), true);
     frame.contentWindow.addEventListener("keydown", leaveScene, true);
     // Whoever clicks a tab goes on with the timeline's keys.
-    frame.contentWindow.addEventListener("click", (event) => { if (event.detail) event.target.closest?.("[role=tab]")?.blur(); });
+    frame.contentWindow.addEventListener("click", (/** @type {any} */ event) => { if (event.detail) event.target.closest?.("[role=tab]")?.blur(); });
   });
   onTheme(() => { style.textContent = look(); });
   loadScene(frame);

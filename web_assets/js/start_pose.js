@@ -1,31 +1,28 @@
 // Finding a start pose in a frame: progress while it is looked for, what was found and how sure it is.
 
 import { post, remove, sessionPath } from "./api.js";
-import { openForm } from "./dialogs.js";
+import { openForm, whileOpen } from "./dialogs.js";
+import { percent } from "./elements.js";
 import { jobDone, standing } from "./jobs.js";
 import { say } from "./messages.js";
-import { openSessionAlone, refreshSessions } from "./rail.js";
+import { openSession, refreshSessions } from "./sessions.js";
 
 const UNSURE = 0.75;
 
-/** Look for the pose in a frame; resolves with what was found, throws what went wrong. `wish`: frame, body, behaviour, replace. */
-export async function findStartPose(session, wish, report) {
-  const { identifier } = await post(`${sessionPath(session)}/initialise`, wish);
-  const dialog = document.getElementById("dialog");
-  const stop = () => { remove(`/api/initialisations/${identifier}`).catch(() => {}); };
-  dialog.addEventListener("close", stop, { once: true });
-  try {
-    return await jobDone(`/api/initialisations/${identifier}`, (told) => report(standing(told, "Finding the pose…")));
-  } finally {
-    dialog.removeEventListener("close", stop);
-  }
+/** Look for the pose in a frame; resolves with what was found, throws what went wrong. `request`: frame, body, behaviour, replace. */
+export async function findStartPose(session, request, report) {
+  const { identifier } = await post(`${sessionPath(session)}/initialise`, request);
+  const stop = () => remove(`/api/initialisations/${identifier}`).catch(() => {});
+  return whileOpen(stop, () => jobDone(`/api/initialisations/${identifier}`, (job) => report(standing(job, "Finding the pose…"))));
 }
 
+/** Whether a pose that was found may be wrong. */
+export const isUnsure = (found) => found.confidence < UNSURE;
+
 /** Say what was found, as a warning where it may be wrong. */
-export function tellFound(found) {
-  const unsure = found.confidence < UNSURE;
-  const sure = `confidence ${Math.round(100 * found.confidence)} %`;
-  say(`Start pose found in frame ${found.frame} (${sure}), kept in ${found.file}.`, {
+export function sayFound(found) {
+  const unsure = isUnsure(found);
+  say(`Start pose found in frame ${found.frame} (confidence ${percent(found.confidence)}), kept in ${found.file}.`, {
     kind: unsure ? "warning" : "info",
     remedy: [unsure ? "Look at it in the scene before you track: it may face the other way." : "", found.note].filter(Boolean).join(" "),
   });
@@ -44,8 +41,8 @@ export function startPoseForm(entry) {
       const found = await findStartPose(entry.name, { frame: Number(values.frame), replace: values.replace }, report);
       await refreshSessions();
       // A run's frames would be shown over it.
-      openSessionAlone(entry.name);
-      tellFound(found);
+      openSession(entry.name, null);
+      sayFound(found);
     },
   });
 }

@@ -24,15 +24,15 @@ const watchers = new Map();
 /** The current value under a name. */
 export const get = (name) => values[name];
 
-/** Change values and tell whoever watches one of them, once per call. */
+/** Change values and call whoever watches one of them, once each. */
 export function set(changes) {
-  const told = new Set();
+  const called = new Set();
   for (const [name, value] of Object.entries(changes)) {
     if (values[name] === value) continue;
     values[name] = value;
-    for (const watcher of watchers.get(name) ?? []) told.add(watcher);
+    for (const watcher of watchers.get(name) ?? []) called.add(watcher);
   }
-  for (const watcher of told) watcher(values);
+  for (const watcher of called) watcher(values);
 }
 
 /** Call `watcher(values)` now and after every change of one of the names. */

@@ -1,13 +1,16 @@
 // Light or dark, remembered; the scene follows (scene_window.js).
 
+import { seriesToken, token } from "./chart_looks.js";
+import { byId } from "./elements.js";
+
+export { token };
+
 const root = document.documentElement;
+/** @type {Set<(theme: string) => void>} */
 const listeners = new Set();
 
 /** The theme in use: "light" or "dark". */
 export const theme = () => root.dataset.theme;
-
-/** A token's colour in the theme in use. */
-export const token = (name) => getComputedStyle(root).getPropertyValue(`--${name}`).trim();
 
 /** Colour of layer `index` of `count`, from the tokens' sequence, first cool to last warm. */
 export function layerColour(index, count) {
@@ -18,10 +21,8 @@ export function layerColour(index, count) {
   return rest < 0.01 || low === 9 ? token(`layer-${low}`) : resolved(mix(token(`layer-${low}`), token(`layer-${low + 1}`)));
 }
 
-const SERIES = 8;
-
 /** Colour of what is compared, by its place in the list. */
-export const seriesColour = (index) => token(`series-${index % SERIES}`);
+export const seriesColour = (index) => token(seriesToken(index));
 
 const probe = document.createElement("i");
 probe.hidden = true;
@@ -32,7 +33,7 @@ function resolved(expression) {
   probe.style.color = expression;
   const text = getComputedStyle(probe).color;
   const parts = text.match(/color\(srgb ([\d.]+) ([\d.]+) ([\d.]+)/);
-  return parts ? `rgb(${parts.slice(1, 4).map((part) => Math.round(part * 255)).join(",")})` : text;
+  return parts ? `rgb(${parts.slice(1, 4).map((part) => Math.round(255 * Number(part))).join(",")})` : text;
 }
 
 /** Call `listener` whenever the theme changes. */
@@ -48,5 +49,5 @@ function apply(name) {
 export function startTheme() {
   const wanted = localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark");
   apply(wanted);
-  document.getElementById("theme").onclick = () => apply(theme() === "dark" ? "light" : "dark");
+  byId("theme").onclick = () => apply(theme() === "dark" ? "light" : "dark");
 }

@@ -1,18 +1,19 @@
 // The timeline: what is tracked, weight and error over the frames, lost spans, settings changes, the cursor.
 
-import { drawSoon } from "./drawing.js";
+import { drawSoon } from "./pacing.js";
+import { byId, dotted, element, fill } from "./elements.js";
 import { say } from "./messages.js";
 import { get, set, watch } from "./state.js";
 import { onTheme, token } from "./theme.js";
 
-const track = document.getElementById("track");
-const canvas = document.getElementById("track-canvas");
-const label = document.getElementById("frame-label");
+const track = byId("track");
+const canvas = byId("track-canvas");
+const label = byId("frame-label");
 const PADDING = 6;
 // How a frame went, its colour, and what is said of it; frames that were simply tracked carry no mark.
 const STATES = {
   lost: ["bad", "the tracker lost the body here and searches for it"],
-  "limb lost": ["warn", "a limb is off: the silhouettes deny it"],
+  "limb lost": ["warn", "a limb is off: it is off the silhouettes"],
   damaged: ["bad", "damaged on the disk: resume the run to track it again"],
   "no evidence": ["text-quiet", "nothing to be seen: the pose is held"],
   recovered: ["good", "found again"],
@@ -31,12 +32,12 @@ export function range() {
   return summary ? [summary.first, summary.last] : [0, 1];
 }
 
-/** Show a frame that has a result: the nearest one to the wish. */
+/** Show a frame that has a result: the nearest one. */
 export function goTo(frame) {
   const frames = get("summary")?.frames;
   if (!frames?.length) return;
-  const wish = Math.max(frames[0].frame, Math.min(frames[frames.length - 1].frame, Math.round(frame)));
-  set({ frame: wish, follow: wish === frames[frames.length - 1].frame && get("work")?.state === "tracking", whatIf: null });
+  const nearest = Math.max(frames[0].frame, Math.min(frames[frames.length - 1].frame, Math.round(frame)));
+  set({ frame: nearest, follow: nearest === frames[frames.length - 1].frame && get("work")?.state === "tracking", whatIf: null });
 }
 
 /** Where the marks of the run begin: frames of which something is to be said that is not said of the one before. */
@@ -108,7 +109,7 @@ function drawTimeline() {
   }
 }
 
-/** Where a person put the run right: a diamond, and the line of the frames that were tracked backwards from it. */
+/** Where a person corrected the run: a diamond, and the line of the frames that were tracked backwards from it. */
 function markCorrection(pen, summary, width, height) {
   if (!isCorrected(summary)) return;
   const at = position(summary.corrected, width);
@@ -121,7 +122,7 @@ function markCorrection(pen, summary, width, height) {
 
 const isCorrected = (summary) => summary?.corrected !== null && summary?.corrected !== undefined;
 
-/** A band along the top: where the tracker was lost, blind, or found the body again. */
+/** A band along the top: where the tracker was lost, saw nothing, or found the body again. */
 function markStates(pen, frames, width) {
   const [first, last] = range();
   const step = Math.max(3, (width - 2 * PADDING) / Math.max(1, last - first - 1) + 0.5);
@@ -157,22 +158,15 @@ function explain(pen, frames) {
   }
 }
 
-function tellFrame() {
+function showFrame() {
   const summary = get("summary");
   const frame = get("frame");
-  if (!summary || frame === null) { label.textContent = "–"; return; }
+  if (!summary || frame === null) return fill(label, "–");
   const entry = summary.frames.find((one) => one.frame === frame);
-  label.innerHTML = "";
-  label.append(`${frame} `);
-  const rest = document.createElement("small");
   const state = STATES[entry?.tracking] ? entry.tracking : "";
   const measured = entry?.error_mm != null ? `${entry.error_mm.toPrecision(3)} mm` : "";
-  rest.textContent = [`/ ${summary.last - 1}`, measured, state].filter(Boolean).join(" · ");
-  label.append(rest);
-  track.setAttribute("aria-valuemin", summary.first);
-  track.setAttribute("aria-valuemax", summary.last - 1);
-  track.setAttribute("aria-valuenow", frame);
-  track.setAttribute("aria-valuetext", state ? `frame ${frame}, ${state}` : `frame ${frame}`);
+  fill(label, `${frame} `, element("small", {}, dotted(`/ ${summary.last - 1}`, measured, state)));
+  Object.assign(track, { ariaValueMin: summary.first, ariaValueMax: summary.last - 1, ariaValueNow: frame, ariaValueText: state ? `frame ${frame}, ${state}` : `frame ${frame}` });
 }
 
 function frameAt(event) {
@@ -182,11 +176,11 @@ function frameAt(event) {
 }
 
 /** What the pointer stands on, where the tracker has something to say of it. */
-function toldOf(frame) {
+function wordsOf(frame) {
   const summary = get("summary");
   const entry = known(summary).find((one) => one.frame === frame);
   const state = STATES[entry?.tracking];
-  if (isCorrected(summary) && frame === summary.corrected) return `frame ${frame}: put right by hand in ${summary.made_from}, tracked ${summary.backwards_to === null ? "on" : `backwards to ${summary.backwards_to}`} from it`;
+  if (isCorrected(summary) && frame === summary.corrected) return `frame ${frame}: corrected by hand in ${summary.made_from}, tracked ${summary.backwards_to === null ? "on" : `backwards to ${summary.backwards_to}`} from it`;
   return state ? `frame ${frame}: ${entry.tracking} – ${state[1]}${entry.part ? ` (${entry.part})` : ""}` : "";
 }
 
@@ -195,19 +189,19 @@ export function startTimeline() {
   track.addEventListener("pointerdown", (event) => { track.setPointerCapture(event.pointerId); goTo(frameAt(event)); });
   track.addEventListener("pointermove", (event) => {
     if (event.buttons) goTo(frameAt(event));
-    track.title = toldOf(Math.round(frameAt(event)));
+    track.title = wordsOf(Math.round(frameAt(event)));
   });
   new ResizeObserver(drawTimeline).observe(track);
   onTheme(drawTimeline);
   document.fonts.ready.then(drawTimeline);
-  watch(["summary", "frame"], () => { drawSoon(drawTimeline); tellFrame(); });
-  const layerLabel = document.getElementById("layer-label");
+  watch(["summary", "frame"], () => { drawSoon(drawTimeline); showFrame(); });
+  const layerLabel = byId("layer-label");
   watch(["layer", "detail", "whatIf"], () => {
     const count = (get("whatIf") ?? get("detail")?.layers)?.length ?? 0;
     layerLabel.textContent = get("layer") === null ? "all layers" : `layer ${get("layer") + 1} / ${count}`;
   });
-  document.getElementById("layer-back").onclick = () => stepLayer(-1);
-  document.getElementById("layer-on").onclick = () => stepLayer(1);
+  byId("layer-back").onclick = () => stepLayer(-1);
+  byId("layer-on").onclick = () => stepLayer(1);
 }
 
 /** Show the layer before or after; past either end all layers are shown together. */

@@ -1,6 +1,8 @@
 // The variance reduction (Figs. 12-14, 17, 19): a parameters x layers map, and the bars of the layer under the cursor.
 
-import { Chart, axis, figure, legend, title, tooltip } from "./charts.js";
+import { axis, figure, legend, title, tooltip } from "./chart_looks.js";
+import { Chart } from "./charts.js";
+import { byId } from "./elements.js";
 import { get, set, watch } from "./state.js";
 import { token } from "./theme.js";
 
@@ -40,7 +42,7 @@ function cell(detail, layers, layer, at) {
   const share = shares(layers, "variance_resampled")[layer][at];
   const unit = unitOf(detail, at);
   return `<b>${detail.parameters[at].label}</b>, layer ${layer + 1} of ${layers.length}<br>` +
-    `as weighed ${figure(record.variance_weighed[at])} ${unit}<br>before diffusion ${figure(record.variance_resampled[at])} ${unit}<br>` +
+    `as evaluated ${figure(record.variance_weighed[at])} ${unit}<br>before diffusion ${figure(record.variance_resampled[at])} ${unit}<br>` +
     `after diffusion ${figure(record.variance_diffused[at])} ${unit}<br>${Number.isFinite(share) ? `${figure(share * 100)} % of the first layer's` : "held still in this layer"}`;
 }
 
@@ -87,12 +89,12 @@ export function varianceCsv(detail, layers) {
   const head = ["frame", "layer", "moment", ...detail.parameters.map((parameter) => parameter.name)];
   const moments = [["weighed", "variance_weighed"], ["before_diffusion", "variance_resampled"], ["after_diffusion", "variance_diffused"]];
   const rows = layers.flatMap((layer, at) => moments.map(([word, key]) => [detail.frame, at, word, ...layer[key]]));
-  return [head, ...rows].map((row) => row.join(",")).join("\n") + "\n";
+  return `${[head, ...rows].map((row) => row.join(",")).join("\n")}\n`;
 }
 
 /** Wire the two charts to the state. */
 export function startVariance() {
-  const panel = document.getElementById("panel-variance");
+  const panel = byId("panel-variance");
   let under = null;
   const wire = (chart) => {
     chart.on("mouseover", ({ value }) => { if (value && under !== value[1]) { under = value[1]; draw(); } });

@@ -1,11 +1,12 @@
 // Over the frames: the best weight, and with truth the error.
 
-import { Chart, axis, figure, title, tooltip } from "./charts.js";
+import { axis, figure, title, tooltip } from "./chart_looks.js";
+import { Chart } from "./charts.js";
 import { get, watch } from "./state.js";
 import { token } from "./theme.js";
 import { goTo } from "./timeline.js";
 
-function overFrames(summary, { key, name, unit, colour, note }) {
+function overFrames(summary, { key, name, unit, colour, note = "" }) {
   const frames = summary.frames.map((entry) => entry.frame);
   const cursor = frames.indexOf(get("frame"));
   return {

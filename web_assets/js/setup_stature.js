@@ -1,20 +1,12 @@
 // A person's body as it stands, from the front, with the lengths of its limbs: what a height or a fit makes of it.
 
-import { element } from "./elements.js";
+import { element, fill, shape } from "./elements.js";
 
-const SPACE = "http://www.w3.org/2000/svg";
 const COLOURS = { left: "var(--limb-left)", right: "var(--limb-right)", middle: "var(--limb-middle)" };
 const MARGIN = 90;
 const LABEL_ROOM = 620;
 const LINE = 88;
 const BULGE = 0.4;        // of a radius: how far a limb's end is rounded, so that cones look like limbs
-
-function shape(tag, values, text) {
-  const made = document.createElementNS(SPACE, tag);
-  for (const [name, value] of Object.entries(values)) made.setAttribute(name, value);
-  if (text !== undefined) made.textContent = text;
-  return made;
-}
 
 /** A tapered limb seen from the front, as a path. flat: mm, y to the right of the picture, z down. */
 function outline({ start, end, radii }) {
@@ -39,32 +31,31 @@ function spread(wanted) {
 
 const length = (limb) => Math.hypot(...limb.end.map((value, axis) => value - limb.start[axis]));
 
-/** Draw `told.limbs` in `place`; `compared`: {before: limbs} drawn dashed, and their lengths said too. */
-export function drawStature(place, told, compared, words) {
-  const drawn = told.limbs.filter((limb) => length(limb) > 1);
-  const all = [...drawn, ...(compared?.before ?? [])];
+/** Draw limbs in `place`; `before`: those drawn dashed beside them, and by how much their lengths differ. */
+export function drawStature(place, limbs, before, words) {
+  const drawn = limbs.filter((limb) => length(limb) > 1);
+  const all = [...drawn, ...before];
   const xs = all.flatMap((limb) => [limb.start[1], limb.end[1]].flatMap((y) => [y - limb.radii[0], y + limb.radii[0]]));
   const top = Math.max(...all.flatMap((limb) => [limb.start[2], limb.end[2]]));
   const low = Math.min(0, ...all.flatMap((limb) => [limb.start[2], limb.end[2]]));
   const [left, right] = [Math.min(...xs) - MARGIN, Math.max(...xs) + MARGIN];
-  const svg = shape("svg", { viewBox: `${left - LABEL_ROOM * 0.35} ${-top - MARGIN} ${right - left + LABEL_ROOM * 1.35} ${top - low + 2 * MARGIN}`, role: "img" });
-  svg.setAttribute("aria-label", drawn.map((limb) => `${limb.name} ${Math.round(length(limb))} mm`).join(", "));
+  const svg = shape("svg", { "aria-label": drawn.map((limb) => `${limb.name} ${Math.round(length(limb))} mm`).join(", "), viewBox: `${left - LABEL_ROOM * 0.35} ${-top - MARGIN} ${right - left + LABEL_ROOM * 1.35} ${top - low + 2 * MARGIN}`, role: "img" });
   svg.append(shape("line", { class: "floor", x1: left - 100, x2: right + 60, y1: -low, y2: -low }));
   const far = [...drawn].sort((one, other) => Math.min(one.start[0], one.end[0]) - Math.min(other.start[0], other.end[0]));
   for (const limb of far) svg.append(shape("path", { class: "bone", d: outline(limb), fill: COLOURS[limb.side] ?? COLOURS.middle, stroke: "var(--scene-background)", "stroke-width": 4 }));
-  for (const limb of compared?.before ?? []) if (length(limb) > 1) svg.append(shape("path", { class: "ghost", d: outline(limb) }));
+  for (const limb of before) if (length(limb) > 1) svg.append(shape("path", { class: "ghost", d: outline(limb) }));
   const named = drawn.filter((limb) => limb.side !== "right");
   const places = spread(named.map((limb) => -(limb.start[2] + limb.end[2]) / 2));
   named.forEach((limb, index) => {
     const middle = [(limb.start[1] + limb.end[1]) / 2, -(limb.start[2] + limb.end[2]) / 2];
     const y = places[index];
-    const before = compared?.before.find((one) => one.name === limb.name);
-    const change = before ? Math.round(length(limb) - length(before)) : 0;
+    const earlier = before.find((one) => one.name === limb.name);
+    const change = earlier ? Math.round(length(limb) - length(earlier)) : 0;
     svg.append(shape("polyline", { class: "leader", fill: "none", points: `${middle[0]},${middle[1]} ${right - 30},${y} ${right},${y}` }),
       shape("text", { x: right + 14, y: y + 9 }, `${Math.round(length(limb))} mm${change ? `  (${change > 0 ? "+" : "−"}${Math.abs(change)})` : ""}`),
       shape("text", { class: "name", x: right + 14, y: y + 40 }, limb.name.replace(/^left /, "")));
   });
   const height = Math.round(top - low);
   svg.append(shape("line", { class: "leader", x1: left - 40, x2: left - 40, y1: -low, y2: -top }), shape("text", { x: left - 54, y: -(top + low) / 2, "text-anchor": "end" }, `${(height / 1000).toFixed(2)} m`));
-  place.replaceChildren(element("figure", { className: compared ? "stature compared" : "stature" }, svg, element("figcaption", { textContent: words })));
+  fill(place, element("figure", { className: before.length ? "stature compared" : "stature" }, svg, element("figcaption", {}, words)));
 }

@@ -1,7 +1,8 @@
 // A brush over a camera's picture: what is painted does not count. Mouse, pen or keyboard; kept as a PNG of the
 // footage's own size and orientation.
 
-import { button, element } from "./elements.js";
+import { fault, putBytes, sessionPath } from "./api.js";
+import { button, element, fill, spring } from "./elements.js";
 import { complain } from "./messages.js";
 
 const UNDONE = 30;
@@ -11,24 +12,23 @@ const HELP = "Paint what is not the person. Keys: arrows move, space paints, x p
 /** Edit what is excluded of `lens` (name, picture_width, picture_height, quarter_turns, frame, excluded: whether there is
  * something already, shown before a stroke can be made: one that came after would undo what was painted meanwhile);
  * `done(saved)` when left. */
-export async function brush(way, lens, done) {
-  const place = `${way.api.sessionPath(way.session)}/exclusions/${encodeURIComponent(lens.name)}`;
+export async function brush(setup, lens, done) {
+  const place = `${sessionPath(setup.session)}/exclusions/${encodeURIComponent(lens.name)}`;
   const turns = ((lens.quarter_turns % 4) + 4) % 4;
   const stored = [lens.picture_width, lens.picture_height];
   const [width, height] = turns % 2 ? [stored[1], stored[0]] : stored;
-  const canvas = element("canvas", { width, height, tabIndex: 0, className: "brush-canvas" });
-  canvas.setAttribute("role", "application");
-  canvas.setAttribute("aria-label", `What does not count of ${lens.name}. ${HELP}`);
+  const canvas = element("canvas", { width, height, tabIndex: 0, className: "brush-canvas", role: "application", ariaLabel: `What does not count of ${lens.name}. ${HELP}` });
   const context = canvas.getContext("2d", { willReadFrequently: true });
-  const state = { size: Math.round(width / 16), erasing: false, at: [width / 2, height / 2], last: null, undo: [] };
+  /** @type {{ size: number, erasing: boolean, holding: boolean, at: number[], last: number[], undo: ImageData[] }} */
+  const state = { holding: false, size: Math.round(width / 16), erasing: false, at: [width / 2, height / 2], last: null, undo: [] };
   const colour = getComputedStyle(document.documentElement).getPropertyValue("--accent").trim();
   const ring = element("div", { className: "brush-ring" });
 
   const photo = element("img", { alt: `Picture of ${lens.name}`, className: "brush-photo", draggable: false,
-    src: `${way.api.sessionPath(way.session)}/frames/${lens.frame}/views/${encodeURIComponent(lens.name)}.jpg?show=mask&height=${turns % 2 ? stored[1] : Math.min(PICTURE_HEIGHT, stored[1])}` });
+    src: `${sessionPath(setup.session)}/frames/${lens.frame}/views/${encodeURIComponent(lens.name)}.jpg?show=mask&height=${turns % 2 ? stored[1] : Math.min(PICTURE_HEIGHT, stored[1])}` });
   const sheet = element("div", { className: "brush-sheet" }, photo, canvas, ring);
   sheet.style.aspectRatio = `${width} / ${height}`;
-  sheet.style.setProperty("--sheet-ratio", width / height);
+  sheet.style.setProperty("--sheet-ratio", String(width / height));
 
   function dab(from, to) {
     context.globalCompositeOperation = state.erasing ? "destination-out" : "source-over";
@@ -36,7 +36,7 @@ export async function brush(way, lens, done) {
     context.lineWidth = state.size;
     context.lineCap = context.lineJoin = "round";
     context.beginPath();
-    context.moveTo(...from);
+    context.moveTo(from[0], from[1]);
     context.lineTo(to[0] + 0.01, to[1]);
     context.stroke();
   }
@@ -83,11 +83,11 @@ export async function brush(way, lens, done) {
 
   const size = element("input", { type: "range", min: 2, max: Math.round(width / 4), value: state.size, ariaLabel: "Size of the brush" });
   size.oninput = () => { state.size = Number(size.value); drawRing(); };
-  const erase = element("button", { type: "button", className: "toggle small", textContent: "Erase" });
-  erase.onclick = () => setErasing(!state.erasing);
+  const resize = (wanted) => { size.value = wanted; size.dispatchEvent(new Event("input")); };
+  const erase = button("Erase", () => setErasing(!state.erasing), "toggle small");
   function setErasing(wanted) {
     state.erasing = wanted;
-    erase.setAttribute("aria-pressed", String(wanted));
+    erase.ariaPressed = String(wanted);
     drawRing();
   }
   const undo = button("Undo", takeBack, "small");
@@ -95,7 +95,7 @@ export async function brush(way, lens, done) {
   const keep = button("Keep", save, "primary");
   const leave = button("Leave", () => done(false), "quiet");
 
-  /** A picture turned clockwise by quarter turns. */
+  /** A picture turned clockwise by quarter turns. @returns {[HTMLCanvasElement, CanvasRenderingContext2D]} */
   function turned(source, by, size) {
     const out = element("canvas", { width: size[0], height: size[1] });
     const drawn = out.getContext("2d");
@@ -110,11 +110,11 @@ export async function brush(way, lens, done) {
     drawn.setTransform(1, 0, 0, 1, 0, 0);
     drawn.globalCompositeOperation = "source-in";
     drawn.fillStyle = "#fff";
-    drawn.fillRect(0, 0, ...stored);
-    const painted = drawn.getImageData(0, 0, ...stored).data.some((value, index) => index % 4 === 3 && value > 127);
+    drawn.fillRect(0, 0, stored[0], stored[1]);
+    const painted = drawn.getImageData(0, 0, stored[0], stored[1]).data.some((value, index) => index % 4 === 3 && value > 127);
     const content = painted ? await new Promise((resolve) => out.toBlob(resolve, "image/png")) : "";
     try {
-      await way.api.put(place, content);
+      await putBytes(place, content);
       await done(true);
     } catch (error) { complain(error); }
   }
@@ -122,7 +122,7 @@ export async function brush(way, lens, done) {
   /** Show what is excluded now. */
   async function load() {
     const answer = await fetch(place);
-    if (!answer.ok) throw new Error(`What is excluded of ${lens.name} could not be read. Open the brush again.`);
+    if (!answer.ok) throw fault(`What is excluded of ${lens.name} could not be read.`, "Open the brush again.");
     const picture = await createImageBitmap(await answer.blob());
     const [out] = turned(picture, turns, [width, height]);
     const read = out.getContext("2d").getImageData(0, 0, width, height);
@@ -142,8 +142,8 @@ export async function brush(way, lens, done) {
       state.at = to;
     } else if (event.key === " ") {
       if (!event.repeat && !state.holding) { remember(); state.holding = true; dab(state.at, state.at); }
-    } else if (event.key === "[") { size.value = state.size * 0.8; size.oninput(); }
-    else if (event.key === "]") { size.value = Math.max(state.size + 1, state.size * 1.25); size.oninput(); }
+    } else if (event.key === "[") { resize(0.8 * state.size); }
+    else if (event.key === "]") { resize(Math.max(state.size + 1, 1.25 * state.size)); }
     else if (event.key === "x") setErasing(!state.erasing);
     else if (event.key === "z" && (event.ctrlKey || event.metaKey)) takeBack();
     else if (event.key === "Enter") save();
@@ -157,7 +157,7 @@ export async function brush(way, lens, done) {
 
   undo.disabled = true;
   setErasing(false);
-  const tools = element("div", { className: "mask-bar" }, element("b", { textContent: lens.name }), element("label", { className: "check" }, "size", size), erase, undo, clear, element("span", { className: "spring" }), leave, keep);
+  const tools = element("div", { className: "mask-bar" }, element("b", {}, lens.name), element("label", { className: "check" }, "size", size), erase, undo, clear, spring(), leave, keep);
   try {
     if (lens.excluded) await load();
   } catch (error) {
@@ -165,7 +165,7 @@ export async function brush(way, lens, done) {
     await done(false);
     return;
   }
-  way.aside.replaceChildren(tools, element("div", { className: "brush-room" }, sheet), element("p", { className: "hint brush-help", textContent: HELP }));
+  fill(setup.aside, tools, element("div", { className: "brush-room" }, sheet), element("p", { className: "hint brush-help" }, HELP));
   canvas.focus();
   drawRing();
 }

@@ -1,0 +1,25 @@
+// The studio's events: one socket a page, opened again when it breaks; whoever listens can stop.
+
+import { eventSocket } from "./window.js";
+
+const RETRY_MILLISECONDS = 1500;
+/** @type {Map<string, Set<(event: any) => void>>} */
+const listeners = new Map();
+
+/** Call `handler(event)` on every event of a type; returns what stops that. */
+export function listen(type, handler) {
+  if (!listeners.has(type)) listeners.set(type, new Set());
+  listeners.get(type).add(handler);
+  return () => { listeners.get(type).delete(handler); };
+}
+
+/** Open the socket and keep it open. opened, closed: called then; `closed` resolves with the pause before the next try. */
+export function startEvents(opened = () => {}, closed = async () => RETRY_MILLISECONDS) {
+  const socket = eventSocket();
+  socket.onopen = opened;
+  socket.onmessage = ({ data }) => {
+    const event = JSON.parse(data);
+    for (const handler of [...(listeners.get(event.type) ?? [])]) handler(event);
+  };
+  socket.onclose = async () => setTimeout(startEvents, await closed(), opened, closed);
+}

@@ -1,0 +1,32 @@
+// The sessions of the workspace, and which of them is open with which run.
+
+import { fetchJson } from "./api.js";
+import { complain } from "./messages.js";
+import { get, set } from "./state.js";
+
+/** Ask the server for the list again. */
+export async function refreshSessions() {
+  try {
+    const { sessions } = await fetchJson("/api/sessions");
+    // An answer that says nothing new leaves the list alone.
+    if (JSON.stringify(sessions) !== JSON.stringify(get("sessions"))) set({ sessions });
+  } catch (error) { complain(error); }
+}
+
+/** Open a session and one of its runs: the newest unless said, none where `run` is null. */
+export function openSession(session, run = undefined) {
+  const newest = get("sessions")?.find((one) => one.name === session)?.runs[0]?.name ?? null;
+  const chosen = run === undefined ? newest : run;
+  if (session === get("session") && chosen === get("run")) return;
+  set({ session, run: chosen, track: "raw", summary: null, detail: null, parameters: null, layerCount: null, settings: null, whatIf: null, frame: null, layer: null, follow: true });
+  document.body.classList.remove("rail-open");
+}
+
+/** What a session is called in a list. */
+export const sessionWords = ({ name, title }) => (title && title !== name ? `${name} · ${title}` : name);
+/** The guided set-up of a session, at its next step. */
+export const setupPath = (entry) => `/way?session=${encodeURIComponent(entry.name)}`;
+/** The studio's own window on a session, or on one of its runs. */
+export const studioPath = (session, run = "") => `/?${new URLSearchParams({ session, ...(run ? { run } : {}) })}`;
+/** What a session that cannot be tracked yet says of itself. */
+export const lacks = (entry) => ({ footage: "no footage yet", calibration: "not calibrated yet" })[entry.next_step] ?? "";

@@ -1,0 +1,205 @@
+// The guided set-up: the stepper, the step's panel, pictures or the scene beside it.
+//
+// A step's module `setup_<step>.js` (start-pose: setup_start_pose.js) exports `mount(place, setup) -> () => void`. `place` is
+// empty and the panel's; what it returns releases everything when another step is shown. One `button.primary` a step:
+// Enter presses the first that is shown.
+
+import { fetchJson, post, sessionPath } from "./api.js";
+import { closeDialog, openForm } from "./dialogs.js";
+import { actions, button, byId, element, failure, fill, lead, NAME, nothing, notice, offer, spring } from "./elements.js";
+import { listen, startEvents } from "./events.js";
+import { complain } from "./messages.js";
+import { loadScene } from "./scene_window.js";
+import { sessionWords } from "./sessions.js";
+import { startTheme } from "./theme.js";
+
+/**
+ * @import { Schemas } from "./api_types"
+ * @typedef Setup what a step is given
+ * @property {string} session
+ * @property {Schemas["SessionDetail"]} detail the session as it was when the step was mounted (no cameras before the calibration)
+ * @property {HTMLElement} aside the empty element at the right, for pictures (class "pictures" with `picture`s in it, if it fits)
+ * @property {Schemas["WayAnswer"]["steps"][number]} step this step as the server sees it now
+ * @property {() => Promise<any>} refresh load the steps again, after something was made
+ * @property {(step: string) => Promise<void>} go show another step
+ * @property {(shown?: object) => Promise<void>} scene show the 3-D scene in `aside` instead, moved to what is to be shown
+ * @property {(type: string, handler: (event: any) => void) => void} on hear events of this session while the step is shown
+ */
+
+const STEPS = {
+  footage: { name: "Footage", lead: "One video, or one folder of pictures, per camera, all of the same recording." },
+  calibration: { name: "Calibration", lead: "Where the cameras stand and how their lenses project, and whether that is right." },
+  background: { name: "Background", lead: "What of each picture is the person, and how far the views agree on it." },
+  subject: { name: "Subject", lead: "The body that is tracked, and its measures." },
+  "start-pose": { name: "Start pose", lead: "How the person stands in the frame where tracking begins." },
+  track: { name: "Track", lead: "The motion, frame by frame." },
+  check: { name: "Check", lead: "Whether the motion fits the pictures, and what makes it better." },
+  export: { name: "Export", lead: "The motion as a file that other programs open." },
+};
+const STATES = { done: "done", ready: "to be done", blocked: "not yet possible", stale: "to be done again", running: "running" };
+
+const stepper = byId("stepper");
+const panel = byId("step");
+const aside = byId("aside");
+const which = byId("which");
+
+let session = "";
+let steps = [];
+let shown = "";        // the step whose panel is mounted
+let mounting = 0;      // rises with every mount, so that a slow one knows that it is too late
+let releases = [];     // what the mounted step has to release
+
+const statusOf = (name) => steps.find((one) => one.step === name);
+const beside = (by) => steps[steps.findIndex((one) => one.step === shown) + by]?.step;
+const moduleOf = (name) => import(`./setup_${name.replaceAll("-", "_")}.js`);
+
+function drawStepper() {
+  fill(stepper, element("ol", {}, steps.map((one) => {
+    const title = `${STEPS[one.step].name}: ${STATES[one.state]}${one.optional ? " (optional)" : ""}`;
+    const row = element("button", { type: "button", title, ariaLabel: [title, one.words, one.why].filter(Boolean).join(". "), dataset: { key: one.step, step: one.step, state: one.state }, onclick: () => go(one.step) },
+      element("i", { className: "step-dot" }), element("span", { className: "name" }, STEPS[one.step].name),
+      one.words && element("span", { className: "words" }, one.words), one.why && element("span", { className: "why" }, one.why));
+    if (one.step === shown) row.ariaCurrent = "step";
+    return element("li", {}, row);
+  })));
+}
+
+/** Load how far the session is. */
+async function refresh() {
+  const wanted = session;
+  const answer = await fetchJson(`${sessionPath(wanted)}/way`);
+  if (wanted !== session) return;
+  steps = answer.steps;
+  drawStepper();
+  drawHead();
+}
+
+function release() {
+  for (const each of releases) each();
+  releases = [];
+  fill(aside);
+}
+
+/** The scene beside the panel, moved to what is to be shown. */
+async function scene(wanted = {}) {
+  if (!aside.querySelector("iframe")) fill(aside, loadScene(element("iframe", { title: "3-D scene" })));
+  await post("/api/scene/show", { session, ...wanted });
+}
+
+function drawHead() {
+  const head = panel.querySelector(".step-head");
+  const status = statusOf(shown);
+  if (!head || !status) return;
+  panel.dataset.state = status.state;
+  fill(head, element("h1", {}, STEPS[shown].name), lead(STEPS[shown].lead), status.why && notice(status.why));
+}
+
+/** Show a step. */
+async function go(name) {
+  if (!statusOf(name)) return;
+  const turn = ++mounting;
+  release();
+  shown = name;
+  drawStepper();
+  history.replaceState(null, "", `?session=${encodeURIComponent(session)}&step=${name}`);
+  document.title = `${STEPS[name].name} · ${session} · Capture studio`;
+  const place = element("div", { className: "step-place" });
+  const [before, next] = [beside(-1), beside(1)];
+  fill(panel, element("header", { className: "step-head" }), place, element("div", { className: "step-foot" },
+    before && button(`‹ ${STEPS[before].name}`, () => go(before), "quiet"), spring(), next && button(`${STEPS[next].name} ›`, () => go(next), "quiet next-step")));
+  panel.scrollTop = 0;
+  drawHead();
+  if (statusOf(name).state === "blocked") return;
+  try {
+    const [module, detail] = await Promise.all([moduleOf(name), fetchJson(sessionPath(session))]);
+    if (turn !== mounting) return;
+    releases.push(module.mount(place, setupOf(detail)));
+  } catch (error) {
+    fill(place, element("p", {}, "This step cannot be shown."), failure(error));
+  }
+}
+
+/** What a step's module is given. @returns {Setup} */
+const setupOf = (detail) => ({
+  session, detail, aside, refresh, go, scene,
+  get step() { return statusOf(shown); },
+  on: (type, handler) => { releases.push(listen(type, (event) => { if (event.session === session) handler(event); })); },
+});
+
+/** Open a session at its next step, or the one that is wanted. */
+async function open(name, wanted = "") {
+  session = name;
+  shown = "";
+  which.value = name;
+  try {
+    const answer = await fetchJson(`${sessionPath(name)}/way`);
+    steps = answer.steps;
+    await go(statusOf(wanted) ? wanted : answer.next || "footage");
+  } catch (error) {
+    release();
+    fill(stepper);
+    fill(panel, failure(error));
+  }
+}
+
+/** The sessions of the workspace in the bar's list; which there are. */
+async function drawSessions() {
+  const { sessions } = await fetchJson("/api/sessions");
+  offer(which, sessions.map((one) => [one.name, sessionWords(one)]), session);
+  which.hidden = !sessions.length;
+  return sessions.map((one) => one.name);
+}
+
+/** The form of a session that begins empty. */
+function beginForm() {
+  openForm({
+    heading: "New session", action: "Begin", intro: "It begins empty; footage and calibration come next. A name has letters, digits, - and _.",
+    rows: [[{ name: "name", label: "Name", ...NAME, oninput: ({ target }) => { target.value = target.value.replace(/\s/g, "-"); } }]],
+    send: async (values) => {
+      const made = await post("/api/sessions", { name: values.name });
+      closeDialog();
+      session = made.name;
+      await drawSessions();
+      await open(made.name);
+    },
+  });
+}
+
+/** Up and down (or k and j) between the steps, Enter for the step's own button. */
+function takeKey(event) {
+  if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest?.("input, select, textarea, dialog, [role=slider], [role=menu], [role=radiogroup], canvas")) return;
+  const by = { j: 1, ArrowDown: 1, k: -1, ArrowUp: -1 }[event.key];
+  const next = by && beside(by);
+  if (next) {
+    event.preventDefault();
+    go(next);
+    stepper.querySelector(`[data-step="${next}"]`)?.focus();
+  } else if (event.key === "Enter" && !(event.target.closest?.("button, a, summary") && !event.target.closest("#stepper"))) {
+    const own = [...panel.querySelectorAll("button.primary")].find((one) => one.offsetParent && !one.disabled);
+    const primary = own ?? (panel.dataset.state === "done" ? panel.querySelector(".next-step") : null);
+    if (!primary) return;
+    event.preventDefault();
+    primary.click();
+  }
+}
+
+async function start() {
+  startTheme();
+  startEvents();
+  document.addEventListener("keydown", takeKey);
+  byId("begin").onclick = beginForm;
+  which.onchange = () => open(which.value);
+  for (const type of ["sessions", "track", "subject", "initialise", "export", "state", "import"]) {
+    listen(type, (event) => { if (session && event.session === session && event.state !== "running") refresh().catch(() => {}); });
+  }
+  const query = new URLSearchParams(location.search);
+  try {
+    const [first] = await drawSessions();
+    const wanted = query.get("session") ?? first;
+    if (wanted && !query.has("new")) return await open(wanted, query.get("step") ?? "");
+    fill(panel, nothing("From your own cameras", lead("From the raw footage of your cameras to a motion file, step by step. Begin with an empty session."), actions(button("New session", beginForm, "primary"))));
+    if (query.has("new")) beginForm();
+  } catch (error) { complain(error); }
+}
+
+start();

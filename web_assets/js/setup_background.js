@@ -1,0 +1,239 @@
+// Step Background: what backgrounds are made of, how masks are cut, what does not count, how far the views agree.
+
+import { fetchJson, post, put, remove, sessionPath } from "./api.js";
+import { actions, button, check, drawProgress, element, failure, field, files, fill, hint, notice, optional, select } from "./elements.js";
+import { progressOf } from "./jobs.js";
+import { complain } from "./messages.js";
+import { uploadFiles } from "./uploading.js";
+import { alignmentBox } from "./setup_alignment.js";
+import { brush } from "./setup_brush.js";
+import { maskPictures } from "./setup_masks.js";
+import { qualityList } from "./setup_quality.js";
+
+/** @import { Schemas } from "./api_types" */
+
+const POLL_MILLISECONDS = 500;
+const PREVIEW_MILLISECONDS = 180;
+const HIGHEST_SLIDER = 5000;
+const SOURCES = {
+  combined: ["Combined", "Pictures of the empty room where there are any, the footage itself elsewhere; cleaned by what the other views see. The best where there are three cameras or more."],
+  plate: ["Picture", "A picture of the empty room from each camera, as it is."],
+  clip: ["Clip", "A short video of the empty room from each camera, as it is."],
+  median: ["Median", "What the footage itself shows most of the time. Good where the person moves about."],
+};
+const MISSING = { plate: "Give a picture for every camera below.", clip: "Give a clip for every camera below." };
+const FIRST = ["mask_threshold", "mask_gain_fit", "mask_shadow_test", "mask_shadow_darkest", "mask_shadow_colour", "mask_opening", "mask_closing", "mask_keep_components"];
+
+/** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
+export function mount(place, setup) {
+  const here = sessionPath(setup.session);
+  /** @type {Schemas["BackgroundAnswer"]} */
+  let background = null;
+  /** @type {Schemas["BackgroundWish"]["source"]} */
+  let source = null;
+  let tune = true;
+  let unused = false;    // whether what the person never comes near is excluded
+  /** @type {Record<string, string | number | boolean>} */
+  let changed = {};      // knobs that are tried
+  let quality = null;
+  let failed = null;
+  let gone = false;
+  let timer = 0;
+  let preview = 0;
+
+  const make = element("div", { className: "background-make" });
+  const going = optional();
+  const agreement = element("section", { className: "background-quality" });
+  const cameras = element("section", { className: "background-quality", hidden: true });
+  const knobs = element("details", { className: "background-knobs" });
+  place.append(make, agreement, cameras, knobs);
+  const alignment = alignmentBox(setup, cameras, () => {
+    quality = null;
+    drawQuality();
+    pictures.show();
+    setup.refresh().catch(complain);
+  });
+  const pictures = maskPictures(setup, paint);
+
+  async function load() {
+    background = await fetchJson(`${here}/background`);
+    if (!source && background.source !== "masks") source = background.cameras.length >= 3 && Object.keys(background.own).length === 0 ? "combined" : background.source;
+  }
+
+  // What backgrounds are made of.
+
+  function sourceChoices() {
+    const rows = Object.entries(SOURCES).map(([key, [label, words]]) => {
+      const name = /** @type {Schemas["BackgroundWish"]["source"]} */ (key);
+      const possible = background.possible.includes(name);
+      const used = background.source === name && Object.keys(background.own).length > 0;
+      return element("label", { className: "choice" },
+        element("input", { type: "radio", name: "background-source", value: name, checked: name === source, disabled: !possible, onchange: () => { source = name; drawMake(); } }),
+        element("span", {}, element("b", {}, label), used && element("span", { className: "badge good" }, "in use"), element("span", { className: "hint" }, possible ? words : MISSING[name])));
+    });
+    return element("fieldset", { className: "choices" }, element("legend", {}, "Backgrounds are made of"), rows);
+  }
+
+  function plates() {
+    const accept = "image/*,video/*";
+    const many = files({ multiple: true, accept, ariaLabel: "Pictures or clips of the empty room", onchange: ({ target }) => give([...target.files], {}) });
+    const rows = background.cameras.map(({ name, given, file }) => {
+      const input = files({ accept, hidden: true, onchange: ({ target }) => give([...target.files], { [name]: target.files[0]?.name }) });
+      return element("li", {}, element("span", {}, name), element("span", { className: "hint" }, given ? `${given === "clip" ? "clip" : "picture"} ${file}` : "none"),
+        button("Choose…", () => input.click(), "quiet small", { ariaLabel: `Choose the empty room of ${name}` }), input);
+    });
+    const given = background.cameras.filter((camera) => camera.given).length;
+    return element("details", { className: "plates", open: make.querySelector("details")?.open ?? (!given && background.cameras.length < 3) },
+      element("summary", {}, `Pictures of the empty room: ${given} of ${background.cameras.length} cameras`),
+      field("One picture or clip per camera, matched by name", many), element("ul", { className: "plate-list" }, rows), element("p", { className: "hint upload-words", role: "status" }));
+  }
+
+  async function give(chosen, named) {
+    if (!chosen.length) return;
+    const words = make.querySelector(".upload-words");
+    try {
+      const upload = await uploadFiles(chosen, (text) => { words.textContent = text; });
+      words.textContent = "Looking at them…";
+      background = await post(`${here}/backgrounds`, { upload, files: named });
+      failed = null;
+      pictures.preview(changed);
+    } catch (error) { failed = error; }
+    drawMake();
+    make.querySelector("details").open = true;
+  }
+
+  function drawMake() {
+    const running = background.job?.state === "running";
+    fill(make, background.source === "masks" && notice("Masks came with the footage and are used as they are. Set a background up only if they are not good."),
+      sourceChoices(), plates(),
+      check("try what makes the views agree best", { checked: tune, onchange: ({ target }) => { tune = target.checked; } }, "Knobs under which the views agree best are chosen; those that you set below stay."),
+      source === "combined" && check("exclude what the person never comes near", { checked: unused, onchange: ({ target }) => { unused = target.checked; } }, "A bystander, a monitor, a window: what moves there is not the person."),
+      !running && actions(button("Set up the background", setUp, "primary", { disabled: !source })), going, failure(failed),
+      (background.job?.notes ?? []).map((note) => hint(note)));
+    if (running) drawGoing();
+    else fill(going);
+  }
+
+  function drawGoing() {
+    drawProgress(going, progressOf(background.job, "Reading the footage", () => remove(`${here}/background`).catch(complain)));
+  }
+
+  async function setUp() {
+    failed = null;
+    try {
+      background.job = await post(`${here}/background`, { source, knobs: changed, tune, exclude_unused: unused && source === "combined" });
+    } catch (error) { failed = error; }
+    drawMake();
+    follow();
+  }
+
+  /** Ask how the set-up stands until it ends. */
+  async function follow() {
+    clearTimeout(timer);
+    if (gone || background.job?.state !== "running") return;
+    timer = setTimeout(async () => {
+      await load().catch(complain);
+      if (gone) return;
+      const { job } = background;
+      if (job?.state === "running") { drawGoing(); return follow(); }
+      if (job?.state === "failed") failed = job;
+      if (job?.state === "done") {
+        quality = job.quality;
+        changed = {};
+        pictures.preview(changed);
+        drawKnobs();
+        setup.refresh().catch(complain);
+        if (background.cameras.length > 1) alignment.measure();
+      }
+      drawQuality();
+      drawMake();
+    }, POLL_MILLISECONDS);
+  }
+
+  // How far the views agree.
+
+  function drawQuality() {
+    const measure = button("Measure", async () => {
+      agreement.querySelector(".hint").textContent = "Comparing the masks of five frames…";
+      try { quality = await post(`${here}/masks/quality`); setup.refresh().catch(complain); } catch (error) { complain(error); }
+      drawQuality();
+    }, "small", { hidden: background.cameras.length < 2 });
+    fill(agreement, element("div", { className: "head-line" }, element("h2", {}, "Agreement of the views"), measure), qualityList(quality, paint, background.measured));
+    pictures.rate(quality);
+  }
+
+  // Knobs with a live preview.
+
+  const valueWords = (knob, value) => `${typeof value === "number" ? Number(value.toPrecision(3)) : ""} ${knob.unit}`;
+
+  function knobRow(knob) {
+    const value = changed[knob.name] ?? background.settings[knob.name];
+    const shown = element("output", {}, valueWords(knob, value));
+    const take = (wanted) => {
+      if (wanted === background.settings[knob.name]) delete changed[knob.name]; else changed[knob.name] = wanted;
+      shown.textContent = valueWords(knob, wanted);
+      row.classList.toggle("changed", knob.name in changed);
+      offerKeeping();
+      clearTimeout(preview);
+      preview = setTimeout(() => pictures.preview(changed), PREVIEW_MILLISECONDS);
+    };
+    const ariaLabel = knob.label;
+    const isNumber = knob.kind !== "bool" && !knob.choices.length;
+    const made = isNumber
+      ? element("input", { type: "range", ariaLabel, min: knob.low, max: Math.min(knob.high, HIGHEST_SLIDER), step: knob.step || (knob.kind === "int" ? 1 : "any"), value, oninput: ({ target }) => take(Number(target.value)) })
+      : knob.choices.length ? select(knob.choices, value, { ariaLabel, onchange: ({ target }) => take(target.value) })
+        : element("input", { type: "checkbox", ariaLabel, checked: value, onchange: ({ target }) => take(target.checked) });
+    const row = element("label", { className: knob.name in changed ? "knob changed" : "knob", title: knob.help }, element("span", {}, knob.label), made, isNumber && shown);
+    return row;
+  }
+
+  const keep = button("Keep", async () => {
+    try {
+      await put(`${here}/evidence`, { ...background.own, ...changed });
+      changed = {};
+      await load();
+      drawKnobs();
+      drawMake();
+      pictures.preview(changed);
+      setup.refresh().catch(complain);
+    } catch (error) { complain(error); }
+  }, "small");
+  const reset = button("Reset", () => { changed = {}; drawKnobs(); pictures.preview(changed); }, "quiet small");
+  const offerKeeping = () => { keep.hidden = reset.hidden = !Object.keys(changed).length; };
+
+  function drawKnobs() {
+    const named = (name) => background.knobs.find((knob) => knob.name === name);
+    const rest = background.knobs.filter((knob) => knob.name.startsWith("mask_") && !FIRST.includes(knob.name));
+    offerKeeping();
+    fill(knobs, element("summary", {}, "Fine adjustment"), hint("The pictures follow; nothing is kept before you say so."), FIRST.map((name) => knobRow(named(name))),
+      element("details", {}, element("summary", {}, "More"), rest.map(knobRow)), actions(keep, reset));
+  }
+
+  /** Paint what does not count of a camera, over its picture. */
+  function paint(camera) {
+    const lens = setup.detail.cameras.find((one) => one.name === camera);
+    const { excluded } = background.cameras.find((one) => one.name === camera);
+    brush(setup, { ...lens, frame: pictures.frame, excluded }, async (saved) => {
+      if (!saved) return pictures.show();
+      quality = null;
+      await load().catch(complain);
+      pictures.mark(background.cameras);
+      pictures.show();
+      drawQuality();
+      setup.refresh().catch(complain);
+    });
+  }
+
+  load().then(() => {
+    if (gone) return;
+    quality = background.job?.quality ?? null;
+    pictures.begin(background);
+    drawMake();
+    drawQuality();
+    drawKnobs();
+    follow();
+    alignment.load().catch(complain);
+  }).catch((error) => place.append(failure(error)));
+
+  return () => { gone = true; clearTimeout(timer); clearTimeout(preview); pictures.close(); alignment.stop(); };
+}

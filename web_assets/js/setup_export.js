@@ -1,0 +1,32 @@
+// Step Export: the studio's own export panel, which takes the best track.
+
+import { fetchJson, runPath } from "./api.js";
+import { byId, hint } from "./elements.js";
+import { startExporting } from "./exporting.js";
+import { complain } from "./messages.js";
+import { set } from "./state.js";
+import { viewWall } from "./setup_views.js";
+
+const panel = byId("panel-export");
+let started = false;
+
+/** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
+export function mount(place, setup) {
+  const run = setup.detail.runs[0];
+  const which = hint();
+  place.append(which, panel);
+  panel.hidden = false;
+  if (!started) { startExporting(); started = true; }
+  set({ session: setup.session, run: run.name });
+  fetchJson(`${runPath(setup.session, run.name)}/check`).then(({ usual, note }) => {
+    which.textContent = `${run.name}: track "${usual}" is exported unless you choose another. ${note} Frames before the first and after the last tracked one are left out.`;
+    wall.show({ run: run.name, frame: Math.max(run.first, Math.floor((run.first + run.tracked_to) / 2)), track: usual === "raw" ? "" : usual, show: "outline" });
+  }).catch(complain);
+  const wall = viewWall(setup);
+  return () => {
+    panel.hidden = true;
+    document.body.append(panel);
+    set({ run: null });
+    wall.stop();
+  };
+}

@@ -1,0 +1,36 @@
+// How far the views' masks agree in the hull: a bar a camera with words, and the camera to look at first.
+
+import { findingList } from "./calibration_drawing.js";
+import { button, element, hint, notice, percent } from "./elements.js";
+
+const USABLE = 0.9;
+
+function agreementBar(line) {
+  const kind = line.usable ? "good" : line.agreement !== null && line.agreement >= 0.8 ? "warn" : "bad";
+  return element("div", {
+    className: `agree-bar ${kind}`, role: "meter", title: `In the hull: ${percent(line.covered)} of the mask. In the mask: ${percent(line.inside)} of the hull.`,
+    ariaValueNow: line.agreement ?? 0, ariaValueMin: 0, ariaValueMax: 1, ariaLabel: `Agreement of ${line.camera}`,
+  }, element("i", { style: `width: ${Math.round(100 * (line.agreement ?? 0))}%` }), element("b", { style: `left: ${100 * USABLE}%` }));
+}
+
+/** What is said of a quality (`GET S/masks/quality`), null where it was not measured since the studio was opened (then what
+ * is known in words, `measured`, is said); `paint(camera)` opens the brush. */
+export function qualityList(quality, paint, measured = "") {
+  if (!quality && measured) return [hint(`When it was last measured, ${measured}. Measure again to see every camera.`)];
+  if (!quality) return [hint("Not measured yet. No truth is needed: where one view's mask says “person”, the others must agree in space.")];
+  const rows = quality.cameras.map((line) => element("li", {}, element("span", {}, line.camera), agreementBar(line), element("span", { className: "figure" }, percent(line.agreement)), line.note && hint(line.note)));
+  const worst = quality.cameras.find((line) => line.camera === quality.worst);
+  const doubts = quality.doubts.length > 0 && element("div", {}, notice("The silhouettes speak against the calibration:"), findingList({ findings: quality.doubts }));
+  const verdict = worst
+    ? element("div", { className: "notice" }, element("p", {}, remedy(worst)), button(`Exclude regions of ${worst.camera}…`, () => paint(worst.camera), "small"))
+    : !doubts && hint(`Every view agrees with the others; ${quality.frames.length} frames were compared.`);
+  return [element("ul", { className: "agree" }, rows), verdict, doubts];
+}
+
+function remedy(line) {
+  const first = `Look at ${line.camera} first.`;
+  if (line.agreement === null) return `${first} Its mask is empty: lower “mask threshold”, or give a picture of its empty room.`;
+  if (line.denied > 0.05) return `${first} Its mask has holes that carve the person in all views: lower “mask threshold”, or switch “shadow test” off.`;
+  if (line.covered !== null && line.covered < USABLE) return `${first} It holds something that no other view has: a bystander, a reflection, a shadow. Exclude the region, or raise “mask threshold”.`;
+  return `${first} It lacks parts of the person: lower “mask threshold”, or raise “close gaps”.`;
+}

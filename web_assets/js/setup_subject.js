@@ -1,0 +1,188 @@
+// Step Subject: which body, how tall, what follows from it; and the fit to the footage, with lengths before and after.
+
+import { fault, fetchJson, post, put, remove, sessionPath } from "./api.js";
+import { actions, button, check, drawProgress, element, failure, field, fill, hint, number, optional, percent, select, table, text } from "./elements.js";
+import { followJob, progressOf } from "./jobs.js";
+import { complain } from "./messages.js";
+import { drawStature } from "./setup_stature.js";
+
+/** @import { Schemas } from "./api_types" */
+
+const PREVIEW_MILLISECONDS = 150;
+const USUAL_HEIGHT = 1750;
+const LEAST_MM = 1000;
+const MOST_MM = 2200;
+const LEAST_METRES = 0.3;
+const MOST_METRES = 3;
+const PICTURE_HEIGHT = 300;
+
+const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
+
+/** @param {HTMLElement} place @param {import("./setup.js").Setup} setup */
+export function mount(place, setup) {
+  const here = sessionPath(setup.session);
+  /** @type {Schemas["SubjectAnswer"]} */
+  let subject = null;
+  /** @type {{ name: string, label: string }[]} */
+  let bodies = [];
+  let body = "";
+  let height = null;     // mm, null while it is unknown
+  /** @type {Schemas["FitSubjectState"]} */
+  let fit = null;
+  let failed = null;     // what went wrong with the height
+  let unfitted = null;   // what went wrong with the fit
+  let preview = 0;
+  let gone = false;
+  const options = { symmetric: true, lengths: true, radii: true, count: 5, frames: "", run: "" };
+  const who = element("section", { className: "subject-who background-make" });
+  const fitting = element("section", { className: "subject-fit background-quality" });
+  const progress = optional();
+  place.append(who, fitting);
+
+  const changed = () => body !== subject.body || height !== subject.height_mm;
+
+  // Who it is.
+
+  function drawWho() {
+    const take = (value) => { height = value; look(); drawFit(); };
+    const typed = number(height ? height / 10 : "", { min: 30, max: 300, step: 0.5, placeholder: "unknown", ariaLabel: "Height in centimetres" });
+    const slider = element("input", { type: "range", min: LEAST_MM, max: MOST_MM, step: 5, value: height ?? USUAL_HEIGHT, ariaLabel: "Height" });
+    typed.oninput = () => { if (typed.value === "" || !typed.checkValidity()) return; take(Number(typed.value) * 10); slider.value = height; };
+    // "1.80" is metres: no person is that many centimetres tall.
+    typed.onchange = () => {
+      const metres = Number(typed.value);
+      if (metres < LEAST_METRES || metres > MOST_METRES) return;
+      typed.value = String(Math.round(1000 * metres) / 10);
+      typed.dispatchEvent(new Event("input"));
+    };
+    slider.oninput = () => { take(Number(slider.value)); typed.value = String(height / 10); };
+    fill(who, field("Body", select(bodies.map((one) => [one.name, one.label]), body, { onchange: ({ target }) => { body = target.value; look(); drawFit(); } })),
+      field("Height (cm)", element("div", { className: "height-row" }, typed, slider)),
+      hint(`Every length follows from the height by published proportions. ${subject.fitted ? "A height that is set again replaces what was fitted." : "A guess within 3 cm will do; the fit finds the rest."}`),
+      actions(saveHeight), failure(failed));
+  }
+
+  const saveHeight = button("Set the height", async () => {
+    failed = null;
+    try {
+      if (!height) throw fault("The height is not known yet.", "Type it, or move the slider.");
+      await put(`${here}/subject`, { height_mm: height, body });
+      await load();
+      fit = null;
+      setup.refresh().catch(complain);
+    } catch (error) { failed = error; }
+    draw();
+  });
+
+  /** Draw the body as it would be. */
+  function look() {
+    clearTimeout(preview);
+    preview = setTimeout(async () => {
+      const query = new URLSearchParams({ body, ...(height ? { height_mm: String(height) } : {}) });
+      try {
+        const shown = changed() ? await fetchJson(`${here}/subject?${query}`) : subject;
+        if (!gone && !fit?.limbs?.length) drawStature(setup.aside, shown.limbs, [], note(shown));
+      } catch (error) { complain(error); }
+    }, PREVIEW_MILLISECONDS);
+  }
+
+  const note = (shown) => (shown !== subject ? "As it would be." : shown.fitted ? "As it was fitted to the footage." : shown.saved ? "By published proportions." : "Of usual size: nothing is known of the person yet.");
+
+  // The fit.
+
+  function drawFit() {
+    saveHeight.classList.toggle("primary", !subject.saved || changed());
+    const going = fit?.state === "running";
+    const found = fit?.state === "done";
+    const isReady = subject.saved && !changed();
+    const box = (name, title) => check(name === "symmetric" ? "left and right alike" : name, { checked: options[name], onchange: ({ target }) => { options[name] = target.checked; } }, title);
+    /** @type {[string, string][]} */
+    const runs = setup.detail.runs.filter((run) => run.done).map((run) => [run.name, `of ${run.name}`]);
+    fill(fitting, element("h2", {}, "Fit the subject to the footage"),
+      hint(isReady ? "Lengths and radii are found together with the poses of a few frames, on the silhouettes. Frames without a pose are searched first, which takes longest." : "Set the height first: it is the one measure that the pictures alone cannot give."),
+      element("div", { className: "step-row" },
+        field("How many frames", number(options.count, { min: 1, max: 24, step: 1, onchange: ({ target }) => { options.count = Number(target.value) || 5; } })),
+        field("or these frames", text({ value: options.frames, placeholder: "chosen for variety", pattern: "[0-9, ]*", onchange: ({ target }) => { options.frames = target.value; } }))),
+      field("First poses", select([["", "the newest run's, else searched for"], ...runs], options.run, { onchange: ({ target }) => { options.run = target.value; } })),
+      element("div", { className: "fit-boxes" }, box("symmetric", "Off: each side has its own lengths, which needs more frames."), box("lengths", "Of limbs"), box("radii", "Of limbs")),
+      !going && actions(button(found ? "Fit again" : "Fit the subject", beginFit, isReady && !(found && !fit.file) ? "primary" : "", { disabled: !isReady })),
+      progress, failure(unfitted), found && results());
+    if (going) drawGoing();
+    else fill(progress);
+  }
+
+  async function beginFit() {
+    const frames = options.frames.split(/[,\s]+/).filter(Boolean).map(Number);
+    unfitted = null;
+    try {
+      if (frames.some((frame) => !Number.isInteger(frame))) throw fault("Frames are whole numbers.", "Write them like 10, 40, 80.");
+      fit = await post(`${here}/fit-subject`, { ...options, frames, run: options.run || null, keep: false });
+      draw();
+      fit = await followJob(`/api/subject-fits/${fit.identifier}`, (job) => { fit = job; drawGoing(); }, () => gone);
+    } catch (error) { fit = null; unfitted = error; }
+    if (!gone) draw();
+  }
+
+  function drawGoing() {
+    const { identifier } = fit;
+    drawProgress(progress, progressOf(fit, "beginning", () => remove(`/api/subject-fits/${identifier}`).catch(complain)));
+  }
+
+  const sizeWords = (name) => name.replaceAll("_", " ").replace(/ (length|radius)$/, "");
+
+  function sizeTable(kind) {
+    const sizes = fit.sizes.filter((size) => size.kind === kind);
+    return sizes.length > 0 && table([kind === "length" ? "Length (mm)" : "Radius (mm)", "before", "after", "±"],
+      sizes.map((size) => [sizeWords(size.name), Math.round(size.before), element("td", { className: "after" }, Math.round(size.after)), Math.max(1, Math.round(size.deviation))]), "sizes");
+  }
+
+  async function keep() {
+    try {
+      fit = await post(`/api/subject-fits/${fit.identifier}/keep`);
+      await load();
+      setup.refresh().catch(complain);
+    } catch (error) { complain(error); }
+    draw();
+  }
+
+  /** Each size before and after, and how far silhouettes overlap. */
+  function results() {
+    const frames = fit.frames.length > 1 ? `frames ${fit.frames.slice(0, -1).join(", ")} and ${fit.frames.at(-1)}` : `frame ${fit.frames[0]}`;
+    return element("div", { className: "background-quality" },
+      element("p", {}, `Body and silhouettes overlap by ${percent(mean(fit.overlap))} (${percent(mean(fit.overlap_before))} before), in ${frames}; first poses ${fit.poses_from.startsWith("run") ? `of ${fit.poses_from}` : fit.poses_from}.`),
+      fit.file ? hint("Saved. What was there before stays beside it as subject-before.") : actions(button("Save as the subject", keep, "primary")),
+      sizeTable("length"), sizeTable("radius"), hint("± is one standard deviation: two limbs in three, about, lie within it. Wrists and shoulders show least."));
+  }
+
+  /** The pictures of the fit: the new body over each frame, a camera each in turn. */
+  function fitPictures() {
+    const names = setup.detail.cameras.map((camera) => camera.name);
+    return element("div", { className: "pictures fitted" }, fit.frames.map((frame, at) => {
+      const camera = names[at % names.length];
+      return element("figure", { className: "picture" }, element("img", { alt: `Frame ${frame}, ${camera}`, src: `/api/subject-fits/${fit.identifier}/frames/${frame}/views/${encodeURIComponent(camera)}.jpg?height=${PICTURE_HEIGHT}` }),
+        element("figcaption", {}, element("span", {}, element("b", {}, `frame ${frame}`), ` ${camera}, overlap ${percent(fit.overlap[at])}`)));
+    }));
+  }
+
+  function draw() {
+    drawWho();
+    drawFit();
+    if (fit?.state !== "done") return look();
+    drawStature(setup.aside, fit.limbs, subject.limbs, fit.file ? "Fitted and saved. Dashed: by height alone." : "As fitted. Dashed: as it was before.");
+    setup.aside.append(fitPictures());
+  }
+
+  async function load() {
+    subject = await fetchJson(`${here}/subject`);
+    [body, height] = [subject.body, subject.height_mm];
+  }
+
+  Promise.all([fetchJson("/api/choices"), load()]).then(([choices]) => {
+    if (gone) return;
+    bodies = choices.bodies;
+    if (!bodies.some((one) => one.name === body)) bodies.push({ name: body, label: body });
+    draw();
+  }).catch((error) => place.append(failure(error)));
+
+  return () => { gone = true; clearTimeout(preview); };
+}
