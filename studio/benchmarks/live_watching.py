@@ -8,7 +8,7 @@ from studio.errors import RunError
 from studio.progress import Progress
 from studio.runs.live_summary import LiveSummary, summary_of
 from studio.scene.light_viewer import LightViewer
-from studio.scene.stage import SceneStage
+from studio.scene.scene_server import SceneServer
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
@@ -41,7 +41,7 @@ def track_watched(
     messages = size = float("nan")
     try:
         if scene:
-            stage = SceneStage(workspace, control)
+            stage = SceneServer(workspace, control)
             viewer = LightViewer(stage.port, stage.relay_headers())
             stage.show_run(session.name, run.name)
         events = control.subscribe()
