@@ -13,7 +13,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import viser
 from numpy import float64
@@ -53,8 +53,8 @@ from studio.scene.scene_views import SceneViews
 from studio.sessions.workspace import Workspace
 from studio.settings import all_knobs
 from studio.worker import commands
+from studio.worker.control import StudioControl
 from studio.worker.events import Acknowledged, Event, FrameFinished, StateChanged
-from studio.worker.watchers import Subscription
 
 Array = NDArray[float64]
 
@@ -66,23 +66,6 @@ _LOG = logging.getLogger(__name__)
 _WAKE = Event("", "")
 
 
-class TrackingProcess(Protocol):
-    """The tracking process as its owner sees it (`worker.control.StudioControl`)."""
-
-    @property
-    def state(self) -> StateChanged:
-        """Where the search stands."""
-        ...
-
-    def send(self, command: commands.Command) -> object:
-        """Post a command; an `Acknowledged` event follows. Raises RunError if the process has died."""
-        ...
-
-    def subscribe(self) -> Subscription:
-        """Every event from now on."""
-        ...
-
-
 class SceneController:
     """moved : called in the scene's thread with the selection whenever the scene's own controls, playback or the
     tracking changed it; it returns at once.
@@ -92,7 +75,7 @@ class SceneController:
         self,
         server: viser.ViserServer,
         workspace: Workspace,
-        process: TrackingProcess,
+        process: StudioControl,
         moved: Callable[[Selection], None],
     ) -> None:
         self._server, self._workspace, self._process, self._moved = server, workspace, process, moved
@@ -123,13 +106,10 @@ class SceneController:
             self._thread.join(timeout=10.0)
         self._close()
 
-    def post(self, change: Change, *values: Any) -> None:  # noqa: ANN401 - what the change takes
-        """Let a change happen soon; what it moves is reported to `moved`."""
-        self._put(change, values, told=True)
-
-    def post_quietly(self, change: Change, *values: Any) -> None:  # noqa: ANN401 - what the change takes
-        """Like `post`, for who asks from outside the scene and knows what it asked for."""
-        self._put(change, values, told=False)
+    def post(self, change: Change, *values: Any, told: bool = True) -> None:  # noqa: ANN401 - what the change takes
+        """Let a change happen soon. told : whether `moved` hears of it; who asks from outside knows already."""
+        self._inbox.append((change, values, told))
+        self._events.put(_WAKE)
 
     def refused(self, problem: StudioError) -> None:
         """Tell every viewer about a refusal."""
@@ -280,7 +260,7 @@ class SceneController:
             found,
             clicked=lambda camera: self.post(camera_clicked, camera),
             volume_made=lambda: self.post(lambda model: replace(model)),
-            failed=self.refused,
+            failed=lambda problem: self.post(self._fail, problem),
         )
         self.views.look_at_person(move_viewers=not same_place)
         subject = subject_of(found)
@@ -301,6 +281,9 @@ class SceneController:
             self.opened.close()
         self.views = self.opened = self.handles = self._refining = None
 
+    def _fail(self, _: Model, problem: StudioError) -> Model:
+        raise problem
+
     async def _greet(self, client: viser.ClientHandle) -> None:
         def place(model: Model) -> Model:
             if self.views is not None:
@@ -310,10 +293,6 @@ class SceneController:
         self.post(place)
 
     # The thread.
-
-    def _put(self, change: Change, values: tuple[Any, ...], *, told: bool) -> None:
-        self._inbox.append((change, values, told))
-        self._events.put(_WAKE)
 
     def _run(self) -> None:
         before = time.monotonic()

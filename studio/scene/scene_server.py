@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.errors import SettingsError
-from studio.scene.controller import SceneController, TrackingProcess
+from studio.scene.controller import SceneController
 from studio.scene.guarded_server import GuardedServer
 from studio.scene.model import (
     Selection,
@@ -23,6 +23,7 @@ from studio.scene.model import (
     show_frame,
 )
 from studio.sessions.workspace import Workspace
+from studio.worker.control import StudioControl
 
 Array = NDArray[np.float64]
 
@@ -37,7 +38,7 @@ class SceneServer:
     def __init__(
         self,
         workspace: Workspace,
-        process: TrackingProcess,
+        process: StudioControl,
         moved: Callable[[Selection], None] = lambda _: None,
     ) -> None:
         self._server = GuardedServer()
@@ -69,15 +70,15 @@ class SceneServer:
         self, session: str, run: str = "", frame: int | None = None, layer: int | None = None
     ) -> None:
         """Show a session and one of its runs ("" : the session alone), a frame, one layer's cloud (None: all)."""
-        self._controller.post_quietly(self._controller.show_run, session, run, frame, layer)
+        self._controller.post(self._controller.show_run, session, run, frame, layer, told=False)
 
     def show_frame(self, frame: int) -> None:
         """Show a stored frame; where it is not stored the nearest one."""
-        self._controller.post_quietly(show_frame, frame)
+        self._controller.post(show_frame, frame, told=False)
 
     def select(self, **changes: object) -> None:
         """Select a layer, limb, parameter, particle or camera, by the names of `Selection`; None: none."""
-        self._controller.post_quietly(lambda model: select(model, **changes))
+        self._controller.post(lambda model: select(model, **changes), told=False)
 
     def show_layer(self, layer: int | None) -> None:
         """Show one layer's cloud, or all (None)."""
@@ -89,7 +90,7 @@ class SceneServer:
 
     def look_through(self, camera: str | None) -> None:
         """Put the viewers into a camera's place, or back where they were (None or "")."""
-        self._controller.post_quietly(look_through, camera or None)
+        self._controller.post(look_through, camera or None, told=False)
 
     def set_options(self, **changes: object) -> None:
         """Change what is drawn, by the names of `ViewOptions`. Raises SettingsError for a name that is none."""
@@ -97,11 +98,13 @@ class SceneServer:
         for name in changes:
             if name not in known:
                 raise SettingsError(f"The scene has no option '{name}'.", f"Known: {', '.join(known)}.")
-        self._controller.post_quietly(change_options, changes)
+        self._controller.post(change_options, changes, told=False)
 
-    def play(self, playing: bool, *, speed: float | None = None, loop: bool | None = None) -> None:
-        """Play stored frames, or stop. speed : 1 is real time. loop : start over at the end. None leaves either."""
-        self._controller.post_quietly(set_playback, playing, speed, loop)
+    def play(
+        self, playing: bool | None = None, *, speed: float | None = None, loop: bool | None = None
+    ) -> None:
+        """Play stored frames, or stop. speed : 1 is real time. loop : start over at the end. None leaves each."""
+        self._controller.post(set_playback, playing, speed, loop, told=False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 from studio.capture.freed_memory import give_back_freed_memory
 from studio.errors import StudioError
-from studio.scene.controller import TrackingProcess
 from studio.scene.model import Selection
 from studio.scene.recording import record_scene
 from studio.scene.scene_server import SceneServer
 from studio.sessions.workspace import Workspace
+from studio.worker.control import StudioControl
 
 MOST_SCENES = 32
 """A scene takes two threads, six file descriptors and about 25 MB with four cameras of 640 × 480."""
@@ -43,7 +43,7 @@ class WindowScenes:
     def __init__(
         self,
         workspace: Workspace,
-        process: TrackingProcess,
+        process: StudioControl,
         *,
         most: int = MOST_SCENES,
         grace: float = GRACE_SECONDS,

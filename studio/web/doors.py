@@ -179,8 +179,10 @@ class Stage(Protocol):
         """Change what is drawn. Raises SettingsError for a name that is none."""
         ...
 
-    def play(self, playing: bool) -> None:
-        """Play stored frames, or stop."""
+    def play(
+        self, playing: bool | None = None, *, speed: float | None = None, loop: bool | None = None
+    ) -> None:
+        """Play stored frames, or stop, and how; None leaves it."""
         ...
 
 

@@ -16,7 +16,7 @@ from studio.worker.watchers import Subscription, Watchers
 
 
 class FakeControl:
-    """Satisfies `scene.controller.TrackingProcess`; a test answers for it."""
+    """What a scene uses of `worker.control.StudioControl`; a test answers for it."""
 
     def __init__(self, session: str = "", run: str = "", state: str = "idle") -> None:
         self.state = StateChanged(session, run, state, 0, 0, 0, 6, 5, math.nan, math.nan)

@@ -108,7 +108,9 @@ class RecordingStage:
     def set_options(self, **changes: object) -> None:
         self.calls.append(("options", changes))
 
-    def play(self, playing: bool) -> None:
+    def play(
+        self, playing: bool | None = None, *, speed: float | None = None, loop: bool | None = None
+    ) -> None:
         self.calls.append(("play", playing))
 
 
