@@ -4,10 +4,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from studio.benchmarks.light_viewer import LightViewer
 from studio.errors import RunError
 from studio.progress import Progress
 from studio.runs.live_summary import LiveSummary, summary_of
-from studio.scene.light_viewer import LightViewer
 from studio.scene.scene_server import SceneServer
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun

@@ -77,7 +77,6 @@ class FrameVolumes:
         self, opened: OpenedRun, ready: Callable[[], None], failed: Callable[[StudioError], None]
     ) -> None:
         self._opened, self._ready, self._failed = opened, ready, failed
-        self._session, self._body, self._cameras = opened.session, opened.body, opened.cameras
         self._kept: OrderedDict[tuple[object, ...], FrameVolume | None] = OrderedDict()
         self._newest: FrameVolume | None = None
         self._requested: _Request | None = None
@@ -138,15 +137,15 @@ class FrameVolumes:
                 problems.close()
 
     def _make(self, request: _Request, problems: ProblemSource | None) -> ProblemSource | None:
-        began = time.monotonic()
+        opened, began = self._opened, time.monotonic()
         made: FrameVolume | None = None
         try:
-            if len(self._cameras) < FEWEST_VIEWS and len(root_parameters(self._body)):
+            if len(opened.cameras) < FEWEST_VIEWS and len(root_parameters(opened.body)):
                 raise StudioError(
                     "One camera makes no visual hull of a body that moves about.",
                     "Hulls are shown of sessions with two cameras or more.",
                 )
-            problems = problems or ProblemSource(self._session, self._body, self._cameras)
+            problems = problems or ProblemSource(opened.session, opened.body, opened.cameras)
             made = _volume(problems, request)
         except StudioError as problem:
             self._report(problem)

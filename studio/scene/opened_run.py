@@ -97,7 +97,7 @@ class OpenedRun:
     def forget_from(self, frame: int) -> None:
         """Read a frame and all later ones anew when they are asked for again."""
         for kept in (self._results, self._layers):
-            for known in [number for number in kept if number >= frame]:
+            for known in [one for one in kept if one >= frame]:
                 del kept[known]
 
     def poses(self, track: str = RAW) -> tuple[NDArray[np.int64], Array]:

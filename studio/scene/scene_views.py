@@ -17,7 +17,7 @@ from studio.scene.camera_views import LONGEST_SIDE, CameraViews
 from studio.scene.floor_view import FloorView
 from studio.scene.frame_volume import FrameVolumes, has_blobs
 from studio.scene.line_views import TrailView, TruthView
-from studio.scene.model import Model, Subject, ViewOptions
+from studio.scene.model import Model
 from studio.scene.opened_run import Moment, OpenedRun
 from studio.scene.particle_view import CloudStyle, ParticleView
 from studio.scene.volume_view import VolumeView
@@ -84,7 +84,13 @@ class SceneViews:
         volume = self._volumes.of(moment, knobs.settings, blobs=options.blobs) if wanted else None
         doubtful = moment.tracking in (LOST, NO_EVIDENCE)
         most = DOUBTFUL if doubtful else EDITED if moment.edited else 1.0
-        style = cloud_style(model, moment, subject)
+        style = CloudStyle(
+            subject.chosen_limbs(options),
+            options.colour_by,
+            model.selection.layer,
+            moment.layer_count,
+            options.point_size,
+        )
         markers = subject.listed("trail_markers", options) if options.trails else ()
         through = model.selection.look_through
         with self._server.atomic():
@@ -147,18 +153,6 @@ class SceneViews:
         if track != self._trails_of[0] or is_due:
             self.trails.set_poses(*self._opened.poses(track[0]))
             self._trails_of, self._trails_read = (track, frames), now
-
-
-def cloud_style(model: Model, moment: Moment, subject: Subject) -> CloudStyle:
-    """How a model draws the clouds."""
-    options: ViewOptions = model.options
-    return CloudStyle(
-        subject.chosen_limbs(options),
-        options.colour_by,
-        model.selection.layer,
-        moment.layer_count,
-        options.point_size,
-    )
 
 
 def first_view(person: Array, cameras: list[Array]) -> tuple[Array, Array]:

@@ -7,12 +7,12 @@ import pytest
 from live_driving import live_run
 from toy_session import make_session
 
+from studio.benchmarks.light_viewer import LightViewer
 from studio.benchmarks.live import run_live_benchmark
 from studio.benchmarks.live_watching import track_watched
 from studio.runs.live_replay import compare, prepare_replay
 from studio.runs.live_summary import LiveStanding
 from studio.scene.controller import LIVE_PICTURE_SECONDS, PICTURE_SECONDS, picture_pause
-from studio.scene.light_viewer import LightViewer
 from studio.scene.panel import search_html
 from studio.scene.scene_server import SceneServer
 from studio.sessions.workspace import Workspace
