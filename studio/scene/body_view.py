@@ -41,15 +41,14 @@ class BodyView:
 
     def show(self, pose: Array | None, tokens: ColourTokens, opacity: float = 1.0) -> None:
         """Move every limb to a pose (radians, mm); None hides the body."""
+        if pose is not None:
+            wxyz, positions = limb_frames(self._body, pose)
+            for handle, turn, place in zip(self.handles, wxyz, positions, strict=True):
+                handle.wxyz, handle.position = turn, place
+                handle.opacity = None if opacity >= 1.0 else float(opacity)
         for handle, limb in zip(self.handles, self._body.drawn, strict=True):
-            handle.visible = pose is not None
             handle.color = tokens["ghost" if self._ghost else f"limb-{limb.side}"]
-        if pose is None:
-            return
-        wxyz, positions = limb_frames(self._body, pose)
-        for handle, turn, place in zip(self.handles, wxyz, positions, strict=True):
-            handle.wxyz, handle.position = turn, place
-            handle.opacity = None if opacity >= 1.0 else float(opacity)
+            handle.visible = pose is not None
 
 
 def limb_frames(body: BodyModel, pose: Array) -> tuple[Array, Array]:
