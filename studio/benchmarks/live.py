@@ -9,6 +9,7 @@ from pathlib import Path
 
 import msgspec
 
+from studio.benchmarks.light_viewer import LightViewer
 from studio.benchmarks.live_footage import learn_walk, make_footage
 from studio.benchmarks.live_stages import (
     CHANGES,
@@ -24,8 +25,7 @@ from studio.errors import RunError
 from studio.progress import Progress
 from studio.runs.live_summary import LiveSummary, summary_of
 from studio.runs.new_run import RunRequest, prepare_run
-from studio.scene.light_viewer import LightViewer
-from studio.scene.stage import SceneStage
+from studio.scene.scene_server import SceneServer
 from studio.sessions.manifest import write_manifest
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -63,7 +63,7 @@ def track_watched(
     messages = size = float("nan")
     try:
         if scene:
-            stage = SceneStage(workspace, control)
+            stage = SceneServer(workspace, control)
             viewer = LightViewer(stage.port, stage.relay_headers())
             stage.show_run(session.name, run.name)
         events = control.subscribe()

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from studio.body.extremities import extremities
 from studio.body.forward_kinematics import joint_frames, marker_points
 from studio.body.model import BodyModel, Marker
 
@@ -61,3 +62,16 @@ def marker_sides(body: BodyModel) -> dict[str, str]:
             joint = body.joints[joint].parent
         found[marker.name] = sides.get(joint, "middle")
     return found
+
+
+def extremity_markers(body: BodyModel) -> tuple[str, ...]:
+    """The outermost marker towards each extremity: wrists, ankles, head, tips (hands and feet may carry none)."""
+    last = {marker.joint: marker.name for marker in body.markers}
+    found: dict[str, None] = {}
+    for index in extremities(body):
+        joint = body.drawn[index].joint
+        while joint >= 0 and joint not in last:
+            joint = body.joints[joint].parent
+        if joint >= 0:
+            found[last[joint]] = None
+    return tuple(found)

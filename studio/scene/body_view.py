@@ -1,93 +1,91 @@
-"""The body in the scene: one mesh handle for each drawn limb, moved and never sent again."""
-
-from collections.abc import Callable
+"""The body in the scene: a mesh for each drawn limb, made once in the limb's frame; a pose only moves it."""
 
 import numpy as np
+import trimesh
 import viser
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from studio.body.model import BodyModel
+from studio.body.forward_kinematics import joint_frames
+from studio.body.model import BodyModel, Limb
 from studio.runs.colour_tokens import ColourTokens
-from studio.scene.limb_meshes import limb_frames, limb_mesh
+from studio.scene import METRES_PER_MM
 
 Array = NDArray[np.float64]
 
+SECTIONS = 28
 _CAGE_SECTIONS, _CAGE_SCALE = 10, (1.03, 1.03, 1.0)
 
 
 class BodyView:
-    """A body at one pose.
+    """A body at one pose. name : the nodes' path. ghost : a grey cage, for the stored answer beside another one."""
 
-    name : the handles' path, e.g. "/body". ghost : drawn as a grey cage instead of coloured solid limbs;
-    used for the stored answer beside a re-annealed one.
-    """
-
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        body: BodyModel,
-        tokens: ColourTokens,
-        *,
-        name: str,
-        ghost: bool = False,
-    ) -> None:
-        self._server = server
-        self._body = body
-        self._ghost = ghost
-        self._sides = [limb.side for limb in body.drawn]
+    def __init__(self, server: viser.ViserServer, body: BodyModel, *, name: str, ghost: bool = False) -> None:
+        self._body, self._ghost = body, ghost
+        meshes = [limb_mesh(limb, _CAGE_SECTIONS if ghost else SECTIONS) for limb in body.drawn]
         self.handles = [
-            _add_limb(server, f"{name}/{limb.name}", index, body, tokens, ghost)
-            for index, limb in enumerate(body.drawn)
+            server.scene.add_mesh_simple(
+                f"{name}/{limb.name}",
+                np.asarray(mesh.vertices),
+                np.asarray(mesh.faces),
+                wireframe=ghost,
+                # Beside an answer that hardly differs the cage must lie around it, not in its surface.
+                scale=_CAGE_SCALE if ghost else 1.0,
+                side="front",
+                cast_shadow=not ghost,
+                receive_shadow=not ghost,
+                visible=False,
+            )
+            for limb, mesh in zip(body.drawn, meshes, strict=True)
         ]
 
-    def show(self, pose: Array | None, opacity: float = 1.0) -> None:
-        """Move every limb to a pose (radians, mm) at once; None hides the body."""
-        with self._server.atomic():
-            if pose is not None:
-                wxyz, positions = limb_frames(self._body, pose)
-                for handle, turn, place in zip(self.handles, wxyz, positions, strict=True):
-                    handle.wxyz = turn
-                    handle.position = place
-                    handle.opacity = None if opacity >= 1.0 else float(opacity)
-            for handle in self.handles:
-                handle.visible = pose is not None
-
-    def recolour(self, tokens: ColourTokens) -> None:
-        """Take the colours of another theme."""
-        for handle, side in zip(self.handles, self._sides, strict=True):
-            handle.color = _colour(tokens, side, self._ghost)
-
-    def on_click(self, react: Callable[[str], None]) -> None:
-        """Call `react` with the limb's name when a limb is clicked."""
+    def show(self, pose: Array | None, tokens: ColourTokens, opacity: float = 1.0) -> None:
+        """Move every limb to a pose (radians, mm); None hides the body."""
+        if pose is not None:
+            wxyz, positions = limb_frames(self._body, pose)
+            for handle, turn, place in zip(self.handles, wxyz, positions, strict=True):
+                handle.wxyz, handle.position = turn, place
+                handle.opacity = None if opacity >= 1.0 else float(opacity)
         for handle, limb in zip(self.handles, self._body.drawn, strict=True):
-            handle.on_click(lambda _, name=limb.name: react(name))
-
-    def remove(self) -> None:
-        """Take the body out of the scene."""
-        for handle in self.handles:
-            handle.remove()
-        self.handles = []
+            handle.color = tokens["ghost" if self._ghost else f"limb-{limb.side}"]
+            handle.visible = pose is not None
 
 
-def _colour(tokens: ColourTokens, side: str, ghost: bool) -> tuple[int, int, int]:
-    return tokens["ghost"] if ghost else tokens[f"limb-{side}"]
+def limb_frames(body: BodyModel, pose: Array) -> tuple[Array, Array]:
+    """The drawn limbs' frames at a pose: wxyz quaternions (L, 4) and positions (L, 3) in metres."""
+    frames = joint_frames(body, np.asarray(pose, dtype=np.float64)[None])[0]
+    chosen = frames[[limb.joint for limb in body.drawn]]
+    wxyz = Rotation.from_matrix(chosen[:, :, :3]).as_quat(scalar_first=True)
+    return wxyz, chosen[:, :, 3] * METRES_PER_MM
 
 
-def _add_limb(
-    server: viser.ViserServer, name: str, index: int, body: BodyModel, tokens: ColourTokens, ghost: bool
-) -> viser.MeshHandle:
-    limb = body.drawn[index]
-    mesh = limb_mesh(limb, _CAGE_SECTIONS) if ghost else limb_mesh(limb)
-    return server.scene.add_mesh_simple(
-        name,
-        np.asarray(mesh.vertices),
-        np.asarray(mesh.faces),
-        color=_colour(tokens, limb.side, ghost),
-        wireframe=ghost,
-        # Beside an answer that hardly differs the cage must lie around it, not in its surface.
-        scale=_CAGE_SCALE if ghost else 1.0,
-        side="front",
-        cast_shadow=not ghost,
-        receive_shadow=not ghost,
-        visible=False,
-    )
+def limb_mesh(limb: Limb, sections: int = SECTIONS) -> trimesh.Trimesh:
+    """A truncated cone with an elliptical cross-section along z in its joint's frame, metres: a side and two flat caps
+    with crisp rims, normals outwards.
+    """
+    turn = np.linspace(0.0, 2.0 * np.pi, sections, endpoint=False)
+    circle = np.stack([limb.scale_x * np.cos(turn), limb.scale_y * np.sin(turn)], axis=-1)
+    start = np.column_stack([limb.radius_start * circle, np.zeros(sections)])
+    end = np.column_stack([limb.radius_end * circle, np.full(sections, limb.length)])
+    here = np.arange(sections)
+    after = np.roll(here, -1)
+    lower = np.column_stack([here, after, after + sections])
+    upper = np.column_stack([here, after + sections, here + sections])
+    parts = [
+        trimesh.Trimesh(np.concatenate([start, end]), np.concatenate([lower, upper]), process=False),
+        _cap(start, np.array([0.0, 0.0, 0.0]), facing_up=False),
+        _cap(end, np.array([0.0, 0.0, limb.length]), facing_up=True),
+    ]
+    mesh: trimesh.Trimesh = trimesh.util.concatenate(parts)  # pyright: ignore[reportAssignmentType]
+    if limb.length < 0.0:
+        mesh.invert()
+    mesh.apply_scale(METRES_PER_MM)
+    return mesh
+
+
+def _cap(rim: Array, centre: Array, facing_up: bool) -> trimesh.Trimesh:
+    here = np.arange(len(rim))
+    after = np.roll(here, -1)
+    hub = np.full(len(rim), len(rim))
+    faces = np.column_stack([hub, here, after] if facing_up else [hub, after, here])
+    return trimesh.Trimesh(np.concatenate([rim, centre[None]]), faces, process=False)

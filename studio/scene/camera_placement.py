@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from studio.geometry.camera import Camera
+from studio.runs.overlay_drawing import upright
+from studio.scene import METRES_PER_MM
 
-METRES_PER_MM = 0.001
 _VIEW_MARGIN = 1.04
 
 Array = NDArray[np.float64]
@@ -101,11 +102,6 @@ def clockwise_turn(quarter_turns: int) -> Array:
     return np.linalg.matrix_power(quarter, quarter_turns % 4)
 
 
-def turned(picture: Bytes, quarter_turns: int) -> Bytes:
-    """The picture turned clockwise by so many times 90°."""
-    return np.ascontiguousarray(np.rot90(picture, -quarter_turns))
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class StraightPicture:
     """Takes the lens distortion out of a camera's pictures and makes them small; maps are computed once."""
@@ -119,7 +115,7 @@ class StraightPicture:
         straight = cv2.remap(
             picture, self.columns, self.rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT
         )
-        return turned(np.asarray(straight, dtype=np.uint8), self.quarter_turns)
+        return upright(np.asarray(straight, dtype=np.uint8), self.quarter_turns)
 
 
 def straight_picture(camera: Camera, source_width: int, longest_side: int) -> StraightPicture:

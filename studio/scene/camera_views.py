@@ -5,6 +5,7 @@ backdrop, so that the body stands in front of its own picture.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 import trimesh
@@ -29,22 +30,20 @@ _ASIDE = np.array([0.0, 0.0, 1.0])
 
 
 class CameraView:
-    """One camera."""
+    """One camera. on_click : called when the camera or its picture is clicked, in a thread of viser's."""
 
-    def __init__(self, server: viser.ViserServer, camera: Camera, tokens: ColourTokens) -> None:
+    def __init__(
+        self, server: viser.ViserServer, camera: Camera, on_click: Callable[[], None] = lambda: None
+    ) -> None:
         self.camera = camera
         self.plane: PicturePlane = picture_plane(camera)
         name = f"/cameras/{camera.name}"
-        self._server = server
-        self._place = server.scene.add_frame(
-            name, show_axes=False, wxyz=self.plane.wxyz, position=self.plane.position
-        )
+        server.scene.add_frame(name, show_axes=False, wxyz=self.plane.wxyz, position=self.plane.position)
         bars = frustum_mesh(self.plane)
         self.bars = server.scene.add_mesh_simple(
             f"{name}/bars",
             np.asarray(bars.vertices),
             np.asarray(bars.faces),
-            color=tokens["camera-frame"],
             flat_shading=True,
             cast_shadow=False,
             receive_shadow=False,
@@ -60,6 +59,7 @@ class CameraView:
             cast_shadow=False,
             receive_shadow=False,
             position=self.plane.middle * DEPTH,
+            visible=False,
         )
         self._label = server.scene.add_label(
             f"{name}/name",
@@ -69,136 +69,88 @@ class CameraView:
             font_screen_scale=0.8,
         )
         self._straight: dict[int, StraightPicture] = {}
-        self._visible, self._with_picture, self._role = True, True, "shown"
         self._has_picture = False
-        self._show()
+        self.bars.on_click(lambda _: on_click())
+        self.picture.on_click(lambda _: on_click())
 
-    def show_picture(self, picture: Bytes) -> None:
+    def hang(self, picture: Bytes) -> None:
         """Hang a picture (H, W, 3) BGR, as stored or evenly reduced, on the plane."""
         width = picture.shape[1]
         if width not in self._straight:
             self._straight[width] = straight_picture(self.camera, width, LONGEST_SIDE)
         self.picture.image = np.ascontiguousarray(self._straight[width](picture)[:, :, ::-1])
         self._has_picture = True
-        self._show()
 
-    def show(self, visible: bool, with_picture: bool) -> None:
-        """Show or hide the camera, and its picture."""
-        self._visible, self._with_picture = visible, with_picture
-        self._show()
-
-    def take_role(self, role: str) -> None:
-        """role : "shown" (nobody looks through a camera), "backdrop" (through this one) or "aside" (another
-        one).
+    def show(
+        self, tokens: ColourTokens, visible: bool = True, picture: bool = False, through: str | None = None
+    ) -> None:
+        """Show or hide the camera and its picture. through : the camera that is looked through: its picture becomes
+        the backdrop, and the others are out of the way.
         """
-        self._role = role
-        depth = BACKDROP_DEPTH if role == "backdrop" else DEPTH
+        is_backdrop = through == self.camera.name
+        self.bars.visible = self._label.visible = visible and through is None
+        self.bars.color = tokens["camera-frame"]
+        hung = is_backdrop or (through is None and visible and picture)
+        self.picture.visible = self._has_picture and hung
+        depth = BACKDROP_DEPTH if is_backdrop else DEPTH
         self.picture.scale = depth / DEPTH
         self.picture.position = self.plane.middle * depth
-        self._show()
-
-    def recolour(self, tokens: ColourTokens, chosen: bool = False) -> None:
-        """Take the colours of another theme."""
-        self.bars.color = tokens["camera-chosen" if chosen else "camera-frame"]
-
-    def on_click(self, react: Callable[[], None]) -> None:
-        """Call `react` when the camera or its picture is clicked."""
-        self.bars.on_click(lambda _: react())
-        self.picture.on_click(lambda _: react())
-
-    def remove(self) -> None:
-        """Take the camera out of the scene (its parts go with it)."""
-        self._place.remove()
-
-    def _show(self) -> None:
-        plain = self._visible and self._role == "shown"
-        self.bars.visible = plain
-        self._label.visible = plain
-        self.picture.visible = (
-            self._has_picture
-            and self._role != "aside"
-            and (self._role == "backdrop" or (plain and self._with_picture))
-        )
 
 
 class CameraViews:
-    """All cameras of a session."""
+    """All cameras of a session. clicked : called with a camera's name, in a thread of viser's."""
 
-    def __init__(self, server: viser.ViserServer, cameras: Sequence[Camera], tokens: ColourTokens) -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        cameras: Sequence[Camera],
+        clicked: Callable[[str], None] = lambda _: None,
+    ) -> None:
         self._server = server
-        self.through: str | None = None
+        self._through: str | None = None
         self._free: dict[int, tuple[NDArray[np.float64], ...]] = {}
-        self.views = {camera.name: CameraView(server, camera, tokens) for camera in cameras}
+        self.views = {
+            camera.name: CameraView(server, camera, partial(clicked, camera.name)) for camera in cameras
+        }
 
-    def show_pictures(self, pictures: Mapping[str, Bytes]) -> None:
-        """Hang new pictures, by camera name."""
-        with self._server.atomic():
-            for name, picture in pictures.items():
-                self.views[name].show_picture(picture)
+    def hang(self, pictures: Mapping[str, Bytes]) -> None:
+        """Hang new pictures, by camera name; they are seen from the next `show` on."""
+        for name, picture in pictures.items():
+            self.views[name].hang(picture)
 
-    def show(self, visible: bool, with_pictures: bool) -> None:
-        """Show or hide all cameras and their pictures."""
+    def show(self, tokens: ColourTokens, visible: bool, pictures: bool, through: str | None = None) -> None:
+        """Show or hide cameras and pictures; put the viewers into a camera's place, or back (None)."""
         for view in self.views.values():
-            view.show(visible, with_pictures)
-
-    def recolour(self, tokens: ColourTokens) -> None:
-        """Take the colours of another theme."""
-        for view in self.views.values():
-            view.recolour(tokens)
-
-    def on_click(self, react: Callable[[str], None]) -> None:
-        """Call `react` with the camera's name when one is clicked."""
-        for name, view in self.views.items():
-            view.on_click(lambda name=name: react(name))
-
-    def look_through(self, name: str | None) -> None:
-        """Put every viewer into a camera's place, or back where each was before (None)."""
-        self.through = name
-        for other, view in self.views.items():
-            view.take_role("shown" if name is None else "backdrop" if other == name else "aside")
-        for client in self._server.get_clients().values():
-            if name is None:
-                self._set_free(client)
-            else:
-                self.place_viewer(client, name)
-
-    def place_viewer(self, client: viser.ClientHandle, name: str) -> None:
-        """Put one viewer into a camera's place, remembering where it was."""
-        camera = client.camera
-        remembered = (camera.position, camera.look_at, camera.up_direction, np.array(camera.fov))
-        self._free.setdefault(client.client_id, remembered)
-        plane = self.views[name].plane
-        with client.atomic():
-            _put(camera, plane.position)
-            camera.look_at = plane.position + plane.forward * _LOOK_DISTANCE
-            camera.up_direction = plane.up
-            camera.fov = plane.field_of_view(camera.aspect)
-
-    def remove(self) -> None:
-        """Take all cameras out of the scene."""
-        for view in self.views.values():
-            view.remove()
-        self.views = {}
-
-    def _set_free(self, client: viser.ClientHandle) -> None:
-        remembered = self._free.pop(client.client_id, None)
-        if remembered is None:
+            view.show(tokens, visible, pictures, through)
+        if through == self._through:
             return
-        position, look_at, up, fov = remembered
+        self._through = through
+        for client in self._server.get_clients().values():
+            self.place(client)
+
+    def place(self, client: viser.ClientHandle) -> None:
+        """Put a viewer into the place of the camera that is looked through, or back where it was."""
+        camera = client.camera
+        before = (camera.position, camera.look_at, camera.up_direction, np.array(camera.fov))
+        if self._through is None:
+            found = self._free.pop(client.client_id, None)
+            if found is None:
+                return
+            position, look_at, up, fov = found
+        else:
+            self._free.setdefault(client.client_id, before)
+            plane = self.views[self._through].plane
+            position, up = plane.position, plane.up
+            look_at = position + plane.forward * _LOOK_DISTANCE
+            fov = plane.field_of_view(camera.aspect)
         with client.atomic():
-            _put(client.camera, position)
-            client.camera.up_direction = up
-            client.camera.look_at = look_at
-            client.camera.fov = float(fov)
-
-
-def _put(camera: viser.CameraHandle, position: NDArray[np.float64]) -> None:
-    """Move a viewer, also where viser takes it to be there already.
-
-    A slow browser tells where it was after it was moved away; viser believes it and would leave out the way back.
-    """
-    camera.position = position + _ASIDE
-    camera.position = position
+            # A slow browser tells where it was after it was moved away; viser believes it and would leave out the
+            # way back to a place that it takes to be the viewer's already.
+            camera.position = position + _ASIDE
+            camera.position = position
+            camera.up_direction = up
+            camera.look_at = look_at
+            camera.fov = float(fov)
 
 
 def frustum_mesh(plane: PicturePlane, depth: float = DEPTH, bar: float = _BAR) -> trimesh.Trimesh:

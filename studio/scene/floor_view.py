@@ -7,70 +7,48 @@ import trimesh
 import viser
 from numpy.typing import NDArray
 
-from studio.geometry.camera import Camera
 from studio.runs.colour_tokens import ColourTokens
-from studio.scene.limb_meshes import METRES_PER_MM
+from studio.scene import METRES_PER_MM
 
 Array = NDArray[np.float64]
 
 _THICKNESS = 0.02
-_LEAST_HALF_WIDTH = 2.0
-_MOST_HALF_WIDTH = 8.0
+_LEAST_HALF_WIDTH, _MOST_HALF_WIDTH = 2.0, 8.0
 
 
 class FloorView:
-    """The floor z = 0, as large as the cameras' ring and the person in it."""
+    """The floor z = 0 under points (3,) mm: the cameras, and where the body begins."""
 
-    def __init__(
-        self, server: viser.ViserServer, cameras: Sequence[Camera], person: Array, tokens: ColourTokens
-    ) -> None:
-        """person : (3,) mm, where the body begins."""
-        self._server = server
-        self._middle, self._half_width = floor_extent([*(camera.centre for camera in cameras), person])
-        self._slab: viser.MeshHandle | None = None
-        self._lines: viser.GridHandle | None = None
-        self.recolour(tokens)
-
-    def recolour(self, tokens: ColourTokens) -> None:
-        """Draw the floor in a theme's colours."""
-        width = 2.0 * self._half_width
+    def __init__(self, server: viser.ViserServer, points: Sequence[Array]) -> None:
+        middle, half_width = floor_extent(points)
+        width = 2.0 * half_width
         mesh = trimesh.creation.box(extents=(width, width, _THICKNESS))
-        self._slab = self._server.scene.add_mesh_simple(
+        self._slab = server.scene.add_mesh_simple(
             "/floor/slab",
             np.asarray(mesh.vertices),
             np.asarray(mesh.faces),
-            color=tokens["scene-floor"],
             flat_shading=True,
             cast_shadow=False,
-            position=(*self._middle, -_THICKNESS),
+            position=(*middle, -_THICKNESS),
         )
-        self._lines = self._server.scene.add_grid(
+        self._lines = server.scene.add_grid(
             "/floor/lines",
             width,
             width,
             plane="xy",
             cell_size=0.5,
             section_size=1.0,
-            cell_color=tokens["scene-floor-line"],
-            section_color=tokens["scene-floor-line"],
             cell_thickness=0.6,
             section_thickness=1.2,
             shadow_opacity=0.25,
-            position=(*self._middle, 0.0),
+            position=(*middle, 0.0),
         )
 
-    def show(self, visible: bool) -> None:
-        """Show or hide the floor."""
-        for handle in (self._slab, self._lines):
-            if handle is not None:
-                handle.visible = visible
-
-    def remove(self) -> None:
-        """Take the floor out of the scene."""
-        for handle in (self._slab, self._lines):
-            if handle is not None:
-                handle.remove()
-        self._slab = self._lines = None
+    def show(self, tokens: ColourTokens, visible: bool = True) -> None:
+        """Draw the floor in a theme's colours, or hide it."""
+        self._slab.visible = self._lines.visible = visible
+        self._slab.color = tokens["scene-floor"]
+        self._lines.cell_color = self._lines.section_color = tokens["scene-floor-line"]
 
 
 def floor_extent(points: Sequence[Array]) -> tuple[tuple[float, float], float]:

@@ -21,8 +21,7 @@ from studio.capture.video import give_back_freed_memory
 from studio.errors import StudioError
 from studio.numba_in_threads import numba
 from studio.runs.problem_source import ProblemSource
-from studio.scene.moment import Moment
-from studio.scene.opened_run import OpenedRun
+from studio.scene.opened_run import Moment, OpenedRun
 from studio.settings import RunSettings, default_settings
 from studio.volume.alignment import root_parameters
 from studio.volume.blob_model import BlobMixture, BlobModel
@@ -36,7 +35,7 @@ BLOBS = "blobs"
 FEWEST_VIEWS = 2
 KEPT = 6
 REST_SECONDS = 20.0
-"""After so long without a wish, the footage and background models are given back."""
+"""After so long without a request, the footage and background models are given back."""
 LEAST_PAUSE_SECONDS, LONGEST_PAUSE_SECONDS = 0.05, 0.5
 """Between two frames: as long as the last one took, so that at most half a core goes into it."""
 NICENESS = 10
@@ -55,7 +54,7 @@ class FrameVolume:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Wish:
+class _Request:
     key: tuple[object, ...]
     frame: int
     settings: RunSettings
@@ -69,7 +68,7 @@ def has_blobs(settings: RunSettings) -> bool:
 
 
 class FrameVolumes:
-    """Makes the volumes of an opened run on demand, the newest wish first, and keeps the last few.
+    """Makes the volumes of an opened run on demand, the newest request first, and keeps the last few.
 
     ready : called from the thread when one was made. failed : called from it with a reason, once for each.
     """
@@ -78,11 +77,10 @@ class FrameVolumes:
         self, opened: OpenedRun, ready: Callable[[], None], failed: Callable[[StudioError], None]
     ) -> None:
         self._opened, self._ready, self._failed = opened, ready, failed
-        self._session, self._body, self._cameras = opened.session, opened.body, opened.cameras
         self._kept: OrderedDict[tuple[object, ...], FrameVolume | None] = OrderedDict()
         self._newest: FrameVolume | None = None
-        self._wish: _Wish | None = None
-        self._said: set[str] = set()
+        self._requested: _Request | None = None
+        self._reported: set[str] = set()
         self._lock = threading.Lock()
         self._wake, self._stopping = threading.Event(), threading.Event()
         self._thread: threading.Thread | None = None
@@ -90,13 +88,13 @@ class FrameVolumes:
     def of(self, moment: Moment, settings: RunSettings, *, blobs: bool) -> FrameVolume | None:
         """The volume of a moment; until it is made, the one that was shown before. blobs : wanted with the hull."""
         frame = self._opened.span[0] if moment.frame is None else moment.frame
-        wish = self._wish_for(frame, moment.pose, settings, blobs=blobs and has_blobs(settings))
+        request = self._request_for(frame, moment.pose, settings, blobs=blobs and has_blobs(settings))
         with self._lock:
-            if wish.key in self._kept:
-                self._kept.move_to_end(wish.key)
-                self._newest = self._kept[wish.key]
+            if request.key in self._kept:
+                self._kept.move_to_end(request.key)
+                self._newest = self._kept[request.key]
                 return self._newest
-            self._wish = wish
+            self._requested = request
         self._wake.set()
         if self._thread is None:
             self._thread = threading.Thread(target=self._work, name="scene-volumes", daemon=True)
@@ -104,20 +102,20 @@ class FrameVolumes:
         return self._newest
 
     def close(self) -> None:
-        """End the thread and let go of the footage."""
+        """End the thread and release the footage."""
         self._stopping.set()
         self._wake.set()
         if self._thread is not None:
             self._thread.join(timeout=10.0)
 
-    def _wish_for(self, frame: int, pose: Array | None, settings: RunSettings, *, blobs: bool) -> _Wish:
+    def _request_for(self, frame: int, pose: Array | None, settings: RunSettings, *, blobs: bool) -> _Request:
         chosen = settings if has_blobs(settings) else _carving(settings)
         if not blobs or pose is None:
-            return _Wish((frame, chosen.evidence, chosen.weighting), frame, chosen, None, {})
+            return _Request((frame, chosen.evidence, chosen.weighting), frame, chosen, None, {})
         key = (frame, chosen.evidence, chosen.weighting, pose.tobytes())
         before = self._opened.result(frame - 1) if key not in self._kept else None
         memory = before.carried.memory if before is not None else {}
-        return _Wish(key, frame, chosen, pose.copy(), memory)
+        return _Request(key, frame, chosen, pose.copy(), memory)
 
     def _work(self) -> None:
         _step_back()
@@ -130,29 +128,29 @@ class FrameVolumes:
                     give_back_freed_memory()
                 self._wake.clear()
                 with self._lock:
-                    wish, self._wish = self._wish, None
-                if wish is None or self._stopping.is_set():
+                    request, self._requested = self._requested, None
+                if request is None or self._stopping.is_set():
                     continue
-                problems = self._make(wish, problems)
+                problems = self._make(request, problems)
         finally:
             if problems is not None:
                 problems.close()
 
-    def _make(self, wish: _Wish, problems: ProblemSource | None) -> ProblemSource | None:
-        began = time.monotonic()
+    def _make(self, request: _Request, problems: ProblemSource | None) -> ProblemSource | None:
+        opened, began = self._opened, time.monotonic()
         made: FrameVolume | None = None
         try:
-            if len(self._cameras) < FEWEST_VIEWS and len(root_parameters(self._body)):
+            if len(opened.cameras) < FEWEST_VIEWS and len(root_parameters(opened.body)):
                 raise StudioError(
                     "One camera makes no visual hull of a body that moves about.",
                     "Hulls are shown of sessions with two cameras or more.",
                 )
-            problems = problems or ProblemSource(self._session, self._body, self._cameras)
-            made = _volume(problems, wish)
+            problems = problems or ProblemSource(opened.session, opened.body, opened.cameras)
+            made = _volume(problems, request)
         except StudioError as problem:
-            self._complain(problem)
+            self._report(problem)
         with self._lock:
-            self._kept[wish.key] = made
+            self._kept[request.key] = made
             while len(self._kept) > KEPT:
                 self._kept.popitem(last=False)
         self._ready()
@@ -160,20 +158,20 @@ class FrameVolumes:
         self._stopping.wait(min(LONGEST_PAUSE_SECONDS, max(LEAST_PAUSE_SECONDS, took)))
         return problems
 
-    def _complain(self, problem: StudioError) -> None:
-        if str(problem) not in self._said:
-            self._said.add(str(problem))
+    def _report(self, problem: StudioError) -> None:
+        if str(problem) not in self._reported:
+            self._reported.add(str(problem))
             self._failed(problem)
 
 
-def _volume(problems: ProblemSource, wish: _Wish) -> FrameVolume:
+def _volume(problems: ProblemSource, request: _Request) -> FrameVolume:
     """Raises FootageError, NotFoundError, CalibrationError."""
-    problem = problems.problem(wish.frame, wish.settings)
+    problem = problems.problem(request.frame, request.settings)
     assert isinstance(problem, BlobProblem)
-    if wish.pose is None:
-        return FrameVolume(wish.frame, problem.hull)
-    expected = problem.expecting(wish.pose[None], wish.memory)
-    return FrameVolume(wish.frame, problem.hull, expected.model, blob_mixture(expected))
+    if request.pose is None:
+        return FrameVolume(request.frame, problem.hull)
+    expected = problem.expecting(request.pose[None], request.memory)
+    return FrameVolume(request.frame, problem.hull, expected.model, blob_mixture(expected))
 
 
 def _carving(settings: RunSettings) -> RunSettings:

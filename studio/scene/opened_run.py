@@ -1,6 +1,8 @@
 """A session and one of its runs, opened for looking: everything the scene draws comes from here."""
 
 from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,7 @@ from studio.errors import NotFoundError, SessionError, StudioError
 from studio.geometry.camera import Camera
 from studio.motion_files.trc import MarkerMotion, read_trc
 from studio.runs.tracks import RAW, Track, read_track, track_names, track_stamp
+from studio.scene.model import LiveSearch
 from studio.sessions.results_store import ResultsReader
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -21,10 +24,27 @@ Array = NDArray[np.float64]
 _KEPT_FRAMES = 8
 
 
-class OpenedRun:
-    """run : None shows the session alone (cameras, pictures, start pose, truth). Used by one thread at a
-    time.
+@dataclass(frozen=True, slots=True, eq=False)
+class Moment:
+    """What there is to draw at a frame (None while there is none). pose : (D,) drawn as the body.
+
+    beside : (D,) the stored answer while a re-annealed one, or another track's, is shown. records : the layers whose
+    clouds are drawn. layer_count : how many layers the frame takes. truth : (M, 3) mm. tracking : how a stored frame
+    went, "" unknown. edited : whether the pose is edited, and no answer.
     """
+
+    frame: int | None
+    pose: Array | None
+    beside: Array | None
+    records: Sequence[LayerRecord]
+    layer_count: int
+    truth: Array | None
+    tracking: str = ""
+    edited: bool = False
+
+
+class OpenedRun:
+    """run : None shows the session alone (cameras, pictures, start pose, truth). Used by one thread at a time."""
 
     def __init__(self, session: Session, run: StoredRun | None) -> None:
         self.session = session
@@ -77,7 +97,7 @@ class OpenedRun:
     def forget_from(self, frame: int) -> None:
         """Read a frame and all later ones anew when they are asked for again."""
         for kept in (self._results, self._layers):
-            for known in [number for number in kept if number >= frame]:
+            for known in [one for one in kept if one >= frame]:
                 del kept[known]
 
     def poses(self, track: str = RAW) -> tuple[NDArray[np.int64], Array]:
@@ -144,8 +164,46 @@ class OpenedRun:
             record.tracker, record.weighting, history[-1].values if history else record.settings
         )
 
+    def moment(
+        self,
+        frame: int | None,
+        live: LiveSearch,
+        *,
+        edited: Array | None = None,
+        layers: int = 0,
+        track: str = RAW,
+    ) -> Moment:
+        """The moment at `frame`: stored, in progress, annealed again, or a pose being edited.
+
+        live : used where it is about this frame. edited : (D,) shown instead of an answer. layers : how many a frame
+        takes with the settings in use. track : whose poses are shown of stored frames, where it has one.
+        """
+        truth = None if frame is None else self.truth_at(frame)
+        if edited is not None:
+            return Moment(frame, edited, None, (), 0, truth, edited=True)
+        if frame is None:
+            return Moment(None, self.start_pose(), None, (), layers, None)
+        if frame == live.frame and live.is_whole and not live.reannealed:
+            return Moment(
+                frame, live.pose, None, live.records, len(live.records), truth
+            )  # it need not be read
+        stored = self.result(frame)
+        if frame == live.frame and (live.reannealed or stored is None):
+            beside = stored.estimate.pose if stored is not None else None
+            count = live.result.layers if live.result is not None else layers
+            return Moment(frame, live.pose, beside, live.records, _at_least(count, live.records), truth)
+        records = self.layers(frame)
+        if stored is None:
+            pose = records[-1].mean if records else self.start_pose()
+            return Moment(frame, pose, None, records, _at_least(layers, records), truth)
+        pose, made = stored.estimate.pose, self.pose_in(track, frame)
+        count = _at_least(stored.layers, records)
+        if made is None:
+            return Moment(frame, pose, None, records, count, truth, stored.tracking)
+        return Moment(frame, made, pose, records, count, truth, stored.tracking)
+
     def close(self) -> None:
-        """Let go of the files."""
+        """Release the files."""
         if self.results is not None:
             self.results.close()
 
@@ -159,6 +217,10 @@ def _truth_of(session: Session) -> tuple[MarkerMotion | None, str]:
         return read_trc(path), ""
     except StudioError as problem:
         return None, str(problem)
+
+
+def _at_least(count: int, records: Sequence[LayerRecord]) -> int:
+    return max(count, *(record.layer + 1 for record in records)) if records else count
 
 
 def _keep(store: OrderedDict, key: int, value: object) -> None:

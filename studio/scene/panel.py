@@ -1,74 +1,58 @@
-"""viser's panel as a whole: the run on top, under it tabs for Search, Show, Weighting, Masks and Start
-pose.
-"""
+"""viser's panel: which run is shown and how it stands, and under it the tabs. The page carries the transport."""
 
-from collections.abc import Mapping
-from typing import Protocol
+from html import escape
 
 import numpy as np
 import viser
 
-from studio.errors import StudioError
-from studio.knobs import Value
 from studio.runs.colour_tokens import ColourTokens
-from studio.scene.pose_editor import PoseEditor, PoseWishes
-from studio.scene.run_panel import RunPanel, Transport
-from studio.scene.settings_panel import SettingsPanel, SettingsTabs
-from studio.scene.show_panel import ShowPanel
-from studio.scene.wishes import Wishes
+from studio.scene.controls import Change, Post
+from studio.scene.model import Model
+from studio.scene.opened_run import Moment
+from studio.scene.pose_panel import PosePanel
+from studio.scene.settings_panel import Request, SettingsPanel
+from studio.scene.show_panel import ShowPanel, css
+from studio.tracking.tracker import LIMB_LOST, LOST, NO_EVIDENCE, RECOVERED
+from studio.worker.events import StateChanged
 
 PANEL_WIDTH = 310
-
-
-class Director(Transport, Protocol):
-    """What the panel's callbacks post their wishes to."""
-
-    wishes: Wishes
-
-    @property
-    def posing(self) -> PoseWishes:
-        """Where poses are edited."""
-        ...
-
-    def change_settings(self, changes: dict[str, Value]) -> str:
-        """Ask for knobs; the identifier of the answer. Raises StudioError if it cannot be asked."""
-        ...
-
-    def change_options(self, changes: Mapping[str, object]) -> None:
-        """Show other things."""
-        ...
-
-    def choose_layer(self, layer: int | None) -> None:
-        """Show one layer's cloud, or all."""
-        ...
-
-    def refused(self, problem: StudioError) -> None:
-        """Tell the person about a refusal."""
-        ...
+MARKS = {
+    LOST: ("bad", "the tracker is off the body and searches for it"),
+    LIMB_LOST: ("warn", "a limb is off, the silhouettes deny it"),
+    NO_EVIDENCE: ("text-quiet", "nothing is to be seen, the pose is held"),
+    RECOVERED: ("good", "the body was found again"),
+}
+STATE_WORDS = {"reannealing": "annealing again", "lost": "worker lost", "compiling": "compiling, once"}
 
 
 class Panel:
-    """All controls, wired to a director."""
+    """All controls. request, refine, save : what needs more than the model, see the parts."""
 
-    def __init__(self, server: viser.ViserServer, director: Director) -> None:
+    def __init__(
+        self, server: viser.ViserServer, post: Post, request: Request, refine: Change, save: Change
+    ) -> None:
         gui = server.gui
         gui.main_panel.dock_right()
         gui.main_panel.set_width(PANEL_WIDTH)
-        self.run = RunPanel(
-            gui,
-            gui.add_folder("Track and play", expand_by_default=False),
-            director.wishes,
-            transport=director,
-            refused=director.refused,
-        )
+        self.status = gui.add_html("")
+        self.mark = gui.add_html("", visible=False)
         tabs = gui.add_tab_group()
-        search, show = tabs.add_tab("Search"), tabs.add_tab("Show")
-        weighting, masks, pose = tabs.add_tab("Weighting"), tabs.add_tab("Masks"), tabs.add_tab("Pose")
-        self.settings = SettingsPanel(
-            gui, SettingsTabs(search, weighting, masks), director.change_settings, director.refused
+        search, show, weighting, masks, pose = (
+            tabs.add_tab(name) for name in ("Search", "Show", "Weighting", "Masks", "Pose")
         )
-        self.show = ShowPanel(gui, show, director.change_options, director.choose_layer)
-        self.pose = PoseEditor(gui, pose, director.posing)
+        self.settings = SettingsPanel(gui, search, weighting, masks, post, request)
+        self.options = ShowPanel(gui, show, post)
+        self.pose = PosePanel(gui, pose, post, refine, save)
+
+    def show(self, model: Model, moment: Moment | None, tokens: ColourTokens) -> None:
+        """Bring every control to a model."""
+        self.status.content = status_html(model)
+        self.mark.content = mark_html(model, moment, tokens)
+        self.mark.visible = bool(self.mark.content)
+        if model.knobs is not None:
+            self.settings.show(model.knobs)
+        self.options.show(model, moment, tokens)
+        self.pose.show(model)
 
 
 def dress(server: viser.ViserServer, tokens: ColourTokens) -> None:
@@ -85,9 +69,70 @@ def dress(server: viser.ViserServer, tokens: ColourTokens) -> None:
     server.scene.set_background_image(background, format="png")
 
 
-def tell(server: viser.ViserServer, title: str, body: str, *, bad: bool = False) -> None:
+def notify(server: viser.ViserServer, title: str, body: str, *, bad: bool = False) -> None:
     """Show every viewer a notification that goes away by itself."""
     for client in server.get_clients().values():
         client.add_notification(
             title, body, auto_close_seconds=8.0 if bad else 4.0, color="red" if bad else "green"
         )
+
+
+def status_html(model: Model) -> str:
+    """Which run is shown and how it stands: two quiet lines."""
+    selection, state, subject = model.selection, model.search, model.subject
+    if subject is None or model.is_searched or state.state == "lost":
+        return search_html(state)
+    first, last = subject.span
+    if not selection.run:
+        return _two_lines(selection.session, f"{last - first} frames, no run shown")
+    name = f"{selection.session} / {selection.run}"
+    return _two_lines(name, f"stored · {len(model.frames)} of {last - first} frames")
+
+
+def search_html(state: StateChanged) -> str:
+    """How the run stands that the tracking process has open, how fast it goes, how long it takes still."""
+    if not state.run:
+        return _two_lines("No run is open", "Open one in the list on the left.")
+    name = f"{state.session} / {state.run} — {STATE_WORDS.get(state.state, state.state)}"
+    said = [part for part in (state.message, state.hint) if part]
+    if state.live is not None:
+        return _two_lines(name, " · ".join(said) or state.live.in_words)
+    parts = [f"frame {state.frame}", f"{state.done} of {state.last - state.first} done"]
+    if state.state == "tracking" and state.frames_per_second == state.frames_per_second:
+        parts.append(f"{state.frames_per_second:.3g} fps")
+    if state.state == "tracking" and state.seconds_left == state.seconds_left:
+        parts.append(f"{clock(state.seconds_left)} left")
+    return _two_lines(name, " · ".join(said if state.message else parts))
+
+
+def mark_html(model: Model, moment: Moment | None, tokens: ColourTokens) -> str:
+    """How the shown frame went, where it did not simply go on, in the colour of its mark on the timeline; of a start
+    pose that was found, how sure it is.
+    """
+    if model.edit is not None and model.edit.found:
+        title, words, colour = "start pose", model.edit.found, tokens["good"]
+    elif moment is not None and moment.tracking in MARKS:
+        token, words = MARKS[moment.tracking]
+        title, colour = moment.tracking, tokens[token]
+    else:
+        return ""
+    return (
+        '<div style="padding:0 10px 4px;font-size:12px;display:flex;gap:6px;align-items:baseline">'
+        f'<span style="flex:none;width:9px;height:9px;border-radius:50%;background:{css(colour)}"></span>'
+        f"<span><b>{escape(title)}</b>: {escape(words)}</span></div>"
+    )
+
+
+def clock(seconds: float) -> str:
+    """Seconds as minutes:seconds, or hours:minutes:seconds."""
+    whole = max(0, round(seconds))
+    hours, minutes, rest = whole // 3600, whole // 60 % 60, whole % 60
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+
+
+def _two_lines(first: str, second: str) -> str:
+    return (
+        '<div style="padding:2px 10px 4px;font-variant-numeric:tabular-nums">'
+        f'<div style="font-size:13px;font-weight:600">{escape(first)}</div>'
+        f'<div style="font-size:12px;opacity:.72;min-height:1.3em">{escape(second)}</div></div>'
+    )

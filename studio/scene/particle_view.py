@@ -1,8 +1,7 @@
-"""The particle clouds: every layer's own particles through forward kinematics, as points at chosen limb
-ends.
+"""The particle clouds: every layer's own particles through forward kinematics, as points at chosen limb ends.
 
-Layers are coloured from cool (first) to warm (last), or particles by their weight within what is shown; one
-handle a layer, so that showing one layer alone is a matter of visibility.
+Layers are coloured from cool (first) to warm (last), or particles by their weight within what is shown; one handle a
+layer, so that showing one layer alone is a matter of visibility.
 """
 
 from collections.abc import Sequence
@@ -15,11 +14,10 @@ from numpy.typing import NDArray
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.runs.colour_tokens import ColourTokens
-from studio.scene.limb_meshes import METRES_PER_MM
+from studio.scene import METRES_PER_MM
 from studio.tracking.tracker import LayerRecord
 
 Array = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
 
 FAR_END = 1
 MOST_DRAWN = 4000
@@ -29,13 +27,74 @@ MOST_DRAWN = 4000
 @dataclass(frozen=True, slots=True)
 class CloudStyle:
     """limbs : indices into the body's drawn limbs whose far ends are shown. colour_by : "layer" or "weight".
-    layer : the only layer to show, None for all. layer_count : how many layers a frame takes (colours)."""
+    layer : the only layer to show, None for all. layer_count : how many layers a frame takes (colours). point_size :
+    metres.
+    """
 
     limbs: tuple[int, ...]
     colour_by: str
     layer: int | None
     layer_count: int
     point_size: float
+
+
+class ParticleView:
+    """The clouds of one frame."""
+
+    def __init__(self, server: viser.ViserServer, body: BodyModel) -> None:
+        self._server, self._body = server, body
+        self.handles: list[viser.PointCloudHandle] = []
+        self._drawn: dict[int, tuple[LayerRecord, tuple[object, ...]]] = {}
+
+    def show(self, records: Sequence[LayerRecord], style: CloudStyle, tokens: ColourTokens) -> None:
+        """Draw the layers' clouds; layers that are not in `records` vanish."""
+        by_layer = {record.layer: record for record in records if len(record.poses)}
+        weights = _weight_range(list(by_layer.values()), style.layer) if style.colour_by == "weight" else None
+        look = (style.limbs, style.layer_count, style.point_size, tokens.name, weights)
+        for layer in range(len(self.handles), max(by_layer, default=-1) + 1):
+            self.handles.append(self._added(layer))
+        for layer, handle in enumerate(self.handles):
+            record = by_layer.get(layer)
+            handle.visible = record is not None and style.layer in (None, layer) and bool(style.limbs)
+            if record is None or not handle.visible:
+                continue
+            # While a frame is searched every redraw shows all of its layers, and only the newest one is new.
+            before = self._drawn.get(layer)
+            if before is None or before[0] is not record or before[1] != look:
+                self._drawn[layer] = (record, look)
+                self._draw(handle, record, style, tokens, weights)
+
+    def _added(self, layer: int) -> viser.PointCloudHandle:
+        return self._server.scene.add_point_cloud(
+            f"/particles/layer {layer}",
+            np.zeros((1, 3), dtype=np.float32),
+            (255, 255, 255),
+            precision="float32",
+            point_shape="circle",
+            point_shading="flat",
+            visible=False,
+        )
+
+    def _draw(
+        self,
+        handle: viser.PointCloudHandle,
+        record: LayerRecord,
+        style: CloudStyle,
+        tokens: ColourTokens,
+        weights: tuple[float, float] | None,
+    ) -> None:
+        stride = -(-len(record.poses) // MOST_DRAWN)
+        points = cloud_points(self._body, record.poses[::stride], style.limbs)
+        if weights is None:
+            colours = np.array(tokens.layer(record.layer, style.layer_count), dtype=np.uint8)
+        else:
+            shares = weight_shares(record.log_weights[::stride], *weights)
+            colours = np.repeat(tokens.ramp(shares), len(style.limbs), axis=0)
+        # A colour array of another length must never meet the old points: a single colour goes in between.
+        if handle.points.shape != points.shape:
+            handle.colors = np.array(tokens["ghost"], dtype=np.uint8)
+        handle.points, handle.colors = points.astype(np.float32), colours
+        handle.point_size = style.point_size
 
 
 def cloud_points(body: BodyModel, poses: Array, limbs: Sequence[int]) -> Array:
@@ -50,102 +109,8 @@ def weight_shares(log_weights: Array, low: float, high: float) -> Array:
     return np.ones_like(log_weights) if spread <= 0.0 else np.clip((log_weights - low) / spread, 0.0, 1.0)
 
 
-class ParticleView:
-    """The clouds of one frame."""
-
-    def __init__(self, server: viser.ViserServer, body: BodyModel) -> None:
-        self._server = server
-        self._body = body
-        self.handles: list[viser.PointCloudHandle] = []
-        self._drawn: dict[int, tuple[LayerRecord, tuple[object, ...]]] = {}
-
-    def show(self, records: Sequence[LayerRecord], style: CloudStyle, tokens: ColourTokens) -> None:
-        """Draw the layers' clouds; layers that are not in `records` vanish."""
-        by_layer = {record.layer: record for record in records if len(record.poses)}
-        low, high = _weight_range(list(by_layer.values()), style.layer)
-        with self._server.atomic():
-            self._provide(max(by_layer, default=-1) + 1)
-            for layer, handle in enumerate(self.handles):
-                record = by_layer.get(layer)
-                visible = record is not None and style.layer in (None, layer) and bool(style.limbs)
-                if visible and record is not None and self._is_new(layer, record, style, tokens, (low, high)):
-                    self._draw(handle, record, style, tokens, (low, high))
-                handle.visible = visible
-
-    def clear(self) -> None:
-        """Hide all clouds."""
-        for handle in self.handles:
-            handle.visible = False
-
-    def remove(self) -> None:
-        """Take the clouds out of the scene."""
-        for handle in self.handles:
-            handle.remove()
-        self.handles = []
-        self._drawn.clear()
-
-    def _is_new(
-        self,
-        layer: int,
-        record: LayerRecord,
-        style: CloudStyle,
-        tokens: ColourTokens,
-        weights: tuple[float, float],
-    ) -> bool:
-        """Whether a layer's handle has something else to show than it does; notes that it shows this then.
-
-        While a frame is searched every redraw shows all of its layers, and only the newest one is new.
-        """
-        by_weight = weights if style.colour_by == "weight" else ()
-        look = (style.limbs, style.colour_by, style.layer_count, style.point_size, tokens.name, by_weight)
-        before = self._drawn.get(layer)
-        if before is not None and before[0] is record and before[1] == look:
-            return False
-        self._drawn[layer] = (record, look)
-        return True
-
-    def _provide(self, count: int) -> None:
-        while len(self.handles) < count:
-            self.handles.append(
-                self._server.scene.add_point_cloud(
-                    f"/particles/layer {len(self.handles)}",
-                    np.zeros((1, 3), dtype=np.float32),
-                    (255, 255, 255),
-                    precision="float32",
-                    point_shape="circle",
-                    point_shading="flat",
-                    visible=False,
-                )
-            )
-
-    def _draw(
-        self,
-        handle: viser.PointCloudHandle,
-        record: LayerRecord,
-        style: CloudStyle,
-        tokens: ColourTokens,
-        weights: tuple[float, float],
-    ) -> None:
-        stride = -(-len(record.poses) // MOST_DRAWN)
-        points = cloud_points(self._body, record.poses[::stride], style.limbs)
-        if style.colour_by == "weight":
-            shares = weight_shares(record.log_weights[::stride], *weights)
-            colours = np.repeat(tokens.ramp(shares), len(style.limbs), axis=0)
-        else:
-            colours = np.array(tokens.layer(record.layer, style.layer_count), dtype=np.uint8)
-        # A new colour array of another length must never meet the old points: the single colour goes in
-        # between.
-        if handle.points.shape != points.shape:
-            handle.colors = np.array(tokens["ghost"], dtype=np.uint8)
-        handle.points = points.astype(np.float32)
-        handle.colors = colours
-        handle.point_size = style.point_size
-
-
 def _weight_range(records: Sequence[LayerRecord], layer: int | None) -> tuple[float, float]:
+    """The lowest and highest finite log-weight that is shown; 0 and 0 without any."""
     shown = [record.log_weights for record in records if layer in (None, record.layer)]
-    finite = [values[np.isfinite(values)] for values in shown]
-    finite = [values for values in finite if len(values)]
-    if not finite:
-        return 0.0, 0.0
-    return min(float(values.min()) for values in finite), max(float(values.max()) for values in finite)
+    finite = np.concatenate([np.zeros(0), *(values[np.isfinite(values)] for values in shown)])
+    return (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)

@@ -1,127 +1,88 @@
-"""What a person takes hold of in the scene: a ball on every limb's end, a gizmo on the chosen one and on the root.
+"""What a person takes hold of in the scene: a ball on every limb's end, a gizmo on the chosen one and on the root."""
 
-The viewers' drags arrive in viser's own thread; only the newest place of each is kept, until the scene's thread asks
-for it.
-"""
-
-import threading
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 import viser
 from numpy.typing import NDArray
 from viser.transforms import SO3
 
-from studio.body.dragging import Grip
+from studio.body.dragging import Dragger
 from studio.runs.colour_tokens import ColourTokens
-from studio.scene.limb_meshes import METRES_PER_MM
+from studio.scene import METRES_PER_MM
+from studio.scene.controls import Post
+from studio.scene.model import Model, edit_pose
+from studio.scene.pose_edit import PoseEdit, dragged
 
 Array = NDArray[np.float64]
 
-RADIUS, CHOSEN_RADIUS = 0.032, 0.045
+RADIUS = 0.032
 GRIP_SCALE, ROOT_SCALE = 0.28, 0.5
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Pull:
-    """A drag's newest place. grip : a limb's name, "" the root. place : (3,) mm. wxyz : the root's attitude. ended :
-    whether the hand has let go.
-    """
-
-    grip: str
-    place: Array
-    wxyz: Array
-    ended: bool
-
-
 class PoseHandles:
-    """chosen : called with a limb's name when its ball is clicked. pulled : called when `take` has something new; both
-    in viser's thread, returning at once. All else in the scene's thread.
-    """
+    """The handles of one body. Drags and clicks are posted as they come."""
 
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        grips: Sequence[Grip],
-        tokens: ColourTokens,
-        *,
-        rooted: bool,
-        chosen: Callable[[str], None],
-        pulled: Callable[[], None],
-    ) -> None:
-        self._pulled = pulled
-        self._lock = threading.Lock()
-        self._newest: Pull | None = None
-        self._held: str | None = None
-        self._rooted = rooted
-        self.chosen = ""
-        self._names = [grip.name for grip in grips]
+    def __init__(self, server: viser.ViserServer, dragger: Dragger, post: Post) -> None:
+        self._dragger = dragger
+        self._names = [grip.name for grip in dragger.grips]
         self.balls = [
             server.scene.add_icosphere(
-                f"/grips/{at}",
-                RADIUS,
-                tokens[f"limb-{grip.side}"],
-                subdivisions=2,
-                visible=False,
-                cast_shadow=False,
-                receive_shadow=False,
+                f"/grips/{at}", RADIUS, subdivisions=2, visible=False, cast_shadow=False, receive_shadow=False
             )
-            for at, grip in enumerate(grips)
+            for at in range(len(self._names))
         ]
-        for ball, grip in zip(self.balls, grips, strict=True):
-            ball.on_click(lambda _, name=grip.name: chosen(name))
+        for ball, name in zip(self.balls, self._names, strict=True):
+            ball.on_click(lambda _, name=name: post(take_hold, name))
         self.gizmo = server.scene.add_transform_controls(
             "/grip", GRIP_SCALE, line_width=3.0, disable_rotations=True, depth_test=False, visible=False
         )
         self.root = server.scene.add_transform_controls(
             "/root", ROOT_SCALE, line_width=2.0, depth_test=False, opacity=0.8, visible=False
         )
-        self.gizmo.on_update(self._limb_dragged)
-        self.root.on_update(self._root_dragged)
 
-    def show(self, points: Array, root: Array | None) -> None:
-        """Put everything where the body is. points : (G, 3) mm of the grips. root : (3, 4) its frame, mm."""
-        for ball, point, name in zip(self.balls, points, self._names, strict=True):
-            ball.position = point * METRES_PER_MM
-            ball.visible = name != self.chosen
+        self._grip = ""
+
+        async def limb_dragged(event: viser.TransformControlsEvent) -> None:
+            post(drag, self._grip, *_dragged_to(event))
+
+        async def root_dragged(event: viser.TransformControlsEvent) -> None:
+            post(drag, "", *_dragged_to(event))
+
+        self.gizmo.on_update(limb_dragged)
+        self.root.on_update(root_dragged)
+
+    def show(self, edit: PoseEdit, tokens: ColourTokens) -> None:
+        """Put everything where the body is, or out of sight while it is not edited."""
+        self._grip = edit.grip
+        points = self._dragger.points(edit.pose) * METRES_PER_MM
+        root = self._dragger.root_frame(edit.pose)
+        for ball, point, grip in zip(self.balls, points, self._dragger.grips, strict=True):
+            ball.visible = edit.active and grip.name != edit.grip
+            ball.position, ball.color = point, tokens[f"limb-{grip.side}"]
+        self.gizmo.visible = edit.active and edit.grip in self._names
         # What is being dragged is where the hand is; to move it would pull it out of the hand.
-        if self.chosen in self._names and self._held != self.chosen:
-            self.gizmo.position = points[self._names.index(self.chosen)] * METRES_PER_MM
-        self.gizmo.visible = self.chosen in self._names
-        if root is not None and self._held != "":
+        if edit.grip in self._names and edit.held != edit.grip:
+            self.gizmo.position = points[self._names.index(edit.grip)]
+        self.root.visible = edit.active and root is not None
+        if root is not None and edit.held != "":
             self.root.position = root[:, 3] * METRES_PER_MM
             self.root.wxyz = SO3.from_matrix(root[:, :3]).wxyz
-        self.root.visible = self._rooted and root is not None
 
-    def hide(self) -> None:
-        """Take them out of sight."""
-        self._held = None
-        for handle in (*self.balls, self.gizmo, self.root):
-            handle.visible = False
 
-    def take(self) -> Pull | None:
-        """The newest drag, once."""
-        with self._lock:
-            newest, self._newest = self._newest, None
-        if newest is not None:
-            self._held = None if newest.ended else newest.grip
-        return newest
+def take_hold(model: Model, grip: str) -> Model:
+    """Put the gizmo on a limb's end; "" on none."""
+    return edit_pose(model, lambda edit: replace(edit, grip=grip))
 
-    def remove(self) -> None:
-        """Take them out of the scene."""
-        for handle in (*self.balls, self.gizmo, self.root):
-            handle.remove()
 
-    async def _limb_dragged(self, event: viser.TransformControlsEvent) -> None:
-        self._keep(self.chosen, event)
+def drag(model: Model, grip: str, place: Array, wxyz: Array, is_last: bool) -> Model:
+    """A limb's end, or ("") the root, was dragged to a place (3,) mm and an attitude. is_last : and released there."""
+    if model.subject is None:
+        return model
+    dragger = model.subject.dragger
+    return edit_pose(model, lambda edit: dragged(edit, dragger, grip, place, wxyz, is_last=is_last))
 
-    async def _root_dragged(self, event: viser.TransformControlsEvent) -> None:
-        self._keep("", event)
 
-    def _keep(self, grip: str, event: viser.TransformControlsEvent) -> None:
-        place = np.array(event.target.position, dtype=np.float64) / METRES_PER_MM
-        wxyz = np.array(event.target.wxyz, dtype=np.float64)
-        with self._lock:
-            self._newest = Pull(grip, place, wxyz, event.phase == "end")
-        self._pulled()
+def _dragged_to(event: viser.TransformControlsEvent) -> tuple[Array, Array, bool]:
+    place = np.array(event.target.position, dtype=np.float64) / METRES_PER_MM
+    return place, np.array(event.target.wxyz, dtype=np.float64), event.phase == "end"

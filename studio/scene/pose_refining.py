@@ -4,7 +4,6 @@ import logging
 import math
 import threading
 from collections.abc import Callable
-from pathlib import Path
 
 from numpy import float64
 from numpy.typing import NDArray
@@ -18,61 +17,51 @@ _LOG = logging.getLogger(__name__)
 
 
 class PoseRefining:
-    """One search. told : with the share that is done. found : with this object, when it ended by itself, `better` or
-    `problem` being there; both are called in the search's thread.
+    """One search, under way. progress : called with the share that is done. done : called with this object and what
+    came of it, a `BetterPose` or the reason why there is none. Both are called in the search's thread.
     """
 
     def __init__(
         self,
-        session: Path,
+        session: Session,
         run: StoredRun | None,
         frame: int,
         pose: NDArray[float64],
         *,
-        told: Callable[[float], None],
-        found: Callable[["PoseRefining"], None],
+        progress: Callable[[float], None],
+        done: Callable[["PoseRefining", BetterPose | StudioError], None],
     ) -> None:
-        self.better: BetterPose | None = None
-        self.problem: StudioError | None = None
-        self._session, self._run, self._frame, self._pose = session, run, frame, pose.copy()
-        self._told, self._found = told, found
         self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._search, name="pose-refining", daemon=True)
 
-    def start(self) -> None:
-        """Begin."""
-        self._thread.start()
+        def search() -> None:
+            try:
+                found = better_pose(
+                    session,
+                    frame,
+                    pose,
+                    run=run,
+                    progress=lambda _, step, total: progress(step / total),
+                    cancelled=self._stopping.is_set,
+                )
+            except StudioError as problem:
+                found = problem
+            except Exception:
+                _LOG.exception("refining a pose failed")
+                found = StudioError("The search around the pose failed.", "See the studio's log.")
+            if not self._stopping.is_set():
+                done(self, found)
+
+        threading.Thread(target=search, name="pose-refining", daemon=True).start()
 
     def stop(self) -> None:
-        """End it soon; nothing is told any more."""
+        """End it soon; nothing is reported any more."""
         self._stopping.set()
 
-    @property
-    def in_words(self) -> str:
-        """What came of it."""
-        if self.better is None:
-            return ""
-        if self.better.gain <= 0.0:
-            return "The pose was the best one around already."
-        before, after = self.better.overlap_before, self.better.overlap
-        if math.isfinite(before) and math.isfinite(after):
-            return f"Overlap with the masks {100.0 * before:.0f} % → {100.0 * after:.0f} %."
-        return "A better pose was found nearby."
 
-    def _search(self) -> None:
-        try:
-            self.better = better_pose(
-                Session(self._session),
-                self._frame,
-                self._pose,
-                run=self._run,
-                progress=lambda _, done, total: self._told(done / total),
-                cancelled=self._stopping.is_set,
-            )
-        except StudioError as problem:
-            self.problem = problem
-        except Exception:
-            _LOG.exception("refining a pose failed")
-            self.problem = StudioError("The search around the pose failed.", "See the studio's log.")
-        if not self._stopping.is_set():
-            self._found(self)
+def outcome(found: BetterPose) -> str:
+    """What came of a search, in words."""
+    if found.gain <= 0.0:
+        return "The pose was the best one around already."
+    if math.isfinite(found.overlap_before) and math.isfinite(found.overlap):
+        return f"Overlap with the masks {100.0 * found.overlap_before:.0f} % → {100.0 * found.overlap:.0f} %."
+    return "A better pose was found nearby."

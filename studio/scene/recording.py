@@ -17,11 +17,11 @@ from studio.body.forward_kinematics import limb_ends
 from studio.errors import ExportError
 from studio.export.task import ExportTask, Written, agreed
 from studio.runs.colour_tokens import colour_tokens
-from studio.scene.body_view import BodyView
+from studio.scene import METRES_PER_MM
+from studio.scene.body_view import BodyView, limb_frames
 from studio.scene.camera_views import CameraView
 from studio.scene.floor_view import FloorView
 from studio.scene.guarded_server import GuardedServer
-from studio.scene.limb_meshes import METRES_PER_MM, limb_frames
 
 Array = NDArray[np.float64]
 
@@ -48,12 +48,12 @@ def record_scene(task: ExportTask) -> Written:
     server = GuardedServer()
     try:
         _build(server, task)
-        body = BodyView(server, task.motion.body, colour_tokens(dark=True), name=BODY)
+        body, tokens = BodyView(server, task.motion.body, name=BODY), colour_tokens(dark=True)
         serializer = server.get_scene_serializer()
         for row in range(len(task.motion.poses)):
             if row % STEP_ROWS == 0:
                 task.step("recording", row, len(task.motion.poses))
-            body.show(task.motion.poses[row] if task.motion.known[row] else None)
+            body.show(task.motion.poses[row] if task.motion.known[row] else None, tokens)
             serializer.insert_sleep(1.0 / task.motion.fps)
         task.step("packing", len(task.motion.poses), len(task.motion.poses))
         if task.place.suffix == PAGE:
@@ -76,10 +76,9 @@ def read_recording(path: Path) -> Recording:
         size = int.from_bytes(content[:LENGTH], "little")
         inner = zstandard.ZstdDecompressor().decompress(content[LENGTH:], max_output_size=size)
         end = LENGTH + int.from_bytes(inner[:LENGTH], "little")
-        told = msgspec.msgpack.decode(inner[LENGTH:end])
-        return Recording(
-            float(told["durationSeconds"]), [(float(at), message) for at, message in told["messages"]]
-        )
+        found = msgspec.msgpack.decode(inner[LENGTH:end])
+        messages = [(float(at), message) for at, message in found["messages"]]
+        return Recording(float(found["durationSeconds"]), messages)
     except (
         OSError,
         IndexError,
@@ -99,9 +98,9 @@ def _build(server: GuardedServer, task: ExportTask) -> None:
     tokens, cameras = colour_tokens(dark=True), task.run.cameras()
     ends = limb_ends(task.motion.body, task.motion.poses[:1])[0].reshape(-1, 3)
     middle = ends.mean(axis=0)
-    FloorView(server, cameras, middle, tokens)
+    FloorView(server, [*(camera.centre for camera in cameras), middle]).show(tokens)
     for camera in cameras:
-        CameraView(server, camera, tokens).show(True, False)
+        CameraView(server, camera).show(tokens)
     server.scene.set_up_direction("+z")
     target = middle * METRES_PER_MM
     server.initial_camera.position = tuple(target + np.array([AWAY, 0.0, HIGHER]))

@@ -1,187 +1,201 @@
-"""The settings in viser's panel, made from the declarations of the knobs in use.
+"""The knobs of a run as controls, made from their declarations.
 
-A control only asks `change` for a value; what is in use comes back as a `SettingsApplied` event and is
-shown by `show_applied`, which asks for nothing.
+A number with a range is a slider, words to choose from a dropdown, yes or no a check box, other text a text field. A
+changed value carries a dot in its label and a button that puts the default back.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import viser
 
-from studio.errors import StudioError
-from studio.knobs import Knob, Value, knobs_of
-from studio.scene.knob_input import KnobInput
+from studio.knobs import Knob, Value, allowed, knobs_of
+from studio.scene.controls import Control, Post, on_press
+from studio.scene.model import Knobs, Model
 from studio.settings import RunSettings, values
 from studio.tracking.catalogue import presets
-from studio.tracking.tracker import Preset
-from studio.worker.events import SettingsApplied
 
-_FOREMOST = 6
-_NO_PRESET = "choose …"
-_AS_BEGUN = "_Settings as the run began._"
+FOREMOST = 6
+NO_PRESET = "choose …"
+FIRST_SPAN = 5
+"""A slider over a range far wider than usual moves in leaps: it first spans so many times the default, and grows when
+it is drawn to its end."""
 
-Change = Callable[[dict[str, Value]], str]
-Refused = Callable[[StudioError], None]
-
-
-@dataclass(frozen=True, slots=True)
-class SettingsTabs:
-    """The containers of the four groups, in which the controls are put."""
-
-    search: viser.GuiTabHandle
-    weighting: viser.GuiTabHandle
-    masks: viser.GuiTabHandle
+Request = Callable[[Model, Mapping[str, Value]], Model]
+"""Asks the tracking process for knobs; those that are shown already are left out."""
 
 
 class SettingsPanel:
-    """change : asks for knobs (the identifier of the answer comes back); refused : tells the person."""
+    """search, weighting, masks : the tabs that carry the controls."""
 
-    def __init__(self, gui: viser.GuiApi, tabs: SettingsTabs, change: Change, refused: Refused) -> None:
-        self._gui = gui
-        self._tabs = tabs
-        self._change = change
-        self._refused = refused
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        search: viser.GuiTabHandle,
+        weighting: viser.GuiTabHandle,
+        masks: viser.GuiTabHandle,
+        post: Post,
+        request: Request,
+    ) -> None:
+        self._gui, self._post, self._request = gui, post, request
+        self._search, self._weighting, self._masks = search, weighting, masks
         self._folders: list[viser.GuiFolderHandle] = []
-        self._names: tuple[str, ...] = ()
-        self._resets: list[tuple[viser.GuiButtonHandle, tuple[str, ...]]] = []
-        self._in_use: viser.GuiMarkdownHandle | None = None
-        self._presets: tuple[Preset, ...] = ()
+        self._made_for: tuple[str, ...] = ()
+        self._resets: list[tuple[viser.GuiButtonHandle, tuple[Knob, ...]]] = []
         self.inputs: dict[str, KnobInput] = {}
-        self.preset: viser.GuiDropdownHandle[str] | None = None
+        self.preset: Control | None = None
 
-    def show_settings(self, settings: RunSettings) -> None:
-        """Show a run's settings; the controls are made anew only when other knobs are needed."""
-        now = values(settings)
-        if tuple(now) != self._names or settings.tracker_name != getattr(self, "_tracker", None):
-            self._build(settings)
-        for name, value in now.items():
+    def show(self, knobs: Knobs) -> None:
+        """Show the values in use and requested; the controls are made anew only where other knobs are needed."""
+        made_for = (knobs.settings.tracker_name, *values(knobs.settings))
+        if made_for != self._made_for:
+            self._build(knobs.settings)
+            self._made_for = made_for
+        shown = knobs.shown
+        for name, value in shown.items():
             self.inputs[name].show(value)
-        if self._in_use is not None:
-            self._in_use.content = _AS_BEGUN
-        self._dress_resets()
+        self.since.content = since_in_words(knobs)
+        if self.preset is not None:
+            self.preset.show(NO_PRESET)
+        for button, declared in self._resets:
+            moved = sum(shown[knob.name] != knob.default for knob in declared)
+            button.visible = moved > 1
+            button.label = f"Reset {moved} to their defaults"
 
-    def show_applied(self, event: SettingsApplied) -> None:
-        """Show what is in use since when."""
-        for name, value in event.values.items():
-            if name in self.inputs:
-                self.inputs[name].show(value)
-        if self._in_use is not None:
-            self._in_use.content = in_use(event)
-        self._dress_resets()
-
-    def settle(self, identifier: str, taken: bool) -> None:
-        """Take the answer to what was asked for under an identifier."""
-        for entry in self.inputs.values():
-            entry.settle(identifier, taken)
-        self._dress_resets()
-
-    def clear(self) -> None:
-        """Take all controls out of the panel."""
+    def _build(self, settings: RunSettings) -> None:
         for folder in self._folders:
             folder.remove()
         self._folders, self._resets, self.inputs = [], [], {}
-        self._names, self._in_use, self.preset = (), None, None
-
-    def _build(self, settings: RunSettings) -> None:
-        self.clear()
         now = values(settings)
-        self._names, self._tracker = tuple(now), settings.tracker_name
-        with self._tabs.search, self._folder():
-            self._in_use = self._gui.add_markdown(_AS_BEGUN)
-            self._add_presets()
+        with self._search, self._folder():
+            self.since = self._gui.add_markdown("")
+            self._add_presets(now)
             tracker = knobs_of(type(settings.tracker))
-            self._add(tracker[:_FOREMOST], now)
-            self._add_folded("More of the search", tracker[_FOREMOST:], now)
-            others = ()
-            for title, group in (
-                ("Refinement", settings.refinement),
-                ("When lost", settings.recovery),
-                ("Recording", settings.recording),
-            ):
-                declared = knobs_of(type(group))
-                self._add_folded(title, declared, now)
-                others += declared
-            self._add_reset((*tracker, *others))
-        for tab, group in ((self._tabs.weighting, settings.weighting), (self._tabs.masks, settings.evidence)):
+            self._add(tracker[:FOREMOST], now)
+            others = [
+                ("More of the search", tracker[FOREMOST:]),
+                ("Refinement", knobs_of(type(settings.refinement))),
+                ("When lost", knobs_of(type(settings.recovery))),
+                ("Recording", knobs_of(type(settings.recording))),
+            ]
+            for label, declared in others:
+                if declared:
+                    with self._gui.add_folder(label, expand_by_default=False):
+                        self._add(declared, now)
+            self._add_reset([*tracker[:FOREMOST], *(knob for _, declared in others for knob in declared)])
+        for tab, group in ((self._weighting, settings.weighting), (self._masks, settings.evidence)):
             with tab, self._folder():
                 declared = knobs_of(type(group))
                 self._add(declared, now)
                 self._add_reset(declared)
 
-    def _folder(self, label: str | None = None) -> viser.GuiFolderHandle:
-        folder = self._gui.add_folder(label, expand_by_default=label is None)
-        if label is None:
-            self._folders.append(folder)
-        return folder
+    def _folder(self) -> viser.GuiFolderHandle:
+        self._folders.append(self._gui.add_folder(None))
+        return self._folders[-1]
 
     def _add(self, declared: Sequence[Knob], now: Mapping[str, Value]) -> None:
         for knob in declared:
-            self.inputs[knob.name] = KnobInput(self._gui, knob, now[knob.name], self._ask, self._refused)
+            self.inputs[knob.name] = KnobInput(self._gui, knob, now[knob.name], self._post, self._request)
 
-    def _add_folded(self, label: str, declared: Sequence[Knob], now: Mapping[str, Value]) -> None:
-        if declared:
-            with self._folder(label):
-                self._add(declared, now)
-
-    def _add_presets(self) -> None:
-        self._presets = tuple(one for one in presets() if one.values.keys() <= set(self._names))
-        if not self._presets:
-            return
-        self.preset = self._gui.add_dropdown(
-            "preset",
-            (_NO_PRESET, *(preset.name for preset in self._presets)),
-            hint=" ".join(f"{preset.name}: {preset.help}" for preset in self._presets),
-        )
-        self.preset.on_update(self._preset_chosen)
-
-    async def _preset_chosen(self, event: viser.GuiEvent) -> None:
-        chosen = [preset for preset in self._presets if preset.name == event.target.value]
-        if chosen:
-            self.ask_all(chosen[0].values)
-            event.target.value = _NO_PRESET
-
-    def ask_all(self, wanted: Mapping[str, Value]) -> None:
-        """Ask for several knobs at once; all are changed or, if one is refused, none."""
-        changes = {name: value for name, value in wanted.items() if self.inputs[name].accepted != value}
-        if not changes:
-            return
-        try:
-            identifier = self._change(changes)
-        except StudioError as refusal:
-            self._refused(refusal)
-            return
-        for name, value in changes.items():
-            self.inputs[name].await_answer(identifier, value)
-        self._dress_resets()
-
-    def _ask(self, name: str, value: Value) -> str:
-        identifier = self._change({name: value})
-        self._dress_resets(pending={name: value})
-        return identifier
+    def _add_presets(self, now: Mapping[str, Value]) -> None:
+        offered = {one.name: one for one in presets() if one.values.keys() <= now.keys()}
+        self.preset = None
+        if offered:
+            hint = " ".join(f"{one.name}: {one.help}" for one in offered.values())
+            handle = self._gui.add_dropdown("preset", (NO_PRESET, *offered), hint=hint)
+            wanted = {name: one.values for name, one in offered.items()}
+            self.preset = Control(
+                handle, self._post, lambda model, name: self._request(model, wanted.get(name, {}))
+            )
 
     def _add_reset(self, declared: Sequence[Knob]) -> None:
-        names = tuple(knob.name for knob in declared if knob.takes_effect != "new run")
+        changeable = tuple(knob for knob in declared if knob.takes_effect != "new run")
         button = self._gui.add_button("Reset to defaults", color="gray", visible=False)
-
-        async def reset(_: viser.GuiEvent) -> None:
-            self.ask_all({name: self.inputs[name].knob.default for name in names})
-
-        button.on_click(reset)
-        self._resets.append((button, names))
-
-    def _dress_resets(self, pending: Mapping[str, Value] | None = None) -> None:
-        pending = pending or {}
-        for button, names in self._resets:
-            moved = [
-                name
-                for name in names
-                if pending.get(name, self.inputs[name].accepted) != self.inputs[name].knob.default
-            ]
-            button.visible = len(moved) > 1
-            button.label = f"Reset {len(moved)} to their defaults"
+        defaults = {knob.name: knob.default for knob in changeable}
+        on_press(button, self._post, lambda model: self._request(model, defaults))
+        self._resets.append((button, changeable))
 
 
-def in_use(event: SettingsApplied) -> str:
-    """Since when the settings are in use, in words."""
-    return f"_In use since frame {event.frame}, layer {event.layer + 1}._"
+class KnobInput:
+    """The control of one knob, and the button that puts its default back."""
+
+    def __init__(self, gui: viser.GuiApi, knob: Knob, value: Value, post: Post, request: Request) -> None:
+        self.knob = knob
+        self.handle = _make(gui, knob, value)
+        self._control = Control(
+            self.handle, post, lambda model, moved: request(model, {knob.name: knob_value(knob, moved)})
+        )
+        # A group of one button: as slight as what it resets, and in line with it.
+        self.reset = gui.add_button_group(" ", (f"reset to {in_words(knob, knob.default)}",), visible=False)
+        on_press(self.reset, post, lambda model, _: request(model, {knob.name: knob.default}))
+
+    def show(self, value: Value) -> None:
+        """Show the knob's value."""
+        knob, handle = self.knob, self.handle
+        if isinstance(handle, viser.GuiSliderHandle) and knob.high is not None:
+            number = float(value)
+            if number >= handle.max < knob.high:
+                handle.max = knob.kind(min(knob.high, 2 * max(number, handle.max)))
+        self._control.show(value if knob.kind in (bool, str) else knob.kind(value))
+        changed = value != knob.default
+        handle.label = title(knob, changed)
+        self.reset.visible = changed and not handle.disabled
+
+
+def since_in_words(knobs: Knobs) -> str:
+    """Since when the settings are in use."""
+    if knobs.since is None:
+        return "_Settings as the run began._"
+    return f"_In use since frame {knobs.since[0]}, layer {knobs.since[1] + 1}._"
+
+
+def title(knob: Knob, changed: bool) -> str:
+    """The control's label: a dot where the value was changed, the name, the unit."""
+    unit = f" ({knob.unit})" if knob.unit else ""
+    return f"{'• ' if changed else ''}{knob.label}{unit}"
+
+
+def in_words(knob: Knob, value: Value) -> str:
+    """A value in words: yes or no, numbers without noise, empty text as a dash."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    text = f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{text} {knob.unit}".strip() or "–"
+
+
+def knob_value(knob: Knob, value: Value) -> Value:
+    """A control's value as the knob's: noise of the slider's arithmetic removed, held at the range's lower end where
+    the slider begins at a rounder number.
+    """
+    if knob.kind in (bool, str) or knob.low is None or knob.high is None:
+        return value
+    return knob.kind(max(round(float(value), 9), knob.low))
+
+
+def slider_range(knob: Knob, value: Value) -> tuple[float, float, float]:
+    """Least, most and step of a number's slider: steps fall on round numbers, the end may lie before the knob's."""
+    low, high = float(knob.low or 0.0), float(knob.high or 0.0)
+    step = float(knob.step or (high - low) / 100.0)
+    start = math.floor(low / step + 1e-9) * step
+    usual = FIRST_SPAN * max(abs(float(knob.default)), abs(float(value)), step)
+    end = high if (high - low) / step <= 200 else min(high, max(start + 100 * step, usual))
+    return round(start, 9), round(end, 9), step
+
+
+def _make(gui: viser.GuiApi, knob: Knob, value: Value) -> viser.GuiInputHandle:
+    default = in_words(knob, knob.default)
+    hint = f"{knob.help} Default {default}; {allowed(knob)}. Takes effect: {knob.takes_effect}."
+    label, more = (
+        title(knob, value != knob.default),
+        {"hint": hint, "disabled": knob.takes_effect == "new run"},
+    )
+    if knob.kind is bool:
+        return gui.add_checkbox(label, bool(value), **more)
+    if knob.choices:
+        return gui.add_dropdown(label, knob.choices, initial_value=str(value), **more)
+    if knob.kind is str:
+        return gui.add_text(label, str(value), **more)
+    if knob.low is None or knob.high is None:
+        return gui.add_number(label, knob.kind(value), step=knob.step, **more)
+    low, high, step = (knob.kind(number) for number in slider_range(knob, value))
+    return gui.add_slider(label, low, high, step, knob.kind(value), **more)

@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from studio.body.model import BodyModel
 from studio.runs.colour_tokens import ColourTokens
+from studio.scene import METRES_PER_MM
 from studio.scene.frame_volume import FrameVolume
-from studio.scene.limb_meshes import METRES_PER_MM
 from studio.volume.blob_model import BlobMixture, BlobModel
 from studio.volume.hull import Hull
 
@@ -50,24 +50,13 @@ class VolumeView:
         """Draw what there is of a volume. pose : (D,) whose own blobs are drawn. hull, blobs : what is wanted."""
         voxels = volume.hull if volume is not None and hull else None
         model = volume.model if volume is not None and blobs else None
-        with self._server.atomic():
-            if self._is_new("voxels", voxels):
-                self.voxels.draw(*(voxel_instances(voxels) if voxels is not None else NOTHING))
-            fitted = volume.fitted if volume is not None and blobs else None
-            if self._is_new("fitted", fitted, tokens.name):
-                self.fitted.draw(
-                    *(blob_instances(fitted, tokens["ghost"]) if fitted is not None else NOTHING)
-                )
-            shown = None if model is None or pose is None else pose.tobytes()
-            if self._is_new("own", model, shown, tokens.name):
-                drawn = NOTHING if model is None or pose is None else self._own(model, pose, tokens)
-                self.own.draw(*drawn)
-
-    def remove(self) -> None:
-        """Take it all out of the scene."""
-        for part in (self.voxels, self.fitted, self.own):
-            part.draw(*NOTHING)
-        self._drawn.clear()
+        fitted = volume.fitted if volume is not None and blobs else None
+        if self._is_new("voxels", voxels):
+            self.voxels.draw(*(NOTHING if voxels is None else voxel_instances(voxels)))
+        if self._is_new("fitted", fitted, tokens.name):
+            self.fitted.draw(*(NOTHING if fitted is None else blob_instances(fitted, tokens["ghost"])))
+        if self._is_new("own", model, None if model is None or pose is None else pose.tobytes(), tokens.name):
+            self.own.draw(*(NOTHING if model is None or pose is None else self._own(model, pose, tokens)))
 
     def _own(self, model: BlobModel, pose: Array, tokens: ColourTokens) -> tuple[Array, Array, Array, Bytes]:
         mixture = model.mixture(self._body, pose[None]).at(0)

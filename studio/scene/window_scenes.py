@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 from studio.capture.video import give_back_freed_memory
 from studio.errors import StudioError
+from studio.scene.model import Selection
 from studio.scene.recording import record_scene
-from studio.scene.stage import SceneStage
-from studio.scene.view_options import Shown
-from studio.scene.wishes import Control
+from studio.scene.scene_server import SceneServer
 from studio.sessions.workspace import Workspace
+from studio.worker.control import StudioControl
 
 MOST_SCENES = 32
 """A scene takes two threads, six file descriptors and about 25 MB with four cameras of 640 × 480."""
@@ -29,39 +29,39 @@ class TooManyScenesError(StudioError):
 
 @dataclass(slots=True)
 class _Entry:
-    stage: SceneStage
+    scene: SceneServer
     used: float
 
 
 class WindowScenes:
     """The scenes of a workspace by the names of their windows; may be used from any thread.
 
-    control : the tracking process, which all windows share. most : scenes at a time. `grace` : seconds for which a
+    process : the tracking process, which all windows share. most : scenes at a time. `grace` : seconds for which a
     scene without its window is kept.
     """
 
     def __init__(
         self,
         workspace: Workspace,
-        control: Control,
+        process: StudioControl,
         *,
         most: int = MOST_SCENES,
         grace: float = GRACE_SECONDS,
     ) -> None:
-        self._workspace, self._control, self._most, self.grace = workspace, control, most, grace
+        self._workspace, self._process, self._most, self.grace = workspace, process, most, grace
         self._entries: dict[str, _Entry] = {}
         self._lock = threading.Lock()
         self._stopped = False
-        self._moved: Callable[[str, Shown], None] = lambda window, shown: None
+        self._moved: Callable[[str, Selection], None] = lambda window, shown: None
         self.record_scene = record_scene
 
-    def watch(self, moved: Callable[[str, Shown], None]) -> None:
+    def watch(self, moved: Callable[[str, Selection], None]) -> None:
         """Call `moved` with the window and what it shows when a scene's own controls, playback or the tracking
         move it, in that scene's thread.
         """
         self._moved = moved
 
-    def scene(self, window: str) -> SceneStage:
+    def scene(self, window: str) -> SceneServer:
         """The scene of a window, built where there is none yet (that blocks for some 30 ms).
 
         Raises TooManyScenesError when no other scene can make room.
@@ -70,21 +70,21 @@ class WindowScenes:
             entry = self._entries.get(window)
             if entry is None:
                 self._make_room()
-                stage = SceneStage(self._workspace, self._control, lambda shown: self._moved(window, shown))
-                entry = self._entries[window] = _Entry(stage, 0.0)
+                scene = SceneServer(self._workspace, self._process, lambda shown: self._moved(window, shown))
+                entry = self._entries[window] = _Entry(scene, 0.0)
             entry.used = time.monotonic()
-            return entry.stage
+            return entry.scene
 
-    def open_scenes(self) -> dict[str, SceneStage]:
+    def open_scenes(self) -> dict[str, SceneServer]:
         """The scenes that there are, by window."""
-        return {window: entry.stage for window, entry in list(self._entries.items())}
+        return {window: entry.scene for window, entry in list(self._entries.items())}
 
     def close_unused(self, windows: Collection[str]) -> None:
         """Close the scenes that had no viewer and no window for a while. windows : those that are there."""
         now = time.monotonic()
         with self._lock:
             for window, entry in self._entries.items():
-                if window in windows or entry.stage.is_viewed:
+                if window in windows or entry.scene.is_viewed:
                     entry.used = now
             gone = [window for window, entry in self._entries.items() if now - entry.used > self.grace]
             closing = [self._entries.pop(window) for window in gone]
@@ -106,7 +106,7 @@ class WindowScenes:
             raise StudioError("The studio is closing.", "Start it again.")
         if len(self._entries) < self._most:
             return
-        idle = [name for name, entry in self._entries.items() if not entry.stage.is_viewed]
+        idle = [name for name, entry in self._entries.items() if not entry.scene.is_viewed]
         if not idle:
             raise TooManyScenesError(
                 f"{self._most} windows show a scene already, which is as many as the studio serves.",
@@ -117,6 +117,6 @@ class WindowScenes:
 
 def _close(entry: _Entry) -> None:
     try:
-        entry.stage.stop()
+        entry.scene.stop()
     except Exception:
         _LOG.exception("A scene could not be closed.")

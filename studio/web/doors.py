@@ -83,7 +83,7 @@ class SceneFrame(Protocol):
 
 
 class Shown(SceneFrame, Protocol):
-    """What the scene shows, when its own controls moved it (`scene.view_options.Shown`)."""
+    """What the scene shows, when its own controls moved it (`scene.model.Selection`)."""
 
     @property
     def layer(self) -> int | None: ...
@@ -99,7 +99,7 @@ class Shown(SceneFrame, Protocol):
 
 
 class EditedPose(SceneFrame, Protocol):
-    """What is being edited in the scene (`scene.pose_desk.Editing`)."""
+    """What is being edited in the scene (`scene.scene_server.Editing`)."""
 
     @property
     def pose(self) -> Iterable[float]: ...
@@ -109,7 +109,7 @@ class EditedPose(SceneFrame, Protocol):
 
 
 class ScenePoses(Protocol):
-    """Poses laid before the scene's viewers (`scene.scene_poses.ScenePoses`)."""
+    """Poses laid before the scene's viewers (`scene.scene_server.ScenePoses`)."""
 
     @property
     def editing(self) -> EditedPose | None:
@@ -132,7 +132,7 @@ class ScenePoses(Protocol):
 
 
 class Stage(Protocol):
-    """A window's 3-D scene (`scene.stage.SceneStage`)."""
+    """A window's 3-D scene (`scene.scene_server.SceneServer`)."""
 
     @property
     def port(self) -> int:
@@ -179,8 +179,10 @@ class Stage(Protocol):
         """Change what is drawn. Raises SettingsError for a name that is none."""
         ...
 
-    def play(self, playing: bool) -> None:
-        """Play stored frames, or stop."""
+    def play(
+        self, playing: bool | None = None, *, speed: float | None = None, loop: bool | None = None
+    ) -> None:
+        """Play stored frames, or stop, and how; None leaves it."""
         ...
 
 

@@ -15,7 +15,7 @@ class SceneWish(Request):
     With `session` the whole moment is named: `run` left out shows the session alone, `layer` left out
     all layers. follow: whether each frame is shown as it is tracked. look_through: a camera's name, null
     or "" for the free view. options: what is drawn, by the names of the scene's own view options (body,
-    truth, particles, trails, cameras, pictures, overlays …).
+    truth, particles, trails, cameras, pictures, overlays …). playing, speed (1 is real time), loop: of stored frames.
     """
 
     session: RunName | None = None
@@ -26,6 +26,8 @@ class SceneWish(Request):
     look_through: str | None = Field(None, max_length=128)
     dark: bool | None = None
     playing: bool | None = None
+    speed: float | None = Field(None, gt=0.0, le=10.0)
+    loop: bool | None = None
     options: dict[str, bool | int | float | str | list[str] | None] = Field(default_factory=dict)
 
 
@@ -55,8 +57,8 @@ def show(wish: SceneWish, doors: Door, scene: Scene) -> None:
         options["dark"] = wish.dark
     if options:
         scene.set_options(**options)
-    if wish.playing is not None:
-        scene.play(wish.playing)
+    if {"playing", "speed", "loop"} & given:
+        scene.play(wish.playing, speed=wish.speed, loop=wish.loop)
 
 
 @router.post("/view", status_code=204)

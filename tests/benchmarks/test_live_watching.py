@@ -7,24 +7,22 @@ import pytest
 from live_driving import live_run
 from toy_session import make_session
 
+from studio.benchmarks.light_viewer import LightViewer
 from studio.benchmarks.live import run_live_benchmark, track_watched
 from studio.runs.live_replay import compare, prepare_replay
 from studio.runs.live_summary import LiveStanding
-from studio.scene.light_viewer import LightViewer
-from studio.scene.live_search import LiveSearch
-from studio.scene.presenter import LIVE_PICTURE_SECONDS, PICTURE_SECONDS, Presenter
-from studio.scene.run_panel import status_html
-from studio.scene.stage import SceneStage
+from studio.scene.controller import LIVE_PICTURE_SECONDS, PICTURE_SECONDS, picture_pause
+from studio.scene.panel import search_html
+from studio.scene.scene_server import SceneServer
 from studio.sessions.workspace import Workspace
 from studio.worker.control import StudioControl, nothing_open
 from studio.worker.live_tracking import replay_live
-from studio.worker.watchers import Subscription
 
 
 def test_a_light_viewer_takes_part() -> None:
     workspace = Workspace()
     control = StudioControl(workspace)
-    stage = SceneStage(workspace, control)
+    stage = SceneServer(workspace, control)
     viewer = LightViewer(stage.port, stage.relay_headers())
     assert viewer.messages > 0
     assert viewer.size > 0
@@ -34,48 +32,18 @@ def test_a_light_viewer_takes_part() -> None:
 
 
 def test_pictures_come_less_often_while_a_live_run_is_tracked() -> None:
-    times: list[float] = []
-
-    class Hours:
-        now = 0.0
-
-    presenter = Presenter(
-        Subscription(),
-        heard=lambda _: None,
-        tick=lambda _: False,
-        draw=lambda: None,
-        draw_pictures=lambda: times.append(Hours.now),
-        failed=lambda _: None,
-        clock=lambda: Hours.now,
-    )
-    pictures = presenter._drawings[1]
-
-    def pass_a_second() -> int:
-        before = len(times)
-        for _ in range(100):
-            Hours.now += 0.01
-            presenter.redraw()
-            if pictures.due(Hours.now):
-                pictures.done(Hours.now)
-                pictures.draw()
-        return len(times) - before
-
-    assert pass_a_second() == pytest.approx(1.0 / PICTURE_SECONDS, abs=1)
-    presenter.yield_to_live(True)
-    assert pass_a_second() == pytest.approx(1.0 / LIVE_PICTURE_SECONDS, abs=1)
-    presenter.yield_to_live(False)
-    assert pass_a_second() == pytest.approx(1.0 / PICTURE_SECONDS, abs=1)
+    state = dataclasses.replace(nothing_open(), state="tracking")
+    live = dataclasses.replace(state, live=LiveStanding(3, 0.01, 24.2, 29.8))
+    assert picture_pause(state) == PICTURE_SECONDS
+    assert picture_pause(live) == LIVE_PICTURE_SECONDS > PICTURE_SECONDS
+    assert picture_pause(dataclasses.replace(live, state="paused")) == PICTURE_SECONDS
 
 
 def test_the_panel_says_how_a_live_run_keeps_up() -> None:
     state = dataclasses.replace(nothing_open(), session="toy", run="live", state="tracking")
     state = dataclasses.replace(state, live=LiveStanding(3, 0.01, 24.2, 29.8))
-    assert "live · 29.8 fps · latency 24 ms · 3 dropped" in status_html(state)
-    assert "The disk is full." in status_html(dataclasses.replace(state, message="The disk is full."))
-
-
-def test_nothing_is_whole_before_its_result() -> None:
-    assert not LiveSearch().is_whole
+    assert "live · 29.8 fps · latency 24 ms · 3 dropped" in search_html(state)
+    assert "The disk is full." in search_html(dataclasses.replace(state, message="The disk is full."))
 
 
 @pytest.mark.slow

@@ -6,7 +6,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from studio.geometry.camera import Camera
-from studio.scene.camera_placement import clockwise_turn, picture_plane, straight_picture, turned
+from studio.runs.overlay_drawing import upright
+from studio.scene.camera_placement import clockwise_turn, picture_plane, straight_picture
 from studio.scene.camera_views import frustum_mesh
 
 
@@ -55,9 +56,9 @@ def test_the_turned_picture_is_upright_for_a_camera_lying_on_its_side(cameras: t
 def test_a_quarter_turn_moves_pixels_as_turning_the_picture_does() -> None:
     picture = np.zeros((3, 5, 3), dtype=np.uint8)
     picture[0, 4] = 255
-    upright = turned(picture, 1)
-    assert upright.shape == (5, 3, 3)
-    assert upright[4, 2].all(), "the right end of the top row becomes the lower end of the right column"
+    hung = upright(picture, 1)
+    assert hung.shape == (5, 3, 3)
+    assert hung[4, 2].all(), "the right end of the top row becomes the lower end of the right column"
     np.testing.assert_array_equal(clockwise_turn(1) @ [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
     np.testing.assert_array_equal(clockwise_turn(5), clockwise_turn(1))
 

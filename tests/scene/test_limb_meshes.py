@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from studio.body.catalogue import list_bodies, load_body
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import Limb
-from studio.scene.limb_meshes import SECTIONS, limb_frames, limb_mesh
+from studio.scene.body_view import SECTIONS, limb_frames, limb_mesh
 
 
 @pytest.mark.parametrize("length", [400.0, -400.0])

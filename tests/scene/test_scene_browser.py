@@ -20,7 +20,7 @@ from scene_fakes import FakeControl
 from swaying_session import cloud_record
 
 from studio.body.model import BodyModel
-from studio.scene.stage import SceneStage
+from studio.scene.scene_server import SceneServer
 from studio.sessions.workspace import Workspace
 from studio.tracking.settings import AnnealedSettings
 from studio.web.scene_relay import router
@@ -56,14 +56,14 @@ def control() -> FakeControl:
 
 
 @pytest.fixture
-def stage(workspace: Workspace, control: FakeControl) -> Iterator[SceneStage]:
-    made = SceneStage(workspace, control)
+def stage(workspace: Workspace, control: FakeControl) -> Iterator[SceneServer]:
+    made = SceneServer(workspace, control)
     yield made
     made.stop()
 
 
 @pytest.fixture
-def address(stage: SceneStage) -> Iterator[str]:
+def address(stage: SceneServer) -> Iterator[str]:
     """Where the scene is served, by the web application's relay without its access guard."""
     app = FastAPI()
     app.include_router(router)
@@ -106,7 +106,7 @@ def close_to(picture: np.ndarray, hue: str) -> int:
 
 
 def test_a_person_sees_the_run_and_moves_the_survival_rate(
-    page: Page, address: str, stage: SceneStage, control: FakeControl, human: BodyModel, tmp_path: Path
+    page: Page, address: str, stage: SceneServer, control: FakeControl, human: BodyModel, tmp_path: Path
 ) -> None:
     faults: list[str] = []
     page.on("pageerror", lambda fault: faults.append(str(fault)))
@@ -135,7 +135,7 @@ def test_a_person_sees_the_run_and_moves_the_survival_rate(
     page.get_by_text("In use since frame 4, layer 1.").wait_for(timeout=PATIENCE * 1000)
     page.get_by_text("• survival rate").wait_for(timeout=PATIENCE * 1000)
     control.say(LayerFinished("swaying", "run-1", cloud_record(human, 4, 0), True))
-    clouds = stage._director.state.run.drawing.particles
+    clouds = stage._controller.views.particles
     until(page, lambda: [handle.visible for handle in clouds.handles] == [True, False, False, False])
 
     page.get_by_role("tab", name="Show").click()

@@ -11,11 +11,13 @@ from studio.body.forward_kinematics import limb_ends, limb_frames, marker_points
 from studio.body.model import BodyModel, extremities
 from studio.geometry.camera import Camera
 from studio.runs.colour_tokens import colour_tokens
+from studio.runs.marker_lines import extremity_markers
 from studio.scene import particle_view
 from studio.scene.body_view import BodyView
 from studio.scene.camera_views import BACKDROP_DEPTH, DEPTH, CameraViews
 from studio.scene.floor_view import floor_extent
 from studio.scene.guarded_server import GuardedServer
+from studio.scene.line_views import TrailView, TruthView, trail_segments
 from studio.scene.particle_view import (
     MOST_DRAWN,
     CloudStyle,
@@ -23,8 +25,6 @@ from studio.scene.particle_view import (
     cloud_points,
     weight_shares,
 )
-from studio.scene.stick_figure import TruthView, trail_segments
-from studio.scene.trail_view import TrailView, extremity_markers
 
 DARK, LIGHT = colour_tokens(True), colour_tokens(False)
 
@@ -34,9 +34,9 @@ def style(limbs: tuple[int, ...], colour_by: str = "layer", layer: int | None = 
 
 
 def test_limbs_stand_where_the_kinematics_puts_them(server: GuardedServer, human: BodyModel) -> None:
-    view = BodyView(server, human, DARK, name="/body")
+    view = BodyView(server, human, name="/body")
     pose = swaying_pose(human, 3)
-    view.show(pose, 0.6)
+    view.show(pose, DARK, 0.6)
     frames = limb_frames(human, pose)[0]
     for handle, frame, limb in zip(view.handles, frames, human.drawn, strict=True):
         np.testing.assert_allclose(handle.position, frame[:, 3] / 1000.0, atol=1e-12)
@@ -45,22 +45,20 @@ def test_limbs_stand_where_the_kinematics_puts_them(server: GuardedServer, human
         assert handle.visible
         assert handle.opacity == pytest.approx(0.6)
         assert handle.color == DARK[f"limb-{limb.side}"]
-    view.recolour(LIGHT)
+    view.show(pose, LIGHT)
     assert view.handles[0].color == LIGHT[f"limb-{human.drawn[0].side}"]
-    view.show(None)
+    view.show(None, LIGHT)
     assert not any(handle.visible for handle in view.handles)
-    view.remove()
 
 
 def test_moving_the_body_sends_no_mesh_again(server: GuardedServer, human: BodyModel) -> None:
-    view = BodyView(server, human, DARK, name="/moving")
-    view.show(swaying_pose(human, 0))
+    view = BodyView(server, human, name="/moving")
+    view.show(swaying_pose(human, 0), DARK)
     buffer = server._websock_server._broadcast_buffer
     before = buffer.message_counter
-    view.show(swaying_pose(human, 1))
+    view.show(swaying_pose(human, 1), DARK)
     sent = [buffer.message_from_id[number] for number in range(before, buffer.message_counter)]
     assert {type(message).__name__ for message in sent} == {"SetOrientationMessage", "SetPositionMessage"}
-    view.remove()
 
 
 @pytest.mark.parametrize("name", ["human31", "planar_arm4", "dog"])
@@ -76,7 +74,6 @@ def test_clouds_equal_the_kinematics_of_the_stored_particles(server: GuardedServ
     ends = np.stack([limb_ends(body, pose)[0, list(limbs), 1] for pose in poses]).reshape(-1, 3) / 1000.0
     assert view.handles[0].points.dtype == np.float32
     np.testing.assert_allclose(view.handles[0].points, ends, rtol=1e-6, atol=1e-6)
-    view.remove()
 
 
 def test_layers_are_shown_together_or_one_at_a_time(server: GuardedServer, human: BodyModel) -> None:
@@ -94,7 +91,6 @@ def test_layers_are_shown_together_or_one_at_a_time(server: GuardedServer, human
     assert [handle.visible for handle in view.handles] == [True, True, False, False]
     view.show(records, style(()), DARK)
     assert not any(handle.visible for handle in view.handles)
-    view.remove()
 
 
 def test_only_what_is_new_of_a_cloud_is_drawn_again(
@@ -123,7 +119,6 @@ def test_only_what_is_new_of_a_cloud_is_drawn_again(
     np.testing.assert_allclose(
         view.handles[3].points, cloud_points(human, cloud_record(human, 3, 3).poses, (0,)), atol=1e-6
     )
-    view.remove()
 
 
 def test_weights_colour_from_the_lowest_to_the_highest(server: GuardedServer, human: BodyModel) -> None:
@@ -135,7 +130,6 @@ def test_weights_colour_from_the_lowest_to_the_highest(server: GuardedServer, hu
     assert tuple(colours[record.log_weights.argmin(), 0]) == DARK["layer-0"]
     assert tuple(colours[record.log_weights.argmax(), 0]) == DARK["layer-9"]
     np.testing.assert_array_equal(weight_shares(np.array([2.0, 2.0]), 2.0, 2.0), [1.0, 1.0])
-    view.remove()
 
 
 def test_the_extremities_are_hands_feet_and_head(human: BodyModel) -> None:
@@ -150,19 +144,18 @@ def test_the_truth_is_drawn_in_white_and_leaves_out_what_is_missing(
     server: GuardedServer, human: BodyModel
 ) -> None:
     names = tuple(marker.name for marker in human.markers)
-    view = TruthView(server, human, names, DARK)
+    view = TruthView(server, human, names)
     points = marker_points(human, swaying_pose(human, 1))[0]
-    view.show(points)
+    view.show(points, DARK)
     assert view.handle.visible
     assert view.handle.points.shape == (14, 2, 3)
     np.testing.assert_allclose(view.handle.points[0], points[list(view.links[0])] / 1000.0, atol=1e-6)
     assert tuple(view.handle.colors) == (255, 255, 255)
     points[names.index("RKnee")] = np.nan
-    view.show(points)
+    view.show(points, DARK)
     assert view.handle.points.shape == (12, 2, 3)
-    view.show(None)
+    view.show(None, DARK)
     assert not view.handle.visible
-    view.remove()
 
 
 def test_trails_join_neighbouring_frames_only() -> None:
@@ -184,45 +177,43 @@ def test_trails_grow_and_follow_the_shown_frame(server: GuardedServer, human: Bo
     np.testing.assert_allclose(view.handle.points[:, 0], expected[:-1], atol=1e-6)
     np.testing.assert_allclose(view.handle.points[:, 1], expected[1:], atol=1e-6)
     assert set(extremity_markers(human)) == {"LAnkle", "RAnkle", "LWrist", "RWrist", "Head"}
-    view.show(4, None, 0, DARK)
+    view.show(4, extremity_markers(human), 0, DARK)
     assert view.handle.points.shape == (5 * 8, 2, 3)
-    view.show(4, None, 0, DARK, visible=False)
+    view.show(4, (), 0, DARK)
     assert not view.handle.visible
-    view.remove()
 
 
 def test_looking_through_a_camera_puts_its_picture_behind_and_the_others_away(
     server: GuardedServer, cameras: tuple[Camera, ...]
 ) -> None:
-    views = CameraViews(server, cameras, DARK)
-    views.show_pictures({camera.name: np.full((240, 320, 3), 80, dtype=np.uint8) for camera in cameras})
+    views = CameraViews(server, cameras)
+    views.hang({camera.name: np.full((240, 320, 3), 80, dtype=np.uint8) for camera in cameras})
+    views.show(DARK, True, True)
     assert all(view.picture.visible for view in views.views.values())
-    views.look_through("cam2")
+    views.show(DARK, True, True, "cam2")
     chosen = views.views["cam2"]
     assert chosen.picture.visible
     assert chosen.picture.scale == pytest.approx(BACKDROP_DEPTH / DEPTH)
     np.testing.assert_allclose(chosen.picture.position, chosen.plane.middle * BACKDROP_DEPTH)
     assert not chosen.bars.visible
     assert not views.views["cam1"].picture.visible
-    views.look_through(None)
+    views.show(DARK, True, True)
     assert all(view.picture.visible and view.bars.visible for view in views.views.values())
     assert chosen.picture.scale == pytest.approx(1.0)
-    views.show(True, with_pictures=False)
+    views.show(DARK, True, False)
     assert not any(view.picture.visible for view in views.views.values())
-    views.remove()
 
 
 def test_a_picture_on_its_side_hangs_upright(server: GuardedServer, cameras: tuple[Camera, ...]) -> None:
-    views = CameraViews(server, cameras, DARK)
+    views = CameraViews(server, cameras)
     picture = np.zeros((240, 320, 3), dtype=np.uint8)
     picture[:, 300:] = (255, 0, 0)
-    views.show_pictures({"cam4": picture})
+    views.hang({"cam4": picture})
     hung = views.views["cam4"].picture.image
     assert hung.shape == (320, 240, 3)
     assert hung[310, 120].tolist() == [0, 0, 255], (
         "blue in BGR is blue in RGB; the right end hangs at the bottom"
     )
-    views.remove()
 
 
 def test_the_floor_lies_under_all_cameras(cameras: tuple[Camera, ...]) -> None:
@@ -247,7 +238,6 @@ def test_of_an_enormous_set_evenly_spaced_particles_are_drawn(
     view = ParticleView(server, human)
     view.show([type(record)(**fields)], style((0,), "weight"), DARK)
     assert view.handles[0].points.shape == (-(-many // 3), 3)
-    view.remove()
 
 
 def test_hands_and_feet_without_markers_leave_their_trails_to_wrists_and_ankles(human: BodyModel) -> None:

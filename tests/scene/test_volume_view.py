@@ -4,7 +4,6 @@ import dataclasses
 import threading
 
 import numpy as np
-import pytest
 from scipy.spatial.transform import Rotation
 from swaying_session import swaying_pose
 from toy_session import true_poses
@@ -17,10 +16,8 @@ from studio.runs.new_run import RunRequest, prepare_run
 from studio.runs.problem_source import ProblemSource
 from studio.scene.frame_volume import FrameVolume, FrameVolumes
 from studio.scene.guarded_server import GuardedServer
-from studio.scene.live_search import LiveSearch
-from studio.scene.moment import moment_of
+from studio.scene.model import LiveSearch
 from studio.scene.opened_run import OpenedRun
-from studio.scene.show_panel import ShowPanel
 from studio.scene.volume_view import BLOB_REACH, VolumeView, as_light, blob_instances, voxel_instances
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -102,7 +99,6 @@ def test_what_is_drawn_already_is_not_sent_again(server: GuardedServer, human: B
     assert view.voxels.handle is None
     view.show(None, None, TOKENS, hull=True, blobs=True)
     assert view.voxels.handle is None
-    view.remove()
 
 
 def tracked(session: Session, weighting: str) -> StoredRun:
@@ -125,7 +121,7 @@ class Made:
 
     def of(self, frame: int, *, blobs: bool) -> FrameVolume | None:
         """The volume of a stored frame, when it is made."""
-        moment = moment_of(self.opened, frame, LiveSearch())
+        moment = self.opened.moment(frame, LiveSearch())
         settings = self.opened.settings()
         self.happened.clear()
         found = self.volumes.of(moment, settings, blobs=blobs)
@@ -179,16 +175,3 @@ def test_one_camera_is_refused_once(stored: tuple[Session, StoredRun]) -> None:
         "One camera makes no visual hull of a body that moves about."
     ]
     made.volumes.close()
-
-
-@pytest.mark.parametrize("offered", [True, False])
-def test_a_hull_is_a_matter_of_a_tick_and_blobs_are_offered_where_there_are_any(
-    server: GuardedServer, offered: bool
-) -> None:
-    tab = server.gui.add_tab_group().add_tab("Show")
-    panel = ShowPanel(server.gui, tab, lambda changes: None, lambda layer: None)
-    panel.offer_blobs(offered)
-    assert panel.inputs["blobs"][0].visible is offered
-    assert panel.inputs["hull"][0].value is False
-    panel.show_options(dataclasses.replace(panel.options, hull=True))
-    assert panel.inputs["hull"][0].value is True

@@ -9,7 +9,7 @@ from studio.comparison.findings import VERDICTS
 from studio.evidence.settings import EvidenceSettings
 from studio.knobs import knobs_of
 from studio.reproduction.catalogue import EXPERIMENTS
-from studio.scene.view_options import Shown
+from studio.scene.model import Selection
 from studio.sessions.stored_run import StoredRun
 from studio.settings import RecordingSettings
 from studio.tracking.catalogue import TRACKERS
@@ -151,7 +151,7 @@ def test_the_scene_is_not_told_of_what_does_not_exist(studio: Studio, tracked: S
     for wish in ({"session": "../x"}, {"frame": -1}, {"layer": "x"}, {"unknown": 1}):
         assert studio.client.post("/api/scene/show", json=wish).status_code == 422
     assert studio.stage.calls == []
-    assert Shown().session == ""
+    assert Selection().session == ""
 
 
 def test_the_api_describes_itself(studio: Studio) -> None:

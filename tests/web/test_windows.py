@@ -16,6 +16,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from studio.runs.new_run import RunRequest, prepare_run
+from studio.scene.model import select
 from studio.scene.window_scenes import TooManyScenesError, WindowScenes
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
@@ -124,9 +125,9 @@ def test_frames_layers_options_and_edits_are_a_window_s_own(windows: Windows, ru
     told = {name: windows.client.get("/api/scene/edit", headers=own[name]).json() for name in "abc"}
     assert [told[name]["editing"] for name in "abc"] == [False, False, True]
     assert (a.shown.look_through, c.shown.layer, c.shown.run) == (None, None, "run-2")
-    until(lambda: not a._director.state.options.dark)
-    assert b._director.state.options.dark
-    assert b._director.state.options.trails
+    until(lambda: not a._controller.model.options.dark)
+    assert b._controller.model.options.dark
+    assert b._controller.model.options.trails
     windows.client.delete("/api/scene/edit", headers=own["a"])
     assert windows.client.get("/api/scene/edit", headers=own["c"]).json()["editing"]
 
@@ -156,7 +157,7 @@ def test_a_scene_reports_its_moves_to_its_own_window_only(windows: Windows, runs
         for window, name in (("a", runs[0]), ("b", runs[1])):
             windows.show(window, session="take1", run=name)
         until(lambda: all(windows.scenes.scene(window).shown.run for window in "ab"))
-        windows.scenes.scene("a")._director.choose_layer(3)
+        windows.scenes.scene("a")._controller.post(lambda model: select(model, layer=3))
         # The same for all, after it: what comes to the other window before this is all that it was sent.
         until(lambda: windows.scenes.scene("a").shown.layer == 3)
         windows.client.post("/api/sessions/take1/duplicate", json={"name": "end"})
@@ -189,8 +190,8 @@ def test_a_window_that_is_gone_frees_its_scene_and_one_that_is_loaded_again_find
             windows.show(f"w{number}", session="take1", run=runs[number])
             scene = windows.scenes.scene(f"w{number}")
             until(lambda scene=scene: scene.shown.run)
-            freed += [weakref.ref(scene), weakref.ref(scene._director), weakref.ref(scene._server)]
-            threads += [scene._director._presenter._thread, scene._server._websock_server._server_thread]
+            freed += [weakref.ref(scene), weakref.ref(scene._controller), weakref.ref(scene._server)]
+            threads += [scene._controller._thread, scene._server._websock_server._server_thread]
     assert all(thread.is_alive() for thread in threads)
     # Loaded again, it is as it was; without a view of the scene it is kept as long as the page hears events.
     with windows.socket("/api/events?window=w2") as events:

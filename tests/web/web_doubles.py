@@ -15,7 +15,7 @@ from fastapi import FastAPI
 
 from studio.errors import RunError
 from studio.export.task import ExportTask, Written
-from studio.scene.view_options import Shown
+from studio.scene.model import Selection
 from studio.sessions.workspace import Workspace
 from studio.worker.commands import Command
 from studio.worker.events import Event, StateChanged
@@ -79,7 +79,7 @@ class RecordingStage:
     headers: Mapping[str, str] = field(default_factory=dict)
     calls: list[tuple[object, ...]] = field(default_factory=list)
     editing: SimpleNamespace | None = None
-    shown: Shown = field(default_factory=Shown)
+    shown: Selection = field(default_factory=Selection)
 
     def relay_headers(self) -> Mapping[str, str]:
         return self.headers
@@ -108,7 +108,9 @@ class RecordingStage:
     def set_options(self, **changes: object) -> None:
         self.calls.append(("options", changes))
 
-    def play(self, playing: bool) -> None:
+    def play(
+        self, playing: bool | None = None, *, speed: float | None = None, loop: bool | None = None
+    ) -> None:
         self.calls.append(("play", playing))
 
 
@@ -118,7 +120,7 @@ class RecordingScenes:
 
     plain: RecordingStage = field(default_factory=RecordingStage)
     by_window: dict[str, RecordingStage] = field(default_factory=dict)
-    moved: Callable[[str, Shown], None] | None = None
+    moved: Callable[[str, Selection], None] | None = None
     unused: list[set[str]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -130,7 +132,7 @@ class RecordingScenes:
     def open_scenes(self) -> Mapping[str, RecordingStage]:
         return self.by_window
 
-    def watch(self, moved: Callable[[str, Shown], None]) -> None:
+    def watch(self, moved: Callable[[str, Selection], None]) -> None:
         self.moved = moved
 
     def close_unused(self, windows: Collection[str]) -> None:

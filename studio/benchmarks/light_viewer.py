@@ -33,9 +33,7 @@ CAMERA: dict[str, object] = {
 
 
 class LightViewer:
-    """port, headers : of the scene (`SceneStage.port`, `SceneStage.relay_headers`). messages, size : that came so far,
-    and their bytes.
-    """
+    """port, headers : of the scene, see `SceneServer`. messages, size : that came so far, and their bytes."""
 
     def __init__(self, port: int, headers: Mapping[str, str]) -> None:
         self.messages = self.size = 0

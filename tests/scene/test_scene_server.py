@@ -4,13 +4,11 @@ import asyncio
 import dataclasses
 import socket
 from collections.abc import Iterator
-from types import SimpleNamespace
-from typing import Any, cast
 
 import numpy as np
 import pytest
 import viser
-from scene_fakes import FakeControl
+from scene_fakes import FakeControl, by_hand
 from swaying_session import FRAMES, LAYERS, cloud_record, frame_result, swaying_pose
 from waiting import until
 from websockets.asyncio.client import connect
@@ -19,13 +17,16 @@ from websockets.typing import Subprotocol
 
 from studio.body.forward_kinematics import limb_ends, limb_frames
 from studio.body.model import BodyModel, extremities
-from studio.errors import SettingsError
-from studio.scene.stage import SceneStage
-from studio.scene.view_options import Shown
+from studio.errors import SettingsError, StudioError
+from studio.scene.controller import Due
+from studio.scene.model import Model, Selection
+from studio.scene.panel import Panel
+from studio.scene.scene_server import SceneServer
+from studio.scene.scene_views import SceneViews
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.workspace import Workspace
 from studio.worker import commands
-from studio.worker.events import FrameFinished, LayerFinished, SettingsApplied, StateChanged
+from studio.worker.events import FrameFinished, LayerFinished, SettingsApplied
 
 
 @pytest.fixture
@@ -34,35 +35,36 @@ def control() -> FakeControl:
 
 
 @pytest.fixture
-def stage(workspace: Workspace, control: FakeControl) -> Iterator[SceneStage]:
-    made = SceneStage(workspace, control)
+def stage(workspace: Workspace, control: FakeControl) -> Iterator[SceneServer]:
+    made = SceneServer(workspace, control)
     yield made
     made.stop()
 
 
-def drawing(stage: SceneStage):
-    return stage._director.state.run.drawing
+def views(stage: SceneServer) -> SceneViews:
+    found = stage._controller.views
+    assert found is not None
+    return found
 
 
-def open_run(stage: SceneStage) -> None:
+def panel(stage: SceneServer) -> Panel:
+    return stage._controller.panel
+
+
+def open_run(stage: SceneServer) -> None:
     stage.show_run("swaying", "run-1")
-
-    def is_drawn() -> bool:
-        run = stage._director.state.run
-        return stage.shown.run == "run-1" and run is not None and run.drawing.body.handles[0].visible
-
-    until(is_drawn)
+    until(lambda: stage.shown.run == "run-1" and views(stage).body.handles[0].visible)
 
 
-def body_stands_at(stage: SceneStage, body: BodyModel, pose: np.ndarray) -> bool:
-    if stage._director.state.run is None:
+def body_stands_at(stage: SceneServer, body: BodyModel, pose: np.ndarray) -> bool:
+    if stage._controller.views is None:
         return False  # being opened
     places = limb_frames(body, pose)[0, :, :, 3] / 1000.0
-    return np.allclose([handle.position for handle in drawing(stage).body.handles], places, atol=1e-9)
+    return np.allclose([handle.position for handle in views(stage).body.handles], places, atol=1e-9)
 
 
 def test_the_stored_run_is_drawn_clouds_and_all(
-    stage: SceneStage, human: BodyModel, workspace: Workspace
+    stage: SceneServer, human: BodyModel, workspace: Workspace
 ) -> None:
     open_run(stage)
     assert stage.shown.frame == FRAMES - 2, "the newest stored frame"
@@ -70,28 +72,28 @@ def test_the_stored_run_is_drawn_clouds_and_all(
     until(lambda: body_stands_at(stage, human, swaying_pose(human, 1)))
     with workspace.session("swaying").run("run-1").results() as results:
         records = results.layers(1)
-    until(lambda: len(drawing(stage).particles.handles) == LAYERS)
-    for record, handle in zip(records, drawing(stage).particles.handles, strict=True):
+    until(lambda: len(views(stage).particles.handles) == LAYERS)
+    for record, handle in zip(records, views(stage).particles.handles, strict=True):
         ends = limb_ends(human, record.poses)[:, list(extremities(human)), 1].reshape(-1, 3) / 1000.0
         until(lambda handle=handle, ends=ends: np.allclose(handle.points, ends, atol=1e-6))
         assert handle.visible
-    assert drawing(stage).truth.handle.visible
-    assert not drawing(stage).beside.handles[0].visible
+    assert views(stage).truth.handle.visible
+    assert not views(stage).beside.handles[0].visible
 
 
-def test_the_pictures_are_hung_with_outlines(stage: SceneStage) -> None:
+def test_the_pictures_are_hung_with_outlines(stage: SceneServer) -> None:
     open_run(stage)
-    views = drawing(stage).cameras.views
-    until(lambda: all(view.picture.visible for view in views.values()))
-    plain = views["cam1"].picture.image
+    hung = views(stage).cameras.views
+    until(lambda: all(view.picture.visible for view in hung.values()))
+    plain = hung["cam1"].picture.image
     colourful = np.abs(plain.astype(int) - plain.mean(axis=2, keepdims=True)).max(axis=2) > 60
     assert colourful.sum() > 100, "the limbs' outlines are the only saturated colours"
     stage.set_options(overlays=())
-    until(lambda: np.abs(np.diff(views["cam1"].picture.image.astype(int), axis=2)).max() < 60)
+    until(lambda: np.abs(np.diff(hung["cam1"].picture.image.astype(int), axis=2)).max() < 60)
 
 
 def test_layers_in_the_making_are_drawn_at_once(
-    stage: SceneStage, control: FakeControl, human: BodyModel
+    stage: SceneServer, control: FakeControl, human: BodyModel
 ) -> None:
     open_run(stage)
     control.say(dataclasses.replace(control.state, state="tracking"))
@@ -101,7 +103,7 @@ def test_layers_in_the_making_are_drawn_at_once(
     until(lambda: stage.shown.frame == new)
     until(
         lambda: (
-            [handle.visible for handle in drawing(stage).particles.handles][:LAYERS]
+            [handle.visible for handle in views(stage).particles.handles][:LAYERS]
             == [True, True, False, False]
         )
     )
@@ -109,7 +111,7 @@ def test_layers_in_the_making_are_drawn_at_once(
 
 
 def test_a_reannealed_frame_stands_beside_the_stored_answer(
-    stage: SceneStage, control: FakeControl, human: BodyModel
+    stage: SceneServer, control: FakeControl, human: BodyModel
 ) -> None:
     open_run(stage)
     stage.show_frame(2)
@@ -120,7 +122,7 @@ def test_a_reannealed_frame_stands_beside_the_stored_answer(
     moved[4] += 120.0
     until(lambda: body_stands_at(stage, human, moved))
     stored = limb_frames(human, swaying_pose(human, 2))[0, :, :, 3] / 1000.0
-    ghosts = drawing(stage).beside.handles
+    ghosts = views(stage).beside.handles
     until(lambda: all(ghost.visible for ghost in ghosts))
     np.testing.assert_allclose([ghost.position for ghost in ghosts], stored, atol=1e-9)
     stage.show_frame(3)
@@ -128,13 +130,13 @@ def test_a_reannealed_frame_stands_beside_the_stored_answer(
     until(lambda: not ghosts[0].visible)
 
 
-def test_a_setting_selects_the_shown_frame_and_is_asked_for(stage: SceneStage, control: FakeControl) -> None:
+def test_a_setting_selects_the_shown_frame_and_is_asked_for(stage: SceneServer, control: FakeControl) -> None:
     open_run(stage)
     stage.show_frame(2)
     until(lambda: stage.shown.frame == 2)
-    panel = stage._director.state._panel
-    default = panel.settings.inputs["survival"].knob.default
-    panel.settings.inputs["survival"].handle.value = 0.7
+    survival = panel(stage).settings.inputs["survival"]
+    default = survival.knob.default
+    by_hand(survival.handle, 0.7)
     until(lambda: len(control.commands) == 2)
     seek, change = control.commands
     assert isinstance(seek, commands.Seek)
@@ -142,37 +144,63 @@ def test_a_setting_selects_the_shown_frame_and_is_asked_for(stage: SceneStage, c
     assert isinstance(change, commands.ChangeSettings)
     assert change.changes == {"survival": 0.7}
     control.answer(change, "Setting 'survival' cannot be 0.7.", "Try 0.6.")
-    until(lambda: panel.settings.inputs["survival"].handle.value == default)
+    until(lambda: survival.handle.value == default)
     control.say(SettingsApplied("swaying", "run-1", 2, 2, 0, {"survival": 0.6}, ("survival",)))
-    until(lambda: panel.settings.inputs["survival"].handle.value == 0.6)
+    until(lambda: survival.handle.value == 0.6)
     assert len(control.commands) == 2, "showing what is in use asks for nothing"
 
 
-def test_a_run_that_is_not_open_is_opened_first(stage: SceneStage, control: FakeControl) -> None:
+def test_knobs_are_about_the_run_that_is_shown(stage: SceneServer, control: FakeControl) -> None:
+    said: list[StudioError] = []
+    stage._controller.refused = said.append
+    stage._controller.post(stage._controller.request_knobs, {"survival": 0.7})
     control.state = dataclasses.replace(control.state, session="other", run="run-9")
     open_run(stage)
-    stage._director.reanneal_shown()
-    assert [type(command) for command in control.commands] == [commands.Open, commands.Reanneal]
+    assert control.commands == [], "no run was shown"
+    survival = panel(stage).settings.inputs["survival"]
+    by_hand(survival.handle, 0.7)
+    until(lambda: len(control.commands) == 3)
+    assert [type(command) for command in control.commands] == [
+        commands.Open,
+        commands.Seek,
+        commands.ChangeSettings,
+    ]
+    control.commands.clear()
     control.say(dataclasses.replace(control.state, state="tracking"))
-    with pytest.raises(Exception, match=r"run-9.*is being tracked"):
-        stage._director.reanneal_shown()
+    by_hand(survival.handle, 0.6)
+    until(lambda: said)
+    assert "run-9" in said[0].message
+    assert control.commands == [], "another window's run goes on"
+    until(lambda: survival.handle.value == 0.7)
+    by_hand(survival.handle, 99.0)
+    until(lambda: len(said) == 2)
+    assert "99" in said[1].message
+    until(lambda: survival.handle.value == 0.7)
+
+
+def test_a_frame_is_not_selected_while_tracking(stage: SceneServer, control: FakeControl) -> None:
+    open_run(stage)
+    control.say(dataclasses.replace(control.state, state="tracking"))
+    by_hand(panel(stage).settings.inputs["survival"].handle, 0.7)
+    until(lambda: control.commands)
+    assert [type(command) for command in control.commands] == [commands.ChangeSettings]
 
 
 def test_playback_shows_one_frame_after_another_and_tells_the_page(
     workspace: Workspace, control: FakeControl
 ) -> None:
-    told: list[Shown] = []
-    stage = SceneStage(workspace, control, told.append)
+    told: list[Selection] = []
+    stage = SceneServer(workspace, control, told.append)
     open_run(stage)
     stage.show_frame(0)
     until(lambda: stage.shown.frame == 0)
     assert told == [], "who asked is not told"
-    stage.play(True)
+    stage.play(True, speed=4.0)
     until(lambda: {shown.frame for shown in told} >= set(range(1, FRAMES - 1)) and len(told) > 6)
     stage.stop()
 
 
-def test_looking_through_a_camera_by_its_name(stage: SceneStage) -> None:
+def test_looking_through_a_camera_by_its_name(stage: SceneServer) -> None:
     open_run(stage)
     stage.look_through("cam2")
     until(lambda: stage.shown.look_through == "cam2")
@@ -181,34 +209,34 @@ def test_looking_through_a_camera_by_its_name(stage: SceneStage) -> None:
     until(lambda: stage.shown.look_through is None)
 
 
-def test_the_theme_changes_every_colour(stage: SceneStage) -> None:
+def test_the_theme_changes_every_colour(stage: SceneServer) -> None:
     open_run(stage)
-    before = drawing(stage).body.handles[0].color
+    before = views(stage).body.handles[0].color
     stage.set_options(dark=False)
     stage.set_options(colour_by="weight")
-    until(lambda: drawing(stage).body.handles[0].color != before)
-    until(lambda: stage._director.state.options.colour_by == "weight")
-    assert not stage._director.state.options.dark, "one change does not take back another"
+    until(lambda: views(stage).body.handles[0].color != before)
+    until(lambda: stage._controller.model.options.colour_by == "weight")
+    assert not stage._controller.model.options.dark, "one change does not take back another"
     with pytest.raises(SettingsError, match="no option 'colour'"):
         stage.set_options(colour="red")
 
 
-def test_a_session_without_a_run_and_none_at_all(stage: SceneStage, human: BodyModel) -> None:
+def test_a_session_without_a_run_and_none_at_all(stage: SceneServer, human: BodyModel) -> None:
     stage.show_run("swaying")
     until(lambda: stage.shown.session == "swaying" and stage.shown.run == "")
     until(lambda: body_stands_at(stage, human, human.neutral))
     stage.show_run("")
-    until(lambda: stage.shown.session == "" and stage._director.state.run is None)
+    until(lambda: stage.shown.session == "" and stage._controller.views is None)
 
 
-def test_what_cannot_be_opened_leaves_the_scene_alive(stage: SceneStage) -> None:
+def test_what_cannot_be_opened_leaves_the_scene_alive(stage: SceneServer) -> None:
     open_run(stage)
     stage.show_run("no-such-session", "run-1")
-    until(lambda: stage.shown.session == "" and stage._director.state.run is None)
+    until(lambda: stage.shown.session == "" and stage._controller.views is None)
     open_run(stage)
 
 
-def test_strangers_are_refused_and_nothing_is_ever_shared(stage: SceneStage) -> None:
+def test_strangers_are_refused_and_nothing_is_ever_shared(stage: SceneServer) -> None:
     open_run(stage)
 
     async def knock(headers: dict[str, str]) -> tuple[int | None, int]:
@@ -235,43 +263,8 @@ def test_strangers_are_refused_and_nothing_is_ever_shared(stage: SceneStage) -> 
     assert server.request_share_url() is None
 
 
-def test_how_slowly_the_search_goes_is_shown_and_a_run_is_opened_only_by_its_window(
-    stage: SceneStage, control: FakeControl
-) -> None:
-    panel = stage._director.state._panel
-    state = StateChanged("swaying", "run-1", "tracking", 0, 0, 0, 6, 5, 30.0, 0.1, seconds_a_layer=0.1)
-    control.say(state)
-    until(lambda: panel.run.pace.value == "10 layers/s")
-    assert stage.shown == Shown()
-    stage._director.wishes.set_pace(1.0)
-    (asked,) = control.commands
-    assert isinstance(asked, commands.SetPace)
-    assert asked.seconds_a_layer == 1.0
-
-
-def test_commands_are_about_the_run_that_is_shown(stage: SceneStage, control: FakeControl) -> None:
-    panel = stage._director.state._panel.run
-
-    def click(word: str) -> None:
-        asyncio.run(panel._track_clicked(cast("Any", SimpleNamespace(target=SimpleNamespace(value=word)))))
-
-    click("▶ track")
-    assert control.commands == [], "no run is shown"
-    control.state = dataclasses.replace(control.state, session="other", run="run-9")
-    open_run(stage)
-    click("▶ track")
-    assert [type(command) for command in control.commands] == [commands.Open, commands.Start]
-    control.commands.clear()
-    control.say(dataclasses.replace(control.state, state="tracking"))
-    click("pause")
-    assert control.commands == [], "another window's run goes on"
-    control.say(dataclasses.replace(control.state, session="swaying", run="run-1"))
-    click("pause")
-    assert [type(command) for command in control.commands] == [commands.Pause]
-
-
 def test_a_kept_answer_takes_the_place_of_the_stored_one_and_of_what_followed(
-    stage: SceneStage, control: FakeControl, human: BodyModel, workspace: Workspace
+    stage: SceneServer, control: FakeControl, human: BodyModel, workspace: Workspace
 ) -> None:
     open_run(stage)
     stage.show_frame(2)
@@ -281,13 +274,13 @@ def test_a_kept_answer_takes_the_place_of_the_stored_one_and_of_what_followed(
         writer.forget_from(2)
         writer.write_frame(kept, [cloud_record(human, 2, 0)])
     control.say(FrameFinished("swaying", "run-1", kept))
-    until(lambda: stage._director.state.run.frames == (0, 1, 2))
+    until(lambda: stage._controller.model.frames == (0, 1, 2))
     until(lambda: body_stands_at(stage, human, kept.estimate.pose))
 
 
 @pytest.mark.parametrize(("tracking", "faint"), [("lost", True), ("no evidence", True), ("recovered", False)])
 def test_a_frame_that_did_not_simply_go_on_says_so(
-    stage: SceneStage, workspace: Workspace, human: BodyModel, tracking: str, faint: bool
+    stage: SceneServer, workspace: Workspace, human: BodyModel, tracking: str, faint: bool
 ) -> None:
     with ResultsWriter(workspace.session("swaying").run("run-1").folder) as writer:
         layers = [cloud_record(human, FRAMES - 1, layer) for layer in range(LAYERS)]
@@ -297,35 +290,34 @@ def test_a_frame_that_did_not_simply_go_on_says_so(
     stage.show_run("")
     until(lambda: stage.shown.session == "")
     open_run(stage)
-    mark = stage._director.state._panel.run.mark
+    mark = panel(stage).mark
     until(lambda: mark.visible and f"<b>{tracking}</b>" in mark.content)
-    until(lambda: (drawing(stage).body.handles[0].opacity < 0.5) == faint)
+    until(lambda: (views(stage).body.handles[0].opacity < 0.5) == faint)
     stage.show_frame(1)
-    until(lambda: not mark.visible and drawing(stage).body.handles[0].opacity > 0.5)
+    until(lambda: not mark.visible and views(stage).body.handles[0].opacity > 0.5)
 
 
 def test_a_start_pose_that_was_found_is_shown_with_its_confidence_until_it_is_left(
-    stage: SceneStage, human: BodyModel
+    stage: SceneServer, human: BodyModel
 ) -> None:
     found = swaying_pose(human, 5)
     stage.show_run("")
     until(lambda: stage.shown.session == "")
     stage.poses.propose("swaying", found.tolist(), "found in frame 2, confidence 92 %", 2)
     until(lambda: stage.shown.session == "swaying" and body_stands_at(stage, human, found))
-    state = stage._director.state
     assert stage.shown.run == ""
     assert stage.shown.frame == 2
-    until(lambda: "confidence 92 %" in state._panel.run.mark.content)
+    until(lambda: "confidence 92 %" in panel(stage).mark.content)
     stage.show_run("swaying")
     stage.poses.leave()
     until(lambda: body_stands_at(stage, human, human.neutral))
-    until(lambda: not state._panel.run.mark.visible)
+    until(lambda: not panel(stage).mark.visible)
     # A run that is opened shows itself, not what was found.
     stage.poses.propose("swaying", found.tolist(), "found in frame 2, confidence 92 %", 2)
     until(lambda: stage.shown.editing and body_stands_at(stage, human, found))
     stage.show_run("swaying", "run-1")
     until(lambda: stage.shown.run == "run-1" and body_stands_at(stage, human, swaying_pose(human, 4)))
-    until(lambda: not state._panel.run.mark.visible)
+    until(lambda: not panel(stage).mark.visible)
     assert not stage.shown.editing
     assert stage.poses.editing is None
     stage.poses.propose("swaying", found.tolist(), "found in frame 2, confidence 92 %", 2)
@@ -341,7 +333,7 @@ def test_a_start_pose_that_was_found_is_shown_with_its_confidence_until_it_is_le
     "shown",
     [b"X-Studio-Relay: \xe9\xff\xed\xa0\x80", b"X-Studio-Relay: a\r\nX-Studio-Relay: b", b"X-Studio-Relay:"],
 )
-def test_a_strange_relay_header_is_no_way_in(stage: SceneStage, shown: bytes) -> None:
+def test_a_strange_relay_header_is_no_way_in(stage: SceneServer, shown: bytes) -> None:
     """Not ASCII, or given twice: what compares it must not fail and leave the stranger inside."""
     protocol = f"viser-v{viser.__version__}".encode()
     with socket.create_connection(("127.0.0.1", stage.port), 10.0) as knocking:
@@ -354,3 +346,50 @@ def test_a_strange_relay_header_is_no_way_in(stage: SceneStage, shown: bytes) ->
         while b"relay only" not in got and (piece := knocking.recv(65536)):
             got += piece
     assert b"relay only" in got
+
+
+def test_posts_keep_their_order_and_what_goes_wrong_ends_nothing(stage: SceneServer) -> None:
+    said: list[StudioError] = []
+    order: list[int] = []
+    controller = stage._controller
+    controller.refused = said.append
+
+    def note(model: Model, number: int) -> Model:
+        order.append(number)
+        if number % 10 == 3:
+            raise StudioError("The file cannot be read.", "Put it back.")
+        if number % 10 == 7:
+            raise ZeroDivisionError
+        return model
+
+    for number in range(100):
+        controller.post(note, number)
+    until(lambda: len(order) == 100)
+    assert order == list(range(100))
+    until(lambda: len(said) == 10)
+    open_run(stage)
+
+
+def test_a_drawing_waits_until_its_pause_is_over_and_longer_while_a_live_run_is_tracked() -> None:
+    drawing = Due(0.5)
+    assert not drawing.is_due(10.0)
+    drawing.is_wanted = True
+    assert drawing.is_due(10.0)
+    drawing.done(10.0)
+    drawing.is_wanted = True
+    assert not drawing.is_due(10.4)
+    assert drawing.waits(10.4) == pytest.approx(0.1)
+    assert drawing.is_due(10.5)
+
+
+def test_frames_that_were_not_heard_of_are_known_with_the_next(
+    stage: SceneServer, control: FakeControl, human: BodyModel, workspace: Workspace
+) -> None:
+    open_run(stage)
+    stage._controller.post(lambda model: dataclasses.replace(model, frames=model.frames[:2]))
+    until(lambda: len(stage._controller.model.frames) == 2)
+    with ResultsWriter(workspace.session("swaying").run("run-1").folder) as writer:
+        layers = [cloud_record(human, FRAMES - 1, layer) for layer in range(LAYERS)]
+        writer.write_frame(frame_result(human, FRAMES - 1), layers)
+    control.say(FrameFinished("swaying", "run-1", frame_result(human, FRAMES - 1)))
+    until(lambda: stage._controller.model.frames == tuple(range(FRAMES)))

@@ -1,0 +1,59 @@
+"""What stands between viser's inputs and the model: a person's hand is reported, the model's value is shown."""
+
+from collections.abc import Callable
+from typing import Any
+
+import viser
+
+from studio.scene.model import Model
+
+Change = Callable[..., Model]
+"""(model, *values) to the model after it."""
+
+
+Post = Callable[..., None]
+"""post(change, *values): lets a change happen in the scene's thread, soon; from any thread, returns at once."""
+
+
+class Control:
+    """An input of the panel. change : what happens with the model when a person moves it, (model, value) -> model.
+
+    viser tells of every change of a value, from a thread of its own and also when it was made from here. So nothing
+    is decided there: a person's change is counted and posted with its value. While one waits to be decided on, the
+    input is not written to; what the model says then is not yet the answer to it.
+    """
+
+    def __init__(self, handle: Any, post: Post, change: Change) -> None:  # noqa: ANN401 - any input handle
+        self.handle = handle
+        self._change = change
+        self._reported = self._decided = 0
+
+        async def report(event: viser.GuiEvent) -> None:
+            if event.client_id is not None:
+                self._reported += 1
+                post(self._decide, event.target.value)
+
+        handle.on_update(report)
+
+    def _decide(self, model: Model, value: object) -> Model:
+        self._decided += 1
+        return self._change(model, value)
+
+    def show(self, value: object) -> None:
+        """Show a value; nobody is asked for it."""
+        if self._reported == self._decided:
+            self.handle.value = value
+
+    def remove(self) -> None:
+        """Take the input out of the panel."""
+        self.handle.remove()
+
+
+def on_press(handle: Any, post: Post, change: Change) -> None:  # noqa: ANN401 - a button or a group of them
+    """Let a press of a button change the model; of a group with the pressed one's word."""
+    is_group = isinstance(handle, viser.GuiButtonGroupHandle)
+
+    async def report(event: viser.GuiEvent) -> None:
+        post(change, *((event.target.value,) if is_group else ()))
+
+    handle.on_click(report)

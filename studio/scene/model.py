@@ -1,0 +1,442 @@
+"""What a window's scene shows, as one immutable value, and every way in which it changes, as plain functions.
+
+Whatever happens (a person moves a control, the page asks, the tracking process reports, time goes by) is a function
+of the model and of what happened: `change(model, *values) -> Model`. Nothing here reads files, talks to viser or
+looks at a clock: the controller does, in one thread, and the views draw what the model says.
+"""
+
+import bisect
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from numpy import float64
+from numpy.typing import NDArray
+
+from studio.body.dragging import Dragger
+from studio.body.mirroring import Mirror
+from studio.body.model import BodyModel, extremities
+from studio.knobs import Value
+from studio.runs.marker_lines import extremity_markers
+from studio.runs.tracks import RAW
+from studio.scene.pose_edit import PoseEdit, ended
+from studio.settings import RunSettings, all_knobs, changed_settings, values
+from studio.tracking.tracker import FrameResult, LayerRecord
+from studio.worker.events import Event, FrameFinished, LayerFinished, SettingsApplied, StateChanged
+
+Array = NDArray[float64]
+
+SEARCHING = ("tracking", "compiling")
+NEAR_THE_END = 3
+"""Whoever goes to one of the last frames while more are tracked goes on following."""
+REMEMBERED = 256
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """What a window is about. session, run : names, "" while none is open. frame : None while there is none.
+
+    layer : one layer's cloud, None for all together. limb, parameter, camera : names. particle : a row of the layer's
+    cloud. look_through : the camera whose place the viewers take, None for the free view. follow : the frame moves on
+    with the tracking. editing : whether a pose is edited.
+    """
+
+    session: str = ""
+    run: str = ""
+    frame: int | None = None
+    layer: int | None = None
+    limb: str | None = None
+    parameter: str | None = None
+    particle: int | None = None
+    camera: str | None = None
+    look_through: str | None = None
+    follow: bool = True
+    editing: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ViewOptions:
+    """The choices of the Show tab and of the page.
+
+    body, body_opacity : the answer's cones. stored : the stored answer as a grey cage beside a re-annealed one.
+    truth : the reference's stick figure. particles : the clouds, at the far ends of `limbs` (names; None: the
+    extremities'), coloured by "layer" or "weight". point_size : metres. trails : paths of `trail_markers` (None: the
+    extremities') over `trail_frames` frames before and after the shown one (0: all). cameras, pictures : frusta and
+    the pictures on them. hull : the frame's visual hull as voxels. blobs : the blobs fitted to it beside the answer's
+    own, in runs that are weighed by them. track : whose poses are drawn, of `runs.tracks`; the search's own stand
+    beside as the grey cage. overlays : of `runs.overlay_drawing.OVERLAYS`. dark : the theme.
+    """
+
+    body: bool = True
+    body_opacity: float = 0.85
+    stored: bool = True
+    truth: bool = True
+    particles: bool = True
+    limbs: tuple[str, ...] | None = None
+    colour_by: str = "layer"
+    point_size: float = 0.012
+    trails: bool = True
+    trail_markers: tuple[str, ...] | None = None
+    trail_frames: int = 60
+    cameras: bool = True
+    pictures: bool = True
+    hull: bool = False
+    blobs: bool = False
+    track: str = RAW
+    overlays: tuple[str, ...] = ("outline",)
+    dark: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Playback:
+    """speed : 1 is real time. loop : start over at the end. debt : shown time that is no whole frame yet, in frames."""
+
+    playing: bool = False
+    speed: float = 1.0
+    loop: bool = True
+    debt: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LiveSearch:
+    """The layers so far of the frame in progress, or of one that is annealed again.
+
+    frame : None while nothing is known. reannealed : a what-if beside the stored answer. result : None until the
+    frame is finished.
+    """
+
+    frame: int | None = None
+    reannealed: bool = False
+    records: tuple[LayerRecord, ...] = ()
+    result: FrameResult | None = None
+
+    @property
+    def pose(self) -> Array | None:
+        """(D,) the answer so far: the result's pose, else the mean of the newest layer."""
+        if self.result is not None:
+            return self.result.estimate.pose
+        return self.records[-1].mean if self.records else None
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the result is there, and every layer of it."""
+        return self.result is not None and len(self.records) == self.result.layers
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Subject:
+    """What is open: a session, or a run of it. span : its frames, half open. mirror : None for a body without sides."""
+
+    body: BodyModel
+    cameras: tuple[str, ...]
+    span: tuple[int, int]
+    fps: float
+    dragger: Dragger
+    mirror: Mirror | None
+
+    def chosen_limbs(self, options: ViewOptions) -> tuple[int, ...]:
+        """Indices of the drawn limbs whose far ends carry particles."""
+        if options.limbs is None:
+            return extremities(self.body)
+        return tuple(at for at, limb in enumerate(self.body.drawn) if limb.name in options.limbs)
+
+    def listed(self, name: str, options: ViewOptions) -> tuple[str, ...]:
+        """The names that the option "limbs", "trail_markers" or "overlays" stands for."""
+        chosen = getattr(options, name)
+        if chosen is not None:
+            return chosen
+        if name == "limbs":
+            return tuple(self.body.drawn[at].name for at in extremities(self.body))
+        return extremity_markers(self.body)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Knobs:
+    """settings : in use. since : the frame and layer since which, None as the run began.
+
+    requested : changes that wait for the tracking process's answer, by its identifier, oldest first. drafts : text
+    that was refused and stays, so that it can be finished.
+    """
+
+    settings: RunSettings
+    since: tuple[int, int] | None = None
+    requested: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
+    drafts: Mapping[str, Value] = field(default_factory=dict)
+
+    @property
+    def shown(self) -> dict[str, Value]:
+        """What the controls show: the newest request, else what is in use."""
+        merged = {**values(self.settings), **self.drafts}
+        for changes in self.requested.values():
+            merged |= changes
+        return merged
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Model:
+    """All that a scene shows. search : how the tracking process stands. subject, knobs, edit : None while nothing is
+    open. frames : the stored ones, ascending.
+    """
+
+    search: StateChanged
+    selection: Selection = Selection()
+    options: ViewOptions = ViewOptions()
+    playback: Playback = Playback()
+    live: LiveSearch = LiveSearch()
+    subject: Subject | None = None
+    frames: tuple[int, ...] = ()
+    knobs: Knobs | None = None
+    edit: PoseEdit | None = None
+
+    @property
+    def is_searching(self) -> bool:
+        """Whether frames are being tracked, of whatever run."""
+        return self.search.state in SEARCHING
+
+    @property
+    def is_searched(self) -> bool:
+        """Whether the tracking process has the shown run open."""
+        return (self.search.session, self.search.run) == (self.selection.session, self.selection.run)
+
+    @property
+    def edited_pose(self) -> Array | None:
+        """(D,) the pose that is edited, None while none is."""
+        return self.edit.pose if self.edit is not None and self.edit.active else None
+
+
+def same_pictures(one: Model, other: Model) -> bool:
+    """Whether the pictures on the cameras of two models are the same; layers as they come are not drawn on them."""
+    return (
+        (one.selection, one.options) == (other.selection, other.options)
+        and one.subject is other.subject
+        and one.frames is other.frames
+        and one.edit is other.edit
+        and one.live.result is other.live.result
+        and (one.knobs and one.knobs.settings) is (other.knobs and other.knobs.settings)
+    )
+
+
+# What is selected, and what is shown of it.
+
+
+def opened(
+    model: Model,
+    session: str,
+    run: str,
+    subject: Subject | None,
+    frames: Sequence[int] = (),
+    settings: RunSettings | None = None,
+    edit: PoseEdit | None = None,
+) -> Model:
+    """Another session or run is open: its newest frame is shown. subject : None where there is nothing to draw."""
+    # Refusals of what was requested before are still told; its values are of another run.
+    requested = {} if model.knobs is None else {key: {} for key in model.knobs.requested}
+    return replace(
+        model,
+        selection=Selection(
+            session, run, frames[-1] if frames else None, follow=model.selection.follow, editing=False
+        ),
+        playback=replace(model.playback, playing=False),
+        live=LiveSearch(),
+        subject=subject,
+        frames=tuple(frames),
+        knobs=None if settings is None else Knobs(settings, requested=requested),
+        edit=edit,
+    )
+
+
+def select(model: Model, **changes: object) -> Model:
+    """Change the selection by the names of `Selection`. A particle is one of a frame's layer and goes with it."""
+    if {"frame", "layer"} & changes.keys():
+        changes = {"particle": None} | changes
+    after = replace(model.selection, **changes)  # pyright: ignore[reportArgumentType]
+    return model if after == model.selection else replace(model, selection=after)
+
+
+def show_frame(model: Model, frame: int | None) -> Model:
+    """Show a frame: the one in progress, or the stored one that is nearest."""
+    if model.subject is None or frame is None:
+        return model
+    shown = frame if model.live.frame == frame or not model.frames else nearest(frame, model.frames)
+    newest = model.frames[-NEAR_THE_END:]
+    follow = model.selection.follow and (not model.is_searching or not newest or frame >= newest[0])
+    if model.live.reannealed and shown != model.live.frame:
+        model = replace(model, live=LiveSearch())
+    if shown == model.selection.frame:
+        return select(model, follow=follow)
+    return select(model, frame=shown, follow=follow)
+
+
+def nearest(frame: int, frames: Sequence[int]) -> int:
+    """The stored frame nearest to `frame`."""
+    return min(frames, key=lambda stored: abs(stored - frame))
+
+
+def look_through(model: Model, camera: str | None) -> Model:
+    """Look through a camera (None: no longer); unknown ones change nothing."""
+    if model.subject is None or (camera is not None and camera not in model.subject.cameras):
+        return model
+    return select(model, look_through=camera)
+
+
+def camera_clicked(model: Model, camera: str) -> Model:
+    """Look through a camera, or no longer if that is done already."""
+    return look_through(model, None if camera == model.selection.look_through else camera)
+
+
+def change_options(model: Model, changes: Mapping[str, object]) -> Model:
+    """Show other things, by the names of `ViewOptions`."""
+    options = replace(model.options, **changes)  # pyright: ignore[reportArgumentType]
+    return model if options == model.options else replace(model, options=options)
+
+
+def tick_listed(model: Model, name: str, entry: str, ticked: bool) -> Model:
+    """Put an entry into the option "limbs", "trail_markers" or "overlays", or take it out."""
+    before = (
+        getattr(model.options, name) if model.subject is None else model.subject.listed(name, model.options)
+    )
+    kept = tuple(one for one in before or () if one != entry)
+    return change_options(model, {name: (*kept, entry) if ticked else kept})
+
+
+# Playing stored frames.
+
+
+def set_playback(
+    model: Model,
+    playing: bool | None = None,
+    speed: float | None = None,
+    loop: bool | None = None,
+) -> Model:
+    """Play or stop, and how; None leaves it."""
+    now = model.playback
+    after = Playback(
+        now.playing if playing is None else playing,
+        now.speed if speed is None else speed,
+        now.loop if loop is None else loop,
+        now.debt if playing is None else 0.0,
+    )
+    return model if after == now else replace(model, playback=after)
+
+
+def advance(model: Model, seconds: float) -> Model:
+    """Let time go by: what is played moves on."""
+    if model.subject is None or not model.playback.playing:
+        return model
+    after, frame = played(model.playback, seconds * model.subject.fps, model.selection.frame, model.frames)
+    model = replace(model, playback=after)
+    return model if frame == model.selection.frame else show_frame(model, frame)
+
+
+def played(
+    playback: Playback, due: float, frame: int | None, frames: Sequence[int]
+) -> tuple[Playback, int | None]:
+    """The playback and the frame to show after `due` frames of real time. frames : the stored ones, ascending.
+
+    At the end it starts over or stops; a frame between two stored ones takes the next one.
+    """
+    if not playback.playing or not frames:
+        return playback, frame
+    if frame is None:
+        return playback, frames[0]
+    due = playback.debt + due * playback.speed
+    steps = int(due)
+    if steps == 0:
+        return replace(playback, debt=due), frame
+    place = bisect.bisect_left(frames, frame) + steps
+    if place >= len(frames) and not playback.loop:
+        return replace(playback, playing=False, debt=0.0), frames[-1]
+    return replace(playback, debt=due - steps), frames[place % len(frames)]
+
+
+# What the tracking process reports.
+
+
+def hear(model: Model, event: Event, frames: tuple[int, ...] = ()) -> Model:
+    """Take an event. frames : what is stored now, where a frame was finished."""
+    if isinstance(event, StateChanged):
+        return _hear_state(model, event)
+    if model.knobs is None or (event.session, event.run) != (model.selection.session, model.selection.run):
+        return model
+    if isinstance(event, SettingsApplied):
+        settings = changed_settings(model.knobs.settings, event.values)
+        since = event.frame, event.layer
+        return replace(model, knobs=replace(model.knobs, settings=settings, since=since, drafts={}))
+    if not isinstance(event, LayerFinished | FrameFinished):
+        return model
+    model = replace(model, live=searched_on(model.live, event))
+    if isinstance(event, FrameFinished) and not event.reannealed:
+        model = replace(model, frames=frames)
+    if model.selection.follow and not event.reannealed and model.live.frame != model.selection.frame:
+        model = select(model, frame=model.live.frame)
+    return model
+
+
+def _hear_state(model: Model, state: StateChanged) -> Model:
+    before = model.is_searched and model.is_searching
+    model = replace(model, search=state)
+    if state.state == "lost" and model.knobs is not None:
+        model = replace(model, knobs=replace(model.knobs, requested={}))
+    if model.is_searched and model.is_searching and not before:
+        model = edit_pose(model, ended)  # what is searched is to be seen now
+    return model
+
+
+def searched_on(live: LiveSearch, event: LayerFinished | FrameFinished) -> LiveSearch:
+    """The search after another layer or its result.
+
+    A layer of another frame, of the other kind, or with a number that was there already begins anew.
+    """
+    if isinstance(event, FrameFinished):
+        same = (live.frame, live.reannealed) == (event.result.frame, event.reannealed)
+        return LiveSearch(event.result.frame, event.reannealed, live.records if same else (), event.result)
+    record = event.record
+    goes_on = (
+        live.result is None
+        and (live.frame, live.reannealed) == (record.frame, event.reannealed)
+        and bool(live.records)
+        and live.records[-1].layer < record.layer
+    )
+    return LiveSearch(record.frame, event.reannealed, (*live.records, record) if goes_on else (record,))
+
+
+# Knobs: requested here, taken or refused by the tracking process.
+
+
+def request(model: Model, identifier: str, changes: Mapping[str, Value]) -> Model:
+    """Something was sent to the tracking process. changes : the knobs that it asks for, if any."""
+    assert model.knobs is not None
+    waiting = dict([*model.knobs.requested.items(), (identifier, changes)][-REMEMBERED:])
+    drafts = {name: value for name, value in model.knobs.drafts.items() if name not in changes}
+    return replace(model, knobs=replace(model.knobs, requested=waiting, drafts=drafts))
+
+
+def settle(model: Model, identifier: str, taken: bool) -> Model:
+    """The tracking process answered: the values are in use, or those before are shown again."""
+    if model.knobs is None or identifier not in model.knobs.requested:
+        return model
+    waiting = dict(model.knobs.requested)
+    changes = waiting.pop(identifier)
+    settings = model.knobs.settings
+    in_use = changed_settings(settings, changes) if taken else settings
+    model = replace(model, knobs=replace(model.knobs, requested=waiting, settings=in_use))
+    return model if taken else refuse(model, changes)
+
+
+def refuse(model: Model, changes: Mapping[str, Value]) -> Model:
+    """Knobs cannot be changed: they show what is in use, but half-written text (a list of numbers, say) stays."""
+    if model.knobs is None:
+        return model
+    texts = {knob.name for knob in all_knobs(model.knobs.settings) if knob.kind is str and not knob.choices}
+    drafts = {name: value for name, value in changes.items() if name in texts}
+    return replace(model, knobs=replace(model.knobs, drafts={**model.knobs.drafts, **drafts}))
+
+
+# The pose that is edited.
+
+
+def edit_pose(model: Model, change: Callable[[PoseEdit], PoseEdit]) -> Model:
+    """Change the pose that is edited, or whether one is."""
+    if model.edit is None:
+        return model
+    edit = change(model.edit)
+    return select(replace(model, edit=edit), editing=edit.active)

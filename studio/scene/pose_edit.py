@@ -1,0 +1,113 @@
+"""A pose that a person edits: a start pose, or the right pose of a run's frame. A value and plain functions."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from studio.body.dragging import Dragger
+from studio.body.mirroring import Mirror
+
+Array = NDArray[np.float64]
+
+REMEMBERED = 200
+UNDO, RESET = "undo", "reset"
+MIRROR, ROUND = "mirror left / right", "turn round"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseEdit:
+    """start, original, pose : (D,) the start pose, what `RESET` goes back to, and the pose as it is now.
+
+    active : whether it is edited now; otherwise it waits to be gone on with. frame : of the run that is corrected,
+    None: the start pose. past : earlier poses, newest last. source : what moved the pose last; all that one source
+    does in a row is undone at once. grip : the limb that carries the gizmo, "" none. held : the limb being dragged,
+    "" the root. refining : how far the search around the pose is, 0 to 1. found : of a pose that was found
+    automatically, how sure it is.
+    """
+
+    start: Array
+    original: Array
+    pose: Array
+    active: bool = False
+    frame: int | None = None
+    past: tuple[Array, ...] = ()
+    source: str = ""
+    grip: str = ""
+    held: str | None = None
+    refining: float | None = None
+    found: str = ""
+
+    @property
+    def is_moved(self) -> bool:
+        """Whether it is another pose than the original."""
+        return not np.array_equal(self.pose, self.original)
+
+
+def edit_of(pose: Array) -> PoseEdit:
+    """A start pose (D,) that nobody edits yet."""
+    return PoseEdit(pose, pose, pose)
+
+
+def begun(edit: PoseEdit, pose: Array | None = None, frame: int | None = None, found: str = "") -> PoseEdit:
+    """Edit the start pose, or the right pose of a frame. pose : (D,) to begin with or to go on to; None: as it is."""
+    if not edit.active or frame != edit.frame:
+        first = pose if frame is not None else edit.start if edit.frame is not None else None
+        if first is not None:
+            edit = replace(edit_of(first), start=edit.start, grip=edit.grip)
+    edit = replace(edit, active=True, frame=frame, found=found)
+    return edit if pose is None else moved(edit, pose)
+
+
+def ended(edit: PoseEdit) -> PoseEdit:
+    """Stop editing; the pose is kept until another session or run is opened."""
+    return replace(edit, active=False, held=None, refining=None, found="")
+
+
+def moved(edit: PoseEdit, pose: Array, source: str = "") -> PoseEdit:
+    """Take a pose (D,). source : see `PoseEdit`; "": this change is undone by itself."""
+    edit = replace(edit, active=True)
+    if np.array_equal(pose, edit.pose):
+        return edit
+    joined = bool(source) and source == edit.source
+    past = edit.past if joined else (*edit.past, edit.pose)[-REMEMBERED:]
+    return replace(edit, pose=np.array(pose, dtype=np.float64), past=past, source=source)
+
+
+def entry_moved(edit: PoseEdit, index: int, value: float) -> PoseEdit:
+    """Give an entry of the pose (radians or mm) another value."""
+    pose = edit.pose.copy()
+    pose[index] = value
+    return moved(edit, pose, source=f"entry {index}")
+
+
+def dragged(
+    edit: PoseEdit, dragger: Dragger, grip: str, place: Array, wxyz: Array, *, is_last: bool
+) -> PoseEdit:
+    """Bring a limb's end to a place (3,) mm, or ("") the root to a place and attitude. is_last : it is released."""
+    if grip:
+        pose = dragger.dragged(edit.pose, grip, place).pose
+    else:
+        turn = Rotation.from_quat(wxyz, scalar_first=True).as_matrix()
+        pose = dragger.with_root(edit.pose, np.column_stack([turn, place]))
+    edit = moved(edit, pose, source=f"drag {grip}")
+    return replace(edit, held=None, source="") if is_last else replace(edit, held=grip)
+
+
+def changed_whole(edit: PoseEdit, change: str, mirror: Mirror | None) -> PoseEdit:
+    """UNDO, RESET, MIRROR or ROUND."""
+    edit = replace(edit, active=True)
+    if change == UNDO:
+        past = edit.past
+        return replace(edit, source="", pose=past[-1], past=past[:-1]) if past else replace(edit, source="")
+    if change == RESET:
+        return moved(edit, edit.original)
+    if mirror is None:
+        return edit
+    return moved(edit, (mirror.mirrored if change == MIRROR else mirror.turned_round)(edit.pose))
+
+
+def saved(edit: PoseEdit) -> PoseEdit:
+    """The pose was stored as the start pose: it is the original now."""
+    return replace(edit, start=edit.pose, original=edit.pose)

@@ -1,0 +1,156 @@
+"""The viser scene of one window, behind the web application's relay.
+
+Building viser blocks for some milliseconds: in a thread. All methods may be called from any thread; they post what is
+requested to the scene's own thread and return.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from studio.errors import SettingsError
+from studio.scene.controller import SceneController
+from studio.scene.guarded_server import GuardedServer
+from studio.scene.model import (
+    Selection,
+    ViewOptions,
+    change_options,
+    look_through,
+    select,
+    set_playback,
+    show_frame,
+)
+from studio.sessions.workspace import Workspace
+from studio.worker.control import StudioControl
+
+Array = NDArray[np.float64]
+
+
+class SceneServer:
+    """The scene as one window sees it. process : the tracking process, shared by all windows.
+
+    moved : called with every move that the scene's own controls, its playback or the tracking make, in the scene's
+    thread; it returns at once. Moves made through `show_run` and its like are not reported.
+    """
+
+    def __init__(
+        self,
+        workspace: Workspace,
+        process: StudioControl,
+        moved: Callable[[Selection], None] = lambda _: None,
+    ) -> None:
+        self._server = GuardedServer()
+        self._controller = SceneController(self._server, workspace, process, moved)
+        self._controller.start()
+        self.poses = ScenePoses(self._controller)
+        self.port: int = self._server.get_port()
+
+    def stop(self) -> None:
+        """Close the scene; its viewers are disconnected, its files and threads are released."""
+        self._controller.stop()
+        self._server.stop()
+
+    @property
+    def is_viewed(self) -> bool:
+        """Whether a browser is connected."""
+        return self._server.is_viewed
+
+    def relay_headers(self) -> Mapping[str, str]:
+        """The secret that the inner server asks of whoever connects."""
+        return self._server.relay_headers()
+
+    @property
+    def shown(self) -> Selection:
+        """What is shown now."""
+        return self._controller.model.selection
+
+    def show_run(
+        self, session: str, run: str = "", frame: int | None = None, layer: int | None = None
+    ) -> None:
+        """Show a session and one of its runs ("" : the session alone), a frame, one layer's cloud (None: all)."""
+        self._controller.post(self._controller.show_run, session, run, frame, layer, told=False)
+
+    def show_frame(self, frame: int) -> None:
+        """Show a stored frame; where it is not stored the nearest one."""
+        self._controller.post(show_frame, frame, told=False)
+
+    def select(self, **changes: object) -> None:
+        """Select a layer, limb, parameter, particle or camera, by the names of `Selection`; None: none."""
+        self._controller.post(lambda model: select(model, **changes), told=False)
+
+    def show_layer(self, layer: int | None) -> None:
+        """Show one layer's cloud, or all (None)."""
+        self.select(layer=layer)
+
+    def follow(self, following: bool) -> None:
+        """Show each frame as it is tracked, or stay where the viewer is."""
+        self.select(follow=following)
+
+    def look_through(self, camera: str | None) -> None:
+        """Put the viewers into a camera's place, or back where they were (None or "")."""
+        self._controller.post(look_through, camera or None, told=False)
+
+    def set_options(self, **changes: object) -> None:
+        """Change what is drawn, by the names of `ViewOptions`. Raises SettingsError for a name that is none."""
+        known = [entry.name for entry in fields(ViewOptions)]
+        for name in changes:
+            if name not in known:
+                raise SettingsError(f"The scene has no option '{name}'.", f"Known: {', '.join(known)}.")
+        self._controller.post(change_options, changes, told=False)
+
+    def play(
+        self, playing: bool | None = None, *, speed: float | None = None, loop: bool | None = None
+    ) -> None:
+        """Play stored frames, or stop. speed : 1 is real time. loop : start over at the end. None leaves each."""
+        self._controller.post(set_playback, playing, speed, loop, told=False)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Editing:
+    """What is being edited. frame : of the run that is corrected, None: the session's start pose. pose : (D,). moved :
+    whether it is another pose than it was.
+    """
+
+    session: str
+    run: str
+    frame: int | None
+    pose: Array
+    moved: bool
+
+
+class ScenePoses:
+    """Poses that are shown to the scene's viewers to be judged and edited; they may be used from any thread."""
+
+    def __init__(self, controller: SceneController) -> None:
+        self._controller = controller
+
+    @property
+    def editing(self) -> Editing | None:
+        """What is being edited now, None while nothing is."""
+        model = self._controller.model
+        edit, selection = model.edit, model.selection
+        if edit is None or not edit.active:
+            return None
+        return Editing(selection.session, selection.run, edit.frame, edit.pose.copy(), edit.is_moved)
+
+    def propose(self, session: str, pose: Sequence[float], said: str, frame: int | None = None) -> None:
+        """Show a start pose (D,) that was found for a session. said : how sure it is, for the viewers. frame : that it
+        was found in.
+        """
+        given = np.array(pose, dtype=np.float64)
+        self._controller.post(self._controller.propose_pose, session, given, said, frame)
+
+    def edit(
+        self, session: str, run: str = "", frame: int | None = None, pose: Sequence[float] | None = None
+    ) -> None:
+        """Let the viewers edit a session's start pose, or the right pose of a run's frame. pose : (D,) to begin
+        with, or to go on with where that is being edited already; None: the one that is shown there.
+        """
+        given = None if pose is None else np.array(pose, dtype=np.float64)
+        self._controller.post(self._controller.begin_edit, session, run, frame, given)
+
+    def leave(self) -> None:
+        """Stop editing."""
+        self._controller.post(self._controller.end_edit)

@@ -1,0 +1,171 @@
+"""All that stands in the scene of one opened session or run: made when it is opened, moved from then on."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from studio.body.forward_kinematics import limb_ends
+from studio.errors import StudioError
+from studio.runs.colour_tokens import ColourTokens
+from studio.runs.overlay_pictures import ViewComposer
+from studio.scene import METRES_PER_MM
+from studio.scene.body_view import BodyView
+from studio.scene.camera_views import LONGEST_SIDE, CameraViews
+from studio.scene.floor_view import FloorView
+from studio.scene.frame_volume import FrameVolumes, has_blobs
+from studio.scene.line_views import TrailView, TruthView
+from studio.scene.model import Model
+from studio.scene.opened_run import Moment, OpenedRun
+from studio.scene.particle_view import CloudStyle, ParticleView
+from studio.scene.volume_view import VolumeView
+from studio.tracking.tracker import LOST, NO_EVIDENCE
+
+Array = NDArray[np.float64]
+
+DOUBTFUL, EDITED, STORED = 0.35, 0.6, 0.35
+"""Opacity of a body that is held where it was last seen or known to be elsewhere, of one that is edited (so that what
+is behind a limb can be taken hold of), and of the stored answer beside another."""
+TRAIL_SECONDS = 1.0
+_VIEW_ELEVATION = 0.34
+_LEAST_DISTANCE, _MOST_DISTANCE = 2.6, 9.0
+_FIELD_OF_VIEW = 0.85
+_LOOK_HIGHER = np.array([0.0, 0.0, 0.2])
+
+
+class SceneViews:
+    """Draws a model of an opened run. Used by the scene's thread only.
+
+    clicked : called with a camera's name when it is clicked. volume_made, failed : called when a hull was made, or
+    with the reason why it cannot be. All three are called in other threads.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        opened: OpenedRun,
+        *,
+        clicked: Callable[[str], None] = lambda _: None,
+        volume_made: Callable[[], None] = lambda: None,
+        failed: Callable[[StudioError], None] = lambda _: None,
+    ) -> None:
+        self._server, self._opened = server, opened
+        body, centres = opened.body, [camera.centre for camera in opened.cameras]
+        self._person = limb_ends(body, opened.start_pose()[None])[0].reshape(-1, 3)
+        self.floor = FloorView(server, [*centres, self._person.mean(axis=0)])
+        self.body = BodyView(server, body, name="/body")
+        self.beside = BodyView(server, body, name="/stored", ghost=True)
+        self.particles = ParticleView(server, body)
+        self.trails = TrailView(server, body)
+        self.volume = VolumeView(server, body)
+        self.cameras = CameraViews(server, opened.cameras, clicked)
+        self.truth = TruthView(server, body, opened.truth.names if opened.truth else ())
+        self._volumes = FrameVolumes(opened, volume_made, failed)
+        self._composer: ViewComposer | None = None
+        self._trails_of: tuple[tuple[str, int], tuple[int, ...]] = ("", 0), ()
+        self._trails_read = float("-inf")
+
+    def close(self) -> None:
+        """Release footage and threads; what is drawn stays until the scene is cleared."""
+        self._volumes.close()
+        if self._composer is not None:
+            self._composer.close()
+
+    def show(self, model: Model, moment: Moment, tokens: ColourTokens) -> None:
+        """Draw everything but the pictures, in one step for the viewers."""
+        subject, knobs, options = model.subject, model.knobs, model.options
+        if subject is None or knobs is None:
+            return
+        if options.trails:
+            self._read_trails(model)
+        wanted = options.hull or (options.blobs and has_blobs(knobs.settings))
+        volume = self._volumes.of(moment, knobs.settings, blobs=options.blobs) if wanted else None
+        doubtful = moment.tracking in (LOST, NO_EVIDENCE)
+        most = DOUBTFUL if doubtful else EDITED if moment.edited else 1.0
+        style = CloudStyle(
+            subject.chosen_limbs(options),
+            options.colour_by,
+            model.selection.layer,
+            moment.layer_count,
+            options.point_size,
+        )
+        markers = subject.listed("trail_markers", options) if options.trails else ()
+        through = model.selection.look_through
+        with self._server.atomic():
+            self.body.show(moment.pose if options.body else None, tokens, min(options.body_opacity, most))
+            self.beside.show(moment.beside if options.stored else None, tokens, STORED)
+            self.truth.show(moment.truth if options.truth else None, tokens)
+            self.particles.show(moment.records if options.particles else (), style, tokens)
+            self.trails.show(moment.frame, markers, int(options.trail_frames), tokens)
+            self.volume.show(volume, moment.pose, tokens, hull=options.hull, blobs=options.blobs)
+            self.cameras.show(tokens, options.cameras, options.pictures, through)
+            # Through a camera the floor is the one in the picture.
+            self.floor.show(tokens, through is None)
+
+    def hang_pictures(self, model: Model, moment: Moment, tokens: ColourTokens) -> None:
+        """Compose the pictures of a moment and hang them on the cameras; one that cannot be made stays as it was."""
+        subject, knobs, options, selection = model.subject, model.knobs, model.options, model.selection
+        if subject is None or knobs is None or not (options.pictures or selection.look_through):
+            return
+        records = [record for record in moment.records if selection.layer in (None, record.layer)]
+        pictures = {}
+        for camera in self._opened.cameras:
+            shrink = min(1.0, LONGEST_SIDE / max(camera.width, camera.height))
+            try:
+                if self._composer is None:
+                    self._composer = ViewComposer(self._opened.session, self._opened.run)
+                if self._opened.run is not None:
+                    self._composer.use(knobs.settings)
+                pictures[camera.name] = self._composer.compose(
+                    subject.span[0] if moment.frame is None else moment.frame,
+                    camera.name,
+                    options.overlays,
+                    pose=moment.pose,
+                    clouds=records,
+                    limbs=subject.chosen_limbs(options),
+                    height=round(camera.height * shrink),
+                )
+            except StudioError:
+                continue
+        with self._server.atomic():
+            self.cameras.hang(pictures)
+            self.cameras.show(tokens, options.cameras, options.pictures, selection.look_through)
+
+    def look_at_person(self, *, move_viewers: bool) -> None:
+        """Where a viewer begins: in front of the person, between two cameras, a little above the eyes' height."""
+        position, middle = first_view(
+            self._person * METRES_PER_MM,
+            [camera.centre * METRES_PER_MM for camera in self._opened.cameras],
+        )
+        view = self._server.initial_camera
+        view.position, view.look_at, view.fov = position, middle, _FIELD_OF_VIEW
+        for client in self._server.get_clients().values() if move_viewers else ():
+            with client.atomic():
+                client.camera.position, client.camera.look_at = position, middle
+
+    def _read_trails(self, model: Model) -> None:
+        """Take the poses of the shown track, once they changed and not too often."""
+        track, frames = self._opened.track_key(model.options.track), model.frames
+        now = time.monotonic()
+        is_due = frames is not self._trails_of[1] and now - self._trails_read >= TRAIL_SECONDS
+        if track != self._trails_of[0] or is_due:
+            self.trails.set_poses(*self._opened.poses(track[0]))
+            self._trails_of, self._trails_read = (track, frames), now
+
+
+def first_view(person: Array, cameras: list[Array]) -> tuple[Array, Array]:
+    """A place to look from (3,) and at (3,), metres. person : (K, 3) its limbs' ends. cameras : their centres (3,)."""
+    middle = (person.min(axis=0) + person.max(axis=0)) / 2.0 + _LOOK_HIGHER
+    height = float(np.ptp(person[:, 2]))
+    away = [float(np.linalg.norm(centre - middle)) for centre in cameras]
+    wanted = max(2.3 * height, 1.1 * float(np.mean(away)) if away else 0.0)
+    distance = float(np.clip(wanted, _LEAST_DISTANCE, _MOST_DISTANCE))
+    # Towards the gap between the first camera and its neighbour.
+    bearings = [float(np.arctan2(centre[1] - middle[1], centre[0] - middle[0])) for centre in cameras]
+    gaps = [np.mod(other - bearings[0], 2.0 * np.pi) for other in bearings[1:]]
+    half = min(gaps) / 2.0 if gaps and 0.2 < min(gaps) < 2.6 else 0.5
+    bearing = bearings[0] + half if bearings else 0.0
+    toward = np.array([np.cos(bearing), np.sin(bearing), _VIEW_ELEVATION])
+    return middle + distance * toward, middle

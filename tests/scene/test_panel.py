@@ -1,0 +1,278 @@
+"""The panel: made from declarations, reporting what a person does and nothing else, showing what the model says."""
+
+import dataclasses
+import math
+from collections.abc import Mapping
+
+import pytest
+from scene_fakes import Posted, by_hand, press, settle_viser
+from swaying_session import FPS, swaying_pose
+
+from studio.body.dragging import Dragger
+from studio.body.model import BodyModel
+from studio.knobs import Value, knobs_of
+from studio.runs.colour_tokens import colour_tokens
+from studio.scene import model as scene
+from studio.scene.controls import Control
+from studio.scene.guarded_server import GuardedServer
+from studio.scene.model import Knobs, Model
+from studio.scene.opened_run import Moment
+from studio.scene.panel import clock, mark_html, search_html, status_html
+from studio.scene.pose_edit import begun, edit_of, moved
+from studio.scene.pose_panel import PosePanel
+from studio.scene.settings_panel import NO_PRESET, SettingsPanel, knob_value, since_in_words, slider_range
+from studio.scene.show_panel import ShowPanel, legend_html
+from studio.settings import all_knobs, changed_settings, default_settings, values
+from studio.tracking.catalogue import TRACKERS, presets
+from studio.tracking.settings import AnnealedSettings
+from studio.worker.events import StateChanged
+
+DEFAULTS = values(default_settings())
+STATE = StateChanged("walk", "run 7", "tracking", 128, 3, 0, 450, 128, 41.234, 8.2)
+
+
+def model_of(body: BodyModel) -> Model:
+    """Run "run 7" of "walk", with the default settings."""
+    subject = scene.Subject(body, (), (0, 450), FPS, Dragger(body), None)
+    edit = edit_of(swaying_pose(body, 0))
+    return scene.opened(Model(STATE), "walk", "run 7", subject, range(128), default_settings(), edit)
+
+
+@pytest.fixture
+def posted(human: BodyModel) -> Posted:
+    return Posted(model_of(human))
+
+
+class Settings:
+    """A settings panel and what it requests."""
+
+    def __init__(self, server: GuardedServer, posted: Posted) -> None:
+        self.posted, self.requests = posted, []
+        tabs = [server.gui.add_tab_group().add_tab(name) for name in ("Search", "Weighting", "Masks")]
+        self.panel = SettingsPanel(server.gui, *tabs, posted.post, self.request)
+        self.show(Knobs(default_settings()))
+
+    def request(self, model: Model, changes: Mapping[str, Value]) -> Model:
+        self.requests.append(dict(changes))
+        return model
+
+    def show(self, knobs: Knobs) -> None:
+        self.panel.show(knobs)
+
+    def move(self, name: str, value: object) -> None:
+        by_hand(self.panel.inputs[name].handle, value)
+        self.posted.happen()
+
+
+@pytest.fixture
+def settings(server: GuardedServer, posted: Posted) -> Settings:
+    return Settings(server, posted)
+
+
+def test_a_control_reports_a_person_and_shows_the_model(server: GuardedServer, posted: Posted) -> None:
+    moves: list[float] = []
+
+    def change(model: Model, value: float) -> Model:
+        moves.append(value)
+        return model
+
+    handle = server.gui.add_slider("a", 0.0, 1.0, 0.1, 0.5)
+    control = Control(handle, posted.post, change)
+    control.show(0.3)
+    settle_viser(server)
+    assert (handle.value, posted.waiting) == (0.3, []), "what is shown is reported by nobody"
+    # While a move waits to be decided on, nothing is put back under the hand, whatever else is drawn.
+    by_hand(handle, 0.7)
+    control.show(0.3)
+    by_hand(handle, 0.8)
+    control.show(0.3)
+    assert (handle.value, moves) == (0.8, []), "nothing is decided in viser's thread"
+    posted.happen()
+    assert moves == [0.7, 0.8]
+    control.show(0.3)
+    assert handle.value == 0.3, "refused: put back"
+
+
+def test_a_change_that_fails_frees_its_control(server: GuardedServer, posted: Posted) -> None:
+    def fail(model: Model, value: float) -> Model:
+        raise ZeroDivisionError
+
+    handle = server.gui.add_slider("a", 0.0, 1.0, 0.1, 0.5)
+    control = Control(handle, posted.post, fail)
+    by_hand(handle, 0.7)
+    with pytest.raises(ZeroDivisionError):
+        posted.happen()
+    control.show(0.5)
+    assert handle.value == 0.5
+
+
+def test_every_knob_has_a_control_that_says_what_it_is(settings: Settings) -> None:
+    declared = all_knobs(default_settings())
+    assert set(settings.panel.inputs) == {knob.name for knob in declared}
+    for knob in declared:
+        handle = settings.panel.inputs[knob.name].handle
+        assert knob.help in handle.hint
+        assert knob.takes_effect in handle.hint
+        assert handle.label.startswith(knob.label)
+        assert handle.disabled == (knob.takes_effect == "new run")
+        assert handle.value == knob.default
+
+
+def test_a_slider_requests_and_a_changed_value_is_marked(settings: Settings, server: GuardedServer) -> None:
+    settings.move("survival", 0.7000000000000001)
+    assert settings.requests == [{"survival": 0.7}]
+    knob = settings.panel.inputs["survival"]
+    settings.show(Knobs(default_settings(), requested={"one": {"survival": 0.7}}))
+    assert (knob.handle.label[:2], knob.reset.visible) == ("• ", True)
+    press(knob.reset, "reset")
+    settings.posted.happen()
+    assert settings.requests[1:] == [{"survival": DEFAULTS["survival"]}]
+    settings.show(Knobs(changed_settings(default_settings(), {"layers": 12}), since=(128, 2)))
+    settle_viser(server)
+    assert settings.panel.inputs["layers"].handle.value == 12
+    assert (knob.handle.value, knob.handle.label[:2]) == (DEFAULTS["survival"], "su")
+    assert "frame 128, layer 3" in settings.panel.since.content
+    assert "as the run began" in since_in_words(Knobs(default_settings()))
+    assert len(settings.requests) == 2
+
+
+def test_presets_and_resets_are_one_request(settings: Settings) -> None:
+    careful = next(preset for preset in presets() if preset.name == "careful")
+    assert settings.panel.preset is not None
+    by_hand(settings.panel.preset.handle, "careful")
+    settings.posted.happen()
+    assert settings.requests == [dict(careful.values)]
+    settings.show(Knobs(changed_settings(default_settings(), careful.values)))
+    assert settings.panel.preset.handle.value == NO_PRESET
+    button, declared = settings.panel._resets[0]
+    assert (button.visible, button.label) == (True, "Reset 2 to their defaults")
+    press(button)
+    settings.posted.happen()
+    assert settings.requests[1] == {knob.name: knob.default for knob in declared}
+    assert not any(knob.takes_effect == "new run" for knob in declared)
+
+
+def test_another_tracker_gets_other_controls_and_presets(settings: Settings) -> None:
+    for tracker in TRACKERS.values():
+        for preset in tracker.presets:
+            assert changed_settings(default_settings(tracker.name), preset.values) is not None
+
+    def offered(tracker: str) -> tuple[str, ...]:
+        settings.show(Knobs(default_settings(tracker)))
+        preset = settings.panel.preset
+        return () if preset is None else tuple(preset.handle.options[1:])
+
+    assert offered("swarm") == ("paper, swarm",)
+    assert offered("annealed") == tuple(preset.name for preset in TRACKERS["annealed"].presets)
+    assert offered("condensation") == ()
+    assert "survival" not in settings.panel.inputs
+    assert "scale_survival" in settings.panel.inputs
+
+
+def test_sliders_begin_at_round_numbers_and_hold_every_default() -> None:
+    for knob in knobs_of(AnnealedSettings):
+        if knob.kind in (int, float) and knob.low is not None:
+            low, high, step = slider_range(knob, knob.default)
+            assert low <= knob.default <= high
+            assert math.isclose((knob.default - low) / step, round((knob.default - low) / step), abs_tol=1e-6)
+            assert knob_value(knob, low) >= knob.low
+
+
+def test_a_slider_drawn_to_its_end_grows(settings: Settings) -> None:
+    handle = settings.panel.inputs["particles"].handle
+    assert handle.max == 1000
+    for particles, most in ((1000, 2000), (20000, 20000)):
+        settings.show(Knobs(changed_settings(default_settings(), {"particles": particles})))
+        assert handle.max >= most
+        assert handle.value == particles
+
+
+def test_the_show_tab_changes_options_and_follows_them(server: GuardedServer, posted: Posted) -> None:
+    panel = ShowPanel(server.gui, server.gui.add_tab_group().add_tab("Show"), posted.post)
+    moment, tokens = Moment(0, None, None, (), 4, None), colour_tokens()
+
+    def show() -> None:
+        panel.show(posted.model, moment, tokens)
+        settle_viser(server)
+
+    show()
+    assert panel.inputs["point_size"].handle.value == 12
+    by_hand(panel.inputs["point_size"].handle, 20)
+    by_hand(panel.inputs["truth"].handle, False)
+    by_hand(panel.ticks["overlays", "mask"].handle, True)
+    by_hand(panel.ticks["limbs", "head"].handle, False)
+    options = posted.happen().options
+    assert (options.point_size, options.truth, options.overlays) == (
+        pytest.approx(0.02),
+        False,
+        ("outline", "mask"),
+    )
+    assert options.limbs is not None
+    assert "head" not in options.limbs
+    posted.model = scene.change_options(posted.model, {"limbs": None, "hull": True, "overlays": ()})
+    show()
+    assert panel.ticks["limbs", "head"].handle.value
+    assert not panel.ticks["overlays", "outline"].handle.value
+    assert panel.inputs["hull"].handle.value
+    assert posted.waiting == [], "showing options asks for none"
+    assert not panel.inputs["blobs"].handle.visible
+    posted.model = dataclasses.replace(posted.model, knobs=Knobs(default_settings("annealed", "blobs")))
+    show()
+    assert panel.inputs["blobs"].handle.visible, "offered where the run is weighed by them"
+    assert "layer 4" in panel.legend.content
+    assert "truth" in legend_html(tokens, "weight", 4, truth=True)
+
+
+def test_the_pose_tab_speaks_degrees_and_asks_in_radians(
+    server: GuardedServer, human: BodyModel, posted: Posted
+) -> None:
+    tab = server.gui.add_tab_group().add_tab("Pose")
+    panel = PosePanel(server.gui, tab, posted.post, lambda model: model, lambda model: model)
+    panel.show(posted.model)
+    assert len(panel.sliders) == 31
+    assert not panel.back.visible
+    by_hand(panel.sliders[9].handle, -30.0)
+    by_hand(panel.grip.handle, "left forearm")
+    edit = posted.happen().edit
+    assert edit is not None
+    assert (edit.active, edit.grip, edit.pose[9]) == (
+        True,
+        "left forearm",
+        pytest.approx(math.radians(-30.0)),
+    )
+    pose = swaying_pose(human, 2)
+    pose[4] += 123.0
+    posted.model = scene.edit_pose(posted.model, lambda edit: moved(begun(edit), pose))
+    panel.show(posted.model)
+    settle_viser(server)
+    assert posted.waiting == []
+    assert panel.sliders[4].handle.value == pytest.approx(pose[4], abs=0.05)
+    assert panel.back.visible
+    assert not panel.save.disabled
+    assert not panel.whole.visible, "a body without sides is not mirrored"
+    by_hand(panel.grip.handle, "none")
+    press(panel.back, "undo")
+    edit = posted.happen().edit
+    assert edit is not None
+    assert (edit.grip, edit.pose[9]) == ("", pytest.approx(math.radians(-30.0)))
+
+
+def test_the_runs_status_in_words(posted: Posted) -> None:
+    text = status_html(posted.model)
+    assert "walk / run 7" in text
+    assert "41.2 fps" in text
+    assert "0:08 left" in text
+    lost = dataclasses.replace(STATE, state="lost", message="It died.", hint="Resume.")
+    assert "It died." in search_html(lost)
+    assert "No run" in search_html(dataclasses.replace(STATE, session="", run=""))
+    other = dataclasses.replace(posted.model, search=dataclasses.replace(STATE, run="run 8"))
+    assert "stored · 128 of 450 frames" in status_html(other)
+    assert clock(3725) == "1:02:05"
+
+
+def test_a_frame_that_did_not_simply_go_on_says_so(posted: Posted) -> None:
+    tokens, moment = colour_tokens(), Moment(0, None, None, (), 4, None, tracking="limb lost")
+    assert "a limb is off" in mark_html(posted.model, moment, tokens)
+    assert mark_html(posted.model, dataclasses.replace(moment, tracking="tracked"), tokens) == ""
+    found = scene.edit_pose(posted.model, lambda edit: begun(edit, found="confidence 92 %"))
+    assert "confidence 92 %" in mark_html(found, moment, tokens)
