@@ -26,9 +26,10 @@ from studio.numba_in_threads import numba
 from studio.progress import Progress
 from studio.weighting.bodytrack import BodytrackSettings, BodytrackWeigher
 from studio.weighting.edge_region import EdgeRegionProblem, EdgeRegionSettings, EdgeRegionWeigher
-from studio.weighting.edge_region_kernels import LANES, loads_only
+from studio.weighting.edge_region_kernels import loads_only
 from studio.weighting.edge_region_silhouette import EdgeRegionSilhouetteSettings, EdgeRegionSilhouetteWeigher
 from studio.weighting.edge_silhouette import EdgeSilhouetteSettings, EdgeSilhouetteWeigher
+from studio.weighting.outline_kernels import LANES
 from studio.weighting.outlines import OutlineProjector
 from studio.weighting.problem import FrameFunction
 from studio.weighting.silhouette_areas import FULL, HALF
@@ -175,7 +176,7 @@ def limit_contest(problem: EdgeRegionProblem, poses: Array) -> Contest:
     def load() -> NDArray[np.int64]:
         for block in range(blocks):
             one = slice(block, block + 1)
-            loads_only(maps.values, maps.views, edge_pairs[one], region_pairs[one], LIMIT_PASSES, sums[one])
+            loads_only(maps, edge_pairs[one], region_pairs[one], LIMIT_PASSES, sums[one])
         return sums
 
     return Contest("limit", load, blocks * LANES * LIMIT_PASSES)

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.sparse import csr_matrix, lil_matrix
 
+from studio.geometry.projection import distorted
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
@@ -64,11 +66,8 @@ def predicted(bundle: Bundle, seen: Observations) -> Array:
     local = rotated(camera[:, :3], world) + camera[:, 3:]
     depth = np.maximum(local[:, 2], 1.0)
     x, y = local[:, 0] / depth, local[:, 1] / depth
-    fx, fy, cx, cy, k1, k2, p1, p2, k3 = bundle.lenses[seen.camera].T
-    r2 = x * x + y * y
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    across = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
-    down = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+    fx, fy, cx, cy, *lens = bundle.lenses[seen.camera].T
+    across, down, _ = distorted(x, y, lens)
     return np.column_stack([fx * across + cx, fy * down + cy])
 
 

@@ -1,5 +1,7 @@
 """World points to pixels, by the distortion model of the Bouguet toolbox and OpenCV."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,12 +19,20 @@ def project(camera: Camera, points: Array) -> tuple[Array, Array]:
     seen = points @ camera.rotation.T + camera.translation
     depth = seen[..., 2]
     safe = np.where(depth > 0.0, depth, np.nan)
-    x, y = seen[..., 0] / safe, seen[..., 1] / safe
-    k1, k2, p1, p2, k3 = camera.distortion
-    r2 = x * x + y * y
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    xd = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
-    yd = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+    xd, yd, _ = distorted(seen[..., 0] / safe, seen[..., 1] / safe, camera.distortion)
     m = camera.matrix
     pixels = np.stack([m[0, 0] * xd + m[0, 1] * yd + m[0, 2], m[1, 1] * yd + m[1, 2]], axis=-1)
     return pixels, depth
+
+
+def distorted(x: Any, y: Any, lens: Any) -> tuple[Any, Any, Any]:  # noqa: ANN401 - numbers or arrays
+    """Where the lens shows what lies at x, y (at depth 1), and the radial factor there; kernels compile this too.
+
+    lens : k1 k2 p1 p2 k3.
+    """
+    k1, k2, p1, p2, k3 = lens
+    square = x * x + y * y
+    radial = 1.0 + square * (k1 + square * (k2 + square * k3))
+    xd = x * radial + 2.0 * p1 * x * y + p2 * (square + 2.0 * x * x)
+    yd = y * radial + p1 * (square + 2.0 * y * y) + 2.0 * p2 * x * y
+    return xd, yd, radial
