@@ -40,13 +40,13 @@ __all__ = [
 _everything_numba_loads: Any = cpu_target.target_context
 _everything_numba_loads.refresh()
 
-KERNEL = {"cache": True, "nogil": True}
+KERNEL: dict[str, Any] = {"cache": True, "nogil": True}
 """Options of every kernel: it is compiled once on a machine, and other threads go on meanwhile."""
-EXACT = {**KERNEL, "error_model": "numpy"}
+EXACT: dict[str, Any] = {**KERNEL, "error_model": "numpy"}
 """Dividing by zero gives infinity, as in NumPy."""
-CONTRACTED = {**EXACT, "fastmath": {"contract", "nsz"}}
+CONTRACTED: dict[str, Any] = {**EXACT, "fastmath": {"contract", "nsz"}}
 """Products and sums may be rounded together."""
-FAST = {**EXACT, "fastmath": {"contract", "reassoc", "nsz", "arcp", "afn"}}
+FAST: dict[str, Any] = {**EXACT, "fastmath": {"contract", "reassoc", "nsz", "arcp", "afn"}}
 """Sums may be made in any order, so that all of it vectorises. Not a number and infinity keep their meaning (no
 `nnan`, `ninf`): a point that cannot be projected must compare as unseen."""
 EXACT_INLINED, CONTRACTED_INLINED, FAST_INLINED = (
@@ -84,4 +84,4 @@ def parallel_blocks(kernel: Callable[..., None], blocks: int, least: int, *argum
 
 @functools.cache
 def _helpers() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(numba.config.NUMBA_NUM_THREADS, "kernel")
+    return ThreadPoolExecutor(thread_name_prefix="kernel")

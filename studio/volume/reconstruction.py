@@ -64,6 +64,7 @@ class Reconstructor:
         self._first, self._first_states, most = self._start()
         self._heights = radical_inverses(most)
         polynomial = fitted_thresholds(most, settings.hull_confidence)
+        constant, linear, square = polynomial.coefficients
         self._rules = kernels.Rules(
             last=False,
             least_views=min(settings.hull_least_views, len(cameras)),
@@ -72,7 +73,7 @@ class Reconstructor:
             shadow=float(settings.hull_shadow),
             deepest=float(settings.hull_deepest_shadow),
             single=polynomial.single,
-            polynomial=(*map(float, polynomial.coefficients),),
+            polynomial=(float(constant), float(linear), float(square)),
         )
         self._packed: tuple[tuple[YuvBackground, ...], NDArray[np.float32]] | None = None
 

@@ -23,15 +23,14 @@ from numpy.typing import NDArray
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
-from studio.knobs import knob
+from studio.knobs import next_frame_knob
 from studio.numba_in_threads import parallel_blocks
 from studio.weighting.bodytrack_kernels import EDGE_STEP, score_blocks
 from studio.weighting.edge_region_kernels import CHUNK
-from studio.weighting.evidence_check import check_sizes, check_views
-from studio.weighting.hard_priors import HardPriors
+from studio.weighting.evidence_check import check_views
 from studio.weighting.outline_kernels import LANES
-from studio.weighting.outlines import OutlineProjector
 from studio.weighting.picture_maps import Maps, joined_maps
+from studio.weighting.problem import Preparation, PreparedProblem
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -50,11 +49,11 @@ class BodytrackSettings:
 
     title: ClassVar[str] = "Benchmark's score"
 
-    score_edge_weight: float = knob(
-        1.0, 0.0, 5.0, 0.05, takes_effect="next frame", help="Weight of E_edge; the benchmark's is 1."
+    score_edge_weight: float = next_frame_knob(
+        1.0, 0.0, 5.0, 0.05, help="Weight of E_edge; the benchmark's is 1."
     )
-    score_inside_weight: float = knob(
-        1.0, 0.0, 5.0, 0.05, takes_effect="next frame", help="Weight of E_inside; the benchmark's is 1."
+    score_inside_weight: float = next_frame_knob(
+        1.0, 0.0, 5.0, 0.05, help="Weight of E_inside; the benchmark's is 1."
     )
 
 
@@ -71,14 +70,8 @@ class Score:
     inside_samples: int
 
 
-class BodytrackWeigher:
-    """Makes the problem of any frame; holds nothing that changes."""
-
-    def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: BodytrackSettings) -> None:
-        check_sizes(cameras)
-        self.settings, self.cameras = settings, cameras
-        self.projector = OutlineProjector.of_body(body, cameras)
-        self.priors = HardPriors(body)
+class BodytrackWeigher(Preparation):
+    """Makes the problem of any frame."""
 
     def problem(self, evidence: FrameEvidence) -> "BodytrackProblem":
         """One frame as a function of poses; its edge maps are the benchmark's.
@@ -89,11 +82,11 @@ class BodytrackWeigher:
         return BodytrackProblem(self, score_maps(evidence))
 
 
-class BodytrackProblem:
+class BodytrackProblem(PreparedProblem):
     """One frame as a function of poses."""
 
     def __init__(self, weigher: BodytrackWeigher, maps: Maps) -> None:
-        self.weigher, self.maps = weigher, maps
+        self.weigher, self.priors, self.maps = weigher, weigher.priors, maps
 
     def weigh(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights. Raises BodyError for poses that are no finite (N, D)."""
@@ -118,14 +111,6 @@ class BodytrackProblem:
         edge, inside, counts = self.terms(np.asarray(pose, dtype=np.float64)[None])
         both = float(edge[0]), float(inside[0])
         return Score(both[0] + both[1], *both, int(counts[0, 0]), int(counts[0, 1]))
-
-    def fitness(self, poses: Array, stage: int = 0) -> Array:
-        """(N,) the log-weights of poses (N, D): this weighting defines no other fitness."""
-        return self.weigh(poses, stage)
-
-    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
-        """(N, D) poses to (N,) whether the body can take them."""
-        return self.weigher.priors.hold(poses, limbs_apart)
 
     @property
     def _capacity(self) -> int:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.knobs import knob
+from studio.knobs import next_frame_knob
 from studio.numba_in_threads import parallel_blocks
 from studio.weighting.area_kernels import ROWS, WINDOW_STEP, WORD, area_blocks
 from studio.weighting.outline_kernels import LANES
@@ -34,10 +34,9 @@ BLOCKS_A_THREAD = 16
 
 def resolution_knob() -> Any:  # noqa: ANN401 - as `knob` itself
     """The knob of the silhouettes' resolution, the same for all weightings that have it."""
-    return knob(
+    return next_frame_knob(
         HALF,
         choices=(HALF, FULL),
-        takes_effect="next frame",
         help="Resolution of the silhouettes' areas; half orders poses as full does and is nearly twice as fast.",
     )
 
