@@ -57,6 +57,10 @@ def knob(
     return field(default=default, metadata={"knob": declared})
 
 
+next_frame_knob = functools.partial(knob, takes_effect="next frame")
+"""A knob of what is made once a frame: it takes effect with the next."""
+
+
 @functools.cache
 def knobs_of(settings_type: type) -> tuple[Knob, ...]:
     """The knobs of a settings class, in the order of their lines; `group` is the class's `title` attribute."""

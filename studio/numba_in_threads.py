@@ -1,15 +1,18 @@
-"""Numba as a program of several threads may use it. Everything imports it from here.
+"""Numba as a program of several threads uses it: kernels, their options and their threads come from here.
 
 **Loaded whole.** Numba loads seventy of its modules when a kernel is first called. One of them adds to the table in
 which another thread, on its way to Numba's own lock with a kernel of its own, may be looking up the type of a number:
 "dictionary changed size during iteration" (numba 0.68, where two threads make a frame's masks). So they are loaded
 here, before there is a kernel to call.
 
-**One parallel kernel at a time.** Numba's plain thread pool aborts the process when two Python threads launch parallel
-kernels at once, so whoever launches one (`with ONE_LAUNCH:`) holds this lock. A kernel may launch no other inside.
+**Plain threads.** `parallel_blocks` runs a kernel on Python's threads, which it lets go of the interpreter for. Numba's
+own parallel kernels would have to be compiled a second time, abort the process when two threads launch them at once,
+and wait for a thread that a busy machine has no core for.
 """
 
-import threading
+import functools
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numba
@@ -18,9 +21,67 @@ from numba.core import types
 from numba.core.registry import cpu_target
 from numba.extending import intrinsic
 
-__all__ = ["ONE_LAUNCH", "intrinsic", "njit", "numba", "prange", "types"]
+__all__ = [
+    "CONTRACTED",
+    "CONTRACTED_INLINED",
+    "EXACT",
+    "EXACT_INLINED",
+    "FAST",
+    "FAST_INLINED",
+    "KERNEL",
+    "intrinsic",
+    "njit",
+    "numba",
+    "parallel_blocks",
+    "prange",
+    "types",
+]
 
 _everything_numba_loads: Any = cpu_target.target_context
 _everything_numba_loads.refresh()
 
-ONE_LAUNCH = threading.Lock()
+KERNEL: dict[str, Any] = {"cache": True, "nogil": True}
+"""Options of every kernel: it is compiled once on a machine, and other threads go on meanwhile."""
+EXACT: dict[str, Any] = {**KERNEL, "error_model": "numpy"}
+"""Dividing by zero gives infinity, as in NumPy."""
+CONTRACTED: dict[str, Any] = {**EXACT, "fastmath": {"contract", "nsz"}}
+"""Products and sums may be rounded together."""
+FAST: dict[str, Any] = {**EXACT, "fastmath": {"contract", "reassoc", "nsz", "arcp", "afn"}}
+"""Sums may be made in any order, so that all of it vectorises. Not a number and infinity keep their meaning (no
+`nnan`, `ninf`): a point that cannot be projected must compare as unseen."""
+EXACT_INLINED, CONTRACTED_INLINED, FAST_INLINED = (
+    {**options, "forceinline": True} for options in (EXACT, CONTRACTED, FAST)
+)
+
+TURNS = 4
+"""How often each thread takes blocks, if all are equally quick."""
+
+
+def parallel_blocks(kernel: Callable[..., None], blocks: int, least: int, *arguments: object) -> None:
+    """Run kernel(first, last, *arguments) over blocks 0 to `blocks` - 1, on as many threads as
+    `numba.get_num_threads()` says and get enough of them. What comes out of a block may not depend on the others.
+
+    least : blocks that are worth a thread. Threads take a few at a time; one that is scheduled late (a browser that
+    draws the scene may have all cores) finds them done by the others and is not waited for.
+    """
+    threads = min(int(numba.get_num_threads()), blocks // least)
+    if threads <= 1:
+        kernel(0, blocks, *arguments)
+        return
+    step = -(-blocks // (TURNS * threads))
+    firsts = iter(range(0, blocks, step))
+
+    def work() -> None:
+        for first in firsts:
+            kernel(first, min(first + step, blocks), *arguments)
+
+    helpers = [_helpers().submit(work) for _ in range(threads - 1)]
+    work()
+    for helper in helpers:
+        if not helper.cancel():
+            helper.result()
+
+
+@functools.cache
+def _helpers() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(thread_name_prefix="kernel")

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.numba_in_threads import numba
+from studio.numba_in_threads import KERNEL, njit
 
 Array = NDArray[np.float64]
 
@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 NOTHING = -40.0
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def shares_of(log_densities: Array, log_weight: float, totals: Array) -> Array:
     """(n,) probabilities that the points belong to a component. log_densities, totals : (n,), logs."""
     found = np.zeros(len(totals))
@@ -24,7 +24,7 @@ def shares_of(log_densities: Array, log_weight: float, totals: Array) -> Array:
     return found
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def sum_of_others(log_densities: Array, log_weights: Array, number: int, point: int) -> float:
     """Log of the density that all components but one give a point."""
     largest = -np.inf
@@ -40,7 +40,7 @@ def sum_of_others(log_densities: Array, log_weights: Array, number: int, point: 
     return largest + math.log(total)
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def replace_component(
     log_densities: Array, log_weights: Array, number: int, densities: Array, log_weight: float, totals: Array
 ) -> None:
@@ -65,7 +65,7 @@ def replace_component(
         totals[point] = largest + math.log(math.exp(rest - largest) + math.exp(joint - largest))
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def losses_without(log_densities: Array, log_weights: Array, totals: Array) -> Array:
     """(k,) by how much the points' log-likelihood falls without each component, the others sharing its weight."""
     size, count = log_densities.shape

@@ -5,13 +5,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.numba_in_threads import numba
+from studio.numba_in_threads import KERNEL, njit
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def squared_distance(point: Array, mean: Array, whitener: Array) -> float:
     """Squared Mahalanobis distance. point, mean : (p,). whitener : (p, p) lower triangular."""
     total = 0.0
@@ -23,7 +23,7 @@ def squared_distance(point: Array, mean: Array, whitener: Array) -> float:
     return total
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def choose_arcs(
     points: Array, states: IntArray, luck: Array, free: NDArray[np.bool_],
     first: IntArray, symbols: IntArray, log_probabilities: Array,
@@ -62,7 +62,7 @@ def choose_arcs(
     return chosen
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def rooted_noise(roots: Array, labels: IntArray, normals: Array) -> Array:
     """(N, q) normals (N, q) times the symmetric square root (K, q, q) of each particle's cluster."""
     found = np.empty_like(normals)

@@ -27,11 +27,12 @@ from studio.synthesis.arm_footage import filled
 from studio.synthesis.cameras import ring_camera
 from studio.weighting.bodytrack import BodytrackSettings, BodytrackWeigher
 from studio.weighting.edge_region import EdgeRegionProblem, EdgeRegionSettings, EdgeRegionWeigher
-from studio.weighting.edge_region_kernels import LANES, loads_only
+from studio.weighting.edge_region_kernels import loads_only
 from studio.weighting.edge_region_silhouette import EdgeRegionSilhouetteSettings, EdgeRegionSilhouetteWeigher
 from studio.weighting.edge_silhouette import EdgeSilhouetteSettings, EdgeSilhouetteWeigher
+from studio.weighting.outline_kernels import LANES
 from studio.weighting.outlines import OutlineProjector
-from studio.weighting.problem import FrameFunction
+from studio.weighting.problem import FrameProblem
 from studio.weighting.silhouette_areas import FULL, HALF
 from studio.weighting.template import TemplateSettings, TemplateWeigher
 
@@ -130,7 +131,7 @@ def weighing_contests(
 ) -> list[Contest]:
     """Every weighting on one thread, edge-region on two as well."""
     aware = EdgeRegionWeigher(body, cameras, EdgeRegionSettings(occlusion_aware=True))
-    problems: dict[str, FrameFunction] = {
+    problems: dict[str, FrameProblem] = {
         "edge_region": problem,
         "edge_region_occlusion_aware": aware.problem(evidence["proximity"]),
         "bodytrack": BodytrackWeigher(body, cameras, BodytrackSettings()).problem(evidence["bodytrack"]),
@@ -146,9 +147,9 @@ def weighing_contests(
 
 def silhouette_problems(
     body: BodyModel, cameras: tuple[Camera, ...], evidence: FrameEvidence
-) -> dict[str, FrameFunction]:
+) -> dict[str, FrameProblem]:
     """The weightings that look at the bidirectional silhouette, at half and at full resolution."""
-    found: dict[str, FrameFunction] = {}
+    found: dict[str, FrameProblem] = {}
     for resolution in (HALF, FULL):
         edges = EdgeSilhouetteSettings(silhouette_resolution=resolution)
         three = EdgeRegionSilhouetteSettings(silhouette_resolution=resolution)
@@ -173,7 +174,7 @@ def limit_contest(problem: EdgeRegionProblem, poses: Array) -> Contest:
     def load() -> NDArray[np.int64]:
         for block in range(blocks):
             one = slice(block, block + 1)
-            loads_only(maps.values, maps.views, edge_pairs[one], region_pairs[one], LIMIT_PASSES, sums[one])
+            loads_only(maps, edge_pairs[one], region_pairs[one], LIMIT_PASSES, sums[one])
         return sums
 
     return Contest("limit", load, blocks * LANES * LIMIT_PASSES)
@@ -189,5 +190,5 @@ def timed(contests: list[Contest], repeats: int, progress: Progress | None) -> d
     )
 
 
-def _weighing(problem: FrameFunction, poses: Array) -> Callable[[], object]:
+def _weighing(problem: FrameProblem, poses: Array) -> Callable[[], object]:
     return lambda: problem.weigh(poses)

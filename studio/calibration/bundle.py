@@ -64,8 +64,8 @@ def predicted(bundle: Bundle, seen: Observations) -> Array:
     local = rotated(camera[:, :3], world) + camera[:, 3:]
     depth = np.maximum(local[:, 2], 1.0)
     x, y = local[:, 0] / depth, local[:, 1] / depth
-    fx, fy, cx, cy, *coefficients = bundle.lenses[seen.camera].T
-    across, down = distorted(x, y, coefficients)
+    fx, fy, cx, cy, *lens = bundle.lenses[seen.camera].T
+    across, down, _ = distorted(x, y, lens)
     return np.column_stack([fx * across + cx, fy * down + cy])
 
 

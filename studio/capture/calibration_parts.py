@@ -11,6 +11,7 @@ import numpy as np
 from studio.arrays import Array
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
+from studio.geometry.projection import distorted
 
 DISTORTION_NUMBERS = (4, 5)
 FOCAL_SHARES = (0.1, 100.0)
@@ -169,14 +170,10 @@ def _check_distortion(where: str, width: int, height: int, matrix: Array, distor
     xs, ys = (np.array([0.0, 0.5, 1.0]) * side for side in (width, height))
     x = (np.repeat(xs, 3) - matrix[0, 2]) / matrix[0, 0]
     y = (np.tile(ys, 3) - matrix[1, 2]) / matrix[1, 1]
-    k1, k2, p1, p2, k3 = distortion
-    square = x * x + y * y
-    radial = 1.0 + square * (k1 + square * (k2 + square * k3))
-    sideways = np.hypot(
-        2.0 * p1 * x * y + p2 * (square + 2.0 * x * x), p1 * (square + 2.0 * y * y) + 2.0 * p2 * x * y
-    )
+    xd, yd, radial = distorted(x, y, distortion)
+    sideways = np.hypot(xd - x * radial, yd - y * radial)
     low, high = RADIAL_FACTORS
-    if radial.min() < low or radial.max() > high or np.any(sideways > LARGEST_TANGENTIAL * np.sqrt(square)):
+    if radial.min() < low or radial.max() > high or np.any(sideways > LARGEST_TANGENTIAL * np.hypot(x, y)):
         raise CalibrationError(
             f"{where}: the distortions {', '.join(f'{value:.4g}' for value in distortion)} tear the picture apart.",
             "Check their order (k1 k2 p1 p2 k3), or calibrate again.",

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.evidence.settings import EvidenceSettings
-from studio.numba_in_threads import njit
+from studio.numba_in_threads import EXACT, KERNEL, njit
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]
@@ -155,7 +155,7 @@ def gaussian_from_median(frames: Bytes) -> GaussianBackground:
     return GaussianBackground(median.reshape(shape), deviation.reshape(shape))
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def median_and_distance(values):
     """Median of each column and the median distance from it. values : (K, P) uint8. Returns two (P,)
     float32."""
@@ -173,7 +173,7 @@ def median_and_distance(values):
     return median, distance
 
 
-@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+@njit(**EXACT, fastmath=True)
 def differing_pixels(picture, mean, variance, gain, threshold, noise, darkest, colour):
     """255 where a colour differs by more than sqrt(threshold) deviations and the pixel is no shadow.
 

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from studio.evidence.background import GaussianBackground
 from studio.evidence.colour_fit import fitted_line
-from studio.numba_in_threads import njit
+from studio.numba_in_threads import KERNEL, njit
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]
@@ -213,7 +213,7 @@ def background_nearby(frames: Bytes, mean: Floats, unsure: Bytes, factor: float 
     return shares
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def agreeing_frames(frames, low, high):
     """Mean and deviation (H, W, 3) float32 over the frames between low and high, and their number (H, W).
 
@@ -247,7 +247,7 @@ def agreeing_frames(frames, low, high):
     return mean, deviation, agreeing
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def fill_from_most_alike(frames, unsure, shares, mean, deviation):
     """Fill mean and deviation (H, W, 3) where unsure (H, W) from the frames that agree with the best one.
 
@@ -283,7 +283,7 @@ def fill_from_most_alike(frames, unsure, shares, mean, deviation):
                 deviation[y, x, c] = np.sqrt(max(squares / most - (total / most) ** 2, 0.0))
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def fill_finely(plate, frames, top, wanted, origin, shares, gains, offsets, fewest, out):
     """`Combination.fill`: what was found of coarse pictures, pixel by pixel of finer ones."""
     count, rows, width = frames.shape[:3]
@@ -345,7 +345,7 @@ def fill_finely(plate, frames, top, wanted, origin, shares, gains, offsets, fewe
                 out[y, x, c] = np.uint8(mode / most_votes + 0.5)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(**KERNEL, inline="always")
 def is_near(values, k, j):
     """Whether rows k and j of values (K, 3) differ by at most AGREES in each colour."""
     return (

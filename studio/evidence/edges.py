@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.numba_in_threads import njit
+from studio.numba_in_threads import KERNEL, njit
 
 Bytes = NDArray[np.uint8]
 
@@ -67,7 +67,7 @@ def bodytrack_taps() -> NDArray[np.float32]:
     return (weights / weights.sum()).astype(np.float32)
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def edge_pixels(image, least):
     """255 where the squared magnitude of the plain Sobel sums is at least `least` (64 times Sobel / 8's).
 
@@ -88,7 +88,7 @@ def edge_pixels(image, least):
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def blur_twice_truncated(image, taps):
     """Rows, then columns, each sum of 7 in float32 cut off to 8 bits; a border of 3 pixels is 0.
 

@@ -3,11 +3,10 @@
 from dataclasses import dataclass
 
 from studio.evidence.yuv_background import LEAST_NOISE
-from studio.knobs import knob
+from studio.knobs import next_frame_knob
 
 BACKGROUND_MODELS = ("auto", "mask", "gaussian", "median", "combined", "mog2", "knn")
 HULL_EVIDENCE = ("auto", "pixels", "masks")
-NEXT_FRAME = "next frame"
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,168 +15,150 @@ class EvidenceSettings:
 
     title = "Masks and edges"
 
-    background_model: str = knob(
+    background_model: str = next_frame_knob(
         "auto",
         label="masks from",
         choices=BACKGROUND_MODELS,
-        takes_effect=NEXT_FRAME,
         help="mask: the masks that came with the footage; gaussian: difference from the plate or empty clip,"
         " else from the footage's median; median: from the footage's median; combined: the plate where the footage"
         " confirms it, what the footage shows most often where people stood in the plate; mog2, knn: OpenCV's"
         " models, trained on the empty clip, else on the footage; auto: masks that came with it, else gaussian.",
     )
-    mask_threshold: float = knob(
+    mask_threshold: float = next_frame_knob(
         4.0,
         0.5,
         30.0,
         0.25,
         label="mask threshold",
         unit="σ",
-        takes_effect=NEXT_FRAME,
         help="Foreground is what differs from the background by more than this many standard deviations.",
     )
-    mask_noise: float = knob(
+    mask_noise: float = next_frame_knob(
         4.0,
         0.5,
         40.0,
         0.5,
         label="camera noise",
         unit="grey levels",
-        takes_effect=NEXT_FRAME,
         help="Smallest standard deviation of a background pixel; raise it where the light flickers.",
     )
-    mask_gain_fit: bool = knob(
+    mask_gain_fit: bool = next_frame_knob(
         True,
         label="fit colours per frame",
-        takes_effect=NEXT_FRAME,
         help="Scale each colour of the background to each frame first: plates may be exposed differently, and cameras"
         " and lamps change while they run.",
     )
-    mask_shadow_test: bool = knob(
+    mask_shadow_test: bool = next_frame_knob(
         True,
         label="shadow test",
-        takes_effect=NEXT_FRAME,
         help="Count pixels that are only darker than the background, in its own colour, as background.",
     )
-    mask_shadow_darkest: float = knob(
+    mask_shadow_darkest: float = next_frame_knob(
         0.5,
         0.1,
         0.95,
         0.05,
         label="darkest shadow",
-        takes_effect=NEXT_FRAME,
         help="A shadow leaves at least this share of the background's brightness.",
     )
-    mask_shadow_colour: float = knob(
+    mask_shadow_colour: float = next_frame_knob(
         0.04,
         0.005,
         0.5,
         0.005,
         label="shadow colour tolerance",
-        takes_effect=NEXT_FRAME,
         help="How far a shadow's colour may lie from the background's, as a share of its brightness.",
     )
-    mask_opening: int = knob(
+    mask_opening: int = next_frame_knob(
         3,
         0,
         31,
         1,
         label="remove specks",
         unit="px",
-        takes_effect=NEXT_FRAME,
         help="Opening: specks and threads thinner than this vanish; 0 = off.",
     )
-    mask_closing: int = knob(
+    mask_closing: int = next_frame_knob(
         5,
         0,
         61,
         1,
         label="close gaps",
         unit="px",
-        takes_effect=NEXT_FRAME,
         help="Closing: gaps narrower than this are filled; 0 = off.",
     )
-    mask_fill_holes: int = knob(
+    mask_fill_holes: int = next_frame_knob(
         150,
         0,
         100000,
         50,
         label="fill holes up to",
         unit="px²",
-        takes_effect=NEXT_FRAME,
         help="Holes smaller than this area are filled; 0 = off.",
     )
-    mask_min_component: int = knob(
+    mask_min_component: int = next_frame_knob(
         150,
         0,
         100000,
         50,
         label="smallest piece",
         unit="px²",
-        takes_effect=NEXT_FRAME,
         help="Connected pieces smaller than this area are dropped; 0 = off.",
     )
-    mask_keep_components: int = knob(
+    mask_keep_components: int = next_frame_knob(
         0,
         0,
         20,
         1,
         label="pieces kept",
-        takes_effect=NEXT_FRAME,
         help="Only this many largest pieces are kept; 0 = all.",
     )
-    mask_clean_given: bool = knob(
+    mask_clean_given: bool = next_frame_knob(
         False,
         label="clean given masks",
-        takes_effect=NEXT_FRAME,
         help="Apply the clean-up also to masks that came with the footage.",
     )
-    edge_threshold: float = knob(
+    edge_threshold: float = next_frame_knob(
         6.0,
         0.5,
         60.0,
         0.5,
         label="edge threshold",
         unit="grey levels/px",
-        takes_effect=NEXT_FRAME,
         help="Weaker gradients are no edges.",
     )
-    edge_smoothing: float = knob(
+    edge_smoothing: float = next_frame_knob(
         2.0,
         0.5,
         20.0,
         0.25,
         label="edge smoothing",
         unit="px",
-        takes_effect=NEXT_FRAME,
         help="Standard deviation of the Gaussian: from how far an edge is felt.",
     )
-    edge_near_mask: int = knob(
+    edge_near_mask: int = next_frame_knob(
         0,
         0,
         100,
         1,
         label="edges near the mask",
         unit="px",
-        takes_effect=NEXT_FRAME,
         help="Forget edges further than this from the foreground; 0 = keep all, as in the paper.",
     )
-    hull_evidence: str = knob(
+    hull_evidence: str = next_frame_knob(
         "auto",
         label="hull from",
         choices=HULL_EVIDENCE,
-        takes_effect=NEXT_FRAME,
         help="What carves the visual hull: pixels tested one by one against the background's colours, as in the paper"
         " (no mask is made), or masks; auto: pixels where every camera has a plate or an empty clip and no masks.",
     )
-    hull_noise: float = knob(
+    hull_noise: float = next_frame_knob(
         LEAST_NOISE,
         0.5,
         40.0,
         0.5,
         label="hull's camera noise",
         unit="grey levels",
-        takes_effect=NEXT_FRAME,
         help="Smallest standard deviation of a background pixel where pixels carve the hull; raise it where the light"
         " flickers.",
     )

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
+from studio.geometry.projection import distorted
 
 Array = NDArray[np.float64]
 
@@ -140,12 +141,8 @@ def pixel_rays(camera: Camera, samples: int) -> NDArray[np.float32]:
     yd = (v - m[1, 2]) / m[1, 1]
     xd = (u - m[0, 2] - m[0, 1] * yd) / m[0, 0]
     x, y = xd.copy(), yd.copy()
-    k1, k2, p1, p2, k3 = camera.distortion
     for _ in range(UNDISTORT_ROUNDS if camera.distortion.any() else 0):
-        r2 = x * x + y * y
-        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-        dx = 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
-        dy = p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
-        x, y = (xd - dx) / radial, (yd - dy) / radial
+        across, down, radial = distorted(x, y, camera.distortion)
+        x, y = x + (xd - across) / radial, y + (yd - down) / radial
     ahead = np.stack([x, y, np.ones_like(x)], axis=-1) @ camera.rotation
     return (ahead / np.linalg.norm(ahead, axis=-1, keepdims=True)).astype(np.float32)

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from studio.numba_in_threads import njit
-from studio.tracking.refinement_kernels import OPTIONS, turning
+from studio.numba_in_threads import EXACT, njit
+from studio.tracking.refinement_kernels import turning
 
 FIELDS = 3
 """Columns of the counts: a limb's area, its part far outside the silhouette, silhouette far from any limb."""
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def distance_to(x, y, quad, turn):
     """Pixels from a point to a quadrilateral (4, 2) that runs round as `turn` says; 0 inside."""
     inside, nearest = True, np.inf
@@ -26,7 +26,7 @@ def distance_to(x, y, quad, turn):
     return 0.0 if inside else np.sqrt(nearest)
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def is_inside(x, y, quad, turn):
     """Whether a point lies in a quadrilateral (4, 2) that runs round as `turn` says."""
     for corner in range(4):
@@ -37,7 +37,7 @@ def is_inside(x, y, quad, turn):
     return True
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def count_limbs(quads, turns, signed, corner, size, step, far, counts):
     """Fill the first two columns of counts (L, 3) of one view: see `agreement.Disagreement`."""
     left, top = corner
@@ -62,7 +62,7 @@ def count_limbs(quads, turns, signed, corner, size, step, far, counts):
                     counts[limb, 1] += 1.0
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def count_uncovered(quads, turns, signed, corner, step, far, counts):
     """Fill the last column of counts (L, 3) of one view: silhouette that is far from every limb, at its nearest."""
     left, top = corner
@@ -86,7 +86,7 @@ def count_uncovered(quads, turns, signed, corner, step, far, counts):
                 counts[found, 2] += 1.0
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def far_points(quads, signed, corner, step, far):
     """(K, 2) grid points of one view's silhouette that are farther than `far` pixels from every limb of quads."""
     left, top = corner
@@ -107,7 +107,7 @@ def far_points(quads, signed, corner, step, far):
     return found[:count]
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def is_near(x, y, quads, turns, far):
     """Whether a point is within `far` pixels of one of the quadrilaterals."""
     for limb in range(quads.shape[0]):
@@ -127,7 +127,7 @@ def is_near(x, y, quads, turns, far):
     return False
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def add_limb_counts(quads, points, signed, corner, size, step, far, counts):
     """Add to counts (N,), for N places (N, L, 4, 2) of a few limbs in one view, the grid points that they cover far
     outside the silhouette, and those of points (K, 2) that they leave bare.
@@ -144,7 +144,7 @@ def add_limb_counts(quads, points, signed, corner, size, step, far, counts):
                 counts[n] += 1.0
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def view_counts(quads, signed, corner, size, step, far, counts):
     """Fill counts (L, 3) of one view, in grid points. quads : (L, 4, 2) pixels, NaN where a limb is not seen. signed,
     corner, size : as in `evidence.distance_maps`. step : pixels between grid points. far : pixels.
@@ -157,7 +157,7 @@ def view_counts(quads, signed, corner, size, step, far, counts):
     count_uncovered(quads, turns, signed, corner, step, far, counts)
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def count_cells(quads, signed, corner, cell, far, counts):
     """Of one view's cells: one more in counts (H, W) where a limb of quads covers the middle farther than `far` pixels
     from the silhouette, none where that shows something.

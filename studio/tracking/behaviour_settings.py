@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from studio.knobs import knob
+from studio.knobs import knob, next_frame_knob
 from studio.tracking import shared_knobs
 
 
@@ -12,8 +12,8 @@ class BehaviourSettings:
 
     title = "Guided by behaviour"
 
-    particles: int = knob(
-        1000, 2, 200000, 50, takes_effect="next frame", help="N: particles, each weighed once (section 7.3)."
+    particles: int = next_frame_knob(
+        1000, 2, 200000, 50, help="N: particles, each weighed once (section 7.3)."
     )
     attenuation: float = shared_knobs.attenuation(0.5)
     entering: str = shared_knobs.entering()
@@ -27,12 +27,12 @@ class BehaviourSettings:
         0.4, 0.005, 0.98, 0.005, label="survival rate",
         help="Share of the particles that survive a frame, where the selection is by survival.",
     )  # fmt: skip
-    expected_support: float = knob(
-        0.05, 0.0, 0.5, 0.01, label="support of a cluster", takes_effect="next frame",
+    expected_support: float = next_frame_knob(
+        0.05, 0.0, 0.5, 0.01, label="support of a cluster",
         help="Least share of the particles in a motion cluster whose mean the blobs are fitted from (6.3).",
     )  # fmt: skip
-    expected_most: int = knob(
-        4, 1, 20, 1, label="clusters fitted", takes_effect="next frame",
+    expected_most: int = next_frame_knob(
+        4, 1, 20, 1, label="clusters fitted",
         help="From how many clusters' means the blobs are fitted at most (6.3).",
     )  # fmt: skip
     diffusion_scale: float = shared_knobs.diffusion_scale()

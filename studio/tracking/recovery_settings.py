@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from studio.knobs import knob
+from studio.knobs import next_frame_knob
 
 OFF, SPREAD, INITIALISE = "off", "spread", "initialise"
 
@@ -15,18 +15,17 @@ class RecoverySettings:
 
     # On footage with a second of black pictures, and with a person who leaves and comes back elsewhere, the search
     # found the body in every run; particles spread over joints and clusters only where many of them are weighed.
-    recovery: str = knob(
+    recovery: str = next_frame_knob(
         INITIALISE,
         choices=(INITIALISE, SPREAD, OFF),
-        takes_effect="next frame",
         help="When lost: search as for a start pose, or spread the particles over the motion clusters (without a "
         "behaviour model over the joints' ranges) at the hull. Off: losses are not looked for.",
     )
-    lost_after: int = knob(
-        3, 1, 60, 1, label="lost after", unit="frames", takes_effect="next frame",
+    lost_after: int = next_frame_knob(
+        3, 1, 60, 1, label="lost after", unit="frames",
         help="So many frames in a row must look lost before it is believed.",
     )  # fmt: skip
-    recovery_interval: int = knob(
-        10, 1, 600, 1, label="search again after", unit="frames", takes_effect="next frame",
+    recovery_interval: int = next_frame_knob(
+        10, 1, 600, 1, label="search again after", unit="frames",
         help="Frames between two searches while the body is not found.",
     )  # fmt: skip

@@ -8,9 +8,8 @@ what the body does not explain (hair, a shadow in the mask) pulls little.
 
 import numpy as np
 
-from studio.numba_in_threads import njit
+from studio.numba_in_threads import EXACT, njit
 
-OPTIONS = {"error_model": "numpy", "nogil": True, "cache": True}
 MARGIN = 1.0
 """Pixels that a point may lie inside another limb and still count as border."""
 FIRST_CORNER, SECOND_CORNER = (0, 3, 1), (1, 2, 2)
@@ -20,7 +19,7 @@ SAME_WAY = 0.3
 """Least cosine between the outward directions of a border point and of the edge that explains it."""
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def turning(quad):
     """+1 or -1: which way round a quadrilateral (4, 2) runs."""
     ax, ay = quad[2, 0] - quad[0, 0], quad[2, 1] - quad[0, 1]
@@ -28,7 +27,7 @@ def turning(quad):
     return 1.0 if ax * by - ay * bx > 0.0 else -1.0
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def in_another(x, y, quads, usable, turns, boxes, own):
     """Whether a point lies inside (by MARGIN pixels) the quadrilateral of another limb than `own`."""
     for limb in range(quads.shape[0]):
@@ -50,7 +49,7 @@ def in_another(x, y, quads, usable, turns, boxes, own):
     return False
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def add_point(share, residual, nx, ny, first, second, u, normal, pull):
     """Add one residual to its limb's equations: it is that of the point at u between two corners, along (nx, ny).
 
@@ -75,7 +74,7 @@ def add_point(share, residual, nx, ny, first, second, u, normal, pull):
     normal[j + 1, j + 1] += share * by * by
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def add_limbs(normals, pulls, slopes, usable, which, matrix, gradient):
     """Add what the corners of one view's limbs ask for to the equations of the parameters, lower half.
 
@@ -109,7 +108,7 @@ def add_limbs(normals, pulls, slopes, usable, which, matrix, gradient):
                         matrix[p, which[b]] += asked * own[j >> 1, j & 1, which[b]]
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def nearest_edge(x, y, ox, oy, quads, usable, turns, boxes, ends, reach):
     """Limb, edge, place along it and squared distance (pixels) of the union's border nearest to a point with outward
     direction (ox, oy); limb -1 where none is within reach.
@@ -144,7 +143,7 @@ def nearest_edge(x, y, ox, oy, quads, usable, turns, boxes, ends, reach):
     return found, edge, place, nearest
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def read_map(x, y, values, start, width, height):
     """Value and slope of a map at (x, y), bilinear; a flag that is False outside the picture."""
     if not (0.0 <= x < width - 1.0 and 0.0 <= y < height - 1.0):
@@ -157,13 +156,13 @@ def read_map(x, y, values, start, width, height):
     return True, value, (b - a) * (1.0 - fy) + (d - c) * fy, (c - a) * (1.0 - fx) + (d - b) * fx
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def beyond(distance, slack):
     """What of a signed distance lies beyond a slack."""
     return np.sign(distance) * max(0.0, abs(distance) - slack)
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def add_border(border, quads, usable, turns, boxes, ends, slack, mm, scale, normals, pulls):
     """Border points (K, 4: place, outward) of one view to the outlines; returns their loss. slack : (L,) mm by which
     a limb's outline may be off at no cost. scale : c, mm.
@@ -193,7 +192,7 @@ def add_border(border, quads, usable, turns, boxes, ends, slack, mm, scale, norm
     return loss
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def add_outline(
     values, view, size, quads, usable, turns, boxes, ends, slack, mm, scale, part, normals, pulls
 ):
@@ -227,7 +226,7 @@ def add_outline(
     return loss
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def look_at_limbs(quads, slopes, usable, turns, boxes):
     """Fill, of one view's limbs, usable (L,), whether it is seen, turns (L,), which way round it runs, and boxes
     (L, 4): left, top, right, bottom.
@@ -239,7 +238,7 @@ def look_at_limbs(quads, slopes, usable, turns, boxes):
         boxes[limb, 1], boxes[limb, 3] = quads[limb, :, 1].min(), quads[limb, :, 1].max()
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def mirror_lower_half(matrix):
     """Make a matrix symmetric whose lower half was filled."""
     for p in range(matrix.shape[0]):
@@ -247,7 +246,7 @@ def mirror_lower_half(matrix):
             matrix[q, p] = matrix[p, q]
 
 
-@njit(**OPTIONS)
+@njit(**EXACT)
 def normal_equations(
     quads, slopes, ends, slack, maps, views, sizes, border, mm, scales, part, matrix, gradient
 ):
@@ -255,10 +254,9 @@ def normal_equations(
 
     quads : (V, L, 4, 2) pixels, NaN for limbs that are not seen. slopes : (V, L, 4, 2, D) per unit of each parameter.
     ends : (L,) whether a limb's far end may be border. slack : (L,) mm by which a limb may be off at no cost.
-    maps : flat signed distances. views : (V, 7) where each begins,
-    its width and height, its first and last border point, its left and top in the picture, whose width and height are
-    sizes (V, 2). border : (K, 4). mm : (V,) mm per pixel. scales :
-    (V,) c of the loss, mm.
+    maps : flat signed distances. views : (V, 7) where each begins, its width and height, its first and last border
+    point, its left and top in the picture, whose width and height are sizes (V, 2). border : (K, 4). mm : (V,) mm per
+    pixel. scales : (V,) c of the loss, mm. part : of an outline's sample beside a border point; at 0 there are no maps.
     """
     limbs = quads.shape[1]
     normals, pulls, boxes = np.zeros((limbs, 8, 8)), np.zeros((limbs, 8)), np.zeros((limbs, 4))
@@ -269,26 +267,10 @@ def normal_equations(
     for v in range(quads.shape[0]):
         look_at_limbs(quads[v], slopes[v], usable, turns, boxes)
         normals[:], pulls[:] = 0.0, 0.0
-        seen = border[views[v, 3] : views[v, 4]]
-        loss += add_border(
-            seen, quads[v], usable, turns, boxes, ends, slack, mm[v], scales[v], normals, pulls
-        )
-        loss += add_outline(
-            maps,
-            views[v],
-            sizes[v],
-            quads[v],
-            usable,
-            turns,
-            boxes,
-            ends,
-            slack,
-            mm[v],
-            scales[v],
-            part,
-            normals,
-            pulls,
-        )
+        view, limits = quads[v], (usable, turns, boxes, ends, slack, mm[v], scales[v])
+        loss += add_border(border[views[v, 3] : views[v, 4]], view, *limits, normals, pulls)
+        if part > 0.0:
+            loss += add_outline(maps, views[v], sizes[v], view, *limits, part, normals, pulls)
         add_limbs(normals, pulls, slopes[v], usable, which, matrix, gradient)
     mirror_lower_half(matrix)
     return loss

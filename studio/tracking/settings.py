@@ -5,7 +5,7 @@ lines.
 from dataclasses import dataclass
 
 from studio.errors import SettingsError
-from studio.knobs import knob
+from studio.knobs import knob, next_frame_knob
 from studio.tracking import shared_knobs
 from studio.tracking.tracker import Preset, Value, Variant
 
@@ -22,8 +22,8 @@ class AnnealedSettings:
         0.3, 0.02, 0.98, 0.01, label="survival rate",
         help="α: share of the particles that survive a layer (Eq. 12); lower is faster and misses more.",
     )  # fmt: skip
-    layers: int = knob(10, 1, 60, 1, takes_effect="next frame", help="M: annealing layers in a frame.")
-    particles: int = knob(100, 1, 20000, 10, takes_effect="next frame", help="N: particles in every layer.")
+    layers: int = next_frame_knob(10, 1, 60, 1, help="M: annealing layers in a frame.")
+    particles: int = next_frame_knob(100, 1, 20000, 10, help="N: particles in every layer.")
     crossover: float = knob(
         0.5, 0.0, 1.0, 0.05, label="crossover share",
         help="Share of the particles that are made from two parents (Eq. 19).",
@@ -60,9 +60,8 @@ class AnnealedSettings:
         "", label="survival of each layer",
         help="Rates of the layers in turn, like 0.6, 0.5, 0.4 (the last holds on); empty: one rate for all.",
     )  # fmt: skip
-    carry: str = knob(
+    carry: str = next_frame_knob(
         "weighted", choices=("weighted", "resampled", "mode"), label="carried over",
-        takes_effect="next frame",
         help="What the next frame starts from: every particle (Eq. 9), survivors by weight, or the best one.",
     )  # fmt: skip
     dynamics: str = shared_knobs.dynamics()
@@ -93,15 +92,13 @@ class CondensationSettings:
 
     title = "Condensation"
 
-    particles: int = knob(
-        2000, 1, 200000, 100, takes_effect="next frame", help="N: particles, each weighed once."
-    )
+    particles: int = next_frame_knob(2000, 1, 200000, 100, help="N: particles, each weighed once.")
     scale_survival: float = knob(
         0.1, 0.05, 0.2, 0.01, label="survival aimed at",
         help="Share of the particles that survive while the first frames choose the likelihood's scale.",
     )  # fmt: skip
-    scale_frames: int = knob(
-        5, 1, 100, 1, label="frames for the scale", takes_effect="next frame",
+    scale_frames: int = next_frame_knob(
+        5, 1, 100, 1, label="frames for the scale",
         help="How many weighings choose the likelihood's scale (their geometric mean), which then stays.",
     )  # fmt: skip
     diffusion_scale: float = shared_knobs.diffusion_scale()

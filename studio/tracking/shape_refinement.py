@@ -39,8 +39,8 @@ from studio.tracking.refinement import (
     mm_per_pixel,
     rigid_limbs,
 )
+from studio.tracking.refinement_kernels import normal_equations
 from studio.tracking.shape_prior import ShapePrior
-from studio.tracking.shape_refinement_kernels import border_equations
 from studio.weighting.outlines import OutlineProjector
 from studio.weighting.shape_silhouettes import ShapePrograms
 
@@ -59,6 +59,7 @@ OUTSIDE = 0.5
 """Pixels from the centre of a border's pixel to the border."""
 STEPS, ENOUGH = 60, 1e-5
 """Most steps of a descent, and the share of the loss that a step must gain."""
+NO_MAP = np.zeros(1, dtype=np.float32)
 HOPS, SHAKEN_SHAPE, SHAKEN_POSE, SHAKEN_PLACE = 4, 0.04, 0.05, 6.0
 """Descents from shaken answers, and how much they are shaken: share, rad, mm. Which edge explains a border point jumps,
 so the loss has small dents that a descent stays in."""
@@ -79,7 +80,7 @@ class RefinedShape:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Frame:
-    """A frame's border. border : (K, 4). views : (V, 2). mm, scales : (V,)."""
+    """A frame's border, as `normal_equations` has it. border : (K, 4). views : (V, 7). mm, scales : (V,)."""
 
     border: Array
     views: NDArray[np.int64]
@@ -174,9 +175,10 @@ class ShapeRefiner:
         mm = np.array([mm_per_pixel(camera, middle) for camera in self._cameras])
         points = [np.concatenate([v.border + OUTSIDE * v.outward, v.outward], axis=1) for v in views]
         last = np.cumsum([len(part) for part in points])
-        parts = np.stack([last - [len(part) for part in points], last], axis=1)
+        parts = np.zeros((len(points), 7), dtype=np.int64)
+        parts[:, 3], parts[:, 4] = last - [len(part) for part in points], last
         scales = np.maximum(SCALE_MM, FEWEST_PIXELS * mm)
-        return _Frame(np.ascontiguousarray(np.concatenate(points)), parts.astype(np.int64), mm, scales)
+        return _Frame(np.ascontiguousarray(np.concatenate(points)), parts, mm, scales)
 
     def _descended(self, shape: Array, poses: Array, frames: Sequence[_Frame]) -> _State:
         """Where Levenberg-Marquardt ends."""
@@ -237,9 +239,18 @@ class ShapeRefiner:
             by_pose = (corners[1 : size + 1] - corners[size + 1 :]) / (2.0 * DIFFERENCE)
             by_pose[:, :, self._rigid] = 0.0
             slopes = np.moveaxis(np.concatenate([by_pose, by_shape[:, k]]), 0, -1)
-            borders[k] = border_equations(
-                *(corners[0].copy(), np.ascontiguousarray(slopes), self._ends),
-                *(frame.border, frame.views, frame.mm, frame.scales, matrices[k], gradients[k]),
+            borders[k] = normal_equations(
+                *(corners[0].copy(), np.ascontiguousarray(slopes), self._ends, np.zeros(len(self._ends))),
+                *(
+                    NO_MAP,
+                    frame.views,
+                    np.ascontiguousarray(frame.views[:, 5:]),
+                    frame.border,
+                    frame.mm,
+                    frame.scales,
+                    0.0,
+                ),
+                *(matrices[k], gradients[k]),
             )
         worth = 1.0 / (ALIKE * self._variance)
         gradients, matrices = worth * gradients, worth * matrices

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import limb_ends
 from studio.body.shape_space import ShapeSpace
+from studio.tracking.annealing import anneal, normalised
 from studio.tracking.lost_limbs import lost_limbs_found
 from studio.tracking.shape_prior import ShapePrior
 from studio.weighting.shape_silhouettes import POSES, ShapeSilhouettes
@@ -242,23 +243,5 @@ class ShapeSearch:
 
 
 def tempered(log_weights: Array, survival: float) -> Array:
-    """(M,) normalised weights w^β with β in 0..1 such that the survival rate 1 / (M Σ w²) is the wanted one, where β
-    ≤ 1 reaches it (Deutscher & Reid 2005, Eqs. 11, 12).
-    """
-    low, high = 0.0, 1.0
-    best = _normalised(log_weights)
-    if 1.0 / (len(best) * np.square(best).sum()) >= survival:
-        return best
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        best = _normalised(middle * log_weights)
-        if 1.0 / (len(best) * np.square(best).sum()) > survival:
-            low = middle
-        else:
-            high = middle
-    return best
-
-
-def _normalised(log_weights: Array) -> Array:
-    weights = np.exp(log_weights - log_weights.max())
-    return weights / weights.sum()
+    """(M,) normalised weights w^β with β at most 1, smaller where that leaves too few alive."""
+    return np.exp(normalised(log_weights, min(1.0, anneal(log_weights, survival).beta)))

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from studio.knobs import knob
+from studio.knobs import knob, next_frame_knob
 
 CONSTRAINTS = ("redraw", "reject", "clamp", "ignore")
 NOISE, BEHAVIOUR = "noise", "behaviour"
@@ -20,8 +20,8 @@ def diffusion_scale(default: float = 1.0) -> Any:  # noqa: ANN401 - a dataclass 
 
 def dynamics() -> Any:  # noqa: ANN401
     """What a frame expects."""
-    return knob(
-        "none", choices=("none", "constant_velocity"), takes_effect="next frame",
+    return next_frame_knob(
+        "none", choices=("none", "constant_velocity"),
         help="What a frame expects before it looks (Eq. 10): the last pose, or the last movement going on.",
     )  # fmt: skip
 
@@ -68,40 +68,40 @@ def start_repeats(default: int = 2) -> Any:  # noqa: ANN401
 
 def prediction() -> Any:  # noqa: ANN401
     """Whether a frame's first set is made by noise or by a behaviour model."""
-    return knob(
-        "noise", choices=PREDICTIONS, takes_effect="next frame",
+    return next_frame_knob(
+        "noise", choices=PREDICTIONS,
         help="How a frame's first set is made: noise about the last one, or what a behaviour model expects of it.",
     )  # fmt: skip
 
 
 def attenuation(default: float) -> Any:  # noqa: ANN401
     """λ of Caillette et al. 2007, Eq. 4."""
-    return knob(
-        default, 0.0, 1.0, 0.05, takes_effect="next frame",
+    return next_frame_knob(
+        default, 0.0, 1.0, 0.05,
         help="λ: how much of a motion cluster's own spread is added to a particle that stays in it (behaviour, Eq. 4).",
     )  # fmt: skip
 
 
 def entering() -> Any:  # noqa: ANN401
     """What becomes of a particle that enters another cluster (`behaviour.prediction.propagate`)."""
-    return knob(
-        "resample", choices=("resample", "blend"), label="entering a cluster", takes_effect="next frame",
+    return next_frame_knob(
+        "resample", choices=("resample", "blend"), label="entering a cluster",
         help="A particle that enters a motion cluster is drawn from it (5.1), or blended with where it was going.",
     )  # fmt: skip
 
 
 def global_scale(default: float) -> Any:  # noqa: ANN401
     """The root's noise beside a model."""
-    return knob(
-        default, 0.02, 2.0, 0.02, label="root's noise", takes_effect="next frame",
+    return next_frame_knob(
+        default, 0.02, 2.0, 0.02, label="root's noise",
         help="Multiplies σ0 of position and orientation, which no model knows, of particles that a model moves (5.2).",
     )  # fmt: skip
 
 
 def root_prediction() -> Any:  # noqa: ANN401
     """What moves the root beside a model."""
-    return knob(
-        LEARNT, choices=(LEARNT, NOISE), label="root's prediction", takes_effect="next frame",
+    return next_frame_knob(
+        LEARNT, choices=(LEARNT, NOISE), label="root's prediction",
         help="How position and orientation move beside a model: as they did in the particle's motion cluster when it "
         "was learnt, with noise; or by noise alone (5.2).",
     )  # fmt: skip
@@ -109,8 +109,8 @@ def root_prediction() -> Any:  # noqa: ANN401
 
 def automaton_share() -> Any:  # noqa: ANN401
     """Of the particles that a model moves (`behaviour.prediction`)."""
-    return knob(
-        0.8, 0.0, 1.0, 0.05, label="automaton's share", takes_effect="next frame",
+    return next_frame_knob(
+        0.8, 0.0, 1.0, 0.05, label="automaton's share",
         help="Share of the particles that change cluster by the automaton's probabilities alone, whatever Eq. 3's "
         "density says of them; 0 is the paper's Eq. 3.",
     )  # fmt: skip
@@ -118,16 +118,16 @@ def automaton_share() -> Any:  # noqa: ANN401
 
 def model_free_share(default: float) -> Any:  # noqa: ANN401
     """Particles that no model moves."""
-    return knob(
-        default, 0.0, 1.0, 0.05, label="model-free share", takes_effect="next frame",
+    return next_frame_knob(
+        default, 0.0, 1.0, 0.05, label="model-free share",
         help="Share of the particles that are spread by σ0 instead of the behaviour model, for motion never learnt.",
     )  # fmt: skip
 
 
 def model_free_grows() -> Any:  # noqa: ANN401
     """Whether their share grows."""
-    return knob(
-        True, label="model-free share grows", takes_effect="next frame",
+    return next_frame_knob(
+        True, label="model-free share grows",
         help="Whether the model-free share grows while its particles weigh more than those that the model moves.",
     )  # fmt: skip
 

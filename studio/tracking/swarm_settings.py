@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from studio.errors import SettingsError
-from studio.knobs import knob
+from studio.knobs import knob, next_frame_knob
 from studio.tracking import shared_knobs
 from studio.tracking.settings import GUIDED
 from studio.tracking.tracker import Preset, Variant
@@ -22,20 +22,20 @@ class SwarmSettings:
 
     title = "Particle swarm"
 
-    stage1_particles: int = knob(
-        10, 2, 2000, 1, label="particles, stage 1", takes_effect="next frame",
+    stage1_particles: int = next_frame_knob(
+        10, 2, 2000, 1, label="particles, stage 1",
         help="Particles of the first stage, which seeks the root: where the body stands and how it is turned.",
     )  # fmt: skip
-    stage1_iterations: int = knob(
-        20, FEWEST_ITERATIONS, 400, 1, label="iterations, stage 1", takes_effect="next frame",
+    stage1_iterations: int = next_frame_knob(
+        20, FEWEST_ITERATIONS, 400, 1, label="iterations, stage 1",
         help="N of the first stage; the first iteration weighs the swarm as it was sampled.",
     )  # fmt: skip
-    stage2_particles: int = knob(
-        20, 2, 2000, 1, label="particles, stage 2", takes_effect="next frame",
+    stage2_particles: int = next_frame_knob(
+        20, 2, 2000, 1, label="particles, stage 2",
         help="Particles of the stages after the first, which seek the whole pose.",
     )  # fmt: skip
-    stage2_iterations: int = knob(
-        40, FEWEST_ITERATIONS, 400, 1, label="iterations, stage 2", takes_effect="next frame",
+    stage2_iterations: int = next_frame_knob(
+        40, FEWEST_ITERATIONS, 400, 1, label="iterations, stage 2",
         help="N of the stages after the first, together.",
     )  # fmt: skip
     c_first: float = knob(
@@ -46,16 +46,16 @@ class SwarmSettings:
         2.15, 2.01, 4.0, 0.01, label="c at last",
         help="c1 = c2 of a stage's last iteration (Eq. 2); the constriction follows (Eq. 3).",
     )  # fmt: skip
-    partition: str = knob(
-        "soft", choices=PARTITIONS, takes_effect="next frame",
+    partition: str = next_frame_knob(
+        "soft", choices=PARTITIONS,
         help="What is sought first, and whether it may move later: each choice weighs as many poses.",
     )  # fmt: skip
-    start_velocity: str = knob(
-        "uniform", choices=("uniform", "zero"), label="start velocity", takes_effect="next frame",
+    start_velocity: str = next_frame_knob(
+        "uniform", choices=("uniform", "zero"), label="start velocity",
         help="Velocities at a stage's start: drawn from -σ to σ as the paper has them, or zero.",
     )  # fmt: skip
-    position_divisor: float = knob(
-        10.0, 1.0, 100.0, 0.5, label="position divisor", takes_effect="next frame",
+    position_divisor: float = next_frame_knob(
+        10.0, 1.0, 100.0, 0.5, label="position divisor",
         help="What σ of the root's position is divided by in the soft stages after the first (2.4).",
     )  # fmt: skip
     diffusion_scale: float = shared_knobs.diffusion_scale()

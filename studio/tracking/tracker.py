@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.behaviour.model import BehaviourModel
-from studio.weighting.problem import WHOLE_BODY
+from studio.weighting.problem import FrameProblem
 
 Array = NDArray[np.float64]
 Value = bool | int | float | str
@@ -184,24 +184,6 @@ class FrameResult:
     def limbs_lost(self) -> tuple[str, ...]:
         """Limbs that the silhouettes deny."""
         return tuple(name for name, share in self.disagreement.items() if share > LIMB_LOST_SHARE)
-
-
-class FrameProblem(Protocol):
-    """One frame as a function of poses. stage : WHOLE_BODY, or TRUNK_FIRST where only root and trunk are sought."""
-
-    def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
-        """(N, D) poses to (N,) log-weights; -inf never, NaN never."""
-        ...
-
-    def fitness(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
-        """(N, D) poses to (N,) the fitness f that a swarm maximises; the log-weight where there is no f."""
-        ...
-
-    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
-        """(N, D) poses to (N,) whether the body can take them: limits kept and, if `limbs_apart`, no limb inside
-        another.
-        """
-        ...
 
 
 @dataclass(frozen=True, slots=True)

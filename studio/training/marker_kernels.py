@@ -8,12 +8,12 @@ import numpy as np
 
 from studio.body.forward_kinematics import take_step
 from studio.body.model import MOVE
-from studio.numba_in_threads import numba
+from studio.numba_in_threads import KERNEL, njit
 
 MOVES = MOVE
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def place_points(
     poses, parent, first_step, kind, axis, parameter, value, joints, offsets, is_point, places, slopes
 ):
@@ -52,7 +52,7 @@ def place_points(
                 f = parent[f]
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def _place(place, frame, offset, is_point):
     for row in range(3):
         place[row] = frame[row, 3] if is_point else 0.0
@@ -60,7 +60,7 @@ def _place(place, frame, offset, is_point):
             place[row] += frame[row, column] * offset[column]
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def _add_slope(slope, axis, origin, value, kind, place, is_point):
     if kind == MOVES:
         if is_point:

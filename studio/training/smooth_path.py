@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.training.banded_kernels import solve_banded
+from studio.tracking.banded_solving import solve_banded
 
 Array = NDArray[np.float64]
 
 DAMPING, LARGEST_DAMPING, SETTLED = 1e-3, 1e4, 1e-5
-HELD = 1e12
+HELD, LEAST_PIVOT = 1e12, 1e-12
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,4 +129,4 @@ def _solved(normal: Array, bands: Array, right: Array, held: NDArray[np.bool_], 
         coupling = np.repeat(bands[steps, : count - steps], width)
         lower[steps * width :, reach - steps * width] += coupling
     lower[:, reach] += np.where(held.ravel(), HELD, 0.0)
-    return solve_banded(lower, right.ravel().copy()).reshape(count, width)
+    return solve_banded(lower, right.ravel(), LEAST_PIVOT).reshape(count, width)

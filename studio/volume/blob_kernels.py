@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from studio.numba_in_threads import numba
+from studio.numba_in_threads import EXACT, KERNEL, njit
 
 # Columns of a blob's row in `factors`: mean, upper triangle of the root of its inverse covariance, colour, inverse
 # standard deviation of each colour.
@@ -24,7 +24,7 @@ LOG_TWO_PI = math.log(2.0 * math.pi)
 CHUNK = 512
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
+@njit(**EXACT)
 def assign(voxels, factors, labels, distances):
     """The nearest blob of each voxel: labels (K,) int32, and its squared Mahalanobis distance, distances (K,) float32.
 
@@ -57,7 +57,7 @@ def assign(voxels, factors, labels, distances):
                 label[k] = np.int32(b) if nearer else label[k]
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def gather(voxels, volumes, extents, labels, sums):
     """What each blob holds of the voxels assigned to it: sums (B, SUMS) float64, made new.
 
@@ -85,7 +85,7 @@ def gather(voxels, volumes, extents, labels, sums):
         row[16] += share * extents[k]
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def count_changes(labels, before):
     """How many labels (K,) differ from those before, which become the same."""
     changed = 0
@@ -96,7 +96,7 @@ def count_changes(labels, before):
     return changed
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def precision_of(blob, inverse):
     """The inverse of a blob's covariance, inverse (6,) xx xy xz yy yz zz, and its determinant. blob : (STATE,)."""
     xx, xy, xz, yy, yz, zz = blob[3], blob[4], blob[5], blob[6], blob[7], blob[8]
@@ -109,7 +109,7 @@ def precision_of(blob, inverse):
     return determinant
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def fill_factors(state, factors):
     """The rows of `assign`, factors (B, FACTORS), of blobs (B, STATE): the root is Lᵀ of Σ⁻¹ = L Lᵀ (Cholesky)."""
     inverse = np.empty(6)
@@ -128,7 +128,7 @@ def fill_factors(state, factors):
             row[12 + channel] = 1.0 / math.sqrt(blob[12 + channel])
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def likelihood_of(state, sums, colours):
     """Nats a voxel: the mean over the volume of ln β + ln N(x; fitted) + ln N(colour; learnt) of each voxel's own blob,
     from what the blobs hold. state : (B, STATE). colours : (B, 6) the learnt colours and their variances.
@@ -154,7 +154,7 @@ def likelihood_of(state, sums, colours):
     return total
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def update(predicted, sums, prior_share, least_colour, state):
     """The M-step: state (B, STATE) from what each blob holds, the prediction counting as `prior_share` of its volume.
 
@@ -185,7 +185,7 @@ def update(predicted, sums, prior_share, least_colour, state):
     state[:, 15] /= whole
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def thicken(state, least):
     """Make no covariance's eigenvalue less than `least` mm², in place."""
     for b in range(state.shape[0]):
@@ -209,7 +209,7 @@ def thicken(state, least):
                 about += 1
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def fit(voxels, volumes, extents, predicted, colours, rules, best, best_labels):
     """K-means from the predicted blobs (B, STATE): the likeliest on the way into best (B, STATE), the voxels' nearest
     blobs into best_labels (K,); returns their likelihood.

@@ -1,12 +1,20 @@
-"""Kernels of the visual hull: what pictures say of voxels (Caillette et al. 2007, Eq. 6), and what becomes of these."""
+"""Kernels of the visual hull: what pictures say of voxels (Caillette et al. 2007, Eq. 6), and what becomes of these.
+
+**Pixels.** A voxel needs scattered pixels, one of few in a cache line, each with nine numbers of background from
+memory. So when the first sample falls into a tile of 32 × 8 pixels the whole tile is computed, in rows, which takes
+less time than five scattered ones; its distances then serve all voxels of all depths. Distances that were not needed
+yet are NaN. Two threads may compute the same tile: each writes the same numbers, and a reader sees either NaN or the
+number.
+"""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from studio.numba_in_threads import njit, prange
-from studio.volume.distance_kernels import look_at_tile
-from studio.volume.hull_cameras import HEIGHT, WIDTH
+from studio.geometry.camera_table import CameraTable
+from studio.numba_in_threads import EXACT, EXACT_INLINED, njit
 from studio.volume.hull_projection import (
     AREA,
     BOUND_X,
@@ -19,40 +27,98 @@ from studio.volume.hull_projection import (
     sample_count,
     sample_pixel,
 )
-from studio.volume.hull_rules import (
-    DEPTH_IS_LAST,
-    EDGE_SHARE,
-    LEAST_VIEWS,
-    PIXELS,
-    POLYNOMIAL,
-    SAMPLING,
-    SINGLE,
-)
 
 BACKGROUND, EDGE, FOREGROUND, UNSEEN = 0, 1, 2, 3
 CARVED, KEPT, SPLIT = 0, 1, 2
-BLOCK = 64
-"""Voxels dealt out to a thread at a time."""
+TILE_WIDTH, TILE_HEIGHT = 32, 8
 
 
-@njit(cache=True, nogil=True)
-def shares_of(count, share, shares):
-    """How many of `count` things one of several threads gets when blocks of BLOCK are dealt out in turn."""
-    whole, rest = divmod(count, BLOCK * shares)
-    return whole * BLOCK + min(max(rest - share * BLOCK, 0), BLOCK)
+class Rules(NamedTuple):
+    """The rules of carving. last : whether this is the last depth. least_views : fewest that see a voxel. edge_share :
+    of the samples at the last depth. sampling : samples / √area. shadow, deepest : shares of the luminance. single :
+    T_1. polynomial : T_k's three coefficients.
+    """
+
+    last: bool
+    least_views: int
+    edge_share: float
+    sampling: float
+    shadow: float
+    deepest: float
+    single: float
+    polynomial: tuple[float, float, float]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def look_at_mask(cameras, view, starts, sums, last, share, place):
-    """What a mask says of a voxel. sums : summed areas of all masks, this one's (H + 1, W + 1) from
-    starts[1, view].
+class Sights(NamedTuple):
+    """What is seen of a frame, all views one after another.
+
+    by_pixels : not by masks. starts : (2, V + 1) where a view's pixels begin, and its sums. sums : summed areas of the
+    masks, (H + 1, W + 1) each. picture : (N, 3) uint8 BGR. gaussians : (9, N) `YuvBackground.packed`. distances : (N,)
+    from the background, NaN where they were not needed yet. heights : the radical inverse of each sample's number.
+    """
+
+    by_pixels: bool
+    cameras: CameraTable
+    starts: NDArray[np.int64]
+    sums: NDArray[np.int32]
+    picture: NDArray[np.uint8]
+    gaussians: NDArray[np.float32]
+    distances: NDArray[np.float32]
+    heights: NDArray[np.float64]
+
+
+@njit(**EXACT, fastmath=True)
+def row_distances(first, end, picture, gaussians, shadow, deepest, distances):
+    """Squared Mahalanobis distances of pixels first to end - 1 from the background, lit or in shadow.
+
+    picture : (N, 3) uint8 BGR. gaussians : (9, N) `YuvBackground.packed`. distances : (N,) filled. The formula is
+    `YuvBackground.squared_distances`.
+    """
+    one = np.float32(1.0)
+    for at in range(first, end):
+        b, g, r = np.float32(picture[at, 0]), np.float32(picture[at, 1]), np.float32(picture[at, 2])
+        y = np.float32(0.114) * b + np.float32(0.587) * g + np.float32(0.299) * r
+        u, v = np.float32(0.492) * (b - y), np.float32(0.877) * (r - y)
+        my, mu, mv = gaussians[0, at], gaussians[1, at], gaussians[2, at]
+        p00, p11, p22 = gaussians[3, at], gaussians[4, at], gaussians[5, at]
+        p01, p02, p12 = gaussians[6, at], gaussians[7, at], gaussians[8, at]
+        in_shadow = y < (one - np.float32(0.5) * shadow) * my
+        dy, du, dv = y - ((one - shadow) * my if in_shadow else my), u - mu, v - mv
+        found = dy * dy * p00 + du * du * p11 + dv * dv * p22
+        found += np.float32(2.0) * (dy * (du * p01 + dv * p02) + du * dv * p12)
+        if in_shadow and deepest > np.float32(0.0):
+            left = max(y / max(my, one), one - deepest)
+            dy, du, dv = y - left * my, u - left * mu, v - left * mv
+            darker = dy * dy * p00 + du * du * p11 + dv * dv * p22
+            darker += np.float32(2.0) * (dy * (du * p01 + dv * p02) + du * dv * p12)
+            found = min(found, darker)
+        distances[at] = found
+
+
+@njit(**EXACT)
+def look_at_tile(seen, view, x, y, rules):
+    """Fill in the distances of the tile around pixel (x, y) of a view."""
+    width, height = int(seen.cameras[view].size[0]), int(seen.cameras[view].size[1])
+    shadow, deepest = np.float32(rules.shadow), np.float32(rules.deepest)
+    left, top = x // TILE_WIDTH * TILE_WIDTH, y // TILE_HEIGHT * TILE_HEIGHT
+    right = min(left + TILE_WIDTH, width)
+    for row in range(top, min(top + TILE_HEIGHT, height)):
+        first = seen.starts[0, view] + row * width
+        row_distances(
+            first + left, first + right, seen.picture, seen.gaussians, shadow, deepest, seen.distances
+        )
+
+
+@njit(**EXACT_INLINED)
+def look_at_mask(seen, view, rules, place):
+    """What a mask says of a voxel.
 
     Above the last depth every pixel of the rectangle around the voxel counts, so nothing is carved that covers a
     mask pixel. At the last depth: of the rectangle of the voxel's own area.
     """
-    width, height = int(cameras[view, WIDTH]), int(cameras[view, HEIGHT])
-    across, down = place[BOUND_X], place[BOUND_Y]
-    if last:
+    width, height = int(seen.cameras[view].size[0]), int(seen.cameras[view].size[1])
+    sums, across, down = seen.sums, place[BOUND_X], place[BOUND_Y]
+    if rules.last:
         shrunk = math.sqrt(place[AREA] / (4.0 * across * down))
         across, down = across * shrunk, down * shrunk
     left, right = math.floor(place[U] - across + 0.5), math.floor(place[U] + across + 0.5)
@@ -61,38 +127,37 @@ def look_at_mask(cameras, view, starts, sums, last, share, place):
         return UNSEEN
     partly = left < 0 or top < 0 or right >= width or bottom >= height
     left, top, right, bottom = max(left, 0), max(top, 0), min(right, width - 1), min(bottom, height - 1)
-    start = starts[1, view]
+    start = seen.starts[1, view]
     upper, lower = start + top * (width + 1), start + (bottom + 1) * (width + 1)
     found = sums[lower + right + 1] - sums[lower + left] - sums[upper + right + 1] + sums[upper + left]
     pixels = (right - left + 1) * (bottom - top + 1)
-    if last:
+    if rules.last:
         if place[U] < -0.5 or place[V] < -0.5 or place[U] >= width - 0.5 or place[V] >= height - 0.5:
             return UNSEEN
-        return FOREGROUND if found > 0 and found >= share * pixels else BACKGROUND
+        return FOREGROUND if found > 0 and found >= rules.edge_share * pixels else BACKGROUND
     place[SHARE] = found / pixels
     if found == 0 and not partly:
         return BACKGROUND
     return FOREGROUND if found == pixels and not partly else EDGE
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def look_at_pixels(cameras, view, starts, picture, gaussians, distances, heights, rules, place):
-    """Eq. 6 for one voxel in one picture. distances : of all views' pixels, this one's from starts[0, view]; NaN
-    where nobody has looked yet.
-    """
+@njit(**EXACT_INLINED)
+def look_at_pixels(seen, view, rules, place):
+    """Eq. 6 for one voxel in one picture."""
     # One way out, as functions with several count their array arguments in and out at each call.
-    width, height, start = int(cameras[view, WIDTH]), int(cameras[view, HEIGHT]), starts[0, view]
-    last, single = rules[DEPTH_IS_LAST] > 0.0, np.float32(rules[SINGLE])
-    count = sample_count(place, rules[SAMPLING])
-    enough = rules[POLYNOMIAL] + count * (rules[POLYNOMIAL + 1] + count * rules[POLYNOMIAL + 2])
+    width, height = int(seen.cameras[view].size[0]), int(seen.cameras[view].size[1])
+    start, distances = seen.starts[0, view], seen.distances
+    last, single, (one, linear, square) = rules.last, np.float32(rules.single), rules.polynomial
+    count = sample_count(place, rules.sampling)
+    enough = one + count * (linear + count * square)
     total, inside, far, decided = np.float32(0.0), 0, 0, False
     for number in range(count):
-        x, y = sample_pixel(place, number, count, heights)
+        x, y = sample_pixel(place, number, count, seen.heights)
         if x >= 0 and y >= 0 and x < width and y < height:
             at = start + y * width + x
             distance = distances[at]
             if distance != distance:
-                look_at_tile(cameras, view, starts, x, y, picture, gaussians, rules, distances)
+                look_at_tile(seen, view, x, y, rules)
                 distance = distances[at]
             total += distance
             inside += 1
@@ -107,60 +172,54 @@ def look_at_pixels(cameras, view, starts, picture, gaussians, distances, heights
         answer = UNSEEN if last or beyond_x or beyond_y else EDGE
     elif not decided:
         partly = inside < count
-        usual = rules[POLYNOMIAL] + inside * (rules[POLYNOMIAL + 1] + inside * rules[POLYNOMIAL + 2])
+        usual = one + inside * (linear + inside * square)
         if total <= usual:
             answer = EDGE if partly and not last else BACKGROUND
         elif last:
-            answer = FOREGROUND if far >= rules[EDGE_SHARE] * inside else BACKGROUND
+            answer = FOREGROUND if far >= rules.edge_share * inside else BACKGROUND
         elif far == inside and not partly:
             answer = FOREGROUND
     place[SHARE] = far / max(inside, 1)
     return answer
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def judge_share(
-    share, shares, nodes, states, verdicts, corner, edge, cameras, starts, sums, picture, gaussians, distances, heights,
-    rules
-):  # fmt: skip
-    """CARVED, KEPT or SPLIT for every `shares`-th block of the voxels (N, 3), beginning with block `share`.
+@njit(**EXACT)
+def judge(first, end, nodes, states, verdicts, corner, edge, seen, rules):
+    """CARVED, KEPT or SPLIT for the voxels first to end - 1 of nodes (N, 3).
 
     verdicts : (N,) filled. states : (N, 3) bits of the views in which each is foreground for good (masks only), bits of
     those that do not see it, and the view to look at first: that in which its parent was the least foreground, the
     likeliest to carve it. They are brought up to date; they change how much is looked at, never what comes out.
     """
     # One loop, not a function a voxel: array arguments of one with several exits are counted in and out at each call.
-    place, half, views = np.empty(PLACE), 0.5 * edge, cameras.shape[0]
-    last, by_pixels, edge_share = rules[DEPTH_IS_LAST] > 0.0, rules[PIXELS] > 0.0, rules[EDGE_SHARE]
-    for number in range(shares_of(len(nodes), share, shares)):
-        index = (number // BLOCK * shares + share) * BLOCK + number % BLOCK
+    cameras, place, half = seen.cameras, np.empty(PLACE), 0.5 * edge
+    views, by_pixels = cameras.shape[0], seen.by_pixels
+    for index in range(first, end):
         x = corner[0] + nodes[index, 0] * edge + half
         y = corner[1] + nodes[index, 1] * edge + half
         z = corner[2] + nodes[index, 2] * edge + half
         settled, unseen, view = states[index, 0], states[index, 1], int(states[index, 2]) - 1
-        seen, edges, least, answer = 0, 0, 2.0, EDGE
+        looked, edges, least, answer = 0, 0, 2.0, EDGE
         for _ in range(views):
             view = view + 1 if view + 1 < views else 0
             bit = np.uint32(1) << np.uint32(view)
             if unseen & bit:
                 continue
             if settled & bit:
-                seen += 1
+                looked += 1
                 continue
             if not place_voxel(cameras, view, x, y, z, half, place):
                 answer = UNSEEN
             elif by_pixels:
-                answer = look_at_pixels(
-                    cameras, view, starts, picture, gaussians, distances, heights, rules, place
-                )
+                answer = look_at_pixels(seen, view, rules, place)
             else:
-                answer = look_at_mask(cameras, view, starts, sums, last, edge_share, place)
+                answer = look_at_mask(seen, view, rules, place)
             if answer == BACKGROUND:
                 break
             if answer == UNSEEN:
                 unseen |= bit
                 continue
-            seen += 1
+            looked += 1
             if place[SHARE] < least:
                 least = place[SHARE]
                 states[index, 2] = view
@@ -169,32 +228,7 @@ def judge_share(
             elif not by_pixels:
                 settled |= bit
         states[index, 0], states[index, 1] = settled, unseen
-        if answer == BACKGROUND or seen < rules[LEAST_VIEWS]:
+        if answer == BACKGROUND or looked < rules.least_views:
             verdicts[index] = CARVED
         else:
             verdicts[index] = SPLIT if edges else KEPT
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def judge_all(
-    threads,
-    nodes,
-    states,
-    verdicts,
-    corner,
-    edge,
-    cameras,
-    starts,
-    sums,
-    picture,
-    gaussians,
-    distances,
-    heights,
-    rules,
-):
-    """All voxels, their blocks dealt out to the threads in turn."""
-    for thread in prange(threads):
-        judge_share(
-            thread, threads, nodes, states, verdicts, corner, edge, cameras, starts, sums, picture, gaussians,
-            distances, heights, rules,
-        )  # fmt: skip

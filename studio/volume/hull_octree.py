@@ -2,10 +2,8 @@
 
 import numpy as np
 
-from studio.numba_in_threads import njit, prange
-from studio.volume.distance_kernels import look_at_tile
-from studio.volume.hull_cameras import HEIGHT, WIDTH
-from studio.volume.hull_kernels import BLOCK, KEPT, SPLIT, shares_of
+from studio.numba_in_threads import EXACT, KERNEL, njit
+from studio.volume.hull_kernels import KEPT, SPLIT, look_at_tile
 from studio.volume.hull_projection import (
     BOUND_X,
     BOUND_Y,
@@ -16,10 +14,9 @@ from studio.volume.hull_projection import (
     sample_count,
     sample_pixel,
 )
-from studio.volume.hull_rules import PIXELS, SAMPLING, SINGLE
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**EXACT)
 def first_look(nodes, corner, edge, cameras, sampling, states, samples):
     """What no picture is needed for: the bits of the views that cannot see each voxel (N, 3), in states[:, 1], a view
     that sees all of it to begin with, in states[:, 2], and the most samples it takes in a view.
@@ -29,8 +26,8 @@ def first_look(nodes, corner, edge, cameras, sampling, states, samples):
         x = corner[0] + nodes[index, 0] * edge + half
         y = corner[1] + nodes[index, 1] * edge + half
         z = corner[2] + nodes[index, 2] * edge + half
-        for view in range(len(cameras)):
-            width, height = cameras[view, WIDTH] - 1.0, cameras[view, HEIGHT] - 1.0
+        for view in range(cameras.shape[0]):
+            width, height = cameras[view].size[0] - 1.0, cameras[view].size[1] - 1.0
             if not place_voxel(cameras, view, x, y, z, half, place):
                 states[index, 1] |= np.uint32(1) << np.uint32(view)
                 continue
@@ -43,7 +40,7 @@ def first_look(nodes, corner, edge, cameras, sampling, states, samples):
                 states[index, 2] = view
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def kept_nodes(nodes, verdicts):
     """(K, 3) the voxels kept at this depth."""
     out = np.empty((np.count_nonzero(verdicts == KEPT), 3), np.int32)
@@ -55,7 +52,7 @@ def kept_nodes(nodes, verdicts):
     return out
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def children(nodes, states, verdicts, limits):
     """The octants (M, 3) of the voxels that are split, and their states (M, 3), in the order of their parents.
 
@@ -81,7 +78,7 @@ def children(nodes, states, verdicts, limits):
     return found[:count], inherited[:count]
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def summed_areas(mask, sums):
     """How many pixels of a mask (H, W) lie above and left of each corner. sums : ((H + 1) (W + 1),) filled."""
     height, width = mask.shape
@@ -97,50 +94,35 @@ def summed_areas(mask, sums):
             sums[here + x + 1] = sums[before + x + 1] + along
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def colour_share(
-    share,
-    shares,
-    centres,
-    edges,
-    cameras,
-    starts,
-    sums,
-    picture,
-    gaussians,
-    distances,
-    heights,
-    rules,
-    views,
-    means,
-):
-    """Colours of every `shares`-th block of the voxels. views : (K, V, 3), means : (K, 3), both filled.
+@njit(**EXACT)
+def colour(first, end, centres, edges, seen, rules, views, means):
+    """Colours of the voxels first to end - 1. views : (K, V, 3), means : (K, 3), both filled.
 
     A voxel's colour in a view is the mean BGR of its samples that are not background, NaN where there are none; its
     own colour the mean of these, or that of all samples where no view has any.
     """
-    place, by_pixels = np.empty(PLACE), rules[PIXELS] > 0.0
+    cameras, starts, sums, picture = seen.cameras, seen.starts, seen.sums, seen.picture
+    distances, place = seen.distances, np.empty(PLACE)
     one, none = np.float32(1.0), np.float32(np.nan)
-    for turn in range(shares_of(len(centres), share, shares)):
-        index = (turn // BLOCK * shares + share) * BLOCK + turn % BLOCK
+    for index in range(first, end):
         x, y, z = centres[index, 0], centres[index, 1], centres[index, 2]
         blue = green = red = any_blue = any_green = any_red = np.float32(0.0)
-        seen, looked = 0, 0
-        for view in range(len(cameras)):
-            width, height = int(cameras[view, WIDTH]), int(cameras[view, HEIGHT])
+        showing, looked = 0, 0
+        for view in range(cameras.shape[0]):
+            width, height = int(cameras[view].size[0]), int(cameras[view].size[1])
             count, chosen = 0, 0
             if place_voxel(cameras, view, x, y, z, 0.5 * edges[index], place):
-                count = sample_count(place, rules[SAMPLING])
+                count = sample_count(place, rules.sampling)
             b = g = r = np.float32(0.0)
             for number in range(count):
-                column, row = sample_pixel(place, number, count, heights)
+                column, row = sample_pixel(place, number, count, seen.heights)
                 if column < 0 or row < 0 or column >= width or row >= height:
                     continue
                 at = starts[0, view] + row * width + column
-                if by_pixels:
+                if seen.by_pixels:
                     if distances[at] != distances[at]:
-                        look_at_tile(cameras, view, starts, column, row, picture, gaussians, rules, distances)
-                    differs = distances[at] > rules[SINGLE]
+                        look_at_tile(seen, view, column, row, rules)
+                    differs = distances[at] > rules.single
                 else:
                     above = starts[1, view] + row * (width + 1) + column
                     below = above + width + 1
@@ -160,44 +142,13 @@ def colour_share(
                 r * amount,
             )
             if chosen:
-                blue, green, red, seen = blue + b * amount, green + g * amount, red + r * amount, seen + 1
-        if seen == 0:
-            blue, green, red, seen = any_blue, any_green, any_red, looked
-        amount = one / np.float32(seen)
+                blue, green, red, showing = (
+                    blue + b * amount,
+                    green + g * amount,
+                    red + r * amount,
+                    showing + 1,
+                )
+        if showing == 0:
+            blue, green, red, showing = any_blue, any_green, any_red, looked
+        amount = one / np.float32(showing)
         means[index, 0], means[index, 1], means[index, 2] = blue * amount, green * amount, red * amount
-
-
-@njit(cache=True, nogil=True, parallel=True)
-def colour_all(
-    threads,
-    centres,
-    edges,
-    cameras,
-    starts,
-    sums,
-    picture,
-    gaussians,
-    distances,
-    heights,
-    rules,
-    views,
-    means,
-):
-    """All voxels' colours, their blocks dealt out to the threads in turn."""
-    for thread in prange(threads):
-        colour_share(
-            thread,
-            threads,
-            centres,
-            edges,
-            cameras,
-            starts,
-            sums,
-            picture,
-            gaussians,
-            distances,
-            heights,
-            rules,
-            views,
-            means,
-        )

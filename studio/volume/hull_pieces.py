@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.numba_in_threads import njit
+from studio.numba_in_threads import KERNEL, njit
 from studio.volume.hull import Hull
 
 
@@ -27,7 +27,7 @@ def piece_numbers(hull: Hull) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     return rank[found], volumes[order]
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def fill_cubes(lower, sides, filled):
     """Set a grid's cells (X, Y, Z) in each cube: its lowest cell (K, 3) and its side (K,) in cells."""
     for k in range(len(sides)):
@@ -38,7 +38,7 @@ def fill_cubes(lower, sides, filled):
                     filled[x, y, z] = True
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def labels_of(filled):
     """(X, Y, Z) int32, the number of each cell's piece from 1 on, 0 where nothing is; cells touch by faces, edges or
     corners. filled : (X, Y, Z), its outermost cells empty.
@@ -89,7 +89,7 @@ def labels_of(filled):
     return labels
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def joined(parents, one, other):
     """The number of two runs' common piece: the smaller one of theirs."""
     one, other = root_of(parents, one), root_of(parents, other)
@@ -97,7 +97,7 @@ def joined(parents, one, other):
     return min(one, other)
 
 
-@njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def root_of(parents, run):
     """The number that stands for a run's piece."""
     while parents[run] != run:

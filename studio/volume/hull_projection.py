@@ -9,8 +9,8 @@ distortion adds within one voxel is hundredths of a pixel.
 
 import math
 
-from studio.numba_in_threads import njit
-from studio.volume.hull_cameras import CENTRE, DISTORTION, MATRIX, RADIUS, ROTATION, TRANSLATION
+from studio.geometry import projection
+from studio.numba_in_threads import EXACT_INLINED, njit
 
 U, V, DEPTH, AXES, SINKS, BOUND_X, BOUND_Y, AREA, FACES, SHARE, PLACE = 0, 1, 2, 3, 9, 12, 13, 14, 15, 18, 19
 """Of a voxel's place in a picture: centre (pixels), depth (mm), x and y of the half axes towards the camera, their
@@ -19,45 +19,41 @@ the share of foreground that was found there."""
 NEAR = 100.0
 """mm: a voxel that comes nearer to a camera's plane than this is not seen by it."""
 
+distorted = njit(**EXACT_INLINED)(projection.distorted)
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+
+@njit(**EXACT_INLINED)
 def place_voxel(cameras, view, x, y, z, half, place):
     """Fill `place` with a voxel's projection; False where the camera cannot see it. half : of its edge, mm."""
-    r, t = ROTATION, TRANSLATION
-    depth = (
-        cameras[view, r + 6] * x + cameras[view, r + 7] * y + cameras[view, r + 8] * z + cameras[view, t + 2]
-    )
-    reach = half * (abs(cameras[view, r + 6]) + abs(cameras[view, r + 7]) + abs(cameras[view, r + 8]))
+    camera = cameras[view]
+    r, t, m, k = camera.rotation, camera.translation, camera.matrix, camera.lens
+    depth = r[2, 0] * x + r[2, 1] * y + r[2, 2] * z + t[2]
+    reach = half * (abs(r[2, 0]) + abs(r[2, 1]) + abs(r[2, 2]))
     if depth - reach < NEAR:
         return False
     near = 1.0 / depth
-    a = (cameras[view, r] * x + cameras[view, r + 1] * y + cameras[view, r + 2] * z + cameras[view, t]) * near
-    b = (
-        cameras[view, r + 3] * x + cameras[view, r + 4] * y + cameras[view, r + 5] * z + cameras[view, t + 1]
-    ) * near
+    a = (r[0, 0] * x + r[0, 1] * y + r[0, 2] * z + t[0]) * near
+    b = (r[1, 0] * x + r[1, 1] * y + r[1, 2] * z + t[1]) * near
     square = a * a + b * b
-    if square > cameras[view, RADIUS]:
+    if square > camera.limit:
         return False
-    k1, k2, p1 = cameras[view, DISTORTION], cameras[view, DISTORTION + 1], cameras[view, DISTORTION + 2]
-    p2, k3 = cameras[view, DISTORTION + 3], cameras[view, DISTORTION + 4]
-    radial = 1.0 + square * (k1 + square * (k2 + square * k3))
+    k1, k2, p1, p2, k3 = k[0], k[1], k[2], k[3], k[4]
+    xd, yd, radial = distorted(a, b, (k1, k2, p1, p2, k3))
     slope = 2.0 * (k1 + square * (2.0 * k2 + square * 3.0 * k3))
-    xd = a * radial + 2.0 * p1 * a * b + p2 * (square + 2.0 * a * a)
-    yd = b * radial + p1 * (square + 2.0 * b * b) + 2.0 * p2 * a * b
     xx = radial + a * a * slope + 2.0 * p1 * b + 6.0 * p2 * a
     xy = a * b * slope + 2.0 * p1 * a + 2.0 * p2 * b
     yy = radial + b * b * slope + 6.0 * p1 * b + 2.0 * p2 * a
-    fx, skew, fy = cameras[view, MATRIX], cameras[view, MATRIX + 1], cameras[view, MATRIX + 3]
-    place[U] = fx * xd + skew * yd + cameras[view, MATRIX + 2]
-    place[V] = fy * yd + cameras[view, MATRIX + 4]
+    fx, skew, fy = m[0, 0], m[0, 1], m[1, 1]
+    place[U] = fx * xd + skew * yd + m[0, 2]
+    place[V] = fy * yd + m[1, 2]
     place[DEPTH] = depth
     bound_x, bound_y = 0.0, 0.0
     for axis in range(3):
-        away = cameras[view, CENTRE + axis] - (x if axis == 0 else y if axis == 1 else z)
+        away = camera.centre[axis] - (x if axis == 0 else y if axis == 1 else z)
         step = half if away >= 0.0 else -half
-        sink = step * cameras[view, r + 6 + axis]
-        along_a = (step * cameras[view, r + axis] - a * sink) * near
-        along_b = (step * cameras[view, r + 3 + axis] - b * sink) * near
+        sink = step * r[2, axis]
+        along_a = (step * r[0, axis] - a * sink) * near
+        along_b = (step * r[1, axis] - b * sink) * near
         along_x, along_y = xx * along_a + xy * along_b, xy * along_a + yy * along_b
         across, down = fx * along_x + skew * along_y, fy * along_y
         place[AXES + 2 * axis], place[AXES + 2 * axis + 1], place[SINKS + axis] = across, down, sink
@@ -74,13 +70,13 @@ def place_voxel(cameras, view, x, y, z, half, place):
     return True
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@njit(**EXACT_INLINED)
 def sample_count(place, sampling):
     """How many samples a voxel's area is worth: the square root of its pixels, at least one."""
     return max(1, math.ceil(sampling * math.sqrt(place[AREA]) - 1e-9))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@njit(**EXACT_INLINED)
 def sample_pixel(place, number, count, heights):
     """Column and row of one of `count` samples spread evenly over a voxel's area (Hammersley's points on the faces).
 

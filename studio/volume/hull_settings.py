@@ -3,9 +3,7 @@
 from dataclasses import dataclass
 
 from studio.evidence.yuv_background import SHADOW
-from studio.knobs import knob
-
-NEXT_FRAME = "next frame"
+from studio.knobs import next_frame_knob
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,68 +12,61 @@ class HullSettings:
 
     title = "Visual hull"
 
-    hull_depth: int = knob(
+    hull_depth: int = next_frame_knob(
         7,
         5,
         8,
         1,
         label="octree depth",
-        takes_effect=NEXT_FRAME,
         help="The tracking space is cut into 2 to this power voxels a side: 6 coarse and fast, 8 fine and slow.",
     )
-    hull_confidence: float = knob(
+    hull_confidence: float = next_frame_knob(
         0.99,
         0.5,
         0.99999,
         0.00001,
         label="confidence",
-        takes_effect=NEXT_FRAME,
         help="Eq. 5's α: the share of background areas that are taken for background.",
     )
-    hull_shadow: float = knob(
+    hull_shadow: float = next_frame_knob(
         SHADOW,
         0.0,
         0.9,
         0.01,
         label="shadow",
-        takes_effect=NEXT_FRAME,
         help="Share of the luminance that a shadow takes away; 0.1 in the paper.",
     )
-    hull_deepest_shadow: float = knob(
+    hull_deepest_shadow: float = next_frame_knob(
         0.4,
         0.0,
         0.9,
         0.01,
         label="deepest shadow",
-        takes_effect=NEXT_FRAME,
         help="Beyond the paper: every darker shade of the background's own colour down to this share taken away is"
         " shadow too; 0 = off, the paper's two Gaussians only.",
     )
-    hull_sampling: float = knob(
+    hull_sampling: float = next_frame_knob(
         1.0,
         0.25,
         8.0,
         0.25,
         label="samples",
         unit="√px",
-        takes_effect=NEXT_FRAME,
         help="Samples of a voxel's projection: this many times the square root of its area; 1 as in the paper.",
     )
-    hull_edge_share: float = knob(
+    hull_edge_share: float = next_frame_knob(
         0.25,
         0.05,
         1.0,
         0.05,
         label="edge share",
-        takes_effect=NEXT_FRAME,
         help="A voxel of the last depth is kept when this share of its samples is foreground in every view.",
     )
-    hull_least_views: int = knob(
+    hull_least_views: int = next_frame_knob(
         3,
         1,
         32,
         1,
         label="least views",
-        takes_effect=NEXT_FRAME,
         help="Voxels seen by fewer cameras are carved (of fewer cameras: by all).",
     )

@@ -6,22 +6,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.geometry.camera import Camera
-from studio.numba_in_threads import njit
+from studio.geometry.camera_table import camera_table, picture_limit
+from studio.numba_in_threads import EXACT, njit
 from studio.volume.hull import Hull
-from studio.volume.hull_cameras import camera_rows
 from studio.volume.hull_projection import AXES, BOUND_X, BOUND_Y, PLACE, U, V, place_voxel
 
 
 def silhouette(hull: Hull, camera: Camera) -> NDArray[np.uint8]:
     """(H, W) uint8, 255 where a voxel lies behind the pixel's centre, or a voxel's own centre is in the pixel."""
     picture = np.zeros((camera.height, camera.width), dtype=np.uint8)
-    draw_voxels(camera_rows((camera,)), hull.centres, hull.edges, picture)
+    draw_voxels(camera_table((camera,), picture_limit), hull.centres, hull.edges, picture)
     return picture
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**EXACT)
 def draw_voxels(cameras, centres, edges, picture):
-    """Set the pixels of each voxel's hexagon to 255. cameras : one row of `camera_rows`. picture : (H, W) uint8.
+    """Set the pixels of each voxel's hexagon to 255. cameras : a table of one. picture : (H, W) uint8.
 
     A hexagon is all sums of its three half axes a times -1 to 1: a pixel at d from the centre is inside when for the
     normal n of each axis |n d| is at most the sum of |n a|.
@@ -45,7 +45,7 @@ def draw_voxels(cameras, centres, edges, picture):
                     picture[y, x] = 255
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**EXACT)
 def in_hexagon(place, dx, dy):
     """Whether a pixel at (dx, dy) from a voxel's centre lies in its projection."""
     for axis in range(3):

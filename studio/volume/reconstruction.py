@@ -9,7 +9,7 @@ foreground, and otherwise cut into eight, down to the last depth. Where the pape
   centre decides) is left to the others. A voxel seen by fewer than `hull_least_views` views is carved.
 - With masks as evidence the share of mask pixels is counted over the whole rectangle around the voxel's projection
   by summed areas, instead of at samples: no mask pixel at all carves, nothing but mask pixels is foreground.
-- With pixels, distances are found in small tiles when the first sample falls into one (`distance_kernels`). Samples
+- With pixels, distances are found in small tiles when the first sample falls into one (`hull_kernels`). Samples
   miss the tips of limbs now and then: of a body of cones in five views a hull from pixels holds 98.7 %, one from masks
   99.9 % (`tests/volume/test_reconstruction.py`); knob `hull_sampling` buys more.
 - Colours are of the samples that are not background, so that the rim of a body is not mixed with what is behind it.
@@ -19,7 +19,6 @@ Of the last depth's rule, volume kept of that body and its hull's volume over it
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -29,13 +28,12 @@ from studio.errors import FootageError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.yuv_background import YuvBackground
 from studio.geometry.camera import Camera
-from studio.numba_in_threads import ONE_LAUNCH, numba
+from studio.geometry.camera_table import camera_table, picture_limit
+from studio.numba_in_threads import parallel_blocks
 from studio.volume import hull_kernels as kernels
 from studio.volume import hull_octree as octree
-from studio.volume import hull_rules as rule
 from studio.volume.chi_square import fitted_thresholds
 from studio.volume.hull import Hull
-from studio.volume.hull_cameras import camera_rows
 from studio.volume.hull_settings import HullSettings
 from studio.volume.tracking_space import Box
 
@@ -60,20 +58,23 @@ class Reconstructor:
                 f"A hull cannot be carved from {len(cameras)} cameras.", f"Use 1 to {MOST_VIEWS} cameras."
             )
         self.cameras, self.box, self.settings = cameras, box, settings
-        self._rows = camera_rows(cameras)
+        self._table = camera_table(cameras, picture_limit)
         sizes = np.array([(camera.width, camera.height) for camera in cameras], dtype=np.int64)
         self._starts = np.stack([_starts(sizes.prod(axis=1)), _starts((sizes + 1).prod(axis=1))])
         self._first, self._first_states, most = self._start()
         self._heights = radical_inverses(most)
         polynomial = fitted_thresholds(most, settings.hull_confidence)
-        rules = np.zeros(rule.RULES)
-        rules[rule.LEAST_VIEWS] = min(settings.hull_least_views, len(cameras))
-        rules[rule.EDGE_SHARE] = settings.hull_edge_share
-        rules[rule.SAMPLING] = settings.hull_sampling
-        rules[rule.SHADOW], rules[rule.DEEPEST] = settings.hull_shadow, settings.hull_deepest_shadow
-        rules[rule.SINGLE] = polynomial.single
-        rules[rule.POLYNOMIAL :] = polynomial.coefficients
-        self._rules = rules
+        constant, linear, square = polynomial.coefficients
+        self._rules = kernels.Rules(
+            last=False,
+            least_views=min(settings.hull_least_views, len(cameras)),
+            edge_share=float(settings.hull_edge_share),
+            sampling=float(settings.hull_sampling),
+            shadow=float(settings.hull_shadow),
+            deepest=float(settings.hull_deepest_shadow),
+            single=polynomial.single,
+            polynomial=(float(constant), float(linear), float(square)),
+        )
         self._packed: tuple[tuple[YuvBackground, ...], NDArray[np.float32]] | None = None
 
     def hull(self, evidence: FrameEvidence) -> Hull:
@@ -108,26 +109,17 @@ class Reconstructor:
             self.box,
         )
 
-    def _carved(self, seen: "_Seen") -> list[Nodes]:
+    def _carved(self, seen: kernels.Sights) -> list[Nodes]:
         """The kept voxels of each depth."""
         kept: list[Nodes] = []
         nodes, states = self._first, self._first_states.copy()
         depths = range(FIRST_DEPTH, self.settings.hull_depth + 1)
         for depth in depths:
             verdicts = np.empty(len(nodes), dtype=np.uint8)
-            rules = self._rules_at(depth, seen)
+            rules = self._rules._replace(last=depth == depths[-1])
             corner, edge = self.box.corner, self.box.edge / 2.0**depth
-            _on_threads(
-                kernels.judge_share,
-                kernels.judge_all,
-                nodes,
-                states,
-                verdicts,
-                corner,
-                edge,
-                *seen.images,
-                rules,
-            )
+            given = nodes, states, verdicts, corner, edge, seen, rules
+            parallel_blocks(kernels.judge, len(nodes), VOXELS_A_THREAD, *given)
             kept.append(octree.kept_nodes(nodes, verdicts))
             if depth < depths[-1]:
                 nodes, states = octree.children(nodes, states, verdicts, grid_limits(self.box, depth + 1))
@@ -139,22 +131,16 @@ class Reconstructor:
         edges = np.repeat(sizes, [len(nodes) for nodes in kept])
         return self.box.corner + (np.concatenate(kept) + 0.5) * edges[:, None], edges
 
-    def _coloured(self, kept: list[Nodes], seen: "_Seen") -> Hull:
+    def _coloured(self, kept: list[Nodes], seen: kernels.Sights) -> Hull:
         """The kept voxels of each depth as a hull."""
         centres, edges = self._placed(kept)
         views = np.empty((len(edges), len(self.cameras), 3), dtype=np.float32)
         means = np.empty((len(edges), 3), dtype=np.float32)
-        rules = self._rules_at(self.settings.hull_depth, seen)
-        _on_threads(octree.colour_share, octree.colour_all, centres, edges, *seen.images, rules, views, means)
+        given = centres, edges, seen, self._rules, views, means
+        parallel_blocks(octree.colour, len(edges), VOXELS_A_THREAD, *given)
         return Hull(centres, edges, means, views, self.settings.hull_depth, self.box)
 
-    def _rules_at(self, depth: int, seen: "_Seen") -> Array:
-        rules = self._rules.copy()
-        rules[rule.DEPTH_IS_LAST] = depth == self.settings.hull_depth
-        rules[rule.PIXELS] = seen.by_pixels
-        return rules
-
-    def _seen(self, evidence: FrameEvidence) -> "_Seen":
+    def _seen(self, evidence: FrameEvidence) -> kernels.Sights:
         """The frame's pictures, and summed masks or Gaussians, one after the other for the kernels."""
         picture = np.concatenate([view.picture.reshape(-1, 3) for view in evidence.views])
         backgrounds = tuple(view.background for view in evidence.views if view.background is not None)
@@ -162,15 +148,17 @@ class Reconstructor:
             return self._seen_masks([view.mask for view in evidence.views], picture)
         distances = np.full(len(picture), np.nan, dtype=np.float32)
         sums, gaussians = np.zeros(1, dtype=np.int32), self._gaussians(backgrounds)
-        return _Seen(True, (self._rows, self._starts, sums, picture, gaussians, distances, self._heights))
+        shared = self._table, self._starts
+        return kernels.Sights(True, *shared, sums, picture, gaussians, distances, self._heights)
 
-    def _seen_masks(self, masks: Sequence[Bytes], picture: Bytes) -> "_Seen":
+    def _seen_masks(self, masks: Sequence[Bytes], picture: Bytes) -> kernels.Sights:
         """Summed masks. picture : of all views one after the other, where colours are asked for."""
         sums = np.empty(int(self._starts[1, -1]), dtype=np.int32)
         for mask, first, end in zip(masks, self._starts[1], self._starts[1, 1:], strict=False):
             octree.summed_areas(mask, sums[first:end])
         gaussians, distances = np.zeros((9, 1), dtype=np.float32), np.zeros(1, dtype=np.float32)
-        return _Seen(False, (self._rows, self._starts, sums, picture, gaussians, distances, self._heights))
+        shared = self._table, self._starts
+        return kernels.Sights(False, *shared, sums, picture, gaussians, distances, self._heights)
 
     def _gaussians(self, backgrounds: tuple[YuvBackground, ...]) -> NDArray[np.float32]:
         if self._packed is None or any(
@@ -208,19 +196,11 @@ class Reconstructor:
         nodes, edge = grid_within(self.box, FIRST_DEPTH), self.box.edge / 2.0**FIRST_DEPTH
         states, samples = np.zeros((len(nodes), 3), dtype=np.uint32), np.zeros(len(nodes), dtype=np.int64)
         octree.first_look(
-            nodes, self.box.corner, edge, self._rows, self.settings.hull_sampling, states, samples
+            nodes, self.box.corner, edge, self._table, self.settings.hull_sampling, states, samples
         )
         unseen = np.array([int(bits).bit_count() for bits in states[:, 1]])
         seen = len(self.cameras) - unseen >= min(self.settings.hull_least_views, len(self.cameras))
         return nodes[seen], states[seen], int(samples.max(initial=1))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Seen:
-    """What the kernels read of a frame. by_pixels : not by masks."""
-
-    by_pixels: bool
-    images: tuple[Any, ...]
 
 
 def reconstruct(
@@ -257,13 +237,3 @@ def radical_inverses(count: int) -> Array:
 def _starts(lengths: IntArray) -> IntArray:
     """(V + 1,) where each of V pieces begins, and the end of the last."""
     return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
-
-
-def _on_threads(share: Any, everything: Any, voxels: Any, *arguments: Any) -> None:  # noqa: ANN401 - kernels
-    """Run a kernel over all voxels, on as many threads as Numba is set to and get enough of them."""
-    threads = min(int(numba.get_num_threads()), len(voxels) // VOXELS_A_THREAD)
-    if threads <= 1:
-        share(0, 1, voxels, *arguments)
-        return
-    with ONE_LAUNCH:
-        everything(threads, voxels, *arguments)

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import joint_frames
 from studio.body.model import BodyModel, kinematic_tables
-from studio.numba_in_threads import numba
+from studio.numba_in_threads import KERNEL, njit
 from studio.volume.blob_model import BlobMixture, BlobModel
 
 Array = NDArray[np.float64]
@@ -111,7 +111,7 @@ class DivergenceOfPoses:
         return found + self.constant
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(**KERNEL)
 def _pose_divergences(frames, joint, offset, spread, share, means, precisions, found):
     """Σ α ½ (tr(Σg⁻¹ Σf) + (μg - μf)ᵀ Σg⁻¹ (μg - μf)) of frames (N, F, 3, 4) into found (N,): the trace is
     Σ λ_k u_kᵀ Σg⁻¹ u_k over the bone's axes u_k.

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
+from studio.geometry.camera_table import picture_limit
 from studio.geometry.projection import project
-from studio.volume.hull_cameras import radius_limit
 
 Array = NDArray[np.float64]
 
@@ -98,7 +98,7 @@ def sees(camera: Camera, points: Array) -> NDArray[np.bool_]:
     radius = (seen[..., 0] ** 2 + seen[..., 1] ** 2) / ahead**2
     size = np.array([camera.width, camera.height]) - 0.5
     inside = ((pixels >= -0.5) & (pixels < size)).all(axis=-1)
-    return (depth > 0.0) & (radius <= radius_limit(camera)) & inside
+    return (depth > 0.0) & (radius <= picture_limit(camera)) & inside
 
 
 def _surroundings(cameras: Sequence[Camera], height: float) -> tuple[Array, float]:

@@ -12,11 +12,10 @@ precision is no faster.
 
 import numpy as np
 
-from studio.numba_in_threads import intrinsic, njit, prange, types
+from studio.numba_in_threads import CONTRACTED, CONTRACTED_INLINED, intrinsic, njit, types
+from studio.weighting.outline_kernels import LANES
 
-LANES = 16
 ROWS = 8
-CORNERS = 4
 WORD = 64
 WINDOW_STEP = 16
 """Pixels between the places where a window may begin."""
@@ -25,11 +24,6 @@ FAR = 1.0e9
 # Rows of a limb's table: slope and crossing of each edge as a left one, then as a right one; first and last row of
 # pixels; first and last column; area.
 RIGHT, FIRST_ROW, LAST_ROW, FIRST_COLUMN, LAST_COLUMN, AREA, FIELDS = 8, 16, 17, 18, 19, 20, 21
-
-# Not a number and infinity keep their meaning.
-FLAGS = {"contract", "nsz"}
-OPTIONS = {"fastmath": FLAGS, "error_model": "numpy", "nogil": True, "cache": True}
-INLINED = {**OPTIONS, "forceinline": True}
 
 
 @intrinsic
@@ -43,7 +37,7 @@ def bit_count(typingctx, word):
     return signature, generate
 
 
-@njit(**INLINED)
+@njit(**CONTRACTED_INLINED)
 def store_edge(table, corner, lane, px, py, qx, qy, sign, first):
     """Keep the edge from p to q: its slope and where it crosses row `first`, as a left or a right one."""
     a, b = sign * (py - qy), sign * (qx - px)
@@ -55,7 +49,7 @@ def store_edge(table, corner, lane, px, py, qx, qy, sign, first):
     table[(RIGHT + 2 * corner + 1) * LANES + lane] = crossing if a < 0.0 else FAR
 
 
-@njit(**OPTIONS)
+@njit(**CONTRACTED)
 def limb_table(outline, table, scale, width, height):
     """Fill the table (336,) of a limb from its outlines (160,) in one view; see the names above for its rows.
 
@@ -85,7 +79,7 @@ def limb_table(outline, table, scale, width, height):
         store_edge(table, 3, lane, dx, dy, ax, ay, sign, first)
 
 
-@njit(**INLINED)
+@njit(**CONTRACTED_INLINED)
 def limb_edges(table, lane):
     """One lane's eight pairs of slope and crossing."""
     return (
@@ -98,7 +92,7 @@ def limb_edges(table, lane):
     )  # fmt: skip
 
 
-@njit(**INLINED)
+@njit(**CONTRACTED_INLINED)
 def span(edges, row):
     """First pixel and the one after the last of a row, counted from the limb's first."""
     left = max(
@@ -112,14 +106,14 @@ def span(edges, row):
     return np.ceil(left), np.floor(right) + 1.0
 
 
-@njit(**INLINED)
+@njit(**CONTRACTED_INLINED)
 def bits_from(place):
     """A word whose bits from `place` on (0...64) are set."""
     count = np.uint64(np.uint32(np.int32(place)))
     return (ALL_BITS << (count & np.uint64(63))) if count < np.uint64(64) else NO_BITS
 
 
-@njit(**INLINED)
+@njit(**CONTRACTED_INLINED)
 def add_word(edges, begin, chunks, rows, base, most, words, offset):
     """Set the bits of a limb's rows in one column of words, the first of whose pixels is `base`.
 
@@ -137,7 +131,7 @@ def add_word(edges, begin, chunks, rows, base, most, words, offset):
             words[place + np.uint64(i)] |= from_left & ~from_after
 
 
-@njit(**OPTIONS)
+@njit(**CONTRACTED)
 def outside_area(table, lane, edges, width):
     """What of a limb's area lies outside the picture: all of it less its pixels."""
     inside = 0.0
@@ -148,7 +142,7 @@ def outside_area(table, lane, edges, width):
     return max(table[AREA * LANES + lane] - inside, 0.0)
 
 
-@njit(**OPTIONS)
+@njit(**CONTRACTED)
 def body_box(tables, lane):
     """First and last row and column of pixels of all limbs of one pose; last < first where there are none."""
     top, bottom, left, right = FAR, -1.0, FAR, -1.0
@@ -161,7 +155,7 @@ def body_box(tables, lane):
     return int(min(top, bottom + 1.0)), int(bottom), int(min(left, right + 1.0)), int(right)
 
 
-@njit(**OPTIONS)
+@njit(**CONTRACTED)
 def draw_union(tables, lane, top, window, width, height, words):
     """Set the bits of all limbs of one pose in the columns of words that begin at pixel `window`, `height` words
     each, whose first row is `top`."""
@@ -181,7 +175,7 @@ def draw_union(tables, lane, top, window, width, height, words):
             add_word(edges, first - top, chunks, rows, np.float64(base), most, words, column * height)
 
 
-@njit(**INLINED)
+@njit(**CONTRACTED_INLINED)
 def count_bits(words, begin, silhouette, base, rows):
     """How many bits of `rows` words are set, and how many of them in the silhouette too."""
     drawn, shared = 0, 0
@@ -194,7 +188,7 @@ def count_bits(words, begin, silhouette, base, rows):
     return drawn, shared
 
 
-@njit(**OPTIONS)
+@njit(**CONTRACTED)
 def pose_areas(tables, lane, view, silhouettes, words):
     """Pixels of the union of one pose's limbs in one view, and how many of them lie in the silhouette."""
     top, bottom, left, right = body_box(tables, lane)
@@ -206,35 +200,36 @@ def pose_areas(tables, lane, view, silhouettes, words):
     # A limb's last rows may reach further down than the body's.
     height = rows + ROWS
     words[: columns * height] = NO_BITS
-    draw_union(tables, lane, top, window, view[1], height, words)
+    draw_union(tables, lane, top, window, view[2], height, words)
     drawn, shared = 0, 0
     for column in range(columns):
-        base = view[0] + (window + column * WORD) // WINDOW_STEP * view[3] + top
+        base = view[0] + (window + column * WORD) // WINDOW_STEP * view[1] + top
         more_drawn, more_shared = count_bits(words, column * height, silhouettes, base, rows)
         drawn += more_drawn
         shared += more_shared
     return drawn, shared
 
 
-@njit(**OPTIONS)
-def chunk_areas(first, last, outlines, scale, views, silhouettes, counts, outside):
+@njit(**CONTRACTED)
+def area_blocks(first, last, outlines, scale, silhouettes, counts, outside):
     """Areas of the blocks first..last - 1 of sixteen poses.
 
-    scale : pixels of the silhouettes a pixel of the pictures. views : (V, 4) where a view's silhouette begins, its
-    width and height, and words in one of its columns. counts : (B, V, 16, 2) pixels of the union, those in the
+    scale : pixels of the silhouettes a pixel of the pictures. silhouettes : `Maps` of columns of words, of which the
+    second number of a view says how many words each has. counts : (B, V, 16, 2) pixels of the union, those in the
     silhouette. outside : (B, V, 16) area of limbs beyond the picture, overlaps counted twice; the whole picture's
     for a limb that reaches behind the camera.
     """
     tables = np.zeros((outlines.shape[2], FIELDS * LANES))
-    columns = (views[:, 1].max() - 1) // WORD + 2
-    words = np.zeros(columns * (views[:, 2].max() + 2 * ROWS), np.uint64)
+    views = silhouettes.views
+    columns = (views[:, 2].max() - 1) // WORD + 2
+    words = np.zeros(columns * (views[:, 3].max() + 2 * ROWS), np.uint64)
     for block in range(first, last):
         for view in range(outlines.shape[1]):
-            width, height = views[view, 1], views[view, 2]
+            width, height = views[view, 2], views[view, 3]
             for limb in range(outlines.shape[2]):
                 limb_table(outlines[block, view, limb], tables[limb], scale, float(width), float(height))
             for lane in range(LANES):
-                drawn, shared = pose_areas(tables, lane, views[view], silhouettes, words)
+                drawn, shared = pose_areas(tables, lane, views[view], silhouettes.values, words)
                 counts[block, view, lane, 0] = drawn
                 counts[block, view, lane, 1] = shared
                 beyond = 0.0
@@ -245,12 +240,3 @@ def chunk_areas(first, last, outlines, scale, views, silhouettes, counts, outsid
                     elif seen < 0.5:
                         beyond += outside_area(tables[limb], lane, limb_edges(tables[limb], lane), width)
                 outside[block, view, lane] = beyond
-
-
-@njit(parallel=True, **OPTIONS)
-def all_areas(chunks, outlines, scale, views, silhouettes, counts, outside):
-    """`chunk_areas` of all blocks, shared among `chunks` threads."""
-    share = (counts.shape[0] + chunks - 1) // chunks
-    for chunk in prange(chunks):
-        last = min((chunk + 1) * share, counts.shape[0])
-        chunk_areas(chunk * share, last, outlines, scale, views, silhouettes, counts, outside)

@@ -3,10 +3,8 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from studio.knobs import knob
+from studio.knobs import next_frame_knob
 from studio.volume.reconstruction import HullSettings
-
-NEXT_FRAME = "next frame"
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,70 +13,63 @@ class BlobSettings(HullSettings):
 
     title: ClassVar[str] = "Blobs"
 
-    blob_sharpness: float = knob(
+    blob_sharpness: float = next_frame_knob(
         1.0,
         0.1,
         20.0,
         0.1,
         label="sharpness",
-        takes_effect=NEXT_FRAME,
         help="A pose weighs 1 / D to this power; the paper's is 1.",
     )
-    blob_starts: int = knob(
+    blob_starts: int = next_frame_knob(
         6,
         1,
         32,
         1,
         label="fits a frame",
-        takes_effect=NEXT_FRAME,
         help="Most expected poses that blobs are fitted from; the likeliest fit is kept.",
     )
-    blob_iterations: int = knob(
+    blob_iterations: int = next_frame_knob(
         8,
         1,
         50,
         1,
         label="K-means steps",
-        takes_effect=NEXT_FRAME,
         help="Most rounds of giving voxels to blobs and blobs to voxels; a fit that stands still ends earlier.",
     )
-    blob_learning: int = knob(
+    blob_learning: int = next_frame_knob(
         20,
         0,
         200,
         1,
         label="learning frames",
         unit="frames",
-        takes_effect=NEXT_FRAME,
         help="Blobs are learnt from the first so many frames; 0 = keep the cones, without colours.",
     )
-    blob_split: float = knob(
+    blob_split: float = next_frame_knob(
         12.0,
         2.0,
         120.0,
         1.0,
         label="split a blob at",
         unit="grey levels",
-        takes_effect=NEXT_FRAME,
         help="While blobs are learnt, one whose colour changes along the bone by more than this over a standard"
         " deviation becomes two; below half of it two become one.",
     )
-    blob_parts: int = knob(
+    blob_parts: int = next_frame_knob(
         3,
         1,
         8,
         1,
         label="most blobs a limb",
-        takes_effect=NEXT_FRAME,
         help="A limb is never split into more blobs than this.",
     )
-    blob_lost: float = knob(
+    blob_lost: float = next_frame_knob(
         1.5,
         0.1,
         50.0,
         0.1,
         label="lost below",
         unit="nats/voxel",
-        takes_effect=NEXT_FRAME,
         help="The tracker counts as lost where the voxels' likelihood lies this far below the learnt blobs' own.",
     )

@@ -42,7 +42,7 @@ from studio.volume.relative_entropy import DivergenceOfPoses
 from studio.weighting.blob_settings import BlobSettings
 from studio.weighting.evidence_check import check_views
 from studio.weighting.hard_priors import HardPriors
-from studio.weighting.problem import TRUNK_FIRST, WHOLE_BODY
+from studio.weighting.problem import TRUNK_FIRST, WHOLE_BODY, PreparedProblem
 
 Array = NDArray[np.float64]
 
@@ -89,11 +89,11 @@ class BlobWeigher:
         return Profiles(memory["blob_profiles"], int(memory["blob_frames"][0]))
 
 
-class BlobProblem:
+class BlobProblem(PreparedProblem):
     """One frame as a function of poses, before anything is known of where the body may be."""
 
     def __init__(self, weigher: BlobWeigher, hull: Hull) -> None:
-        self.weigher, self.hull = weigher, hull
+        self.weigher, self.hull, self.priors = weigher, hull, weigher.priors
 
     def expecting(self, poses: Array, memory: Mapping[str, Array]) -> "ExpectedBlobs":
         """The frame with blobs fitted from expected poses (S, D), of which the first `blob_starts` are used. Raises
@@ -113,14 +113,6 @@ class BlobProblem:
         if not len(checked):
             return np.zeros(0)
         return self.expecting(checked.mean(axis=0)[None], {}).weigh(checked, stage)
-
-    def fitness(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
-        """(N,) the log-weights of poses (N, D): this weighting defines no other fitness."""
-        return self.weigh(poses, stage)
-
-    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
-        """(N, D) poses to (N,) whether the body can take them."""
-        return self.weigher.priors.hold(poses, limbs_apart)
 
 
 class ExpectedBlobs(BlobProblem):

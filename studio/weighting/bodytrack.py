@@ -23,12 +23,14 @@ from numpy.typing import NDArray
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
-from studio.knobs import knob
-from studio.weighting.block_threads import run_blocks
-from studio.weighting.bodytrack_kernels import EDGE_STEP, LANES, ROUND, all_scores, chunk_scores
-from studio.weighting.evidence_check import check_sizes, check_views
-from studio.weighting.hard_priors import HardPriors
-from studio.weighting.outlines import OutlineProjector
+from studio.knobs import next_frame_knob
+from studio.numba_in_threads import parallel_blocks
+from studio.weighting.bodytrack_kernels import EDGE_STEP, score_blocks
+from studio.weighting.edge_region_kernels import CHUNK
+from studio.weighting.evidence_check import check_views
+from studio.weighting.outline_kernels import LANES
+from studio.weighting.picture_maps import Maps, joined_maps
+from studio.weighting.problem import Preparation, PreparedProblem
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -47,11 +49,11 @@ class BodytrackSettings:
 
     title: ClassVar[str] = "Benchmark's score"
 
-    score_edge_weight: float = knob(
-        1.0, 0.0, 5.0, 0.05, takes_effect="next frame", help="Weight of E_edge; the benchmark's is 1."
+    score_edge_weight: float = next_frame_knob(
+        1.0, 0.0, 5.0, 0.05, help="Weight of E_edge; the benchmark's is 1."
     )
-    score_inside_weight: float = knob(
-        1.0, 0.0, 5.0, 0.05, takes_effect="next frame", help="Weight of E_inside; the benchmark's is 1."
+    score_inside_weight: float = next_frame_knob(
+        1.0, 0.0, 5.0, 0.05, help="Weight of E_inside; the benchmark's is 1."
     )
 
 
@@ -68,14 +70,8 @@ class Score:
     inside_samples: int
 
 
-class BodytrackWeigher:
-    """Makes the problem of any frame; holds nothing that changes."""
-
-    def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: BodytrackSettings) -> None:
-        check_sizes(cameras)
-        self.settings, self.cameras = settings, cameras
-        self.projector = OutlineProjector.of_body(body, cameras)
-        self.priors = HardPriors(body)
+class BodytrackWeigher(Preparation):
+    """Makes the problem of any frame."""
 
     def problem(self, evidence: FrameEvidence) -> "BodytrackProblem":
         """One frame as a function of poses; its edge maps are the benchmark's.
@@ -83,14 +79,14 @@ class BodytrackWeigher:
         Raises FootageError where views do not fit the cameras.
         """
         check_views(self.cameras, evidence)
-        return BodytrackProblem(self, *score_maps(evidence))
+        return BodytrackProblem(self, score_maps(evidence))
 
 
-class BodytrackProblem:
+class BodytrackProblem(PreparedProblem):
     """One frame as a function of poses."""
 
-    def __init__(self, weigher: BodytrackWeigher, maps: NDArray[np.uint16], views: IntArray) -> None:
-        self.weigher, self.maps, self.views = weigher, maps, views
+    def __init__(self, weigher: BodytrackWeigher, maps: Maps) -> None:
+        self.weigher, self.priors, self.maps = weigher, weigher.priors, maps
 
     def weigh(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights. Raises BodyError for poses that are no finite (N, D)."""
@@ -102,13 +98,8 @@ class BodytrackProblem:
         """E_edge (N,), E_inside (N,) and the samples counted of each (N, 2), of poses (N, D)."""
         outlines = self.weigher.projector.blocks(poses)
         sums = np.zeros((len(outlines), LANES, 4), dtype=np.int64)
-        run_blocks(
-            chunk_scores,
-            all_scores,
-            len(outlines),
-            BLOCKS_A_THREAD,
-            *(outlines, self.views, self.maps, self._capacity, sums),
-        )
+        blocks, capacity = len(outlines), self._capacity
+        parallel_blocks(score_blocks, blocks, BLOCKS_A_THREAD, outlines, self.maps, capacity, sums)
         sums = sums.reshape(-1, 4)[: len(poses)]
         counts = np.maximum(sums[:, 1::2], 1)
         edge = np.where(sums[:, 1] > 0, sums[:, 0] / (FULL * counts[:, 0]), 1.0)
@@ -121,20 +112,12 @@ class BodytrackProblem:
         both = float(edge[0]), float(inside[0])
         return Score(both[0] + both[1], *both, int(counts[0, 0]), int(counts[0, 1]))
 
-    def fitness(self, poses: Array, stage: int = 0) -> Array:
-        """(N,) the log-weights of poses (N, D): this weighting defines no other fitness."""
-        return self.weigh(poses, stage)
-
-    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
-        """(N, D) poses to (N,) whether the body can take them."""
-        return self.weigher.priors.hold(poses, limbs_apart)
-
     @property
     def _capacity(self) -> int:
         """Room for every limb running across its picture, and a grid over it."""
-        longest = int(np.hypot(self.views[:, 2], self.views[:, 3]).max() / EDGE_STEP)
+        longest = int(np.hypot(*self.maps.views[:, 2:].T).max() / EDGE_STEP)
         limbs = self.weigher.projector.limb_count
-        return (max(LEAST_CAPACITY, 2 * limbs * longest) + ROUND) // ROUND * ROUND
+        return (max(LEAST_CAPACITY, 2 * limbs * longest) + CHUNK) // CHUNK * CHUNK
 
 
 def score(body: BodyModel, cameras: tuple[Camera, ...], evidence: FrameEvidence, pose: Array) -> Score:
@@ -142,18 +125,7 @@ def score(body: BodyModel, cameras: tuple[Camera, ...], evidence: FrameEvidence,
     return BodytrackWeigher(body, cameras, BodytrackSettings()).problem(evidence).score(pose)
 
 
-def score_maps(evidence: FrameEvidence) -> tuple[NDArray[np.uint16], IntArray]:
-    """Flat maps of (255 - e)² and of "no foreground" of all views, each followed by a 0, and (V, 4) where the
-    edge map and the mask's begin, width, height.
-    """
-    table = ((255 - np.arange(256)) ** 2).astype(np.uint16)
-    sizes = [view.mask.size for view in evidence.views]
-    values = np.zeros(2 * sum(size + 1 for size in sizes), dtype=np.uint16)
-    views = np.zeros((len(sizes), 4), dtype=np.int64)
-    start = 0
-    for row, view, size in zip(views, evidence.views, sizes, strict=True):
-        row[:] = start, start + size + 1, view.mask.shape[1], view.mask.shape[0]
-        np.take(table, view.edges.ravel(), out=values[start : start + size])
-        values[row[1] : row[1] + size] = view.mask.ravel() == 0
-        start += 2 * (size + 1)
-    return values, views
+def score_maps(evidence: FrameEvidence) -> Maps:
+    """Maps of (255 - e)² and of "no foreground" of all views, each followed by a 0."""
+    errors = ((255 - np.arange(256)) ** 2).astype(np.uint16)
+    return joined_maps([[(v.edges, errors), (v.mask == 0, None)] for v in evidence.views], (0,), np.uint16)

@@ -8,27 +8,21 @@ index of an entry that is 0, then bare loads. Maps are 16-bit and hold (255 - e)
 
 import numpy as np
 
-from studio.numba_in_threads import njit, prange
+from studio.numba_in_threads import FAST, FAST_INLINED, njit
+from studio.weighting.edge_region_kernels import CHUNK, add_up, as_pairs
+from studio.weighting.outline_kernels import HALF, LANES, ONE, ZERO
 
-LANES = 16
-ROUND = 16
 LEAST, MOST = 4, np.float32(1.0e6)
 EDGE_STEP, INSIDE_STEP = np.float32(5.0), np.float32(10.0)
-HALF, ONE, ZERO = np.float32(0.5), np.float32(1.0), np.float32(0.0)
-UPPER, LOW = np.uint64(32), np.uint64(0xFFFFFFFF)
-
-FLAGS = {"contract", "reassoc", "nsz", "arcp", "afn"}
-OPTIONS = {"fastmath": FLAGS, "error_model": "numpy", "nogil": True, "cache": True}
-INLINED = {**OPTIONS, "forceinline": True}
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def intervals(x, y, step):
     """How many intervals of about `step` pixels a line is divided into, at least LEAST."""
     return max(LEAST, int(min(np.sqrt(x * x + y * y) / step, MOST) + HALF))
 
 
-@njit(**OPTIONS)
+@njit(**FAST)
 def fill_line(x, y, dx, dy, step, count, width, indices, at):
     """Indices of `count` samples x + i step dx (pixels, half a pixel on), all inside the picture."""
     for i in range(count):
@@ -37,7 +31,7 @@ def fill_line(x, y, dx, dy, step, count, width, indices, at):
     return at + count
 
 
-@njit(**OPTIONS)
+@njit(**FAST)
 def fill_clipped(x, y, dx, dy, step, count, width, height, indices, at):
     """The same for a line that may leave the picture: samples outside are skipped."""
     for i in range(count):
@@ -49,17 +43,17 @@ def fill_clipped(x, y, dx, dy, step, count, width, height, indices, at):
     return at
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def line(whole, x, y, dx, dy, step, count, width, height, indices, at):
     """`fill_line` or `fill_clipped`; nothing where the buffer is full."""
-    if at + count + ROUND > indices.shape[0]:
+    if at + count + CHUNK > indices.shape[0]:
         return at
     if whole:
         return fill_line(x, y, dx, dy, step, count, width, indices, at)
     return fill_clipped(x, y, dx, dy, step, count, width, height, indices, at)
 
 
-@njit(**OPTIONS)
+@njit(**FAST)
 def limb_corners(outlines, block, view, limb, lane):
     """Corners A0, A1, B1, B0 of a limb, pixels, half a pixel on so that flooring rounds."""
     ax, ay = outlines[block, view, limb, lane] + HALF, outlines[block, view, limb, LANES + lane] + HALF
@@ -72,7 +66,7 @@ def limb_corners(outlines, block, view, limb, lane):
     return ax, ay, bx, by, cx, cy, ex, ey
 
 
-@njit(**OPTIONS)
+@njit(**FAST)
 def fill_edges(outlines, block, view, lane, width, height, indices):
     """Indices of the samples along both sides of every limb; returns how many."""
     at = 0
@@ -88,7 +82,7 @@ def fill_edges(outlines, block, view, lane, width, height, indices):
     return at
 
 
-@njit(**OPTIONS)
+@njit(**FAST)
 def fill_inside(outlines, block, view, lane, width, height, indices):
     """Indices of the grid within every limb, its last column left out as the benchmark does; returns how
     many.
@@ -109,62 +103,35 @@ def fill_inside(outlines, block, view, lane, width, height, indices):
     return at
 
 
-@njit(**OPTIONS)
-def add_up(maps, base, nothing, indices, pairs, count):
-    """The sum of a map's entries at the first `count` indices, two indices a load (see
-    `edge_region_kernels`).
-    """
-    rounds = (count + ROUND - 1) // ROUND
-    for i in range(count, rounds * ROUND):
+@njit(**FAST)
+def add_samples(values, base, nothing, indices, pairs, count):
+    """The sum of a map's entries at the first `count` indices; those that fill up the last sixteen become `nothing`."""
+    rounds = (count + CHUNK - 1) // CHUNK
+    for i in range(count, rounds * CHUNK):
         indices[i] = nothing
-    a = b = c = d = np.uint64(0)
-    end = np.uint64(maps.shape[0])
-    for k in range(rounds):
-        if pairs[k, 0] & LOW >= end:
-            break
-        for half in range(0, 8, 4):
-            p, q, r, s = pairs[k, half], pairs[k, half + 1], pairs[k, half + 2], pairs[k, half + 3]
-            a += maps[(p & LOW) + base]
-            b += maps[(p >> UPPER) + base]
-            c += maps[(q & LOW) + base]
-            d += maps[(q >> UPPER) + base]
-            a += maps[(r & LOW) + base]
-            b += maps[(r >> UPPER) + base]
-            c += maps[(s & LOW) + base]
-            d += maps[(s >> UPPER) + base]
-    return np.int64(a + b + c + d)
+    return add_up(values, base, pairs[:rounds])
 
 
-@njit(**OPTIONS)
-def chunk_scores(first, last, outlines, views, maps, capacity, sums):
+@njit(**FAST)
+def score_blocks(first, last, outlines, maps, capacity, sums):
     """Sums of the blocks first..last - 1 over all limbs and views.
 
     sums : (B, 16, 4) int64: edge map, edge samples, inside map, inside samples. capacity : a multiple of
-    sixteen, the most samples of one kind in one view."""
+    sixteen, the most samples of one kind in one view.
+    """
+    values, views = maps.values, maps.views
     indices = np.zeros(capacity, np.uint32)
-    pairs = indices.view(np.uint64).reshape((capacity // ROUND, 8))
+    pairs = as_pairs(indices)
     for block in range(first, last):
         sums[block] = 0
         for view in range(outlines.shape[1]):
             width, height = np.float32(views[view, 2]), np.float32(views[view, 3])
             nothing = np.uint32(views[view, 2] * views[view, 3])
+            edges, inside = np.uint64(views[view, 0]), np.uint64(views[view, 1])
             for lane in range(LANES):
                 count = fill_edges(outlines, block, view, lane, width, height, indices)
-                sums[block, lane, 0] += add_up(
-                    maps, np.uint64(views[view, 0]), nothing, indices, pairs, count
-                )
+                sums[block, lane, 0] += add_samples(values, edges, nothing, indices, pairs, count)
                 sums[block, lane, 1] += count
                 count = fill_inside(outlines, block, view, lane, width, height, indices)
-                sums[block, lane, 2] += add_up(
-                    maps, np.uint64(views[view, 1]), nothing, indices, pairs, count
-                )
+                sums[block, lane, 2] += add_samples(values, inside, nothing, indices, pairs, count)
                 sums[block, lane, 3] += count
-
-
-@njit(parallel=True, **OPTIONS)
-def all_scores(chunks, outlines, views, maps, capacity, sums):
-    """`chunk_scores` of all blocks, shared among `chunks` threads."""
-    share = (sums.shape[0] + chunks - 1) // chunks
-    for chunk in prange(chunks):
-        last = min((chunk + 1) * share, sums.shape[0])
-        chunk_scores(chunk * share, last, outlines, views, maps, capacity, sums)

@@ -16,14 +16,14 @@ from studio.weighting.bodytrack import BodytrackSettings, BodytrackWeigher
 from studio.weighting.edge_region import EdgeRegionSettings, EdgeRegionWeigher
 from studio.weighting.edge_region_silhouette import EdgeRegionSilhouetteSettings, EdgeRegionSilhouetteWeigher
 from studio.weighting.edge_silhouette import EdgeSilhouetteSettings, EdgeSilhouetteWeigher
-from studio.weighting.problem import FrameFunction
+from studio.weighting.problem import FrameProblem
 from studio.weighting.template import TemplateSettings, TemplateWeigher
 
 
 class Weigher(Protocol):
     """A weighting made ready for one body, some cameras and some settings."""
 
-    def problem(self, evidence: FrameEvidence) -> FrameFunction:
+    def problem(self, evidence: FrameEvidence) -> FrameProblem:
         """One frame as a function of poses."""
         ...
 

@@ -28,25 +28,21 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.geometry.camera import Camera
-from studio.knobs import knob
-from studio.weighting.block_threads import run_blocks
+from studio.knobs import next_frame_knob
+from studio.numba_in_threads import parallel_blocks
 from studio.weighting.edge_region_kernels import (
     CHUNK,
     EDGE_LINES,
-    LANES,
-    PADDING,
     REGION_LINES,
     WORST,
-    all_weights,
-    chunk_weights,
     record_indices,
+    weight_blocks,
 )
-from studio.weighting.evidence_check import check_sizes, check_views
-from studio.weighting.hard_priors import HardPriors
-from studio.weighting.outlines import OutlineProjector
+from studio.weighting.evidence_check import check_views
+from studio.weighting.outline_kernels import LANES
+from studio.weighting.picture_maps import Maps, joined_maps
+from studio.weighting.problem import Preparation, PreparedProblem
 from studio.weighting.visible_edges import hidden_samples, limb_sides
 
 Array = NDArray[np.float64]
@@ -67,31 +63,28 @@ class EdgeRegionSettings:
 
     title: ClassVar[str] = "Edge and region"
 
-    edge_weight: float = knob(
+    edge_weight: float = next_frame_knob(
         1.0,
         0.0,
         5.0,
         0.05,
-        takes_effect="next frame",
         help="Weight of the edge term, Eq. 14; the paper's is 1.",
     )
-    region_weight: float = knob(
+    region_weight: float = next_frame_knob(
         1.0,
         0.0,
         5.0,
         0.05,
-        takes_effect="next frame",
         help="Weight of the silhouette term, Eq. 15; the paper's is 1.",
     )
-    edge_samples: int = knob(
-        32, 32, 128, 32, takes_effect="next frame", help="Edge samples a limb and view (to the nearest 32)."
+    edge_samples: int = next_frame_knob(
+        32, 32, 128, 32, help="Edge samples a limb and view (to the nearest 32)."
     )
-    region_samples: int = knob(
-        48, 48, 192, 48, takes_effect="next frame", help="Region samples a limb and view (to the nearest 48)."
+    region_samples: int = next_frame_knob(
+        48, 48, 192, 48, help="Region samples a limb and view (to the nearest 48)."
     )
-    occlusion_aware: bool = knob(
+    occlusion_aware: bool = next_frame_knob(
         False,
-        takes_effect="next frame",
         help="Leave out edge samples that nearer limbs hide; takes two to three times as long.",
     )
 
@@ -106,24 +99,8 @@ class EdgeRegionSettings:
         return max(1, round(self.region_samples / (REGION_LINES * CHUNK)))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class WeightingMaps:
-    """All cameras' maps, one after another. values : flat bytes 255 (1 - p)². views : (V, 4) where the edge
-    map and the region map begin, width, height.
-    """
-
-    values: Bytes
-    views: IntArray
-
-
-class EdgeRegionWeigher:
-    """Makes the problem of any frame; holds nothing that changes."""
-
-    def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: EdgeRegionSettings) -> None:
-        check_sizes(cameras)
-        self.settings, self.cameras = settings, cameras
-        self.projector = OutlineProjector.of_body(body, cameras)
-        self.priors = HardPriors(body)
+class EdgeRegionWeigher(Preparation):
+    """Makes the problem of any frame."""
 
     @property
     def samples_per_evaluation(self) -> int:
@@ -138,11 +115,11 @@ class EdgeRegionWeigher:
         return EdgeRegionProblem(self, weighting_maps(evidence))
 
 
-class EdgeRegionProblem:
+class EdgeRegionProblem(PreparedProblem):
     """One frame as a function of poses."""
 
-    def __init__(self, weigher: EdgeRegionWeigher, maps: WeightingMaps) -> None:
-        self.weigher, self.maps = weigher, maps
+    def __init__(self, weigher: EdgeRegionWeigher, maps: Maps) -> None:
+        self.weigher, self.priors, self.maps = weigher, weigher.priors, maps
 
     def weigh(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights, Eq. 17. Raises BodyError for poses that are no finite (N, D)."""
@@ -173,13 +150,8 @@ class EdgeRegionProblem:
         log_weights = np.empty((blocks, LANES))
         chunks = settings.edge_chunks, settings.region_chunks
         weights = np.array([settings.edge_weight, settings.region_weight])
-        run_blocks(
-            chunk_weights,
-            all_weights,
-            blocks,
-            BLOCKS_A_THREAD,
-            *(outlines, hidden, *chunks, self.maps.views, self.maps.values, weights, terms, log_weights),
-        )
+        given = outlines, hidden, *chunks, self.maps, weights
+        parallel_blocks(weight_blocks, blocks, BLOCKS_A_THREAD, *given, terms, log_weights)
         return terms.reshape(-1, views, 2)[:count], log_weights.ravel()[:count]
 
     def recorded_indices(self, outlines: NDArray[np.float32]) -> tuple[Words, Words]:
@@ -203,27 +175,8 @@ class EdgeRegionProblem:
         hidden = hidden_samples(outlines, limb_sides(limbs), samples)
         return hidden.reshape(blocks, views, limbs, EDGE_LINES, LANES)
 
-    def fitness(self, poses: Array, stage: int = 0) -> Array:
-        """(N,) the log-weights of poses (N, D): this weighting defines no other fitness."""
-        return self.weigh(poses, stage)
 
-    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
-        """(N, D) poses to (N,) whether the body can take them."""
-        return self.weigher.priors.hold(poses, limbs_apart)
-
-
-def weighting_maps(evidence: FrameEvidence) -> WeightingMaps:
-    """Edge and foreground maps of all views as 255 (1 - p)², p = value / 255, each followed by its padding."""
+def weighting_maps(evidence: FrameEvidence) -> Maps:
+    """Edge and foreground maps of all views as 255 (1 - p)², p = value / 255."""
     table = np.round(WORST * (1.0 - np.arange(256) / 255.0) ** 2).astype(np.uint8)
-    sizes = [view.mask.size for view in evidence.views]
-    values = np.empty(2 * sum(size + PADDING for size in sizes), dtype=np.uint8)
-    views = np.zeros((len(sizes), 4), dtype=np.int64)
-    start = 0
-    for row, view, size in zip(views, evidence.views, sizes, strict=True):
-        for column, picture in enumerate((view.edges, view.mask)):
-            row[column] = start
-            np.take(table, picture.ravel(), out=values[start : start + size])
-            values[start + size : start + size + PADDING] = WORST, 0
-            start += size + PADDING
-        row[2], row[3] = view.mask.shape[1], view.mask.shape[0]
-    return WeightingMaps(values, views)
+    return joined_maps([[(v.edges, table), (v.mask, table)] for v in evidence.views], (WORST, 0), np.uint8)

@@ -10,9 +10,9 @@ left out of N.
 
 import numpy as np
 
-from studio.numba_in_threads import njit, prange
+from studio.numba_in_threads import FAST, FAST_INLINED, njit
+from studio.weighting.outline_kernels import HALF, LANES, ONE, ZERO
 
-LANES = 16
 CHUNK = 16
 EDGE_LINES, REGION_LINES = 2, 3
 LINE_ROWS = 4 * (EDGE_LINES + REGION_LINES)
@@ -21,15 +21,10 @@ FIRST_STRIP, SECOND_STRIP, THIRD_STRIP = np.float32(1.0 / 6.0), np.float32(0.5),
 NOTHING_SEEN, NOT_COUNTED = 0, 1
 PADDING = 2
 WORST = 255
-ZERO, HALF, ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)
 UPPER, LOW = np.uint64(32), np.uint64(0xFFFFFFFF)
 
-FLAGS = {"contract", "reassoc", "nsz", "arcp", "afn"}
-OPTIONS = {"fastmath": FLAGS, "error_model": "numpy", "nogil": True, "cache": True}
-INLINED = {**OPTIONS, "forceinline": True}
 
-
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def store_line(row, number, lane, a, b, fraction, samples):
     """Keep the line at a fraction of the way from side a to side b (x, y, dx, dy) as a limb's line `number`:
     the place of its first sample and the step to the next; samples lie at (j + 1/2) / samples."""
@@ -40,7 +35,7 @@ def store_line(row, number, lane, a, b, fraction, samples):
     row[(4 * number + 3) * LANES + lane] = step_y
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def limb_lines(outline, row, edge_samples, region_samples):
     """The five lines of a limb of sixteen poses, from its outlines (160,) in one view.
 
@@ -59,14 +54,14 @@ def limb_lines(outline, row, edge_samples, region_samples):
         store_line(row, 4, lane, a, b, THIRD_STRIP, region_samples)
 
 
-@njit(**OPTIONS)
+@njit(**FAST)
 def view_lines(outlines, block, view, lines, edge_samples, region_samples):
     """The lines (L, 320) of all limbs of sixteen poses in one view."""
     for limb in range(lines.shape[0]):
         limb_lines(outlines[block, view, limb], lines[limb], edge_samples, region_samples)
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def line_at(lines, limb, number, lane):
     """One line of one pose: place of its first sample and step, x, y, dx, dy."""
     return (
@@ -77,7 +72,7 @@ def line_at(lines, limb, number, lane):
     )
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def pixel(line, sample, width):
     """Number of the pixel nearest to a sample of a line (first place and step) inside the picture."""
     number = np.float32(sample)
@@ -85,7 +80,7 @@ def pixel(line, sample, width):
     return np.uint32(np.int32(np.floor(y) * width + np.floor(x)))
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def fill_edges(lines, limb, lane, width, edges):
     """Indices of both sides of a limb that is wholly inside the picture."""
     a, b = line_at(lines, limb, 0, lane), line_at(lines, limb, 1, lane)
@@ -95,7 +90,7 @@ def fill_edges(lines, limb, lane, width, edges):
             edges[limb, chunk, 1, j] = pixel(b, chunk * CHUNK + j, width)
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def fill_region(lines, limb, lane, width, region):
     """Indices of the three inner lines of a limb that is wholly inside the picture."""
     a, b, c = line_at(lines, limb, 2, lane), line_at(lines, limb, 3, lane), line_at(lines, limb, 4, lane)
@@ -106,7 +101,7 @@ def fill_region(lines, limb, lane, width, region):
             region[limb, chunk, 2, j] = pixel(c, chunk * CHUNK + j, width)
 
 
-@njit(**OPTIONS)
+@njit(**FAST)
 def fill_clipped(line, view, unseen, indices, limb, number):
     """Indices of a limb's line that may leave the picture: samples outside it cost the most."""
     width, height = view[2], view[3]
@@ -122,7 +117,7 @@ def fill_clipped(line, view, unseen, indices, limb, number):
             indices[limb, chunk, number, j] = index
 
 
-@njit(**OPTIONS)
+@njit(**FAST)
 def fill_limb_clipped(lines, limb, lane, view, unseen, edges, region):
     """Indices of a limb that is not wholly inside the picture, or not seen at all."""
     for side in range(EDGE_LINES):
@@ -131,7 +126,7 @@ def fill_limb_clipped(lines, limb, lane, view, unseen, edges, region):
         fill_clipped(line_at(lines, limb, EDGE_LINES + strip, lane), view, unseen, region, limb, strip)
 
 
-@njit(**OPTIONS)
+@njit(**FAST)
 def hide(bits, not_counted, edges, limb, side):
     """Replace the indices of one side's hidden samples (a bit each); returns how many there were."""
     count = 0
@@ -144,7 +139,7 @@ def hide(bits, not_counted, edges, limb, side):
     return count
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def fill_view(outlines, lines, hidden, block, view, lane, views, edges, region):
     """Indices of all samples of one pose in one view.
 
@@ -169,53 +164,54 @@ def fill_view(outlines, lines, hidden, block, view, lane, views, edges, region):
     return count
 
 
-@njit(**INLINED)
-def add_up(maps, base, pairs):
-    """The sum of a map's entries at indices (rows, 8), two of them in each word.
+@njit(**FAST_INLINED)
+def add_up(values, base, pairs):
+    """The sum of the entries of a map that begins at `base` at indices (rows, 8), two of them in each word.
 
     The test that never stops the loop keeps the compiler from turning it into gathers, which are slower.
     """
     a = b = c = d = np.uint64(0)
-    end = np.uint64(maps.shape[0])
+    end = np.uint64(values.shape[0])
     for k in range(pairs.shape[0]):
         if pairs[k, 0] & LOW >= end:
             break
         p, q, r, s = pairs[k, 0], pairs[k, 1], pairs[k, 2], pairs[k, 3]
-        a += maps[(p & LOW) + base]
-        b += maps[(p >> UPPER) + base]
-        c += maps[(q & LOW) + base]
-        d += maps[(q >> UPPER) + base]
-        a += maps[(r & LOW) + base]
-        b += maps[(r >> UPPER) + base]
-        c += maps[(s & LOW) + base]
-        d += maps[(s >> UPPER) + base]
+        a += values[(p & LOW) + base]
+        b += values[(p >> UPPER) + base]
+        c += values[(q & LOW) + base]
+        d += values[(q >> UPPER) + base]
+        a += values[(r & LOW) + base]
+        b += values[(r >> UPPER) + base]
+        c += values[(s & LOW) + base]
+        d += values[(s >> UPPER) + base]
         p, q, r, s = pairs[k, 4], pairs[k, 5], pairs[k, 6], pairs[k, 7]
-        a += maps[(p & LOW) + base]
-        b += maps[(p >> UPPER) + base]
-        c += maps[(q & LOW) + base]
-        d += maps[(q >> UPPER) + base]
-        a += maps[(r & LOW) + base]
-        b += maps[(r >> UPPER) + base]
-        c += maps[(s & LOW) + base]
-        d += maps[(s >> UPPER) + base]
+        a += values[(p & LOW) + base]
+        b += values[(p >> UPPER) + base]
+        c += values[(q & LOW) + base]
+        d += values[(q >> UPPER) + base]
+        a += values[(r & LOW) + base]
+        b += values[(r >> UPPER) + base]
+        c += values[(s & LOW) + base]
+        d += values[(s >> UPPER) + base]
     return np.int64(a + b + c + d)
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def as_pairs(indices):
     """Indices (..., 16) uint32 as (rows, 8) uint64: two in each word."""
     return indices.reshape((indices.size // CHUNK, CHUNK)).view(np.uint64)
 
 
-@njit(**OPTIONS)
-def chunk_weights(
-    first, last, outlines, hidden, edge_chunks, region_chunks, views, maps, weights, terms, log_weights
+@njit(**FAST)
+def weight_blocks(
+    first, last, outlines, hidden, edge_chunks, region_chunks, maps, weights, terms, log_weights
 ):
     """Eq. 14, 15 and 17 for the blocks first..last - 1.
 
     edge_chunks, region_chunks : how many times sixteen samples a line has. weights : (2,) of the edge and region
     terms. terms : (B, 16, V, 2) float64, filled with Σe and Σr. log_weights : (B, 16).
     """
+    values, views = maps.values, maps.views
     limbs = outlines.shape[2]
     edges = np.zeros((limbs, edge_chunks, EDGE_LINES, CHUNK), np.uint32)
     region = np.zeros((limbs, region_chunks, REGION_LINES, CHUNK), np.uint32)
@@ -229,30 +225,17 @@ def chunk_weights(
             view_lines(outlines, block, view, lines, edge_samples, region_samples)
             for lane in range(LANES):
                 lost = fill_view(outlines, lines, hidden, block, view, lane, views, edges, region)
-                edge, region_term = 1.0, add_up(maps, region_base, region_pairs) / (WORST * region.size)
+                edge, region_term = 1.0, add_up(values, region_base, region_pairs) / (WORST * region.size)
                 if lost < edges.size:
-                    edge = add_up(maps, edge_base, edge_pairs) / (WORST * (edges.size - lost))
+                    edge = add_up(values, edge_base, edge_pairs) / (WORST * (edges.size - lost))
                 terms[block, lane, view, 0] = edge
                 terms[block, lane, view, 1] = region_term
                 log_weights[block, lane] -= weights[0] * edge + weights[1] * region_term
 
 
-@njit(parallel=True, **OPTIONS)
-def all_weights(
-    chunks, outlines, hidden, edge_chunks, region_chunks, views, maps, weights, terms, log_weights
-):
-    """`chunk_weights` of all blocks, shared among `chunks` threads."""
-    share = (terms.shape[0] + chunks - 1) // chunks
-    for chunk in prange(chunks):
-        chunk_weights(
-            chunk * share, min((chunk + 1) * share, terms.shape[0]), outlines, hidden, edge_chunks,
-            region_chunks, views, maps, weights, terms, log_weights,
-        )  # fmt: skip
-
-
-@njit(**OPTIONS)
+@njit(**FAST)
 def record_indices(outlines, hidden, views, edges, region):
-    """The index stream of `chunk_weights`: (B, V, 16, L, chunks, lines, 16) each. For benchmark and tests."""
+    """The index stream of `weight_blocks`: (B, V, 16, L, chunks, lines, 16) each. For benchmark and tests."""
     lines = np.zeros((outlines.shape[2], LINE_ROWS * LANES), np.float32)
     edge_samples, region_samples = np.float32(edges.shape[4] * CHUNK), np.float32(region.shape[4] * CHUNK)
     for block in range(edges.shape[0]):
@@ -264,16 +247,17 @@ def record_indices(outlines, hidden, views, edges, region):
                 )  # fmt: skip
 
 
-@njit(**OPTIONS)
-def loads_only(maps, views, edge_pairs, region_pairs, passes, sums):
-    """Nothing but the loads of `chunk_weights` at recorded indices, `passes` times over: its limit.
+@njit(**FAST)
+def loads_only(maps, edge_pairs, region_pairs, passes, sums):
+    """Nothing but the loads of `weight_blocks` at recorded indices, `passes` times over: its limit.
 
     edge_pairs, region_pairs : (B, V, 16, rows, 8) uint64. sums : (B, V, 16, 2), added to.
     """
+    values, views = maps.values, maps.views
     for _ in range(passes):
         for block in range(edge_pairs.shape[0]):
             for view in range(edge_pairs.shape[1]):
                 edge_base, region_base = np.uint64(views[view, 0]), np.uint64(views[view, 1])
                 for lane in range(LANES):
-                    sums[block, view, lane, 0] += add_up(maps, edge_base, edge_pairs[block, view, lane])
-                    sums[block, view, lane, 1] += add_up(maps, region_base, region_pairs[block, view, lane])
+                    sums[block, view, lane, 0] += add_up(values, edge_base, edge_pairs[block, view, lane])
+                    sums[block, view, lane, 1] += add_up(values, region_base, region_pairs[block, view, lane])

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
-from studio.knobs import knob
+from studio.knobs import next_frame_knob
 from studio.weighting.edge_region import EdgeRegionProblem, EdgeRegionSettings, EdgeRegionWeigher
-from studio.weighting.problem import TRUNK_FIRST, WHOLE_BODY
+from studio.weighting.problem import TRUNK_FIRST, WHOLE_BODY, PreparedProblem
 from studio.weighting.silhouette_areas import Silhouettes, resolution_knob
 from studio.weighting.visible_edges import body_edges
 
@@ -34,8 +34,8 @@ class EdgeRegionSilhouetteSettings(EdgeRegionSettings):
 
     title: ClassVar[str] = "Edge, region and silhouette"
 
-    silhouette_weight: float = knob(
-        1.0, 0.0, 5.0, 0.05, takes_effect="next frame", help="Weight of the bidirectional silhouette term."
+    silhouette_weight: float = next_frame_knob(
+        1.0, 0.0, 5.0, 0.05, help="Weight of the bidirectional silhouette term."
     )
     silhouette_resolution: str = resolution_knob()
 
@@ -57,13 +57,14 @@ class EdgeRegionSilhouetteWeigher:
         return EdgeRegionSilhouetteProblem(self, edge_region, silhouettes)
 
 
-class EdgeRegionSilhouetteProblem:
+class EdgeRegionSilhouetteProblem(PreparedProblem):
     """One frame as a function of poses."""
 
     def __init__(
         self, weigher: EdgeRegionSilhouetteWeigher, edge_region: EdgeRegionProblem, silhouettes: Silhouettes
     ) -> None:
         self.weigher, self.edge_region, self.silhouettes = weigher, edge_region, silhouettes
+        self.priors = edge_region.priors
 
     def terms(self, poses: Array, stage: int = WHOLE_BODY) -> tuple[Array, Array, Array]:
         """1 - Σe, 1 - Σr and f_s, each (N, V), of poses (N, D).
@@ -94,7 +95,3 @@ class EdgeRegionSilhouetteProblem:
         settings = self.weigher.settings
         best = settings.edge_weight + settings.region_weight + settings.silhouette_weight
         return len(self.weigher.cameras) * (self.fitness(poses, stage) - best)
-
-    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
-        """(N, D) poses to (N,) whether the body can take them."""
-        return self.edge_region.feasible(poses, limbs_apart)

@@ -22,12 +22,10 @@ from numpy.typing import NDArray
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
-from studio.knobs import knob
+from studio.knobs import next_frame_knob
 from studio.weighting.edge_region_kernels import CHUNK
-from studio.weighting.evidence_check import check_sizes, check_views
-from studio.weighting.hard_priors import HardPriors
-from studio.weighting.outlines import OutlineProjector
-from studio.weighting.problem import WHOLE_BODY
+from studio.weighting.evidence_check import check_views
+from studio.weighting.problem import WHOLE_BODY, Preparation, PreparedProblem
 from studio.weighting.silhouette_areas import Silhouettes, resolution_knob
 from studio.weighting.visible_edges import EdgeMaps, body_edges
 
@@ -42,22 +40,20 @@ class EdgeSilhouetteSettings:
 
     title: ClassVar[str] = "Edge and silhouette"
 
-    fitness_scale: float = knob(
+    fitness_scale: float = next_frame_knob(
         25.0,
         0.5,
         200.0,
         0.5,
-        takes_effect="next frame",
         help="log w = scale · f; at 25 a tenth of Condensation's particles survives. The studio's own trackers choose"
         " their sharpness themselves, so it changes numbers on screen only.",
     )
     silhouette_resolution: str = resolution_knob()
-    samples_per_edge: int = knob(
+    samples_per_edge: int = next_frame_knob(
         16,
         16,
         64,
         16,
-        takes_effect="next frame",
         help="Samples on each edge in each view (to the nearest 16).",
     )
 
@@ -67,17 +63,14 @@ class EdgeSilhouetteSettings:
         return max(1, round(self.samples_per_edge / CHUNK))
 
 
-class EdgeSilhouetteWeigher:
-    """Makes the problem of any frame; holds nothing that changes."""
+class EdgeSilhouetteWeigher(Preparation):
+    """Makes the problem of any frame."""
 
     def __init__(
         self, body: BodyModel, cameras: tuple[Camera, ...], settings: EdgeSilhouetteSettings
     ) -> None:
-        check_sizes(cameras)
-        self.settings, self.cameras = settings, cameras
-        self.projector = OutlineProjector.of_body(body, cameras)
+        super().__init__(body, cameras, settings)
         self.edges = body_edges(body)
-        self.priors = HardPriors(body)
 
     def problem(self, evidence: FrameEvidence) -> "EdgeSilhouetteProblem":
         """One frame as a function of poses. Raises FootageError where views do not fit the cameras."""
@@ -86,11 +79,12 @@ class EdgeSilhouetteWeigher:
         return EdgeSilhouetteProblem(self, silhouettes, EdgeMaps(evidence))
 
 
-class EdgeSilhouetteProblem:
+class EdgeSilhouetteProblem(PreparedProblem):
     """One frame as a function of poses."""
 
     def __init__(self, weigher: EdgeSilhouetteWeigher, silhouettes: Silhouettes, edges: EdgeMaps) -> None:
         self.weigher, self.silhouettes, self.edges = weigher, silhouettes, edges
+        self.priors = weigher.priors
 
     def terms(self, poses: Array, stage: int = WHOLE_BODY) -> tuple[Array, Array]:
         """f_s and f_e, each (N, V), of poses (N, D). Raises BodyError for poses that are no finite (N, D)."""
@@ -108,7 +102,3 @@ class EdgeSilhouetteProblem:
     def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N,) log-weights scale · f of poses (N, D). Raises BodyError for poses that are no finite (N, D)."""
         return self.weigher.settings.fitness_scale * self.fitness(poses, stage)
-
-    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
-        """(N, D) poses to (N,) whether the body can take them."""
-        return self.weigher.priors.hold(poses, limbs_apart)

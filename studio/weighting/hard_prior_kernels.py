@@ -12,20 +12,20 @@ Frames are twelve rows of sixteen lanes as in `outline_kernels`, from which the 
 
 import numpy as np
 
-from studio.numba_in_threads import njit, prange
-from studio.weighting.outline_kernels import INLINED, LANES, ONE, OPTIONS, ZERO, pose_frames, pose_motions
+from studio.numba_in_threads import FAST, FAST_INLINED, njit
+from studio.weighting.outline_kernels import LANES, ONE, ZERO, block_frames
 
 # Squared sine of two axes' angle below which they count as parallel; squared mm that count as nothing.
 PARALLEL, NOTHING = np.float32(1.0e-6), np.float32(1.0e-6)
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def within(value):
     """Clamped to 0...1."""
     return min(max(value, ZERO), ONE)
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def closest(a, b, c, e, f):
     """Where segments P + s p and Q + t q come closest, s and t in 0...1.
 
@@ -39,7 +39,7 @@ def closest(a, b, c, e, f):
     return within((b * t - c) / a), t
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def pair_ratios(one, two, shape_one, shape_two, ratios):
     """Ratios (16,) of one pair of limbs, from their frames (192,) each.
 
@@ -73,39 +73,20 @@ def pair_ratios(one, two, shape_one, shape_two, ratios):
         ratios[lane] = square / (extent_one + extent_two + NOTHING)
 
 
-@njit(**OPTIONS)
-def chunk_ratios(
-    first, last, poses, parent, first_operation, kinds, parameters, values, fixed, limb_frame, limb_shape, limbs, out,
-):  # fmt: skip
+@njit(**FAST)
+def ratio_blocks(first, last, poses, program, limbs, out):
     """Ratios (B, P, 16) of the blocks first..last - 1 of sixteen poses each; lanes past the last pose repeat it."""
-    frames = np.zeros((parent.shape[0], 12 * LANES), np.float32)
+    frames = np.zeros((program.parent.shape[0], 12 * LANES), np.float32)
     entries = np.zeros((poses.shape[1], LANES), np.float64)
-    motions = np.zeros((kinds.shape[0], 2 * LANES), np.float32)
+    motions = np.zeros((program.kind.shape[0], 2 * LANES), np.float32)
     ratios = np.zeros(LANES, np.float32)
     for block in range(first, last):
-        for lane in range(LANES):
-            pose = min(block * LANES + lane, poses.shape[0] - 1)
-            for entry in range(poses.shape[1]):
-                entries[entry, lane] = poses[pose, entry]
-        pose_motions(entries, kinds, parameters, values, motions)
-        pose_frames(parent, first_operation, kinds, motions, fixed, frames)
+        block_frames(block, poses, program, entries, motions, frames)
         for pair in range(limbs.shape[0]):
             one, two = limbs[pair, 0], limbs[pair, 1]
             pair_ratios(
-                frames[limb_frame[one]], frames[limb_frame[two]], limb_shape[one], limb_shape[two], ratios
+                frames[program.limb_frame[one]], frames[program.limb_frame[two]],
+                program.limb_shape[one], program.limb_shape[two], ratios,
             )  # fmt: skip
             for lane in range(LANES):
                 out[block, pair, lane] = ratios[lane]
-
-
-@njit(parallel=True, **OPTIONS)
-def all_ratios(
-    chunks, poses, parent, first_operation, kinds, parameters, values, fixed, limb_frame, limb_shape, limbs, out
-):  # fmt: skip
-    """`chunk_ratios` of all blocks, shared among `chunks` threads."""
-    share = (out.shape[0] + chunks - 1) // chunks
-    for chunk in prange(chunks):
-        chunk_ratios(
-            chunk * share, min((chunk + 1) * share, out.shape[0]), poses, parent, first_operation, kinds, parameters,
-            values, fixed, limb_frame, limb_shape, limbs, out,
-        )  # fmt: skip

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from studio.body.forward_kinematics import checked_poses, limb_frames
 from studio.body.model import BodyModel, kinematic_tables
 from studio.errors import BodyError
-from studio.weighting.block_threads import run_blocks
-from studio.weighting.hard_prior_kernels import all_ratios, chunk_ratios
+from studio.numba_in_threads import parallel_blocks
+from studio.weighting.hard_prior_kernels import ratio_blocks
 from studio.weighting.kinematic_program import KinematicProgram, compile_program
 from studio.weighting.outline_kernels import LANES
 
@@ -56,13 +56,7 @@ class LimbPairs:
         """(N, P) how far each pair is apart in poses (N, D), as a share of the radii between their axes."""
         count = -(-len(poses) // LANES)
         out = np.empty((count, len(self.limbs), LANES), dtype=np.float32)
-        run_blocks(
-            chunk_ratios,
-            all_ratios,
-            count,
-            BLOCKS_A_THREAD,
-            *(poses, *self.program.arguments, self.limbs, out),
-        )
+        parallel_blocks(ratio_blocks, count, BLOCKS_A_THREAD, poses, self.program, self.limbs, out)
         return out.transpose(0, 2, 1).reshape(count * LANES, len(self.limbs))[: len(poses)]
 
 

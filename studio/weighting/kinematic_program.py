@@ -5,7 +5,7 @@ that a pose costs one pair of column turns for each of its angles and little els
 `KinematicTables` can hold can be compiled; nothing here knows a body by name.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,38 +22,23 @@ FIXED_MOTION = 7
 NO_PARAMETER = -1
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class KinematicProgram:
-    """F frames (parents first), K operations, L drawn limbs.
+class KinematicProgram(NamedTuple):
+    """F frames (parents first), K operations, L drawn limbs, as kernels read them.
 
-    parent (F,): -1 for the world. first_operation (F + 1,). operation_kind, operation_parameter (K,);
-    operation_value (K,): coefficient of the pose entry. fixed (K, 3, 4): the constant motion of FIXED kinds.
-    limb_frame (L,). limb_shape (L, 5): length, radius_start, radius_end, scale_x, scale_y, mm. Arrays are
-    int64 and float32, as the kernels read them. dimension : entries of a pose that are read, at least."""
+    parent (F,): -1 for the world. first_operation (F + 1,). kind, parameter (K,); value (K,): coefficient of the pose
+    entry. fixed (K, 3, 4): the constant motion of FIXED kinds. limb_frame (L,). limb_shape (L, 5): length,
+    radius_start, radius_end, scale_x, scale_y, mm. dimension : entries of a pose that are read, at least.
+    """
 
     parent: IntArray
     first_operation: IntArray
-    operation_kind: IntArray
-    operation_parameter: IntArray
-    operation_value: Floats
+    kind: IntArray
+    parameter: IntArray
+    value: Floats
     fixed: Floats
     limb_frame: IntArray
     limb_shape: Floats
     dimension: int
-
-    @property
-    def arguments(self) -> tuple[IntArray | Floats, ...]:
-        """The arrays in the order in which kernels take them."""
-        return (
-            self.parent,
-            self.first_operation,
-            self.operation_kind,
-            self.operation_parameter,
-            self.operation_value,
-            self.fixed,
-            self.limb_frame,
-            self.limb_shape,
-        )
 
 
 def compile_program(tables: KinematicTables) -> KinematicProgram:
@@ -70,9 +55,9 @@ def compile_program(tables: KinematicTables) -> KinematicProgram:
     return KinematicProgram(
         parent=np.array(parents, dtype=np.int64),
         first_operation=np.array(first, dtype=np.int64),
-        operation_kind=np.array([operation[0] for operation in operations], dtype=np.int64),
-        operation_parameter=np.array(parameters, dtype=np.int64),
-        operation_value=np.array([operation[2] for operation in operations], dtype=np.float32),
+        kind=np.array([operation[0] for operation in operations], dtype=np.int64),
+        parameter=np.array(parameters, dtype=np.int64),
+        value=np.array([operation[2] for operation in operations], dtype=np.float32),
         fixed=np.array([operation[3] for operation in operations], dtype=np.float32).reshape(-1, 3, 4),
         limb_frame=np.array([number[int(joint)] for joint in tables.limb_joint], dtype=np.int64),
         limb_shape=np.ascontiguousarray(tables.limb_shape, dtype=np.float32),

@@ -7,19 +7,14 @@ middles. Sixteen poses at a time, like the outlines; pairs of limbs that lie apa
 
 import numpy as np
 
-from studio.numba_in_threads import njit, prange
+from studio.numba_in_threads import FAST, FAST_INLINED, njit
+from studio.weighting.outline_kernels import HALF, LANES, ONE, ZERO
 
-LANES = 16
-ZERO, HALF, ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)
 NOWHERE = np.float32(2.0)
 PARALLEL = np.float32(1e-9)
 
-FLAGS = {"contract", "reassoc", "nsz", "arcp", "afn"}
-OPTIONS = {"fastmath": FLAGS, "error_model": "numpy", "nogil": True, "cache": True}
-INLINED = {**OPTIONS, "forceinline": True}
 
-
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def clip(interval, sx, sy, dx, dy, px, py, qx, qy, sign):
     """Keep of `interval` (in t of s + t d) what lies on the inner side of the edge from p to q."""
     ex, ey = (qx - px) * sign, (qy - py) * sign
@@ -33,7 +28,7 @@ def clip(interval, sx, sy, dx, dy, px, py, qx, qy, sign):
     return NOWHERE if outside else max(interval[0], first), min(interval[1], last)
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def hidden_interval(side, near):
     """Begin and end, in 0...1, of the part of a side (start and end point) inside an outline (four corners)."""
     ax, ay, bx, by, cx, cy, ex, ey = near
@@ -47,7 +42,7 @@ def hidden_interval(side, near):
     return clip(interval, sx, sy, dx, dy, ex, ey, ax, ay, sign)
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def sample_bits(interval, samples):
     """Bits of the samples at (j + 1/2) / samples that lie in an interval."""
     first = np.int64(np.ceil(max(interval[0], ZERO) * samples - HALF))
@@ -57,7 +52,7 @@ def sample_bits(interval, samples):
     return ones << np.uint64(min(first, 63))
 
 
-@njit(**OPTIONS)
+@njit(**FAST)
 def line_hidden(line, near, samples, bits):
     """Add to `bits` (16,) those of a line (64,) that another limb (160,) hides, where it is nearer.
 
@@ -75,7 +70,7 @@ def line_hidden(line, near, samples, bits):
         bits[lane] |= found if nearer & both_seen else np.uint64(0)
 
 
-@njit(**OPTIONS)
+@njit(**FAST)
 def limb_boxes(outlines, block, view, boxes):
     """Fill (L, 80) of sixteen poses: least and largest x and y of every limb's corners, depth of its middle."""
     corners = np.zeros(outlines.shape[3], np.float32)
@@ -99,7 +94,7 @@ def limb_boxes(outlines, block, view, boxes):
             box[4 * LANES + lane] = corners[9 * LANES + lane]
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def may_hide(box, near):
     """Whether in any of sixteen poses a limb with box `near` (80,) is nearer and over one with `box`."""
     count = 0
@@ -113,7 +108,7 @@ def may_hide(box, near):
     return count > 0
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def load_line(outlines, block, view, limb, first, last, line):
     """Fill a line (96,) from one corner of a limb to another; see `line_hidden`."""
     for i in range(2 * LANES):
@@ -122,8 +117,8 @@ def load_line(outlines, block, view, limb, first, last, line):
         line[4 * LANES + i] = outlines[block, view, limb, 8 * LANES + i]
 
 
-@njit(**OPTIONS)
-def chunk_hidden(first, last, outlines, lines, samples, hidden):
+@njit(**FAST)
+def hidden_blocks(first, last, outlines, lines, samples, hidden):
     """Bits of the hidden samples of the blocks first..last - 1; hidden (B, V, K, 16) uint64.
 
     lines : (K, 3) limb, its corner where the line begins (0...3: A0 A1 B1 B0), its corner where it ends. samples :
@@ -155,12 +150,3 @@ def chunk_hidden(first, last, outlines, lines, samples, hidden):
                         line_hidden(line, near, count, bits)
                 for lane in range(LANES):
                     hidden[block, view, number, lane] = bits[lane]
-
-
-@njit(parallel=True, **OPTIONS)
-def all_hidden(chunks, outlines, lines, samples, hidden):
-    """`chunk_hidden` of all blocks, shared among `chunks` threads."""
-    share = (hidden.shape[0] + chunks - 1) // chunks
-    for chunk in prange(chunks):
-        last = min((chunk + 1) * share, hidden.shape[0])
-        chunk_hidden(chunk * share, last, outlines, lines, samples, hidden)

@@ -7,14 +7,14 @@ A limb's outline in a view is four points: side A from its start to its end, and
 between them are interpolated in the image by the weightings. Frames are twelve rows of sixteen lanes in one
 flat array: distances between rows that the compiler knows are what lets it vectorise without checking for
 overlap.
-
-Not-a-number and infinity keep their meaning here (no `nnan`, `ninf`): a point that cannot be projected must
-compare as unseen.
 """
+
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from studio.numba_in_threads import njit, prange
+from studio.numba_in_threads import FAST, FAST_INLINED, njit
+from studio.weighting.kinematic_program import FIXED_MOVE
 
 LANES = 16
 # Rows of an outline: x and y (pixels) of A start, A end, B end, B start; how it is seen (1 wholly inside the
@@ -26,9 +26,6 @@ NEAREST_DEPTH = np.float32(10.0)
 # A corner this close to the border (pixels) counts as outside, so that rounding carries no sample over.
 MARGIN = np.float32(0.01)
 
-FLAGS = {"contract", "reassoc", "nsz", "arcp", "afn"}
-OPTIONS = {"fastmath": FLAGS, "error_model": "numpy", "nogil": True, "cache": True}
-INLINED = {**OPTIONS, "forceinline": True}
 
 # sin(x) = x P(x²) and cos(x) = Q(x²) on [-π, π], least-maximum fit: errors 5e-7 and 4e-7 in single precision.
 S1, S2, S3 = np.float32(-0.16666664), np.float32(0.0083333105), np.float32(-0.00019840155)
@@ -39,11 +36,27 @@ ZERO, HALF, ONE, TINY = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.fl
 FULL_TURN, TURNS = 2.0 * np.pi, 0.5 / np.pi
 
 
-@njit(**INLINED)
-def pose_motions(entries, kinds, parameters, values, motions):
+class View(NamedTuple):
+    """A camera's numbers, held in registers. rotation : nine, by rows. matrix : fx skew cx fy cy. right, bottom : the
+    picture's border. eye : where it stands.
+    """
+
+    rotation: tuple[Any, ...]
+    matrix: tuple[Any, ...]
+    lens: tuple[Any, ...]
+    limit: Any
+    right: Any
+    bottom: Any
+    eye: tuple[Any, ...]
+
+
+@njit(**FAST_INLINED)
+def pose_motions(entries, program, motions):
     """Rows 2k and 2k + 1 of `motions`: cosine and sine of operation k's angle, or its distance."""
+    kinds, parameters, values = program.kind, program.parameter, program.value
     for k in range(kinds.shape[0]):
-        if kinds[k] >= 6:
+        kind = kinds[k]
+        if kind >= FIXED_MOVE:
             continue
         parameter, value = parameters[k], np.float64(values[k])
         for lane in range(LANES):
@@ -52,11 +65,11 @@ def pose_motions(entries, kinds, parameters, values, motions):
             q = x * x
             sine = x * (ONE + q * (S1 + q * (S2 + q * (S3 + q * (S4 + q * (S5 + q * S6))))))
             cosine = ONE + q * (-HALF + q * (C2 + q * (C3 + q * (C4 + q * (C5 + q * (C6 + q * C7))))))
-            motions[k, lane] = cosine if kinds[k] < 3 else np.float32(amount)
+            motions[k, lane] = cosine if kind < 3 else np.float32(amount)
             motions[k, LANES + lane] = sine
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def turn(frame, second, third, motions, k):
     """Turn frames about the axis before `second` in the cycle x, y, z: two columns mix."""
     for lane in range(LANES):
@@ -72,7 +85,7 @@ def turn(frame, second, third, motions, k):
         frame[(8 + third) * LANES + lane] = c * b2 - s * a2
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def move(frame, column, motions, k):
     """Move frames along one of their own axes by a pose entry."""
     for lane in range(LANES):
@@ -82,7 +95,7 @@ def move(frame, column, motions, k):
         frame[11 * LANES + lane] += frame[(8 + column) * LANES + lane] * distance
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def fixed_row(frame, row, lane, m):
     """One row of frames times a constant motion, given as its twelve numbers."""
     a, b = frame[row * LANES + lane], frame[(row + 1) * LANES + lane]
@@ -93,7 +106,7 @@ def fixed_row(frame, row, lane, m):
     frame[(row + 3) * LANES + lane] = a * m[3] + b * m[7] + c * m[11] + d
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def fixed_motion(frame, fixed, k):
     """Frames times one constant motion: fixed[k], (3, 4)."""
     motion = (
@@ -107,7 +120,7 @@ def fixed_motion(frame, fixed, k):
         fixed_row(frame, 8, lane, motion)
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def fixed_move(frame, fixed, k):
     """Frames moved by one constant vector in their own axes: the last column of fixed[k]."""
     x, y, z = fixed[k, 0, 3], fixed[k, 1, 3], fixed[k, 2, 3]
@@ -120,7 +133,7 @@ def fixed_move(frame, fixed, k):
         frame[11 * LANES + lane] += pz
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def load_parent(frame, frames, parent):
     """Start from the parent's frames, or from the world's."""
     if parent >= 0:
@@ -135,13 +148,14 @@ def load_parent(frame, frames, parent):
         frame[10 * LANES + lane] = ONE
 
 
-@njit(**OPTIONS)
-def pose_frames(parent, first_operation, kinds, motions, fixed, frames):
+@njit(**FAST)
+def pose_frames(program, motions, frames):
     """World frames (F, 192) of sixteen poses from their motions: rows of (3, 4), sixteen lanes each."""
+    parent, first, kinds, fixed = program.parent, program.first_operation, program.kind, program.fixed
     for joint in range(parent.shape[0]):
         frame = frames[joint]
         load_parent(frame, frames, parent[joint])
-        for k in range(first_operation[joint], first_operation[joint + 1]):
+        for k in range(first[joint], first[joint + 1]):
             kind = kinds[k]
             if kind == 0:
                 turn(frame, 1, 2, motions, k)
@@ -155,24 +169,39 @@ def pose_frames(parent, first_operation, kinds, motions, fixed, frames):
                 move(frame, 1, motions, k)
             elif kind == 5:
                 move(frame, 2, motions, k)
-            elif kind == 6:
+            elif kind == FIXED_MOVE:
                 fixed_move(frame, fixed, k)
             else:
                 fixed_motion(frame, fixed, k)
 
 
-@njit(**INLINED)
-def turned(camera, x, y, z):
-    """A direction in the world in a camera's axes."""
-    return (
-        camera[0] * x + camera[1] * y + camera[2] * z,
-        camera[3] * x + camera[4] * y + camera[5] * z,
-        camera[6] * x + camera[7] * y + camera[8] * z,
+@njit(**FAST_INLINED)
+def view_of(camera):
+    """A row of a `CameraTable` as a View."""
+    r, m, k, eye, size = camera.rotation, camera.matrix, camera.lens, camera.centre, camera.size
+    return View(
+        (r[0, 0], r[0, 1], r[0, 2], r[1, 0], r[1, 1], r[1, 2], r[2, 0], r[2, 1], r[2, 2]),
+        (m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2]),
+        (k[0], k[1], k[2], k[3], k[4]),
+        camera.limit,
+        size[0] - HALF,
+        size[1] - HALF,
+        (eye[0], eye[1], eye[2]),
     )
 
 
-@njit(**INLINED)
-def projected(camera, start, axis, across, along, radius):
+@njit(**FAST_INLINED)
+def turned(r, x, y, z):
+    """A direction in the world in a camera's axes. r : its rotation."""
+    return (
+        r[0] * x + r[1] * y + r[2] * z,
+        r[3] * x + r[4] * y + r[5] * z,
+        r[6] * x + r[7] * y + r[8] * z,
+    )
+
+
+@njit(**FAST_INLINED)
+def projected(view, start, axis, across, along, radius):
     """Pixel of start + along axis + radius across (camera's axes, mm), and how it is seen."""
     x = start[0] + along * axis[0] + radius * across[0]
     y = start[1] + along * axis[1] + radius * across[1]
@@ -180,22 +209,24 @@ def projected(camera, start, axis, across, along, radius):
     inverse = ONE / max(z, NEAREST_DEPTH)
     x *= inverse
     y *= inverse
-    s = x * x + y * y
-    radial = ONE + s * (camera[16] + s * (camera[17] + s * camera[20]))
-    p1, p2 = camera[18], camera[19]
-    xd = x * radial + p1 * (x * y + x * y) + p2 * (s + x * x + x * x)
-    yd = y * radial + p1 * (s + y * y + y * y) + p2 * (x * y + x * y)
-    u = camera[12] * xd + camera[13] * yd + camera[14]
-    v = camera[15] * yd + camera[21]
-    seen = (z > NEAREST_DEPTH) & (s < camera[22])
+    # As `geometry.projection.distorted`, without numbers that would make it double precision.
+    k1, k2, p1, p2, k3 = view.lens
+    square = x * x + y * y
+    radial = ONE + square * (k1 + square * (k2 + square * k3))
+    xd = x * radial + p1 * (x * y + x * y) + p2 * (square + x * x + x * x)
+    yd = y * radial + p1 * (square + y * y + y * y) + p2 * (x * y + x * y)
+    fx, skew, cx, fy, cy = view.matrix
+    u = fx * xd + skew * yd + cx
+    v = fy * yd + cy
+    seen = (z > NEAREST_DEPTH) & (square < view.limit)
     inside = (
-        (u >= MARGIN - HALF) & (u < camera[24] - MARGIN) & (v >= MARGIN - HALF) & (v < camera[25] - MARGIN)
+        (u >= MARGIN - HALF) & (u < view.right - MARGIN) & (v >= MARGIN - HALF) & (v < view.bottom - MARGIN)
     )
     state = (ONE if inside else ZERO) if seen else -ONE
     return u if seen else UNSEEN_PIXEL, v if seen else UNSEEN_PIXEL, state
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def sideways(x, y, scale_x, scale_y):
     """u of a limb whose camera lies at x, y in the limb's axes, scaled with the cross-section."""
     x /= scale_x
@@ -206,16 +237,11 @@ def sideways(x, y, scale_x, scale_y):
     return (ONE if on_axis else y * inverse) * scale_x, (ZERO if on_axis else -x * inverse) * scale_y
 
 
-@njit(**INLINED)
-def limb_outline(frame, shape, table, outline):
+@njit(**FAST_INLINED)
+def limb_outline(frame, shape, view, outline):
     """Outlines (160,) of one limb in one view, from its frames (192,)."""
-    camera = (
-        table[0], table[1], table[2], table[3], table[4], table[5], table[6], table[7], table[8], table[9],
-        table[10], table[11], table[12], table[13], table[14], table[15], table[16], table[17], table[18],
-        table[19], table[20], table[21], table[22], table[23], table[24], table[25],
-    )  # fmt: skip
     length, r0, r1, scale_x, scale_y = shape[0], shape[1], shape[2], shape[3], shape[4]
-    eye_x, eye_y, eye_z = table[27], table[28], table[29]
+    eye_x, eye_y, eye_z = view.eye
     for lane in range(LANES):
         x0, x1, x2 = frame[lane], frame[LANES + lane], frame[2 * LANES + lane]
         y0, y1, y2 = frame[4 * LANES + lane], frame[5 * LANES + lane], frame[6 * LANES + lane]
@@ -223,13 +249,13 @@ def limb_outline(frame, shape, table, outline):
         x3, y3, z3 = frame[3 * LANES + lane], frame[7 * LANES + lane], frame[11 * LANES + lane]
         dx, dy, dz = eye_x - x3, eye_y - y3, eye_z - z3
         ux, uy = sideways(x0 * dx + y0 * dy + z0 * dz, x1 * dx + y1 * dy + z1 * dz, scale_x, scale_y)
-        across = turned(camera, x0 * ux + x1 * uy, y0 * ux + y1 * uy, z0 * ux + z1 * uy)
-        axis = turned(camera, x2 * length, y2 * length, z2 * length)
-        start = turned(camera, -dx, -dy, -dz)
-        ax, ay, a_state = projected(camera, start, axis, across, ZERO, -r0)
-        bx, by, b_state = projected(camera, start, axis, across, ONE, -r1)
-        cx, cy, c_state = projected(camera, start, axis, across, ONE, r1)
-        ex, ey, e_state = projected(camera, start, axis, across, ZERO, r0)
+        across = turned(view.rotation, x0 * ux + x1 * uy, y0 * ux + y1 * uy, z0 * ux + z1 * uy)
+        axis = turned(view.rotation, x2 * length, y2 * length, z2 * length)
+        start = turned(view.rotation, -dx, -dy, -dz)
+        ax, ay, a_state = projected(view, start, axis, across, ZERO, -r0)
+        bx, by, b_state = projected(view, start, axis, across, ONE, -r1)
+        cx, cy, c_state = projected(view, start, axis, across, ONE, r1)
+        ex, ey, e_state = projected(view, start, axis, across, ZERO, r0)
         outline[lane], outline[LANES + lane] = ax, ay
         outline[2 * LANES + lane], outline[3 * LANES + lane] = bx, by
         outline[4 * LANES + lane], outline[5 * LANES + lane] = cx, cy
@@ -238,63 +264,32 @@ def limb_outline(frame, shape, table, outline):
         outline[9 * LANES + lane] = start[2] + HALF * axis[2]
 
 
-@njit(**OPTIONS)
-def chunk_outlines(
-    first,
-    last,
-    poses,
-    parent,
-    first_operation,
-    kinds,
-    parameters,
-    values,
-    fixed,
-    limb_frame,
-    limb_shape,
-    cameras,
-    out,
-):
-    """Outlines of the blocks first..last - 1 of sixteen poses each; lanes past the last pose repeat it."""
-    frames = np.zeros((parent.shape[0], 12 * LANES), np.float32)
+@njit(**FAST_INLINED)
+def block_frames(block, poses, program, entries, motions, frames):
+    """World frames (F, 192) of a block of sixteen poses; lanes past the last pose repeat it. entries (D, 16), motions
+    (K, 32) : scratch.
+    """
+    for lane in range(LANES):
+        pose = min(block * LANES + lane, poses.shape[0] - 1)
+        for entry in range(poses.shape[1]):
+            entries[entry, lane] = poses[pose, entry]
+    pose_motions(entries, program, motions)
+    pose_frames(program, motions, frames)
+
+
+@njit(**FAST)
+def outline_blocks(first, last, poses, program, cameras, out):
+    """Outlines (B, V, L, 160) of the blocks first..last - 1."""
+    limb_frame, limb_shape = program.limb_frame, program.limb_shape
+    frames = np.zeros((program.parent.shape[0], 12 * LANES), np.float32)
     outline = np.zeros(ROWS * LANES, np.float32)
-    entries, motions = (
-        np.zeros((poses.shape[1], LANES), np.float64),
-        np.zeros((kinds.shape[0], 2 * LANES), np.float32),
-    )
+    entries = np.zeros((poses.shape[1], LANES), np.float64)
+    motions = np.zeros((program.kind.shape[0], 2 * LANES), np.float32)
     for block in range(first, last):
-        for lane in range(LANES):
-            pose = min(block * LANES + lane, poses.shape[0] - 1)
-            for entry in range(poses.shape[1]):
-                entries[entry, lane] = poses[pose, entry]
-        pose_motions(entries, kinds, parameters, values, motions)
-        pose_frames(parent, first_operation, kinds, motions, fixed, frames)
-        for limb in range(limb_frame.shape[0]):
-            frame = frames[limb_frame[limb]]
-            for view in range(cameras.shape[0]):
-                limb_outline(frame, limb_shape[limb], cameras[view], outline)
+        block_frames(block, poses, program, entries, motions, frames)
+        for number in range(cameras.shape[0]):
+            view = view_of(cameras[number])
+            for limb in range(limb_frame.shape[0]):
+                limb_outline(frames[limb_frame[limb]], limb_shape[limb], view, outline)
                 for i in range(ROWS * LANES):
-                    out[block, view, limb, i] = outline[i]
-
-
-@njit(parallel=True, **OPTIONS)
-def all_outlines(
-    chunks,
-    poses,
-    parent,
-    first_operation,
-    kinds,
-    parameters,
-    values,
-    fixed,
-    limb_frame,
-    limb_shape,
-    cameras,
-    out,
-):
-    """`chunk_outlines` of all blocks, shared among `chunks` threads."""
-    share = (out.shape[0] + chunks - 1) // chunks
-    for chunk in prange(chunks):
-        chunk_outlines(
-            chunk * share, min((chunk + 1) * share, out.shape[0]), poses, parent, first_operation, kinds, parameters,
-            values, fixed, limb_frame, limb_shape, cameras, out,
-        )  # fmt: skip
+                    out[block, number, limb, i] = outline[i]

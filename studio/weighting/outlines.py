@@ -1,4 +1,4 @@
-"""Projected outlines of a body's limbs for many poses: the typed door of the outline kernel."""
+"""Projected outlines of a body's limbs for many poses: what calls the outline kernel."""
 
 import copy
 
@@ -8,16 +8,14 @@ from numpy.typing import NDArray
 from studio.body.model import BodyModel, KinematicTables, kinematic_tables
 from studio.errors import BodyError
 from studio.geometry.camera import Camera
-from studio.weighting.block_threads import run_blocks
+from studio.geometry.camera_table import camera_table, outward_limit
+from studio.numba_in_threads import parallel_blocks
 from studio.weighting.kinematic_program import KinematicProgram, compile_program
-from studio.weighting.outline_kernels import LANES, ROWS, SEEN_ROW, all_outlines, chunk_outlines
+from studio.weighting.outline_kernels import LANES, ROWS, SEEN_ROW, outline_blocks
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
-CAMERA_COLUMNS = 30
-# Beyond tan²θ = 1e6 (90 degrees off the axis less 3.4 arc minutes) nothing is a picture.
-WIDEST_VIEW = 1.0e6
 # About half a millisecond of ten limbs in four cameras.
 BLOCKS_A_THREAD = 200
 
@@ -28,7 +26,7 @@ class OutlineProjector:
     def __init__(self, tables: KinematicTables, cameras: tuple[Camera, ...]) -> None:
         self.program = compile_program(tables)
         self.cameras = cameras
-        self._camera_table = camera_table(cameras)
+        self._camera_table = camera_table(cameras, outward_limit, np.float32)
 
     @classmethod
     def of_body(cls, body: BodyModel, cameras: tuple[Camera, ...]) -> "OutlineProjector":
@@ -65,13 +63,7 @@ class OutlineProjector:
             )
         count = -(-len(poses) // LANES)
         out = np.empty((count, len(self.cameras), self.limb_count, ROWS * LANES), dtype=np.float32)
-        run_blocks(
-            chunk_outlines,
-            all_outlines,
-            count,
-            BLOCKS_A_THREAD,
-            *(poses, *self.program.arguments, self._camera_table, out),
-        )
+        parallel_blocks(outline_blocks, count, BLOCKS_A_THREAD, poses, self.program, self._camera_table, out)
         return out
 
     def corners(self, poses: Array) -> tuple[Array, NDArray[np.int8]]:
@@ -86,29 +78,3 @@ class OutlineProjector:
         corners = rows[..., :8].astype(np.float64).reshape(*seen.shape, 4, 2)
         corners[seen < 0] = np.nan
         return corners, seen
-
-
-def camera_table(cameras: tuple[Camera, ...]) -> Floats:
-    """(V, 30) rows for the kernels: rotation (9), translation (3), then as named in the code."""
-    table = np.zeros((len(cameras), CAMERA_COLUMNS))
-    for row, camera in zip(table, cameras, strict=True):
-        matrix = camera.matrix
-        k1, k2, p1, p2, k3 = camera.distortion
-        row[0:9], row[9:12] = camera.rotation.ravel(), camera.translation
-        row[12:15] = matrix[0, 0], matrix[0, 1], matrix[0, 2]
-        row[15], row[21] = matrix[1, 1], matrix[1, 2]
-        row[16:21] = k1, k2, p1, p2, k3
-        row[22] = monotone_limit(float(k1), float(k2), float(k3))
-        row[24:26] = camera.width - 0.5, camera.height - 0.5
-        row[27:30] = camera.centre
-    return table.astype(np.float32)
-
-
-def monotone_limit(k1: float, k2: float, k3: float) -> float:
-    """The squared tangent up to which radial distortion moves points outwards, at most WIDEST_VIEW.
-
-    Beyond it the polynomial folds back and would draw what lies outside the picture into it. The first
-    positive root of d/dr [r (1 + k1 r² + k2 r⁴ + k3 r⁶)] = 1 + 3 k1 s + 5 k2 s² + 7 k3 s³, s = r²."""
-    roots = np.roots([7.0 * k3, 5.0 * k2, 3.0 * k1, 1.0])
-    real = roots.real[(np.abs(roots.imag) < 1e-9 * np.abs(roots)) & (roots.real > 0.0)]
-    return float(min(real.min(initial=WIDEST_VIEW), WIDEST_VIEW))

@@ -1,10 +1,17 @@
 """The shape of every weighting's problem, and what some can do beside weighing."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
+
+from studio.body.model import BodyModel
+from studio.geometry.camera import Camera
+from studio.weighting.evidence_check import check_sizes
+from studio.weighting.hard_priors import HardPriors
+from studio.weighting.outlines import OutlineProjector
 
 Array = NDArray[np.float64]
 
@@ -12,8 +19,8 @@ Array = NDArray[np.float64]
 WHOLE_BODY, TRUNK_FIRST = 0, 1
 
 
-class FrameFunction(Protocol):
-    """One frame as a function of poses: what trackers, a storey above, know as `FrameProblem`."""
+class FrameProblem(Protocol):
+    """One frame as a function of poses. stage : WHOLE_BODY, or TRUNK_FIRST where only root and trunk are sought."""
 
     def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N, D) poses to (N,) log-weights; -inf never, NaN never."""
@@ -30,6 +37,39 @@ class FrameFunction(Protocol):
         ...
 
 
+class Preparation:
+    """A weighting made ready for one body, some cameras and some settings; makes the problem of any frame, and holds
+    nothing that changes.
+    """
+
+    def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: Any) -> None:  # noqa: ANN401
+        """settings : the weighting's own. Raises FootageError for a camera whose pictures are too large."""
+        check_sizes(cameras)
+        self.settings, self.cameras = settings, cameras
+        self.projector = OutlineProjector.of_body(body, cameras)
+        self.priors = HardPriors(body)
+
+
+class PreparedProblem(ABC):
+    """What the frames of most weightings have in common: a fitness that is the log-weight, and the body's hard
+    priors.
+    """
+
+    priors: HardPriors
+
+    @abstractmethod
+    def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+        """(N, D) poses to (N,) log-weights. Raises BodyError for poses that are no finite (N, D)."""
+
+    def fitness(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
+        """(N,) the log-weights of poses (N, D), where the weighting defines no other fitness."""
+        return self.weigh(poses, stage)
+
+    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
+        """(N, D) poses to (N,) whether the body can take them."""
+        return self.priors.hold(poses, limbs_apart)
+
+
 @runtime_checkable
 class Expectant(Protocol):
     """A frame that must be told where the body is expected before it can weigh well: the blobs of Caillette, Galata &
@@ -40,7 +80,7 @@ class Expectant(Protocol):
     frame searched again, or gone on with in another process, gives the same result bit for bit.
     """
 
-    def expecting(self, poses: Array, memory: Mapping[str, Array]) -> FrameFunction:
+    def expecting(self, poses: Array, memory: Mapping[str, Array]) -> FrameProblem:
         """The frame as seen from expected poses (S, D), S >= 1. memory : what `remembered` gave at the end of the
         frame before; empty in a run's first frame.
         """

@@ -7,7 +7,6 @@ and sixteen poses of each body are one block of the outline kernel. The fit is t
 measure f_s of Fleischmann et al. 2012 (`silhouette_areas`).
 """
 
-import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -65,8 +64,7 @@ class ShapePrograms:
     def program(self, shape: Array) -> KinematicProgram:
         """The program of a shape (S,)."""
         more = self._own * np.expm1(shape[self._group])
-        return dataclasses.replace(
-            self._first,
+        return self._first._replace(
             fixed=(self._first.fixed + np.tensordot(more, self._fixed, 1)).astype(np.float32),
             limb_shape=np.ascontiguousarray(
                 self._first.limb_shape + np.tensordot(more, self._limbs, 1), dtype=np.float32

@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.knobs import knob
-from studio.weighting.area_kernels import LANES, ROWS, WINDOW_STEP, WORD, all_areas, chunk_areas
-from studio.weighting.block_threads import run_blocks
+from studio.knobs import next_frame_knob
+from studio.numba_in_threads import parallel_blocks
+from studio.weighting.area_kernels import ROWS, WINDOW_STEP, WORD, area_blocks
+from studio.weighting.outline_kernels import LANES
+from studio.weighting.picture_maps import Maps
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -32,10 +34,9 @@ BLOCKS_A_THREAD = 16
 
 def resolution_knob() -> Any:  # noqa: ANN401 - as `knob` itself
     """The knob of the silhouettes' resolution, the same for all weightings that have it."""
-    return knob(
+    return next_frame_knob(
         HALF,
         choices=(HALF, FULL),
-        takes_effect="next frame",
         help="Resolution of the silhouettes' areas; half orders poses as full does and is nearly twice as fast.",
     )
 
@@ -68,20 +69,15 @@ class Silhouettes:
             masks = [halved(mask) for mask in masks]
         self.sizes = np.array([mask.shape[::-1] for mask in masks], dtype=np.int64)
         self.pixels = np.array([np.count_nonzero(mask) for mask in masks], dtype=np.int64)
-        self.words, self.views = packed_windows(masks)
+        self._maps = packed_windows(masks)
 
     def areas(self, outlines: Floats, count: int) -> Areas:
         """The areas of the first `count` poses of outlines (B, V, L, 160)."""
         blocks, views = outlines.shape[:2]
         counts = np.empty((blocks, views, LANES, 2), dtype=np.int64)
         outside = np.empty((blocks, views, LANES))
-        run_blocks(
-            chunk_areas,
-            all_areas,
-            blocks,
-            BLOCKS_A_THREAD,
-            *(outlines, self.scale, self.views, self.words, counts, outside),
-        )
+        given = outlines, self.scale, self._maps
+        parallel_blocks(area_blocks, blocks, BLOCKS_A_THREAD, *given, counts, outside)
         counts = counts.transpose(0, 2, 1, 3).reshape(-1, views, 2)[:count]
         beyond = outside.transpose(0, 2, 1).reshape(-1, views)[:count]
         return Areas(counts[..., 1], counts[..., 0], self.pixels, beyond)
@@ -98,9 +94,9 @@ def halved(mask: Mask) -> Mask:
     return found
 
 
-def packed_windows(masks: list[Mask]) -> tuple[Words, IntArray]:
+def packed_windows(masks: list[Mask]) -> Maps:
     """All masks as columns of 64-bit words, one column for every WINDOW_STEP pixels: bit k of the word in column c
-    and row y is pixel (16 c + k, y); (V, 4) where each begins, width, height, words a column.
+    and row y is pixel (16 c + k, y). The second number of a view is that of words a column.
     """
     parts: list[Words] = []
     views = np.zeros((len(masks), 4), dtype=np.int64)
@@ -114,9 +110,9 @@ def packed_windows(masks: list[Mask]) -> tuple[Words, IntArray]:
         windows = np.lib.stride_tricks.sliding_window_view(packed, WORD // 8, axis=1)
         chosen = np.ascontiguousarray(windows[:, :: WINDOW_STEP // 8].transpose(1, 0, 2))
         parts.append(chosen.view("<u8").astype(np.uint64).ravel())
-        row[:] = start, width, height, words
+        row[:] = start, words, width, height
         start += columns * words
-    return np.concatenate(parts), views
+    return Maps(np.concatenate(parts), views)
 
 
 def _share(part: NDArray[Any], whole: NDArray[Any]) -> Array:

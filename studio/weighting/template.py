@@ -19,12 +19,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.geometry.camera import Camera
 from studio.weighting.evidence_check import check_views
-from studio.weighting.hard_priors import HardPriors
-from studio.weighting.outlines import OutlineProjector
+from studio.weighting.problem import Preparation, PreparedProblem
 from studio.weighting.silhouette_areas import Silhouettes
 
 Array = NDArray[np.float64]
@@ -37,13 +34,8 @@ class TemplateSettings:
     title: ClassVar[str] = "Template"
 
 
-class TemplateWeigher:
-    """Makes the problem of any frame; holds nothing that changes."""
-
-    def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: TemplateSettings) -> None:
-        self.settings, self.cameras = settings, cameras
-        self.projector = OutlineProjector.of_body(body, cameras)
-        self.priors = HardPriors(body)
+class TemplateWeigher(Preparation):
+    """Makes the problem of any frame."""
 
     def problem(self, evidence: FrameEvidence) -> "TemplateProblem":
         """One frame as a function of poses. Raises FootageError where masks do not fit the cameras."""
@@ -51,11 +43,11 @@ class TemplateWeigher:
         return TemplateProblem(self, Silhouettes(evidence))
 
 
-class TemplateProblem:
+class TemplateProblem(PreparedProblem):
     """One frame as a function of poses."""
 
     def __init__(self, weigher: TemplateWeigher, silhouettes: Silhouettes) -> None:
-        self.weigher, self.silhouettes = weigher, silhouettes
+        self.weigher, self.priors, self.silhouettes = weigher, weigher.priors, silhouettes
 
     def weigh(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights. Raises BodyError for poses that are no finite (N, D)."""
@@ -67,11 +59,3 @@ class TemplateProblem:
         areas = self.silhouettes.areas(outlines, len(poses))
         differing = areas.projected + areas.observed - 2 * areas.both
         return differing / self.silhouettes.sizes.prod(axis=1)
-
-    def fitness(self, poses: Array, stage: int = 0) -> Array:
-        """(N,) the log-weights of poses (N, D): this weighting defines no other fitness."""
-        return self.weigh(poses, stage)
-
-    def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
-        """(N, D) poses to (N,) whether the body can take them."""
-        return self.weigher.priors.hold(poses, limbs_apart)

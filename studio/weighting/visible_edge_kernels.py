@@ -8,16 +8,11 @@ which is counted all the same, and NOT_COUNTED for a hidden one.
 
 import numpy as np
 
-from studio.numba_in_threads import njit, prange
+from studio.numba_in_threads import FAST, FAST_INLINED, njit
 from studio.weighting.area_kernels import bit_count
 from studio.weighting.edge_region_kernels import (
     CHUNK,
-    HALF,
-    INLINED,
-    LANES,
     NOT_COUNTED,
-    OPTIONS,
-    ZERO,
     add_up,
     as_pairs,
     fill_clipped,
@@ -26,11 +21,12 @@ from studio.weighting.edge_region_kernels import (
     pixel,
     store_line,
 )
+from studio.weighting.outline_kernels import HALF, LANES, ZERO
 
 BRIGHTEST = 255
 
 
-@njit(**OPTIONS)
+@njit(**FAST)
 def edge_lines(outlines, block, view, corners, lines, samples):
     """Fill lines (K, 64), four rows of sixteen lanes each, of all edges of sixteen poses in one view; pixels, half a
     pixel on so that truncation rounds."""
@@ -49,7 +45,7 @@ def edge_lines(outlines, block, view, corners, lines, samples):
             store_line(line, 0, lane, edge, edge, ZERO, samples)
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def fill_edge(line, bits, not_counted, width, indices, number):
     """Indices of the samples of an edge of a limb that is wholly inside the picture."""
     for chunk in range(indices.shape[1]):
@@ -60,7 +56,7 @@ def fill_edge(line, bits, not_counted, width, indices, number):
         bits >>= np.uint64(CHUNK)
 
 
-@njit(**OPTIONS)
+@njit(**FAST)
 def fill_edge_clipped(line, bits, not_counted, view, unseen, indices, number):
     """Indices of the samples of an edge of a limb that may leave the picture, or is not seen at all."""
     fill_clipped(line, view, unseen, indices, number, 0)
@@ -68,7 +64,7 @@ def fill_edge_clipped(line, bits, not_counted, view, unseen, indices, number):
         hide(bits, not_counted, indices, number, 0)
 
 
-@njit(**INLINED)
+@njit(**FAST_INLINED)
 def fill_edges(outlines, corners, hidden, block, view, lane, lines, views, indices):
     """Indices (K, chunks, 1, 16) of all samples of one pose in one view; returns how many are hidden."""
     width = np.float32(views[view, 2])
@@ -86,14 +82,14 @@ def fill_edges(outlines, corners, hidden, block, view, lane, lines, views, indic
     return lost
 
 
-@njit(**OPTIONS)
-def chunk_edges(first, last, outlines, corners, hidden, chunks, views, maps, found):
+@njit(**FAST)
+def edge_blocks(first, last, outlines, corners, hidden, chunks, maps, found):
     """Mean of the edge maps, 0...1, over the visible samples of the blocks first..last - 1; 0 where none is visible.
 
     corners : (K, 3) limb, corner where the edge begins, corner where it ends. hidden : (B, V, K, 16) bits of hidden
-    samples. chunks : how many times sixteen samples an edge has. views : (V, 4) where a view's map begins, nothing,
-    width, height. found : (B, V, 16).
+    samples. chunks : how many times sixteen samples an edge has. found : (B, V, 16).
     """
+    values, views = maps.values, maps.views
     indices = np.zeros((corners.shape[0], chunks, 1, CHUNK), np.uint32)
     pairs = as_pairs(indices)
     lines = np.zeros((corners.shape[0], 4 * LANES), np.float32)
@@ -105,22 +101,13 @@ def chunk_edges(first, last, outlines, corners, hidden, chunks, views, maps, fou
                 lost = fill_edges(outlines, corners, hidden, block, view, lane, lines, views, indices)
                 mean = 0.0
                 if lost < indices.size:
-                    mean = add_up(maps, base, pairs) / (BRIGHTEST * (indices.size - lost))
+                    mean = add_up(values, base, pairs) / (BRIGHTEST * (indices.size - lost))
                 found[block, view, lane] = mean
 
 
-@njit(parallel=True, **OPTIONS)
-def all_edges(threads, outlines, corners, hidden, chunks, views, maps, found):
-    """`chunk_edges` of all blocks, shared among threads."""
-    share = (found.shape[0] + threads - 1) // threads
-    for chunk in prange(threads):
-        last = min((chunk + 1) * share, found.shape[0])
-        chunk_edges(chunk * share, last, outlines, corners, hidden, chunks, views, maps, found)
-
-
-@njit(**OPTIONS)
+@njit(**FAST)
 def record_edges(outlines, corners, hidden, views, indices):
-    """The index stream of `chunk_edges`: (B, V, 16, K, chunks, 1, 16). For tests."""
+    """The index stream of `edge_blocks`: (B, V, 16, K, chunks, 1, 16). For tests."""
     lines = np.zeros((corners.shape[0], 4 * LANES), np.float32)
     samples = np.float32(indices.shape[4] * CHUNK)
     for block in range(indices.shape[0]):

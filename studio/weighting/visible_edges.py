@@ -20,14 +20,15 @@ from numpy.typing import NDArray
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.weighting.block_threads import run_blocks
-from studio.weighting.edge_region_kernels import CHUNK, LANES, PADDING
-from studio.weighting.occlusion_kernels import all_hidden, chunk_hidden
+from studio.numba_in_threads import parallel_blocks
+from studio.weighting.edge_region_kernels import CHUNK
+from studio.weighting.occlusion_kernels import hidden_blocks
+from studio.weighting.outline_kernels import LANES
+from studio.weighting.picture_maps import joined_maps
 from studio.weighting.problem import TRUNK_FIRST
-from studio.weighting.visible_edge_kernels import all_edges, chunk_edges, record_edges
+from studio.weighting.visible_edge_kernels import edge_blocks, record_edges
 
 Array = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]
 IntArray = NDArray[np.int64]
 Words = NDArray[np.uint64]
@@ -73,34 +74,22 @@ def limb_sides(limbs: int) -> IntArray:
 def hidden_samples(outlines: Floats, edges: IntArray, samples: int) -> Words:
     """(B, V, K, 16) a bit for each of an edge's samples (at most 64) that lies behind a nearer limb."""
     hidden = np.empty((*outlines.shape[:2], len(edges), LANES), dtype=np.uint64)
-    run_blocks(chunk_hidden, all_hidden, len(outlines), BLOCKS_A_THREAD, *(outlines, edges, samples, hidden))
+    parallel_blocks(hidden_blocks, len(outlines), BLOCKS_A_THREAD, outlines, edges, samples, hidden)
     return hidden
 
 
 class EdgeMaps:
-    """The edge maps of a frame, one after another, each followed by its padding."""
+    """The edge maps of a frame."""
 
     def __init__(self, evidence: FrameEvidence) -> None:
-        parts: list[Bytes] = []
-        self.views = np.zeros((len(evidence.views), 4), dtype=np.int64)
-        start = 0
-        for row, view in zip(self.views, evidence.views, strict=True):
-            parts += [view.edges.ravel(), np.zeros(PADDING, dtype=np.uint8)]
-            row[:] = start, 0, view.edges.shape[1], view.edges.shape[0]
-            start += view.edges.size + PADDING
-        self.values = np.concatenate(parts)
+        self.maps = joined_maps([[(view.edges, None)] for view in evidence.views], (0, 0), np.uint8)
 
     def fitness(self, outlines: Floats, edges: IntArray, chunks: int, count: int) -> Array:
         """(N, V) f_e of the first `count` poses of outlines (B, V, L, 160); `chunks` times sixteen samples an edge."""
         found = np.empty((*outlines.shape[:2], LANES))
         hidden = hidden_samples(outlines, edges, chunks * CHUNK)
-        run_blocks(
-            chunk_edges,
-            all_edges,
-            len(outlines),
-            BLOCKS_A_THREAD,
-            *(outlines, edges, hidden, chunks, self.views, self.values, found),
-        )
+        given = outlines, edges, hidden, chunks, self.maps
+        parallel_blocks(edge_blocks, len(outlines), BLOCKS_A_THREAD, *given, found)
         return found.transpose(0, 2, 1).reshape(-1, outlines.shape[1])[:count]
 
     def recorded_indices(self, outlines: Floats, edges: IntArray, chunks: int) -> NDArray[np.uint32]:
@@ -108,7 +97,7 @@ class EdgeMaps:
         shape = (*outlines.shape[:2], LANES, len(edges), chunks, 1, CHUNK)
         indices = np.zeros(shape, dtype=np.uint32)
         hidden = hidden_samples(outlines, edges, chunks * CHUNK)
-        record_edges(outlines, edges, hidden, self.views, indices)
+        record_edges(outlines, edges, hidden, self.maps.views, indices)
         return indices
 
 

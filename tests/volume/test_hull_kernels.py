@@ -5,34 +5,33 @@ import pytest
 from posed_cones import ring
 
 from studio.evidence.yuv_background import YuvBackground, learn_background
+from studio.geometry.camera_table import camera_table, picture_limit
 from studio.volume import hull_kernels as kernels
 from studio.volume import hull_projection as projection
-from studio.volume import hull_rules as rule
 from studio.volume.chi_square import fitted_thresholds
-from studio.volume.distance_kernels import TILE_HEIGHT, TILE_WIDTH, look_at_tile
-from studio.volume.hull_cameras import camera_rows
+from studio.volume.hull_kernels import TILE_HEIGHT, TILE_WIDTH, look_at_tile
 from studio.volume.hull_octree import summed_areas
 from studio.volume.reconstruction import radical_inverses
 
 CAMERA = ring(3)[0]
-ROWS = camera_rows([CAMERA])
+CAMERAS = camera_table([CAMERA], picture_limit)
 STARTS = np.array([[0, 320 * 240], [0, 321 * 241]])
-HEIGHTS = radical_inverses(512)
 MIDDLE = np.array([0.0, 0.0, 900.0])
 POLYNOMIAL = fitted_thresholds(40, 0.99)
+NO_FLOATS, NO_SUMS = np.zeros(1, np.float32), np.zeros(1, np.int32)
+NO_PICTURE, NO_GAUSSIANS = np.zeros((1, 3), np.uint8), np.zeros((9, 1), np.float32)
 
 
-def rules(*, last: bool = False, deepest: float = 0.0, share: float = 0.5) -> np.ndarray:
-    row = np.zeros(rule.RULES)
-    row[rule.DEPTH_IS_LAST], row[rule.PIXELS], row[rule.EDGE_SHARE], row[rule.SAMPLING] = (
-        last,
-        1.0,
-        share,
-        1.0,
-    )
-    row[rule.SHADOW], row[rule.DEEPEST], row[rule.SINGLE] = 0.1, deepest, POLYNOMIAL.single
-    row[rule.POLYNOMIAL :] = POLYNOMIAL.coefficients
-    return row
+def rules(*, last: bool = False, deepest: float = 0.0, share: float = 0.5) -> kernels.Rules:
+    polynomial = (*map(float, POLYNOMIAL.coefficients),)
+    return kernels.Rules(last, 0, share, 1.0, 0.1, deepest, POLYNOMIAL.single, polynomial)
+
+
+def sights(
+    picture: np.ndarray = NO_PICTURE, gaussians: np.ndarray = NO_GAUSSIANS, distances: np.ndarray = NO_FLOATS
+) -> kernels.Sights:
+    flat = picture.reshape(-1, 3)
+    return kernels.Sights(True, CAMERAS, STARTS, NO_SUMS, flat, gaussians, distances, radical_inverses(512))
 
 
 def scene(seed: int = 0) -> tuple[YuvBackground, np.ndarray]:
@@ -44,14 +43,12 @@ def scene(seed: int = 0) -> tuple[YuvBackground, np.ndarray]:
 
 
 def look(
-    picture: np.ndarray, distances: np.ndarray, half: float, row: np.ndarray, at: np.ndarray = MIDDLE
+    picture: np.ndarray, distances: np.ndarray, half: float, row: kernels.Rules, at: np.ndarray = MIDDLE
 ) -> int:
     place = np.empty(projection.PLACE)
-    assert projection.place_voxel(ROWS, 0, *at, half, place)
+    assert projection.place_voxel(CAMERAS, 0, *at, half, place)
     empty = np.zeros((9, picture.size // 3), np.float32)
-    return kernels.look_at_pixels(
-        ROWS, 0, STARTS, picture.reshape(-1, 3), empty, distances, HEIGHTS, row, place
-    )
+    return kernels.look_at_pixels(sights(picture, empty, distances), 0, row, place)
 
 
 @pytest.mark.parametrize("deepest", [0.0, 0.4])
@@ -60,12 +57,12 @@ def test_tiles_hold_the_distances_of_the_background(deepest: float) -> None:
     picture = np.random.default_rng(5).integers(0, 256, picture.shape, dtype=np.uint8)
     expected = background.squared_distances(picture, 0.1, deepest).ravel()
     distances = np.full(320 * 240, np.nan, np.float32)
-    flat, packed = picture.reshape(-1, 3), background.packed()
-    look_at_tile(ROWS, 0, STARTS, 40, 9, flat, packed, rules(deepest=deepest), distances)
+    seen = sights(picture, background.packed(), distances)
+    look_at_tile(seen, 0, 40, 9, rules(deepest=deepest))
     assert np.isfinite(distances).sum() == TILE_WIDTH * TILE_HEIGHT
     for y in range(0, 240, TILE_HEIGHT):
         for x in range(0, 320, TILE_WIDTH):
-            look_at_tile(ROWS, 0, STARTS, x, y, flat, packed, rules(deepest=deepest), distances)
+            look_at_tile(seen, 0, x, y, rules(deepest=deepest))
     np.testing.assert_allclose(distances, expected, rtol=2e-3, atol=0.05)
 
 
@@ -106,9 +103,9 @@ def test_background_is_taken_for_background_as_often_as_the_confidence_says(half
 def test_only_tiles_that_samples_fall_into_are_looked_at() -> None:
     background, picture = scene()
     place, distances = np.empty(projection.PLACE), np.full(320 * 240, np.nan, np.float32)
-    assert projection.place_voxel(ROWS, 0, *MIDDLE, 20.0, place)
-    flat, packed = picture.reshape(-1, 3), background.packed()
-    answer = kernels.look_at_pixels(ROWS, 0, STARTS, flat, packed, distances, HEIGHTS, rules(), place)
+    assert projection.place_voxel(CAMERAS, 0, *MIDDLE, 20.0, place)
+    seen = sights(picture, background.packed(), distances)
+    answer = kernels.look_at_pixels(seen, 0, rules(), place)
     assert answer == kernels.BACKGROUND
     assert np.isfinite(distances).sum() <= 4 * TILE_WIDTH * TILE_HEIGHT
 
@@ -131,19 +128,13 @@ def test_summed_areas_count_mask_pixels() -> None:
 
 def test_a_mask_carves_only_what_covers_none_of_its_pixels() -> None:
     place = np.empty(projection.PLACE)
-    assert projection.place_voxel(ROWS, 0, *MIDDLE, 60.0, place)
+    assert projection.place_voxel(CAMERAS, 0, *MIDDLE, 60.0, place)
     u, v = (int(np.floor(place[k] + 0.5)) for k in (projection.U, projection.V))
     reach = place[projection.BOUND_X]
     for offset, expected in ((0.8 * reach, kernels.EDGE), (1.3 * reach + 1, kernels.BACKGROUND)):
         mask, sums = np.zeros((240, 320), np.uint8), np.empty(321 * 241, np.int32)
         mask[v, int(u + offset)] = 255
         summed_areas(mask, sums)
-        assert kernels.look_at_mask(ROWS, 0, STARTS, sums, False, 0.5, place) == expected
+        assert kernels.look_at_mask(sights()._replace(sums=sums), 0, rules(), place) == expected
     summed_areas(np.full((240, 320), 255, np.uint8), sums)
-    assert kernels.look_at_mask(ROWS, 0, STARTS, sums, False, 0.5, place) == kernels.FOREGROUND
-
-
-@pytest.mark.parametrize("count", [0, 1, 63, 64, 65, 1000])
-def test_blocks_dealt_out_are_all_dealt_out_once(count: int) -> None:
-    for shares in (1, 2, 3):
-        assert sum(kernels.shares_of(count, share, shares) for share in range(shares)) == count
+    assert kernels.look_at_mask(sights()._replace(sums=sums), 0, rules(), place) == kernels.FOREGROUND

@@ -8,9 +8,9 @@ from posed_cones import ring
 from scipy.spatial import ConvexHull
 
 from studio.geometry.camera import Camera
+from studio.geometry.camera_table import camera_table, picture_limit
 from studio.geometry.projection import project
 from studio.volume import hull_projection as projection
-from studio.volume.hull_cameras import camera_rows
 from studio.volume.reconstruction import radical_inverses
 
 CORNERS = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)], dtype=float)
@@ -19,7 +19,7 @@ HEIGHTS = radical_inverses(4096)
 
 def placed(camera: Camera, centre: np.ndarray, half: float) -> np.ndarray | None:
     place = np.empty(projection.PLACE)
-    seen = projection.place_voxel(camera_rows([camera]), 0, *centre, half, place)
+    seen = projection.place_voxel(camera_table([camera], picture_limit), 0, *centre, half, place)
     return place if seen else None
 
 

@@ -114,9 +114,8 @@ def test_the_octree_keeps_what_a_full_grid_keeps(scene: Scene, kind: str) -> Non
     nodes, edge = grid_within(scene.box, 6), scene.box.edge / 64.0
     seen = reconstructor._seen(evidence)
     verdicts, states = np.zeros(len(nodes), np.uint8), np.zeros((len(nodes), 3), np.uint32)
-    kernels.judge_share(
-        0, 1, nodes, states, verdicts, scene.box.corner, edge, *seen.images, reconstructor._rules_at(6, seen)
-    )
+    given = nodes, states, verdicts, scene.box.corner, edge, seen, reconstructor._rules._replace(last=True)
+    kernels.judge(0, len(nodes), *given)
     full = scene.box.corner + (nodes[verdicts == kernels.KEPT] + 0.5) * edge
     centres = scene.box.corner + (nodes + 0.5) * edge
     in_octree, in_grid = hull.contains(centres), verdicts == kernels.KEPT

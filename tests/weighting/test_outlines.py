@@ -11,10 +11,11 @@ from studio.body.forward_kinematics import limb_ends
 from studio.body.model import MOVE, TURN, KinematicTables
 from studio.errors import BodyError
 from studio.geometry.camera import Camera
+from studio.geometry.camera_table import outward_limit
 from studio.geometry.cones import limb_outlines
 from studio.geometry.projection import project
 from studio.weighting.kinematic_program import compile_program
-from studio.weighting.outlines import BLOCKS_A_THREAD, OutlineProjector, monotone_limit
+from studio.weighting.outlines import BLOCKS_A_THREAD, OutlineProjector
 
 
 @pytest.mark.parametrize("name", list_bodies())
@@ -138,18 +139,23 @@ def test_distortion_that_folds_back_draws_nothing_into_the_picture(human):
     assert seen[0, 0, head] == -1
 
 
+def limit_of(k1: float, k2: float, k3: float) -> float:
+    lens = np.array([k1, k2, 0.0, 0.0, k3])
+    return outward_limit(Camera("c", 640, 480, np.eye(3), lens, np.eye(3), np.zeros(3)))
+
+
 @pytest.mark.parametrize(
     ("k1", "k2", "k3"), [(-0.5, 0, 0), (-0.3, -0.1, 0), (0.1, -0.2, 0.01), (-0.6, 0.1, -0.02)]
 )
 def test_the_fold_is_found_where_the_polynomial_turns(k1, k2, k3):
     r = np.linspace(0, 5, 2_000_001)
     turned = np.diff(r * (1 + k1 * r**2 + k2 * r**4 + k3 * r**6)) < 0
-    np.testing.assert_allclose(np.sqrt(monotone_limit(k1, k2, k3)), r[np.argmax(turned)], atol=1e-5)
+    np.testing.assert_allclose(np.sqrt(limit_of(k1, k2, k3)), r[np.argmax(turned)], atol=1e-5)
 
 
 def test_no_fold_means_no_limit_but_the_widest_view():
-    assert monotone_limit(0.0, 0.0, 0.0) == 1e6
-    assert monotone_limit(-0.32, 0.14, 0.0) == 1e6, "the Lee walk's cameras"
+    assert limit_of(0.0, 0.0, 0.0) == 1e6
+    assert limit_of(-0.32, 0.14, 0.0) == 1e6, "the Lee walk's cameras"
 
 
 def test_looking_along_a_limb_gives_numbers(human):

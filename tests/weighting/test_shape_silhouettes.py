@@ -49,7 +49,7 @@ def test_programs_of_shapes_are_those_of_their_bodies() -> None:
         built = compile_program(kinematic_tables(space.body_of(shape)))
         np.testing.assert_allclose(ours.fixed, built.fixed, atol=2e-3)
         np.testing.assert_allclose(ours.limb_shape, built.limb_shape, atol=2e-3)
-        assert (ours.operation_kind == built.operation_kind).all()
+        assert (ours.kind == built.kind).all()
 
 
 def test_fitness_is_that_of_rounded_bodies_one_by_one() -> None:

@@ -13,7 +13,7 @@ from studio.capture.calibration_files import read_calibration
 from studio.capture.pictures import read_picture
 from studio.evidence.frame_evidence import FrameEvidence, ViewEvidence
 from studio.geometry.camera import Camera
-from studio.weighting.area_kernels import LANES
+from studio.weighting.outline_kernels import LANES
 from studio.weighting.outlines import OutlineProjector
 from studio.weighting.silhouette_areas import BLOCKS_A_THREAD, FULL, HALF, Silhouettes, halved
 

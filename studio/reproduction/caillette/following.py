@@ -23,7 +23,7 @@ from studio.sessions.session import Session
 from studio.settings import RunSettings, changed_settings, default_settings
 from studio.tracking.tracker import LayerRecord, start_of
 from studio.weighting.catalogue import WEIGHTINGS
-from studio.weighting.problem import Expectant, FrameFunction
+from studio.weighting.problem import Expectant, FrameProblem
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 class Known:
     """A frame that has been told where the body is, and is not told again by those who search it."""
 
-    told: FrameFunction
+    told: FrameProblem
 
     def weigh(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights."""
@@ -54,12 +54,12 @@ class Known:
 
 def problems(
     shelf: FootageShelf, session: Session, settings: RunSettings, last: int
-) -> Callable[[int], FrameFunction]:
+) -> Callable[[int], FrameProblem]:
     """Frame number to problem, for the first `last` frames. Those of hulls are kept, as carving takes longest."""
     weighting, cameras = WEIGHTINGS[settings.weighting_name], session.cameras()
     weigher = weighting.prepare(session.body(), cameras, settings.weighting)
 
-    def made(frame: int) -> FrameFunction:
+    def made(frame: int) -> FrameProblem:
         seen = shelf.evidence(
             session, cameras, frame, settings.evidence, weighting.edge_kind, weighting.reads_pictures
         )
@@ -74,13 +74,13 @@ def problems(
 
 def known_problems(
     shelf: FootageShelf, session: Session, settings: RunSettings, true_poses: Array
-) -> Callable[[int], FrameFunction]:
+) -> Callable[[int], FrameProblem]:
     """Frame number to problem, each told the true pose (F, D) and nothing else. Raises SettingsError for a weighting
     that needs no telling.
     """
     last = len(true_poses)
 
-    def told() -> Sequence[FrameFunction]:
+    def told() -> Sequence[FrameProblem]:
         memory: Mapping[str, Array] = {}
         found = []
         of_frame = problems(shelf, session, settings, last)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solveh_banded
 
-from studio.training.banded_kernels import solve_banded
+from studio.tracking.banded_solving import solve_banded
 
 
 @pytest.mark.parametrize(("count", "reach"), [(1, 0), (5, 4), (60, 1), (200, 17)])
@@ -18,4 +18,11 @@ def test_it_solves_what_scipy_solves(count: int, reach: int) -> None:
         lower[off:, reach - off] = diagonal
         bands[off, : count - off] = diagonal
     wanted = solveh_banded(bands, right, lower=True)
-    np.testing.assert_allclose(solve_banded(lower, right.copy()), wanted, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(solve_banded(lower, right), wanted, rtol=1e-9, atol=1e-12)
+
+
+def test_what_is_not_positive_definite_is_refused_or_held() -> None:
+    singular = np.array([[0.0, 4.0], [4.0, 4.0]])
+    with pytest.raises(FloatingPointError):
+        solve_banded(singular.copy(), np.ones(2))
+    assert np.isfinite(solve_banded(singular.copy(), np.ones(2), least=1e-12)).all()
