@@ -46,9 +46,10 @@ from studio.runs.search_space import search_space, session_sigma
 from studio.settings import changed_settings, default_settings
 from studio.tracking.catalogue import TRACKERS, knobs_for_evaluations
 from studio.tracking.frame_loop import search_frame
-from studio.tracking.tracker import WHOLE_BODY, FrameProblem, start_of
+from studio.tracking.tracker import FrameProblem, start_of
 from studio.weighting.catalogue import WEIGHTINGS
 from studio.weighting.outlines import OutlineProjector
+from studio.weighting.problem import WHOLE_BODY
 
 # What all experiments of Fleischmann et al. (2012), section 3, have in common.
 # The footage is the Lee-walk twin: the real dataset is not complete here, so a walk is rendered for its cameras with
