@@ -23,9 +23,10 @@ from studio.runs.search_space import search_space, session_sigma
 from studio.settings import changed_settings, default_settings
 from studio.tracking.catalogue import TRACKERS, knobs_for_evaluations
 from studio.tracking.frame_loop import search_frame
-from studio.tracking.tracker import WHOLE_BODY, FrameProblem, start_of
+from studio.tracking.tracker import FrameProblem, start_of
 from studio.weighting.catalogue import WEIGHTINGS
 from studio.weighting.outlines import OutlineProjector
+from studio.weighting.problem import WHOLE_BODY
 
 Array = NDArray[np.float64]
 
