@@ -1,6 +1,5 @@
 """The guided way: how far a session is, and what a change makes stale."""
 
-import dataclasses
 from pathlib import Path
 
 import pytest
@@ -50,6 +49,6 @@ def test_a_fitted_subject_is_as_tall_as_its_body_stands_not_as_was_guessed(tmp_p
     assert subject_step(session).words == "human31, 1.80 m, by height"
     body = session.body()
     shorter = {name: 0.95 * body.dimensions[name] for name in ("left_shin_length", "right_shin_length")}
-    write_subject(dataclasses.replace(guess, dimensions_mm=shorter), session.path / SUBJECT_NAME)
+    write_subject(msgspec.structs.replace(guess, dimensions_mm=shorter), session.path / SUBJECT_NAME)
     note(session, "subject")
     assert subject_step(session).words == "human31, 1.78 m, fitted to the footage"
