@@ -28,7 +28,7 @@ def test_a_start_pose_is_made_better_and_edited(browser: Browser, studio: Studio
     page.get_by_alt_text("front, frame 0, start pose").wait_for()
     before = studio.get(POSE)["pose"]
     page.get_by_role("button", name="Refine from here").click()
-    page.get_by_text("Made better").wait_for()
+    page.get_by_text("Improved:").wait_for()
     better = studio.get(POSE)["pose"]
     assert better != before
     page.get_by_role("button", name="Edit by hand").click()
