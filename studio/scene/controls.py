@@ -20,11 +20,13 @@ class Control:
 
     viser tells of every change of a value, from a thread of its own and also when it was made from here. So nothing
     is decided there: a person's change is counted and posted with its value. While one waits to be decided on, the
-    input is not written to; what the model says then is not yet the answer to it.
+    input is not written to; what the model says then is not yet the answer to it. It is written to in viser's loop:
+    from another thread a value could be written between a person's change and the report of it.
     """
 
     def __init__(self, handle: Any, post: Post, change: Change) -> None:  # noqa: ANN401 - any input handle
         self.handle = handle
+        self._loop = handle._impl.gui_api._event_loop
         self._change = change
         self._reported = self._decided = 0
 
@@ -40,8 +42,11 @@ class Control:
         return self._change(model, value)
 
     def show(self, value: object) -> None:
-        """Show a value; nobody is asked for it."""
-        if self._reported == self._decided:
+        """Show a value, soon; nobody is asked for it."""
+        self._loop.call_soon_threadsafe(self._write, value)
+
+    def _write(self, value: object) -> None:
+        if self._reported == self._decided and not self.handle._impl.removed:
             self.handle.value = value
 
     def remove(self) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scene_fakes import FakeControl
 from swaying_session import (
     FRAMES,
     LAYERS,
@@ -20,6 +21,7 @@ from studio.body.model import BodyModel
 from studio.geometry.camera import Camera
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.scene.guarded_server import GuardedServer
+from studio.scene.scene_server import SceneServer
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -68,5 +70,19 @@ def stored(workspace: Workspace) -> tuple[Session, StoredRun]:
 def server() -> Iterator[GuardedServer]:
     """A viser server that views are drawn on; every test uses bodies and names of its own making."""
     made = GuardedServer()
+    yield made
+    made.stop()
+
+
+@pytest.fixture
+def control() -> FakeControl:
+    """The run is paused."""
+    return FakeControl("swaying", "run-1", "paused")
+
+
+@pytest.fixture
+def stage(workspace: Workspace, control: FakeControl) -> Iterator[SceneServer]:
+    """A scene that shows nothing yet."""
+    made = SceneServer(workspace, control)
     yield made
     made.stop()

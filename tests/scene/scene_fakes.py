@@ -52,9 +52,13 @@ SOMEBODY = 7
 
 def by_hand(handle: Any, value: object) -> None:  # noqa: ANN401 - any input handle
     """What happens when a viewer moves a control: viser's loop takes the value, then awaits the callbacks."""
-    handle._impl.value = value
-    for callback in handle._impl.update_cb:
-        asyncio.run(callback(SimpleNamespace(target=handle, client_id=SOMEBODY)))
+
+    async def take() -> None:
+        handle._impl.value = value
+        for callback in handle._impl.update_cb:
+            await callback(SimpleNamespace(target=handle, client_id=SOMEBODY))
+
+    asyncio.run_coroutine_threadsafe(take(), handle._impl.gui_api._event_loop).result(5)
 
 
 def press(handle: Any, word: object = None) -> None:  # noqa: ANN401 - a button or a group of them

@@ -1,11 +1,15 @@
 """The panel: made from declarations, reporting what a person does and nothing else, showing what the model says."""
 
+import asyncio
 import dataclasses
 import math
+import threading
 from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
-from scene_fakes import Posted, by_hand, press, settle_viser
+from scene_fakes import SOMEBODY, Posted, by_hand, press, settle_viser
 from swaying_session import FPS, swaying_pose
 
 from studio.body.dragging import Dragger
@@ -47,7 +51,7 @@ class Settings:
     """A settings panel and what it requests."""
 
     def __init__(self, server: GuardedServer, posted: Posted) -> None:
-        self.posted, self.requests = posted, []
+        self.server, self.posted, self.requests = server, posted, []
         tabs = [server.gui.add_tab_group().add_tab(name) for name in ("Search", "Weighting", "Masks")]
         self.panel = SettingsPanel(server.gui, *tabs, posted.post, self.request)
         self.show(Knobs(default_settings()))
@@ -58,6 +62,7 @@ class Settings:
 
     def show(self, knobs: Knobs) -> None:
         self.panel.show(knobs)
+        settle_viser(self.server)
 
     def move(self, name: str, value: object) -> None:
         by_hand(self.panel.inputs[name].handle, value)
@@ -86,11 +91,33 @@ def test_a_control_reports_a_person_and_shows_the_model(server: GuardedServer, p
     control.show(0.3)
     by_hand(handle, 0.8)
     control.show(0.3)
+    settle_viser(server)
     assert (handle.value, moves) == (0.8, []), "nothing is decided in viser's thread"
     posted.happen()
     assert moves == [0.7, 0.8]
     control.show(0.3)
+    settle_viser(server)
     assert handle.value == 0.3, "refused: put back"
+
+
+def test_a_value_shown_just_then_does_not_take_a_persons_change_away(
+    server: GuardedServer, posted: Posted
+) -> None:
+    handle = server.gui.add_checkbox("a", False)
+    control = Control(handle, posted.post, lambda model, value: model)
+
+    async def between() -> None:
+        handle._impl.value = True
+        drawing = threading.Thread(target=control.show, args=(False,))
+        drawing.start()
+        drawing.join()
+        for callback in handle._impl.update_cb:
+            await cast("Any", callback)(SimpleNamespace(target=handle, client_id=SOMEBODY))
+
+    asyncio.run_coroutine_threadsafe(between(), server.get_event_loop()).result(5)
+    settle_viser(server)
+    assert [values for _, values in posted.waiting] == [(True,)]
+    assert handle.value is True
 
 
 def test_a_change_that_fails_frees_its_control(server: GuardedServer, posted: Posted) -> None:
@@ -103,6 +130,7 @@ def test_a_change_that_fails_frees_its_control(server: GuardedServer, posted: Po
     with pytest.raises(ZeroDivisionError):
         posted.happen()
     control.show(0.5)
+    settle_viser(server)
     assert handle.value == 0.5
 
 
@@ -118,7 +146,7 @@ def test_every_knob_has_a_control_that_says_what_it_is(settings: Settings) -> No
         assert handle.value == knob.default
 
 
-def test_a_slider_requests_and_a_changed_value_is_marked(settings: Settings, server: GuardedServer) -> None:
+def test_a_slider_requests_and_a_changed_value_is_marked(settings: Settings) -> None:
     settings.move("survival", 0.7000000000000001)
     assert settings.requests == [{"survival": 0.7}]
     knob = settings.panel.inputs["survival"]
@@ -128,7 +156,6 @@ def test_a_slider_requests_and_a_changed_value_is_marked(settings: Settings, ser
     settings.posted.happen()
     assert settings.requests[1:] == [{"survival": DEFAULTS["survival"]}]
     settings.show(Knobs(changed_settings(default_settings(), {"layers": 12}), since=(128, 2)))
-    settle_viser(server)
     assert settings.panel.inputs["layers"].handle.value == 12
     assert (knob.handle.value, knob.handle.label[:2]) == (DEFAULTS["survival"], "su")
     assert "frame 128, layer 3" in settings.panel.since.content

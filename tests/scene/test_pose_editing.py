@@ -25,11 +25,6 @@ from studio.sessions.workspace import Workspace
 
 
 @pytest.fixture
-def control() -> FakeControl:
-    return FakeControl("swaying", "run-1", "paused")
-
-
-@pytest.fixture
 def stage(workspace: Workspace, control: FakeControl) -> Iterator[SceneServer]:
     made = SceneServer(workspace, control)
     made.show_run("swaying", "run-1")

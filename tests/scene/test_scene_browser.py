@@ -21,7 +21,6 @@ from swaying_session import cloud_record
 
 from studio.body.model import BodyModel
 from studio.scene.scene_server import SceneServer
-from studio.sessions.workspace import Workspace
 from studio.tracking.settings import AnnealedSettings
 from studio.web.scene_relay import router
 from studio.worker.commands import ChangeSettings
@@ -48,18 +47,6 @@ def until(page: Page, condition: Callable[[], object]) -> None:
     while not condition():
         assert time.monotonic() < deadline, "it never came about"
         page.wait_for_timeout(100)
-
-
-@pytest.fixture
-def control() -> FakeControl:
-    return FakeControl("swaying", "run-1", "paused")
-
-
-@pytest.fixture
-def stage(workspace: Workspace, control: FakeControl) -> Iterator[SceneServer]:
-    made = SceneServer(workspace, control)
-    yield made
-    made.stop()
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 import asyncio
 import dataclasses
 import socket
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -27,18 +26,6 @@ from studio.sessions.results_store import ResultsWriter
 from studio.sessions.workspace import Workspace
 from studio.worker import commands
 from studio.worker.events import FrameFinished, LayerFinished, SettingsApplied
-
-
-@pytest.fixture
-def control() -> FakeControl:
-    return FakeControl("swaying", "run-1", "paused")
-
-
-@pytest.fixture
-def stage(workspace: Workspace, control: FakeControl) -> Iterator[SceneServer]:
-    made = SceneServer(workspace, control)
-    yield made
-    made.stop()
 
 
 def views(stage: SceneServer) -> SceneViews:
