@@ -21,7 +21,7 @@ from studio.geometry.camera import Camera
 from studio.knobs import knob
 from studio.tracking.agreement import Agreement, Disagreement
 from studio.tracking.hidden_areas import learnt, without_hidden
-from studio.tracking.refinement import Distances, RefinementSettings, Refiner, bounded_angles
+from studio.tracking.refinement import Distances, RefinementSettings, Refiner
 from studio.tracking.tracker import LIMB_LOST_SHARE, Carried, FrameProblem, FrameResult, SearchSpace
 
 Array = NDArray[np.float64]
@@ -177,6 +177,15 @@ class SeenFrame:
             return than
         return self.hypothesis(pose)
 
+    def best_of(self, than: Hypothesis, drawn: Array, own: Sequence[int]) -> Hypothesis:
+        """The best of what there is and where descents end from those of the poses drawn (N, D) that the silhouettes
+        deny least; own : the angles that were drawn.
+        """
+        off = self.agreement.of_places(drawn, self.silhouettes)
+        for start in _best_apart(drawn, off, own, REFINED_DRAWS):
+            than = self.better(than, start)
+        return than
+
 
 def redrawn(
     rng: np.random.Generator, found: Hypothesis, frame: SeenFrame, last: Array | None = None
@@ -184,7 +193,7 @@ def redrawn(
     """What is found with the doubtful limbs where the silhouettes agree with them best, and how many places were
     compared. last : (D,) the pose of the last frame, which is tried as well.
     """
-    body, evaluations, tried, began_with = frame.refiner.body, 0, set[str](), found
+    evaluations, tried, began_with = 0, set[str](), found
     if last is not None:
         found = frame.better(found, last)
     while True:
@@ -194,14 +203,11 @@ def redrawn(
             break
         limb = max(doubtful, key=lambda name: shares[name])
         tried.add(limb)
-        own = _bent_by(body, limb)
+        own = _bent_by(frame.refiner, limb)
         if len(own) > 1:
-            drawn = _drawn(rng, frame.refiner, found.pose[None], own, DRAWS)
-            evaluations += DRAWS
-            for start in _best_apart(
-                drawn, frame.agreement.of_places(drawn, frame.silhouettes), own, REFINED_DRAWS
-            ):
-                found = frame.better(found, start)
+            drawn = _drawn(rng, frame.refiner, found.pose[None], own)
+            found = frame.best_of(found, drawn, own)
+            evaluations += len(drawn)
     shares = found.off.shares()
     limb = max(shares, key=lambda name: shares[name])
     if shares[limb] > LIMB_LOST_SHARE:
@@ -220,35 +226,29 @@ def _both_redrawn(
     refiner, agreement = frame.refiner, frame.agreement
     names = list(found.off.shares())
     twin = names[name_twins(names)[names.index(limb)]]
-    own, others = _bent_by(refiner.body, limb), _bent_by(refiner.body, twin)
+    own, others = _bent_by(refiner, limb), _bent_by(refiner, twin)
     if twin == limb or len(own) < 2 or len(others) < 2:
         return found, 0
-    places = _drawn(rng, refiner, found.pose[None], own, DRAWS)
-    kept = _best_apart(
-        places, agreement.of_places(places, frame.silhouettes, without=twin), own, PAIRED_DRAWS
-    )
-    pairs = _drawn(rng, refiner, np.array(kept), others, DRAWS)
-    off = agreement.of_places(pairs, frame.silhouettes)
-    for start in _best_apart(pairs, off, [*own, *others], REFINED_DRAWS):
-        found = frame.better(found, start)
-    return found, len(places) + len(pairs)
+    places = _drawn(rng, refiner, found.pose[None], own)
+    off = agreement.of_places(places, frame.silhouettes, without=twin)
+    pairs = _drawn(rng, refiner, np.array(_best_apart(places, off, own, PAIRED_DRAWS)), others)
+    return frame.best_of(found, pairs, [*own, *others]), len(places) + len(pairs)
 
 
-def _bent_by(body: BodyModel, limb: str) -> list[int]:
+def _bent_by(refiner: Refiner, limb: str) -> list[int]:
     """The angles with limits that bend a limb."""
-    bounded = bounded_angles(body)
-    return [n for n, entry in enumerate(body.parameters) if entry.limb == limb and bounded[n]]
+    return [n for n, entry in enumerate(refiner.body.parameters) if entry.limb == limb and refiner.bounded[n]]
 
 
-def _drawn(rng: np.random.Generator, refiner: Refiner, poses: Array, own: Sequence[int], count: int) -> Array:
-    """(K · count, D) poses (K, D) with angles drawn: one part about where they are, one anywhere in their range."""
+def _drawn(rng: np.random.Generator, refiner: Refiner, poses: Array, own: Sequence[int]) -> Array:
+    """(K · DRAWS, D) poses (K, D) with angles drawn: one part about where they are, one anywhere in their range."""
     lower, upper = refiner.lower[own], refiner.upper[own]
-    reach, part, size = upper - lower, count // (2 * len(SPREADS)), (len(poses), -1, len(own))
-    drawn = np.repeat(poses[:, None], count, axis=1)
+    reach, part = upper - lower, DRAWS // (2 * len(SPREADS))
+    drawn = np.repeat(poses[:, None], DRAWS, axis=1)
     now = poses[:, None, own]
     near = [now + spread * reach * rng.standard_normal((len(poses), part, len(own))) for spread in SPREADS]
-    anywhere = lower + reach * rng.random((len(poses), count - part * len(SPREADS), len(own)))
-    drawn[:, :, own] = np.clip(np.concatenate([*near, anywhere], axis=1), lower, upper).reshape(size)
+    anywhere = lower + reach * rng.random((len(poses), DRAWS - part * len(SPREADS), len(own)))
+    drawn[:, :, own] = np.clip(np.concatenate([*near, anywhere], axis=1), lower, upper)
     return drawn.reshape(-1, poses.shape[1])
 
 

@@ -140,7 +140,8 @@ class Refiner:
         self.slack = np.where(rigid_limbs(body), SLACK_MM, 0.0)
         self.neutral = body.neutral
         self.stiffness = np.where(hidden_angles(body), HIDDEN_PULL**2, REST_PULL**2)
-        self.stiffness[~bounded_angles(body)] = 0.0
+        self.bounded = bounded_angles(body)
+        self.stiffness[~self.bounded] = 0.0
 
     def refine(
         self, pose: Array, silhouettes: Sequence[Distances], problem: FrameProblem | None = None
