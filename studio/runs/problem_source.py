@@ -2,7 +2,7 @@
 
 Annealing a frame again, or looking at it, decodes and computes nothing twice: evidence is kept by frame and
 evidence settings, problems by frame and all settings that they depend on. With an executor the next frame is
-made ready while this one is searched.
+made ready while this one is searched: who asks for what is there already never waits for what is being made.
 """
 
 import threading
@@ -57,7 +57,7 @@ class ProblemSource:
         self._backgrounds = Backgrounds(self.footage)
         self._executor = executor
         self._views = views
-        self._making = threading.Lock()
+        self._keeping, self._making = threading.Lock(), threading.Lock()
         self._coming: tuple[Hashable, Future[FrameProblem]] | None = None
         self._evidence: OrderedDict[Hashable, FrameEvidence] = OrderedDict()
         self._problems: OrderedDict[Hashable, FrameProblem] = OrderedDict()
@@ -75,8 +75,11 @@ class ProblemSource:
         """What is seen in the frame, as the settings' weighting wants it. Raises FootageError,
         NotFoundError."""
         key = evidence_key(frame, settings)
+        found = self._kept(self._evidence, key)
+        if found is not None:
+            return found
         with self._making:
-            found = _kept(self._evidence, key)
+            found = self._kept(self._evidence, key)
             if found is None:
                 maker = EvidenceMaker(
                     self.cameras_in(frame),
@@ -86,7 +89,7 @@ class ProblemSource:
                     WEIGHTINGS[settings.weighting_name].edge_kind,
                     self._views,
                 )
-                found = _keep(self._evidence, key, maker.evidence(frame), KEPT_FRAMES)
+                found = self._keep(self._evidence, key, maker.evidence(frame), KEPT_FRAMES)
             return found
 
     def cameras_in(self, frame: int) -> tuple[Camera, ...]:
@@ -100,7 +103,7 @@ class ProblemSource:
             # The thread that makes the next frame ready must be out of the files before they close.
             self._coming[1].exception()
         self._coming = None
-        with self._making:
+        with self._making, self._keeping:
             self._problems.clear()
             self._evidence.clear()
             self._weighers.clear()
@@ -108,8 +111,7 @@ class ProblemSource:
 
     def _problem(self, frame: int, settings: RunSettings) -> FrameProblem:
         key = problem_key(frame, settings)
-        with self._making:
-            found = _kept(self._problems, key)
+        found = self._kept(self._problems, key)
         if found is not None:
             return found
         evidence = self.evidence(frame, settings)
@@ -117,15 +119,15 @@ class ProblemSource:
             silhouettes_by_camera(evidence, settings.refinement.refine_frame_points)
         with self._making:
             weigher = self._weigher(settings, self.cameras_in(frame))
-            return _keep(self._problems, key, weigher.problem(evidence), KEPT_FRAMES)
+            return self._keep(self._problems, key, weigher.problem(evidence), KEPT_FRAMES)
 
     def _weigher(self, settings: RunSettings, cameras: tuple[Camera, ...]) -> Any:  # noqa: ANN401 - as weightings are
         key = (settings.weighting_name, settings.weighting, tuple(camera.name for camera in cameras))
-        found = _kept(self._weighers, key)
+        found = self._kept(self._weighers, key)
         if found is None:
             weighting = WEIGHTINGS[settings.weighting_name]
             made = weighting.prepare(self.body, cameras, settings.weighting)
-            found = _keep(self._weighers, key, made, KEPT_WEIGHERS)
+            found = self._keep(self._weighers, key, made, KEPT_WEIGHERS)
         return found
 
     def _prepare(self, frame: int, settings: RunSettings, executor: Executor) -> None:
@@ -147,6 +149,20 @@ class ProblemSource:
             except CancelledError:
                 return
 
+    def _kept(self, store: OrderedDict[Hashable, T], key: Hashable) -> T | None:
+        with self._keeping:
+            if key not in store:
+                return None
+            store.move_to_end(key)
+            return store[key]
+
+    def _keep(self, store: OrderedDict[Hashable, T], key: Hashable, value: T, limit: int) -> T:
+        with self._keeping:
+            store[key] = value
+            while len(store) > limit:
+                store.popitem(last=False)
+            return value
+
 
 def evidence_key(frame: int, settings: RunSettings) -> Hashable:
     """What a frame's evidence depends on."""
@@ -156,17 +172,3 @@ def evidence_key(frame: int, settings: RunSettings) -> Hashable:
 def problem_key(frame: int, settings: RunSettings) -> Hashable:
     """What a frame as a function of poses depends on."""
     return (frame, settings.evidence, settings.weighting_name, settings.weighting)
-
-
-def _kept(store: OrderedDict[Hashable, T], key: Hashable) -> T | None:
-    if key not in store:
-        return None
-    store.move_to_end(key)
-    return store[key]
-
-
-def _keep(store: OrderedDict[Hashable, T], key: Hashable, value: T, limit: int) -> T:
-    store[key] = value
-    while len(store) > limit:
-        store.popitem(last=False)
-    return value
