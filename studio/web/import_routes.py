@@ -19,7 +19,6 @@ from studio.sessions.archives import FOOTAGE_PARTS, only_archive, unpacked, unwr
 from studio.sessions.importers.adding import AddedFootage, FootageWish, add_footage
 from studio.sessions.importers.catalogue import ImportReport, import_source
 from studio.sessions.inner_paths import PathRefused, relative_path
-from studio.web.background_jobs import Job
 from studio.web.doors import Door, Doors, let_go
 from studio.web.import_schemas import (
     FolderView,
@@ -36,6 +35,7 @@ from studio.web.samples import install_sample
 from studio.web.schemas import NewName
 from studio.web.session_routes import OpenSession
 from studio.web.upload_routes import forget, upload_folder
+from studio.worker.jobs import Job
 
 router = APIRouter(prefix="/api", tags=["importing"])
 
@@ -130,7 +130,7 @@ def folders(
 def _unpacked(folder: Path, job: Job) -> Path:
     """The uploaded folder itself: out of its archive, and without the folders that only wrap it."""
     if only_archive(folder):
-        job.tell(step="unpacking")
+        job.change(step="unpacking")
     return unwrapped(unpacked(folder), FOOTAGE_PARTS)
 
 
