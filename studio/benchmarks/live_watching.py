@@ -14,7 +14,7 @@ from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
 from studio.worker import commands
 from studio.worker.control import StudioControl
-from studio.worker.events import StateChanged
+from studio.worker.events import Event, StateChanged
 from studio.worker.watchers import Subscription
 
 PATIENCE_SECONDS = 120.0
@@ -62,7 +62,7 @@ def track_watched(
     return Watched(summary_of(run), messages, size)
 
 
-def _until(events: Subscription, is_reached: Callable[[StateChanged], bool], report: Progress) -> None:
+def _until(events: Subscription[Event], is_reached: Callable[[StateChanged], bool], report: Progress) -> None:
     """Wait for a state of the tracking process, telling how it keeps up."""
     while True:
         event = events.get(timeout=PATIENCE_SECONDS)

@@ -31,7 +31,7 @@ from studio.web.doors import Door, Doors
 from studio.web.safe_paths import folder_to_import
 from studio.worker.camera_service import RecordingState
 from studio.worker.camera_tracking import TakeWish
-from studio.worker.commands import Open, Start
+from studio.worker.commands import Start, about
 
 router = APIRouter(prefix="/api", tags=["cameras"])
 
@@ -94,8 +94,7 @@ async def begin(wish: RecordingWish, doors: Door) -> RecordingState:
     )
 
     def track(session: Session, run: StoredRun) -> None:
-        doors.control.send(Open(session=str(session.path), run=str(run.folder)))
-        doors.control.send(Start())
+        doors.control.send(Start(**about(run.folder)))
         doors.events.session_changed(session.name)
 
     take = TakeWish(place, wish.seconds, keep_start=wish.keep_start)

@@ -14,6 +14,7 @@ from fastapi import Depends, Request
 
 from studio.export.task import Writer
 from studio.runs.overlay_pictures import forget_composers
+from studio.sessions.session import RUNS_NAME
 from studio.sessions.workspace import Workspace
 from studio.web.calibration_proposals import Proposals
 from studio.web.event_stream import EventStream
@@ -21,7 +22,7 @@ from studio.web.job_kinds import COMPARISON
 from studio.web.windows import Window
 from studio.worker.camera_service import CameraService
 from studio.worker.commands import Close, Command
-from studio.worker.events import StateChanged
+from studio.worker.events import Event, StateChanged
 from studio.worker.jobs import JobRunner
 from studio.worker.watchers import Subscription
 
@@ -50,11 +51,7 @@ class Control(Protocol):
         """Post a command and wait until it is acknowledged. Raises what it was refused with."""
         ...
 
-    def change_settings(self, **changes: Value) -> object:
-        """Change knobs of the open run and wait for the answer. Raises SettingsError, RunError."""
-        ...
-
-    def subscribe(self) -> Subscription:
+    def subscribe(self) -> Subscription[Event]:
         """All events from now on."""
         ...
 
@@ -263,9 +260,10 @@ def let_go(doors: Doors, session: str, run: str = "") -> None:
     """
     if not run and doors.jobs.going(COMPARISON, session):
         doors.jobs.check_free(COMPARISON)
-    state = doors.control.state
-    if state.state != "lost" and state.session == session and (not run or state.run == run) and state.run:
-        doors.control.request(Close())
+    state, folder = doors.control.state, doors.workspace.root / session
+    # Else the process itself knows whether that is what it has open; a search elsewhere is not waited for.
+    if state.state != "lost" and (state.session == session or state.state not in ("tracking", "compiling")):
+        doors.control.request(Close(session=str(folder), run=str(folder / RUNS_NAME / run) if run else ""))
     for scene in doors.scenes.open_scenes().values():
         if scene.shown.session == session and (not run or scene.shown.run == run):
             scene.show_run(session if run else "")

@@ -46,6 +46,7 @@ class StudioControl:
         self.workspace = workspace
         self._watchers = Watchers()
         self._lock = threading.RLock()
+        self._reviving = threading.RLock()
         self._process: OwnedProcess | None = None
         self._answers: dict[str, _Answer] = {}
         self._said = nothing_open()
@@ -65,14 +66,22 @@ class StudioControl:
         process = self._process
         return process.identifier if process else None
 
-    def subscribe(self) -> Subscription:
+    def subscribe(self) -> Subscription[Event]:
         """Every event from now on, newest wins; close it when done."""
         return self._watchers.subscribe()
 
     # ------------------------------------------------------------------ asking
 
     def send(self, command: commands.Command) -> None:
-        """Post a command; an `Acknowledged` event follows. Raises RunError if the process has died."""
+        """Post a command; an `Acknowledged` event follows. One that names its run revives a process that was lost.
+
+        Raises RunError if the process has died.
+        """
+        if command.run:
+            with self._reviving:
+                # Whoever comes second finds it revived.
+                if self._state.state == "lost":
+                    self.restart(resume=False)
         with self._lock:
             self._note(command)
             if self._process is None:
@@ -104,15 +113,17 @@ class StudioControl:
             raise _refusal(answer.event)
         return answer.event
 
+    def about(self, session: str, run: str) -> commands.About:
+        """What makes a command one about a run of the workspace. Raises NotFoundError."""
+        return commands.about(self.workspace.session(session).run(run).folder)
+
     def open_run(self, session: str, run: str) -> Acknowledged:
         """Make a run of the workspace the current one. Raises NotFoundError, RunError."""
-        folders = self._folders(session, run)
-        return self.request(commands.Open(session=folders[0], run=folders[1]))
+        return self.request(commands.Open(**self.about(session, run)))
 
-    def enqueue(self, session: str, run: str) -> Acknowledged:
+    def track(self, session: str, run: str) -> Acknowledged:
         """Track a run of the workspace, now or after those that are tracked already. Raises NotFoundError."""
-        folders = self._folders(session, run)
-        return self.request(commands.Enqueue(session=folders[0], run=folders[1]))
+        return self.request(commands.Start(**self.about(session, run)))
 
     def change_settings(self, **changes: Value) -> Acknowledged:
         """Change knobs of the open run by name. Raises SettingsError naming what is allowed."""
@@ -132,6 +143,10 @@ class StudioControl:
         resume : track on if it was tracking. Settings that were changed and not yet in use are changed again, and
         the search goes at the pace that it had. Raises StudioError if the run cannot be opened.
         """
+        with self._reviving:
+            self._restart(resume)
+
+    def _restart(self, resume: bool) -> None:
         with self._lock:
             said, changes, old = self._said, dict(self._changes), self._process
             self._process = None
@@ -144,16 +159,18 @@ class StudioControl:
             self.request(commands.SetPace(seconds_a_layer=said.seconds_a_layer))
         place = self._places.get((said.session, said.run))
         if place is not None:
-            self.request(commands.Open(session=place[0], run=place[1]))
+            about: commands.About = {"session": place[0], "run": place[1]}
             if resume and said.state in ("tracking", "compiling"):
                 # Refused if the process died just after its last frame: then nothing is left to go on with.
                 with contextlib.suppress(RunError):
-                    self.request(commands.Start())
+                    self.request(commands.Start(**about))
+            else:
+                self.request(commands.Open(**about))
             if changes:
-                self.request(commands.ChangeSettings(changes=changes))
+                self.request(commands.ChangeSettings(changes=changes, **about))
         for names in said.waiting:
             session, run = self._places[names]
-            self.request(commands.Enqueue(session=session, run=run))
+            self.request(commands.Start(session=session, run=run))
 
     def close(self) -> None:
         """End the process, its search saved where it stands, and all subscriptions."""
@@ -221,15 +238,11 @@ class StudioControl:
 
     def _note(self, command: commands.Command) -> None:
         """Remember what a restart has to bring back."""
-        if isinstance(command, commands.Open):
+        if command.run:
             names = (Path(command.session).name, Path(command.run).name)
             self._places[names] = (command.session, command.run)
-        elif isinstance(command, commands.ChangeSettings):
+        if isinstance(command, commands.ChangeSettings):
             self._changing[command.identifier] = command
-
-    def _folders(self, session: str, run: str) -> tuple[str, str]:
-        stored = self.workspace.session(session).run(run)
-        return str(stored.folder.parent.parent), str(stored.folder)
 
 
 class _Answer:

@@ -2,6 +2,7 @@
 the store except a layer's own cloud, which travels with `LayerFinished` so that it can be drawn at once."""
 
 import math
+from collections.abc import Hashable
 from dataclasses import dataclass, field
 
 from studio.runs.live_summary import LiveStanding
@@ -16,6 +17,11 @@ class Event:
 
     session: str
     run: str
+
+    @property
+    def key(self) -> Hashable:
+        """Events of one key replace each other where a watcher is slow; None: each is kept."""
+        return type(self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +63,11 @@ class Acknowledged(Event):
     hint: str = ""
     code: str = ""
 
+    @property
+    def key(self) -> Hashable:
+        """Each is kept."""
+        return None
+
 
 @dataclass(frozen=True, slots=True)
 class LayerFinished(Event):
@@ -72,6 +83,11 @@ class LayerFinished(Event):
     asked_at: float = math.nan
     left_at: float = math.nan
 
+    @property
+    def key(self) -> Hashable:
+        """One a layer."""
+        return LayerFinished, self.record.layer, self.reannealed
+
 
 @dataclass(frozen=True, slots=True)
 class FrameFinished(Event):
@@ -83,6 +99,11 @@ class FrameFinished(Event):
     result: FrameResult
     reannealed: bool = False
     latency_ms: float = math.nan
+
+    @property
+    def key(self) -> Hashable:
+        """The newest, and the newest answer."""
+        return FrameFinished, self.reannealed
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,3 +125,8 @@ class LogLine(Event):
     level: str
     time: float
     text: str
+
+    @property
+    def key(self) -> Hashable:
+        """Each is kept."""
+        return None

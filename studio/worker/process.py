@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 
 from studio.worker.commands import Command
-from studio.worker.events import LayerFinished, LogLine
+from studio.worker.events import Event, LayerFinished, LogLine
 from studio.worker.tracking_job import TrackingJob
 from studio.worker.watchers import Subscription
 
@@ -39,10 +39,10 @@ def run_process(inbox: Connection, outbox: Connection) -> None:
     """The process's whole life: until a Stop, or until the server is gone."""
     # Ctrl-C in the terminal reaches both processes; the server decides what becomes of this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    events = Subscription()
+    events = Subscription[Event]()
     sender = threading.Thread(target=_send_all, args=(events, outbox), name="events-out", daemon=True)
     sender.start()
-    job = TrackingJob(events.put)
+    job = TrackingJob(lambda event: events.put(event, event.key))
     try:
         _loop(job, inbox)
     except Exception:
@@ -73,7 +73,7 @@ def _loop(job: TrackingJob, inbox: Connection) -> None:
             job.advance()
 
 
-def _send_all(events: Subscription, outbox: Connection) -> None:
+def _send_all(events: Subscription[Event], outbox: Connection) -> None:
     """Send events as they come, and heartbeats between them, until the stream is closed and empty."""
     with contextlib.suppress(BrokenPipeError, OSError):
         while True:

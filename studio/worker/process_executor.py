@@ -17,14 +17,15 @@ from dataclasses import dataclass
 from multiprocessing import parent_process
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
-from typing import Any, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 from studio.errors import RunError
 
+P = ParamSpec("P")
 T = TypeVar("T")
 
 # Libraries read these when they are loaded, so they are set while a process is started.
-ONE_CORE = dict.fromkeys(
+ONE_CORE: Mapping[str, str] = dict.fromkeys(
     (
         "NUMBA_NUM_THREADS",
         "OMP_NUM_THREADS",
@@ -76,7 +77,7 @@ class ProcessExecutor(Executor):
         self._seats: list[_Seat] = []
         self._idle = 0
 
-    def submit(self, fn: Callable[..., T], /, *args: object, **kwargs: object) -> Future[T]:
+    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """Run `fn(*args, **kwargs)` in a process; the future raises what it raised, ProcessLostError if that died.
 
         Raises RuntimeError after a shutdown, what pickle raises for what cannot be pickled.

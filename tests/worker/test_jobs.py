@@ -341,4 +341,7 @@ def test_a_report_stops_only_who_was_cancelled(office: Office) -> None:
     job.cancel()
     with pytest.raises(WorkCancelledError):
         job.report_or_stop("reading", 1, 2)
-    assert [(message["state"], message["done"]) for message in office.said] == [("queued", 0), ("cancelling", 0)]
+    assert [(message["state"], message["done"]) for message in office.said] == [
+        ("queued", 0),
+        ("cancelling", 0),
+    ]

@@ -21,7 +21,8 @@ def test_a_server_that_reads_nothing_holds_nothing_up() -> None:
     sender.start()
     for frame in range(400):
         for layer in range(3):
-            events.put(LayerFinished("s", "r", layer_of(frame, layer, count=200)))
+            event = LayerFinished("s", "r", layer_of(frame, layer, count=200))
+            events.put(event, event.key)
     events.close()
     received: list[LayerFinished] = []
     while sender.is_alive() or reading.poll(0.0):

@@ -2,7 +2,7 @@
 
 import { fetchJson, post } from "./api.js";
 import { button, element } from "./elements.js";
-import { withTimeLeft } from "./jobs.js";
+import { isGoing, withTimeLeft } from "./jobs.js";
 import { uploadFiles } from "./uploading.js";
 
 const USES = [["", "–"], ["learn", "learn"], ["test", "test"]];
@@ -94,11 +94,11 @@ export function showLearningForm(content, { choices, sessions, started }) {
 }
 
 /** What is said of progress in one line. */
-export const progressWords = (told) => (told.state === "running" ? withTimeLeft(told, "beginning") : told.state);
+export const progressWords = (told) => (isGoing(told) ? withTimeLeft(told, "beginning") : told.state);
 
 /** The card of what is being learnt, or of why it was not. again: called for another form. */
 export function showLearning(content, progress, { cancel, again }) {
-  const running = progress.state === "running";
+  const running = isGoing(progress);
   const bar = element("i");
   bar.style.width = `${progress.total ? (100 * progress.done) / progress.total : 0}%`;
   const told = { cancelled: "It was cancelled; nothing of it was kept.", failed: progress.message }[progress.state] ?? "";
@@ -116,7 +116,7 @@ export function showLearning(content, progress, { cancel, again }) {
 export function updateLearning(content, progress) {
   const card = content.querySelector("#learning");
   const words = card?.querySelector(".words-of-progress");
-  if (!words || progress.state !== "running") return false;
+  if (!words || !isGoing(progress)) return false;
   words.textContent = progressWords(progress);
   card.querySelector(".long-progress i").style.width = `${progress.total ? (100 * progress.done) / progress.total : 0}%`;
   return true;

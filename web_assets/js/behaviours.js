@@ -11,6 +11,7 @@ import { button, element } from "./elements.js";
 import { drawChart } from "./findings_charts.js";
 import { complain, say } from "./messages.js";
 import { startTheme } from "./theme.js";
+import { isGoing } from "./jobs.js";
 
 const FIRST_CLUSTERS = 12;
 const NATS_A_BIT = Math.LN2;
@@ -41,7 +42,7 @@ function nothing() {
 }
 
 function drawList() {
-  const running = learning?.state === "running";
+  const running = isGoing(learning);
   const rows = [...(running ? [learningEntry()] : []), ...models.map(entryOf)];
   list.replaceChildren(...(rows.length ? rows : [element("p", { className: "empty", textContent: "No model yet." })]));
 }
@@ -233,7 +234,7 @@ async function openNew() {
   document.title = "Learn a behaviour · Capture studio";
   const choices = await learningChoices();
   learning = choices.progress;
-  if (learning?.state === "running") showProgress();
+  if (isGoing(learning)) showProgress();
   else await openLearningForm(choices);
   drawList();
 }
@@ -255,7 +256,7 @@ function showProgress() {
 /** Ask how far it is while something is learnt; what was learnt opens, unless another model is being looked at. */
 function watchLearning() {
   clearTimeout(timer);
-  if (learning?.state !== "running") return;
+  if (!isGoing(learning)) return;
   timer = setTimeout(async () => {
     try {
       learning = (await learningChoices()).progress;

@@ -5,7 +5,7 @@ import { button, duration, element } from "./elements.js";
 import { drawChart } from "./findings_charts.js";
 import { seriesColour } from "./theme.js";
 
-const BADGES = { running: "good", cancelling: "warn", finished: "calm", interrupted: "warn", cancelled: "calm", failed: "bad" };
+const BADGES = { running: "good", cancelling: "warn", queued: "calm", done: "calm", interrupted: "warn", cancelled: "calm", failed: "bad" };
 const SIGNIFICANT = 0.05;
 
 let disposals = [];
@@ -43,12 +43,12 @@ export function updateProgress(content, line) {
 function head({ comparison: line, fps }, actions) {
   const facts = [`${line.evaluations} evaluations a frame`, `${line.seeds} ${line.seeds === 1 ? "seed" : "seeds"} each`, `frames ${line.first} to ${line.last - 1} at ${fps} per second`, line.created.slice(0, 16).replace("T", " ")];
   const path = `/api/comparisons/${encodeURIComponent(line.session)}/${encodeURIComponent(line.name)}`;
-  const going = ["running", "cancelling"].includes(line.status);
+  const going = ["queued", "running", "cancelling"].includes(line.status);
   const download = (words, file) => { const link = element("a", { className: "download", href: `${path}/${file}`, textContent: words }); link.setAttribute("download", ""); return link; };
   return element("header", { className: "head" },
     element("div", {}, element("h1", {}, line.trackers.join(", "), " on ", line.session), element("p", { className: "lead" }, line.name, " · ", facts.join(" · "))),
     element("div", { className: "group" },
-      line.status === "finished" && download("JSON", "result.json"), line.status === "finished" && download("CSV", "frames.csv"),
+      line.status === "done" && download("JSON", "result.json"), line.status === "done" && download("CSV", "frames.csv"),
       button("Again…", actions.again), !going && button("Delete…", actions.remove, "quiet")));
 }
 
@@ -59,7 +59,7 @@ function progressWords(line) {
 }
 
 function progressBox(line, actions) {
-  const going = ["running", "cancelling"].includes(line.status);
+  const going = ["queued", "running", "cancelling"].includes(line.status);
   const words = {
     interrupted: "The studio ended before the comparison did. What is measured is kept.",
     cancelled: "Cancelled. What is measured is kept, and it can go on.", failed: line.problem,

@@ -9,7 +9,7 @@ import { complain } from "./messages.js";
 import { onTheme, startTheme } from "./theme.js";
 
 const POLL_MILLISECONDS = 1000;
-const GOING = ["running", "cancelling"];
+const GOING = ["queued", "running", "cancelling"];
 
 const list = document.getElementById("entries");
 const content = document.getElementById("content");
@@ -35,7 +35,7 @@ async function refresh() {
 
 function entryOf(line) {
   const going = GOING.includes(line.status);
-  const mark = line.status === "finished" && line.best
+  const mark = line.status === "done" && line.best
     ? element("span", { className: "mark", textContent: `${line.best_mm.toFixed(1)} mm`, title: line.best })
     : element("span", { className: "mark" }, badge(line.status));
   const row = element("button", { type: "button", className: "entry", title: line.trackers.join(", ") },

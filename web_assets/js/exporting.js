@@ -5,6 +5,7 @@ import { button, duration, element } from "./elements.js";
 import { onEvent } from "./live.js";
 import { complain } from "./messages.js";
 import { get, watch } from "./state.js";
+import { isGoing } from "./jobs.js";
 
 const panel = document.getElementById("panel-export");
 const WORDS = {
@@ -141,7 +142,7 @@ async function refresh() {
 /** An export of this run got further, or ended. */
 function hear(told) {
   if (!isHere(told)) return;
-  if (told.state === "running") {
+  if (isGoing(told)) {
     if (state.going && state.going.identifier !== told.identifier) return;
     state.going = told;
     panel.querySelector(".export-actions")?.replaceWith(actions());

@@ -8,6 +8,9 @@ const POLL_MILLISECONDS = 350;
 /** The code of the error of what a person ended. */
 export const CANCELLED = "cancelled";
 
+/** Whether a job is not over. */
+export const isGoing = (told) => ["queued", "running", "cancelling"].includes(told?.state);
+
 /** What went wrong in a job, as an error with its remedy. */
 export const faultOf = (told) => Object.assign(new Error(told.message), { hint: told.hint, code: told.code });
 
@@ -20,7 +23,7 @@ export async function followJob(path, report = () => {}, gone = () => false) {
     const told = await fetchJson(path);
     if (gone()) return null;
     if (told.state === "failed") throw faultOf(told);
-    if (told.state !== "running") return told;
+    if (!isGoing(told)) return told;
     report(told);
     await new Promise((resolve) => setTimeout(resolve, POLL_MILLISECONDS));
     if (gone()) return null;

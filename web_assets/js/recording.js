@@ -4,6 +4,7 @@ import { fetchJson, post } from "./api.js";
 import { button, element } from "./elements.js";
 import { complain } from "./messages.js";
 import { startTheme } from "./theme.js";
+import { isGoing } from "./jobs.js";
 
 const content = document.getElementById("content");
 const LOOK_MILLISECONDS = 1000;
@@ -16,7 +17,7 @@ let sessions = [];
 let told = null;
 let looking = 0;
 
-const going = () => told?.recording && ["getting ready", "recording", "importing"].includes(told.recording.state);
+const going = () => isGoing(told?.recording);
 const number = (value, digits = 1) => (value === null || value === undefined ? "–" : value.toFixed(digits));
 const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
 
@@ -110,7 +111,7 @@ function update() {
   record.hidden = Boolean(is);
   record.disabled = !told.cameras.length;
   stop.hidden = !is;
-  stop.disabled = told.recording?.state === "importing";
+  stop.disabled = told.recording?.step === "importing";
   for (const input of form.querySelectorAll("input, select")) input.disabled = Boolean(is);
   drawOutcome();
 }
@@ -134,12 +135,12 @@ async function begin() {
 function drawOutcome() {
   const recording = told.recording;
   if (!recording) return outcome.replaceChildren();
-  const { state, session: made, seconds: passed, limit, words, notes, message, hint, run } = recording;
+  const { state, step, session: made, seconds: passed, limit, words, notes, message, hint, run } = recording;
   const link = run ? `/?session=${encodeURIComponent(made)}&run=${encodeURIComponent(run)}` : `/?session=${encodeURIComponent(made)}`;
   if (state === "failed") return outcome.replaceChildren(element("p", { className: "wrong", role: "alert" }, message, element("span", { className: "hint", textContent: ` ${hint}` })));
-  const shown = state === "recording" || state === "getting ready";
+  const shown = isGoing(recording) && step !== "importing";
   const counter = element("span", { className: `counter ${shown ? "live" : ""}`, textContent: limit ? `${clock(passed)} / ${clock(limit)}` : clock(passed) });
-  const line = element("p", { className: "recording-line", role: "status" }, shown ? element("i", { className: "red-dot" }) : null, counter, element("span", { textContent: [state === "done" ? "" : state, words].filter(Boolean).join(" · ") }));
+  const line = element("p", { className: "recording-line", role: "status" }, shown ? element("i", { className: "red-dot" }) : null, counter, element("span", { textContent: [step, words].filter(Boolean).join(" · ") }));
   const places = state === "done" || run ? element("p", {}, element("a", { href: link, textContent: run ? `Watch ${made} / ${run} being tracked` : `Open ${made}` })) : null;
   if (places && state === "done") places.firstChild.textContent = `Open ${made}${run ? ` / ${run}` : ""}`;
   outcome.replaceChildren(line, ...(places ? [places] : []), ...(notes.length ? [element("ul", { className: "words" }, ...notes.map((note) => element("li", { className: "caution", textContent: note })))] : []));

@@ -24,6 +24,7 @@ import { startTheme } from "./theme.js";
 import { WORDS } from "./way_words.js";
 import { drawProgress } from "./way_progress.js";
 import { listen, startWayEvents } from "./way_events.js";
+import { isGoing } from "./jobs.js";
 
 const byId = (id) => document.getElementById(id);
 const stepper = byId("stepper");
@@ -203,7 +204,7 @@ async function start() {
   byId("begin").onclick = beginForm;
   byId("which").onchange = () => open(byId("which").value);
   for (const type of ["sessions", "track", "subject", "initialise", "export", "state", "import"]) {
-    listen(type, (event) => { if (session && event.session === session && event.state !== "running") refresh().catch(() => {}); });
+    listen(type, (event) => { if (session && event.session === session && !isGoing(event)) refresh().catch(() => {}); });
   }
   const wish = new URLSearchParams(location.search);
   try {

@@ -2,6 +2,7 @@
 
 import { button, duration, element } from "./elements.js";
 import { complain } from "./messages.js";
+import { isGoing } from "./jobs.js";
 
 const ASKED = "A tripod that was touched after the calibration turns a camera by a degree, which is twenty pixels. Silhouettes tell, without a board.";
 const pixels = (value) => (value === null ? "–" : `${value.toFixed(1)} px`);
@@ -38,7 +39,7 @@ export function alignmentBox(way, place, changed) {
     if (state.stopped || !state.told) return;
     const { job, possible, turned, notes } = state.told;
     place.hidden = !possible;
-    const going = job?.state === "running";
+    const going = isGoing(job);
     const measure = button(job?.state === "done" ? "Measure again" : "Measure", () => { state.asked = true; return begin(); }, "small");
     measure.disabled = going || state.busy;
     measure.setAttribute("aria-label", "Measure whether the cameras agree");
@@ -86,7 +87,7 @@ export function alignmentBox(way, place, changed) {
     if (!state.told) return;
     state.told = { ...state.told, job };
     draw();
-    if (job.state !== "running") way.refresh().catch(complain);
+    if (!isGoing(job)) way.refresh().catch(complain);
   });
 
   return { ask, measure: begin, stop: () => { state.stopped = true; } };

@@ -7,6 +7,7 @@ import { alignmentBox } from "./way_alignment.js";
 import { brush } from "./way_brush.js";
 import { maskPictures } from "./way_masks.js";
 import { qualityList } from "./way_quality.js";
+import { isGoing } from "./jobs.js";
 
 const POLL_MILLISECONDS = 500;
 const PREVIEW_MILLISECONDS = 180;
@@ -95,7 +96,7 @@ export function mount(place, way) {
 
   function drawMake() {
     const wasOpen = make.querySelector(".plates")?.open;
-    const going = state.told.job?.state === "running";
+    const going = isGoing(state.told.job);
     const bar = element("div", { className: "going" });
     const trying = element("input", { type: "checkbox", checked: state.tune !== false });
     trying.onchange = () => { state.tune = trying.checked; };
@@ -135,12 +136,12 @@ export function mount(place, way) {
   /** Ask how the set-up stands until it ends. */
   async function follow() {
     clearTimeout(state.timer);
-    if (state.gone || state.told.job?.state !== "running") return;
+    if (state.gone || !isGoing(state.told.job)) return;
     state.timer = setTimeout(async () => {
       try { await ask(); } catch (error) { complain(error); }
       if (state.gone) return;
       const { job } = state.told;
-      if (job?.state === "running") { drawGoing(); return follow(); }
+      if (isGoing(job)) { drawGoing(); return follow(); }
       if (job?.state === "failed") state.failed = job;
       if (job?.state === "done") { state.quality = job.quality; state.changed = {}; changedMasks(); drawKnobs(); way.refresh().catch(complain); if (state.told.cameras.length > 1) alignment.measure(); }
       drawQuality();

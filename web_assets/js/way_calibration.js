@@ -7,6 +7,7 @@ import { findingList, plainNumbers, rigFromAbove, residualBars } from "./calibra
 import { clickFloor } from "./calibration_points.js";
 import { boardForm } from "./way_boards.js";
 import { field, files, select, text } from "./way_fields.js";
+import { isGoing } from "./jobs.js";
 
 const WAYS = { file: "From a file", boards: "From a board", used: "In use" };
 /** The step. */
@@ -83,7 +84,7 @@ export function mount(place, way) {
   /** The job got further. */
   async function hear(told) {
     if (gone || told.identifier !== state.job) return;
-    if (told.state === "running") {
+    if (isGoing(told)) {
       const left = told.seconds_left > 2 ? ` · about ${duration(told.seconds_left)} left` : "";
       way.progress(progress, { words: `${told.step || "Beginning"}${told.total > 1 ? ` · ${told.done} of ${told.total}` : ""}${left}`, share: told.share, cancel: () => way.api.remove(`/api/calibrations/${state.job}`).catch(complain) });
       return;

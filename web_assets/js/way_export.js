@@ -6,6 +6,7 @@ import { tell } from "./live.js";
 import { complain } from "./messages.js";
 import { set } from "./state.js";
 import { viewWall } from "./way_views.js";
+import { isGoing } from "./jobs.js";
 
 const panel = document.getElementById("panel-export");
 let started = false;
@@ -17,7 +18,7 @@ export function mount(place, way) {
   panel.hidden = false;
   if (!started) { startExporting(); started = true; }
   set({ session: way.session, run: run.name });
-  way.on("export", (event) => { tell(event); if (event.state !== "running") way.refresh().catch(() => {}); });
+  way.on("export", (event) => { tell(event); if (!isGoing(event)) way.refresh().catch(() => {}); });
   way.api.fetchJson(`${way.api.runPath(way.session, run.name)}/check`).then((told) => {
     which.textContent = `${run.name}: track "${told.usual}" is exported unless you choose another. ${told.note} Frames before the first and after the last tracked one are left out.`;
     wall.show({ run: run.name, frame: Math.max(run.first, Math.floor((run.first + run.tracked_to) / 2)), track: told.usual === "raw" ? "" : told.usual, show: "outline" });

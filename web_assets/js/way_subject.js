@@ -1,7 +1,7 @@
 // Step Subject: which body, how tall, what follows from it; and the fit to the footage, with lengths before and after.
 
 import { button, element } from "./elements.js";
-import { followJob, shareOf, withTimeLeft } from "./jobs.js";
+import { followJob, isGoing, shareOf, withTimeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 import { drawStature } from "./way_stature.js";
 
@@ -78,7 +78,7 @@ export function mount(place, way) {
   function drawFit() {
     saveHeight.classList.toggle("primary", !state.told.saved || changed());
     const { wish } = state;
-    const going = state.fit?.state === "running";
+    const going = isGoing(state.fit);
     const box = (name, label, title) => {
       const input = element("input", { type: "checkbox", checked: wish[name] });
       input.onchange = () => { wish[name] = input.checked; };
@@ -125,7 +125,7 @@ export function mount(place, way) {
   }
 
   async function follow() {
-    if (state.fit.state !== "running") return;
+    if (!isGoing(state.fit)) return;
     try {
       state.fit = await followJob(`/api/subject-fits/${state.fit.identifier}`, (told) => { state.fit = told; drawGoing(); }, () => state.gone);
     } catch (error) { state.fit = { state: "failed", message: error.message, hint: error.hint }; }

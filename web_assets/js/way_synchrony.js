@@ -1,7 +1,7 @@
 // The cameras in step: offsets by hand, by a recorder's times, or estimated; an estimate is shown and applied only by a click.
 
 import { button, element } from "./elements.js";
-import { followJob, shareOf, withTimeLeft } from "./jobs.js";
+import { followJob, isGoing, shareOf, withTimeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 
 /** Draw in `place`; `offered(offsets)` applies offsets. */
@@ -39,7 +39,7 @@ export function synchroniser(place, way, { offered }) {
   function draw(told) {
     state.told = told;
     if (told.cameras.length < 2) return place.replaceChildren();
-    const going = state.estimate?.state === "running";
+    const going = isGoing(state.estimate);
     const bar = element("div", {});
     const apply = button("Apply", () => offered(asked()), "apply-offsets");
     apply.hidden = true;
