@@ -37,13 +37,13 @@ class StateChanged(Event):
     """
 
     state: str
-    frame: int
-    layer: int
-    first: int
-    last: int
-    done: int
-    frames_per_second: float
-    seconds_left: float
+    frame: int = 0
+    layer: int = 0
+    first: int = 0
+    last: int = 0
+    done: int = 0
+    frames_per_second: float = math.nan
+    seconds_left: float = math.nan
     message: str = ""
     hint: str = ""
     waiting: tuple[tuple[str, str], ...] = ()
@@ -130,3 +130,8 @@ class LogLine(Event):
     def key(self) -> Hashable:
         """Each is kept."""
         return None
+
+
+def nothing_open(seconds_a_layer: float = 0.0) -> StateChanged:
+    """The state of a process with no run open."""
+    return StateChanged("", "", "idle", seconds_a_layer=seconds_a_layer)

@@ -2,16 +2,24 @@
 run."""
 
 import contextlib
-import math
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from studio.knobs import Value
 from studio.runs.live_run import LiveRun, without_particles
 from studio.runs.tracking_run import Stepped
 from studio.settings import RunSettings, values
-from studio.worker.events import Event, FrameFinished, LayerFinished, LogLine, SettingsApplied, StateChanged
+from studio.worker.events import (
+    Event,
+    FrameFinished,
+    LayerFinished,
+    LogLine,
+    SettingsApplied,
+    StateChanged,
+    nothing_open,
+)
 from studio.worker.open_run import OpenRun
 from studio.worker.search_pace import SearchPace
 
@@ -39,9 +47,8 @@ class Reporter:
         pace = self._pace.seconds_a_layer
         waiting = tuple((Path(session).name, Path(run).name) for session, run in self._waiting)
         if run is None:
-            nothing = (0, 0, 0, 0, 0, math.nan, math.nan)
-            said = StateChanged("", "", name, *nothing, message, hint, waiting, seconds_a_layer=pace)
-            self.post(said)
+            nothing = nothing_open(pace)
+            self.post(replace(nothing, state=name, message=message, hint=hint, waiting=waiting))
             return
         tracking, record = run.tracking, run.stored.record
         progress = tracking.progress(pace)

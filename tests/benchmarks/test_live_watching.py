@@ -17,7 +17,8 @@ from studio.scene.presenter import LIVE_PICTURE_SECONDS, PICTURE_SECONDS, Presen
 from studio.scene.run_panel import status_html
 from studio.scene.stage import SceneStage
 from studio.sessions.workspace import Workspace
-from studio.worker.control import StudioControl, nothing_open
+from studio.worker.control import StudioControl
+from studio.worker.events import nothing_open
 from studio.worker.live_tracking import replay_live
 from studio.worker.watchers import Subscription
 

@@ -21,7 +21,8 @@ from studio.runs.new_run import RunRequest, prepare_run
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
-from studio.worker import commands, owned_process
+from studio.worker import commands
+from studio.worker import process as tracking_process
 from studio.worker.control import StudioControl
 from studio.worker.events import Event, FrameFinished, LayerFinished, StateChanged
 from studio.worker.watchers import Subscription
@@ -160,7 +161,7 @@ def test_a_command_that_the_process_dies_of_is_answered(
 def test_a_silent_process_is_said_to_be_lost_until_it_speaks_again(
     session_on_disk: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(owned_process, "SILENT_SECONDS", 3.0)
+    monkeypatch.setattr(tracking_process, "SILENT_SECONDS", 3.0)
     control = StudioControl(Workspace())
     watching = control.subscribe()
     new_run(session_on_disk, "a")

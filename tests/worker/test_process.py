@@ -6,8 +6,7 @@ import threading
 from store_records import layer_of
 
 from studio.worker.commands import Pause, Stop
-from studio.worker.control import nothing_open
-from studio.worker.events import Acknowledged, LayerFinished
+from studio.worker.events import Acknowledged, LayerFinished, nothing_open
 from studio.worker.process import Heartbeat, _loop, _send_all
 from studio.worker.tracking_job import TrackingJob
 from studio.worker.watchers import Subscription

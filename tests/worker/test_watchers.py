@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 from store_records import layer_of, result_of
 
-from studio.worker.control import nothing_open
-from studio.worker.events import Acknowledged, Event, FrameFinished, LayerFinished, LogLine
+from studio.worker.events import Acknowledged, Event, FrameFinished, LayerFinished, LogLine, nothing_open
 from studio.worker.watchers import Subscription, Watchers
 
 
