@@ -10,9 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from studio.body.extremities import extremities
 from studio.body.forward_kinematics import joint_frames, marker_points
-from studio.body.model import BodyModel, Marker
+from studio.body.model import BodyModel, Marker, extremities
 
 _MUCH_NEARER = 0.5
 
