@@ -51,7 +51,8 @@ class SessionJob(BaseModel):
     not known to a factor of two. message, hint and code say why it failed.
     """
 
-    model_config = ConfigDict(from_attributes=True)
+    # Every answer holds all of it, and the API's description says so.
+    model_config = ConfigDict(from_attributes=True, json_schema_serialization_defaults_required=True)
 
     state: JobState = JobState.QUEUED
     session: str = ""
