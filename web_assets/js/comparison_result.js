@@ -70,7 +70,7 @@ function progressBox(line, actions) {
     cancelled: "Cancelled. What is measured is kept, and it can go on.", failed: line.problem,
   };
   return card("", element("div", { className: "form-foot" }, badge(line.status), element("span", { className: "progress-words" }, going ? progressWords(line) : words[line.status] ?? ""),
-    spring(), line.status === "running" && button("Cancel", actions.cancel), !going && button("Go on", actions.resume, "primary")),
+    spring(), going && line.status !== "cancelling" && button("Cancel", actions.cancel), !going && button("Go on", actions.resume, "primary")),
   bar(shareOf(line), "long-progress"), !going && hint(`${line.done} of ${line.total} trials are done.`));
 }
 
