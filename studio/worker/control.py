@@ -10,6 +10,7 @@ import contextlib
 import dataclasses
 import logging
 import threading
+from collections.abc import Mapping
 from concurrent.futures import Future
 from pathlib import Path
 
@@ -30,8 +31,8 @@ from studio.worker.process import LOST_HINT, SILENT_SECONDS, OwnedProcess
 from studio.worker.process_executor import ending
 from studio.worker.watchers import Subscription, Watchers
 
-ANSWER_SECONDS = 60.0
-"""How long an acknowledgement may take: as long as the first compilation of the kernels."""
+ANSWER_SECONDS = 180.0
+"""How long an acknowledgement may take: as long as a start and the first compilation on a busy machine."""
 CLOSING_SECONDS = 5.0
 REFUSALS = (RunError, SettingsError, NotFoundError, SessionError, BodyError, CalibrationError, FootageError)
 
@@ -78,6 +79,9 @@ class StudioControl:
 
         Raises RunError if the process has died.
         """
+        self._post(command)
+
+    def _post(self, command: commands.Command, answer: Future[Acknowledged] | None = None) -> None:
         if command.run:
             with self._reviving:
                 # Whoever comes second finds it revived.
@@ -88,6 +92,9 @@ class StudioControl:
             if self._process is None:
                 self._process = OwnedProcess(self.heard, self.silent, self.ended)
             process = self._process
+            # What waits for an answer waits for this process's.
+            if answer is not None:
+                self._answers[command.identifier] = answer
         process.send(command)
 
     def request(self, command: commands.Command, timeout: float = ANSWER_SECONDS) -> Acknowledged:
@@ -97,10 +104,8 @@ class StudioControl:
         time.
         """
         answer: Future[Acknowledged] = Future()
-        with self._lock:
-            self._answers[command.identifier] = answer
         try:
-            self.send(command)
+            self._post(command, answer)
             event = answer.result(timeout)
         except TimeoutError:
             raise RunError(
@@ -151,10 +156,12 @@ class StudioControl:
         with self._lock:
             said, changes, old = self._said, dict(self._changes), self._process
             self._process = None
+            answers, self._answers = self._answers, {}
             self._said = self._state = nothing_open(said.seconds_a_layer)
             self._changes.clear()
         if old is not None:
             old.end(0.0)
+        _leave_unanswered(answers)
         self.start()
         if said.seconds_a_layer:
             self.request(commands.SetPace(seconds_a_layer=said.seconds_a_layer))
@@ -225,9 +232,7 @@ class StudioControl:
             self._publish(self._said)
         else:
             self._lose(f"The tracking process died ({ending(process.exit_code)}).")
-        text = "The tracking process died before it answered."
-        for identifier, answer in answers.items():
-            answer.set_result(Acknowledged("", "", identifier, "", False, text, LOST_HINT, "run"))
+        _leave_unanswered(answers)
 
     def _lose(self, message: str) -> None:
         logger.error("%s", message)
@@ -244,6 +249,12 @@ class StudioControl:
             self._places[names] = (command.session, command.run)
         if isinstance(command, commands.ChangeSettings):
             self._changing[command.identifier] = command
+
+
+def _leave_unanswered(answers: Mapping[str, Future[Acknowledged]]) -> None:
+    text = "The tracking process died before it answered."
+    for identifier, answer in answers.items():
+        answer.set_result(Acknowledged("", "", identifier, "", False, text, LOST_HINT, "run"))
 
 
 def _refusal(event: Acknowledged) -> StudioError:

@@ -30,6 +30,8 @@ HEARTBEAT_SECONDS = 1.0
 WAIT_SECONDS = 0.5
 SILENT_SECONDS = 20.0
 """A process sends a heartbeat every second; after this long without one it is said to be silent."""
+STARTING_SECONDS = 120.0
+"""How long its first one may take: on a busy machine the imports alone take longer than SILENT_SECONDS."""
 LOST_HINT = "Resume: the run goes on from its last finished frame with the same result."
 
 logger = logging.getLogger(__name__)
@@ -161,15 +163,15 @@ class OwnedProcess:
 
     def _listen(self) -> None:
         """Take everything that the process says, until it ends."""
-        outbox, silent = self._outbox, False
+        outbox, silent, patience = self._outbox, False, STARTING_SECONDS
         while True:
             try:
-                if not outbox.poll(SILENT_SECONDS):
+                if not outbox.poll(patience):
                     if not silent:
                         silent = True
                         self._silent(self, True)
                     continue
-                message = outbox.recv()
+                message, patience = outbox.recv(), SILENT_SECONDS
             except (EOFError, OSError, pickle.UnpicklingError):
                 break
             try:
