@@ -6,11 +6,11 @@ valley (`tracking.shape_search`), a descent its floor (`tracking.shape_refinemen
 dimensions are written out, so that every later run of the session has this body.
 """
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -179,7 +179,7 @@ def _first_body(session: Session, asked: FitRequest) -> tuple[BodyModel, Subject
     if asked.height_mm is not None:
         known = Subject(body=known.body, height_mm=asked.height_mm)
     tree = load_body(asked.body or session.manifest.body, session.body_folders)
-    return fit_subject(tree, known, session.body_folders)[0], dataclasses.replace(known, body=tree.name)
+    return fit_subject(tree, known, session.body_folders)[0], msgspec.structs.replace(known, body=tree.name)
 
 
 def _first_poses(
