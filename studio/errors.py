@@ -89,6 +89,12 @@ class BehaviourError(StudioError):
     status, code = 422, "behaviour"
 
 
+class UnforeseenError(StudioError):
+    """A fault of the studio itself."""
+
+    status, code = 500, "unforeseen"
+
+
 class WorkCancelledError(StudioError):
     """Long work that whoever asked for it ended; nothing of it is kept."""
 

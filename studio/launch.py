@@ -23,7 +23,7 @@ from studio.web.app import build_app
 from studio.web.doors import STATE_NAME
 from studio.web.safe_paths import default_footage_roots
 from studio.web.samples import install_sample
-from studio.worker.commands import Open, Start
+from studio.worker.commands import Start, about
 from studio.worker.control import StudioControl
 
 Announce = Callable[[str], None]
@@ -150,8 +150,7 @@ def _alone_on(root: Path) -> Iterator[Callable[[str], None]]:
 
 
 def _track(control: StudioControl, session: Session, run: str) -> None:
-    control.send(Open(session=str(session.path), run=str(session.run(run).folder)))
-    control.send(Start())
+    control.send(Start(**about(session.run(run).folder)))
 
 
 def _listening(host: str, port: int) -> socket.socket:

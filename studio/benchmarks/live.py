@@ -30,9 +30,8 @@ from studio.sessions.manifest import write_manifest
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
-from studio.worker import commands
 from studio.worker.control import StudioControl
-from studio.worker.events import StateChanged
+from studio.worker.events import Event, StateChanged
 from studio.worker.live_tracking import track_live
 from studio.worker.watchers import Subscription
 
@@ -67,8 +66,7 @@ def track_watched(
             viewer = LightViewer(stage.port, stage.relay_headers())
             stage.show_run(session.name, run.name)
         events = control.subscribe()
-        control.open_run(session.name, run.name)
-        control.request(commands.Start())
+        control.track(session.name, run.name)
         _until(events, lambda state: state.live is not None and state.done > 0, report)
         before, began = (viewer.messages, viewer.size) if viewer else (0, 0), time.monotonic()
         _until(events, lambda state: state.state == "finished", report)
@@ -84,7 +82,7 @@ def track_watched(
     return Watched(summary_of(run), messages, size)
 
 
-def _until(events: Subscription, is_reached: Callable[[StateChanged], bool], report: Progress) -> None:
+def _until(events: Subscription[Event], is_reached: Callable[[StateChanged], bool], report: Progress) -> None:
     """Wait for a state of the tracking process, telling how it keeps up."""
     while True:
         event = events.get(timeout=PATIENCE_SECONDS)

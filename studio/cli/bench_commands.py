@@ -11,13 +11,13 @@ from studio.benchmarks.hulls import run_hull_benchmark
 from studio.benchmarks.kernels import run_benchmark
 from studio.benchmarks.live import run_live_benchmark
 from studio.benchmarks.live_stages import in_words
+from studio.benchmarks.reannealing import measure_reannealing
 from studio.cli.output import command, progress
 from studio.progress import Progress
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.sessions.workspace import Workspace
 from studio.web.samples import install_sample
 from studio.worker.control import StudioControl
-from studio.worker.latency import measure_reannealing
 
 
 def _kernels(report: Progress) -> dict[str, object]:

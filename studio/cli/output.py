@@ -18,7 +18,7 @@ from rich.console import Console
 
 from studio.errors import StudioError
 from studio.notebook.progress import bar
-from studio.progress import Progress
+from studio.progress import Progress, TimeLeft, left_in_words
 from studio.registry import Registry
 from studio.sessions.atomic_files import write_bytes
 
@@ -193,17 +193,18 @@ def progress(title: str) -> Iterator[Progress]:
         yield report
 
 
-def progress_lines(title: str, seconds_between: float = 10.0) -> Progress:
+def progress_lines(
+    title: str, seconds_between: float = 10.0, clock: Callable[[], float] = time.monotonic
+) -> Progress:
     """A reporter that prints a line at most every so many seconds."""
-    began = said = time.monotonic()
+    said, left = clock(), TimeLeft(clock)
 
     def report(step: str, done: int, total: int) -> None:
         nonlocal said
-        now = time.monotonic()
+        estimate, now = left.after(step, done, total), clock()
         if now - said < seconds_between:
             return
         said = now
-        left = f", about {(now - began) * (total - done) / done:.0f} s left" if 0 < done < total else ""
-        note(f"{step or title}: {done} of {total}{left}")
+        note(", ".join(filter(None, (f"{step or title}: {done} of {total}", left_in_words(estimate)))))
 
     return report

@@ -2,15 +2,11 @@
 
 import shlex
 import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import click
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-from studio.cli.output import errors_in_words, messages, note, tell
+from studio.cli.output import errors_in_words, note, progress, tell
 from studio.comparison.findings import FAILED
 from studio.comparison.findings_document import REPORT, REPRODUCTIONS, SUMMARY, Document
 from studio.comparison.trials import Scale
@@ -18,11 +14,10 @@ from studio.reproduction.catalogue import EXPERIMENTS, find_experiments
 from studio.reproduction.experiment import Experiment
 from studio.reproduction.findings_files import number_in_words, read_findings
 from studio.reproduction.plan import FULL_SEEDS, QUICK_SEEDS, scale_of
-from studio.reproduction.runner import Report, Reproduction, reproduce
+from studio.reproduction.runner import Reproduction, reproduce
 from studio.sessions.workspace import workspace_root
 
 NOT_CONCLUDED = 1
-SECONDS_BETWEEN_LINES = 10.0
 NOT_RUN = "not run yet"
 
 OUT_HELP = f"Folder of everything that is kept; default: '{REPRODUCTIONS}' in the workspace."
@@ -63,7 +58,7 @@ def _run(
     experiments: tuple[Experiment, ...], folder: Path, scale: Scale, processes: int | None
 ) -> Reproduction:
     try:
-        with trial_progress() as report:
+        with progress("reproducing") as report:
             catalogue = tuple(EXPERIMENTS.values())
             return reproduce(experiments, folder, scale, report, catalogue=catalogue, processes=processes)
     except KeyboardInterrupt:
@@ -115,51 +110,3 @@ def _told(found: Reproduction, folder: Path) -> Document:
 def _verdict(document: Document) -> str:
     firm = document["firm"] or document["verdict"] == FAILED
     return document["verdict"] if firm else f"{document['verdict']}, not firm"
-
-
-@contextmanager
-def trial_progress() -> Iterator[Report]:
-    """Experiment and trial in words, what is done of all, and the time that is left, on standard error.
-
-    A bar on a terminal; in a log file a line now and then.
-    """
-    if not messages.is_terminal:
-        yield _lines()
-        return
-    columns = (
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[left]}"),
-        TextColumn("{task.description}", markup=False),
-    )
-    with Progress(*columns, console=messages) as bar:
-        task = bar.add_task("", total=None, left="")
-
-        def report(step: str, done: int, total: int, seconds: float | None) -> None:
-            bar.update(task, description=step, completed=done, total=total, left=_left(seconds))
-
-        yield report
-
-
-def _lines() -> Report:
-    said = float("-inf")
-
-    def report(step: str, done: int, total: int, seconds: float | None) -> None:
-        nonlocal said
-        now = time.monotonic()
-        if now - said >= SECONDS_BETWEEN_LINES or done == total:
-            said = now
-            left = _left(seconds)
-            note(f"{step}: {done} of {total}{', ' + left if left else ''}")
-
-    return report
-
-
-def _left(seconds: float | None) -> str:
-    if seconds is None:
-        return ""
-    if seconds < 60:
-        return f"about {seconds:.0f} s left"
-    if seconds < 3600:
-        return f"about {seconds / 60:.0f} min left"
-    return f"about {seconds / 3600:.1f} h left"

@@ -86,9 +86,9 @@ class KeptComparison:
         return replace(asked, footage=str(session.path.absolute()), session=session.name)
 
     def status(self) -> str:
-        """running, finished, cancelled, failed, or interrupted (its process is gone; it can go on)."""
+        """running, done, cancelled, failed, or interrupted (its process is gone; it can go on)."""
         if (self.folder / RESULT_NAME).is_file():
-            return "finished"
+            return "done"
         if self.is_running():
             return "running"
         return self.record().ended or "interrupted"

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from rich.progress import Progress as Bar
 
-from studio.progress import Progress
+from studio.progress import Progress, TimeLeft, left_in_words
 
 Told = Progress | bool | None
 """A function of one's own; True for a bar, False for nothing; None for a bar where somebody is looking."""
@@ -31,19 +31,26 @@ def told(progress: Told, title: str) -> Iterator[Progress]:
 def bar(console: Console, title: str) -> Iterator[Progress]:
     """A bar with the time that is left."""
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
-        TimeRemainingColumn(),
+        TextColumn("{task.fields[left]}"),
         TextColumn("{task.fields[speed]}"),
     )
+    left = TimeLeft()
     with Bar(*columns, console=console) as shown:
-        task = shown.add_task(title, total=None, speed="")
+        task = shown.add_task(title, total=None, speed="", left="")
 
         def report(step: str, done: int, total: int) -> None:
             finished = shown.tasks[task]
-            speed = f"{finished.speed:.1f}/s" if finished.speed else ""
-            shown.update(task, description=step or title, completed=done, total=total or None, speed=speed)
+            shown.update(
+                task,
+                description=step or title,
+                completed=done,
+                total=total or None,
+                left=left_in_words(left.after(step, done, total)),
+                speed=f"{finished.speed:.1f}/s" if finished.speed else "",
+            )
 
         yield report
 

@@ -4,7 +4,8 @@ All that is done is kept at once: the same command goes on where a killed one st
 """
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from studio.comparison.findings_document import Document, Making, as_document, f
 from studio.comparison.kept_trials import KeptOutcome, KeptTrials, measured_by
 from studio.comparison.trials import Outcome, Scale, Trial, TrialJob, failure_in_words
 from studio.errors import RunError, SessionError, StudioError
+from studio.progress import Progress
 from studio.reproduction.experiment import Experiment
 from studio.reproduction.findings_files import FOOTAGE, TRIALS, write_findings, write_overview
 from studio.reproduction.plan import PlannedExperiment, each_once, footage_needed, is_rendered, plan
@@ -21,15 +23,10 @@ from studio.sessions.manifest import FILE_NAME as MANIFEST
 from studio.sessions.manifest import now
 from studio.sessions.process_lock import ProcessLock
 from studio.synthesis.recipes import synthesize
-from studio.worker.trial_pool import cores, run_jobs
-from studio.worker.trial_process import TrialResult
+from studio.worker.trials import TrialResult, run_jobs
 
 LOCK = "reproduction.lock"
 SECONDS_BETWEEN_REPORTS = 30.0
-
-# Called with a step in words, what is done of it, how much it is, and the seconds that are left (None: unknown).
-Report = Callable[[str, int, int, float | None], None]
-Kind = tuple[str, tuple[str, ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,23 +48,25 @@ def reproduce(
     experiments: Sequence[Experiment],
     out: Path,
     scale: Scale,
-    report: Report,
+    report: Progress,
     *,
     catalogue: Sequence[Experiment] = (),
     processes: int | None = None,
+    executor: Executor | None = None,
 ) -> Reproduction:
     """Run what is missing of some experiments and write the folder `out`.
 
-    catalogue : whose findings the report shows, by default the experiments. A trial or a conclusion that fails makes
-    its experiment "failed" and no other. Raises SessionError for a folder that cannot be used, RunError while
-    another process works in it, KeyboardInterrupt with everything kept.
+    catalogue : whose findings the report shows, by default the experiments. processes, executor : see
+    `worker.trials.run_jobs`. A trial or a conclusion that fails makes its experiment "failed" and no other. Raises
+    SessionError for a folder that cannot be used, RunError while another process works in it, KeyboardInterrupt with
+    everything kept.
     """
     lock = _taken(out)
     try:
         planned = [plan(experiment, scale) for experiment in experiments]
-        work = _Work(out, planned, tuple(catalogue or experiments), report, processes or cores())
+        work = _Work(out, planned, tuple(catalogue or experiments), report)
         try:
-            work.run()
+            work.run(processes, executor)
         finally:
             results = work.write_overview()
         documents = tuple(work.documents[entry.experiment.name] for entry in planned)
@@ -84,12 +83,11 @@ class _Work:
         out: Path,
         planned: list[PlannedExperiment],
         catalogue: tuple[Experiment, ...],
-        report: Report,
-        processes: int,
+        report: Progress,
     ) -> None:
         self.documents: dict[str, Document] = {}
         self._out, self._planned, self._catalogue = out, planned, catalogue
-        self._report, self._processes = report, processes
+        self._report = report
         self._folder = KeptTrials(out / TRIALS)
         self._jobs = each_once(planned)
         self._kept: dict[str, KeptOutcome] = {}
@@ -99,10 +97,9 @@ class _Work:
             if outcome is not None and outcome.measured is not None:
                 self._kept[key] = outcome
         self.found, self.measured, self.failed = len(self._kept), 0, 0
-        self._pace = TrialPace(self._jobs, self._kept, processes)
         self._written = 0.0
 
-    def run(self) -> None:
+    def run(self, processes: int | None, executor: Executor | None) -> None:
         """Render, run and conclude what is missing."""
         self._conclude_what_is_done()
         missing = [job for key, job in self._jobs.items() if key not in self._kept]
@@ -117,7 +114,7 @@ class _Work:
         self._conclude_what_is_done()
         if runnable:
             self._tell("starting")
-            run_jobs(runnable, self._out / FOOTAGE, self._done, self._processes)
+            run_jobs(runnable, self._out / FOOTAGE, self._done, processes, executor=executor)
 
     def write_overview(self) -> Document:
         """The files of all experiments together."""
@@ -144,7 +141,7 @@ class _Work:
             synthesize(
                 name,
                 beside / name,
-                lambda step, done, total: self._report(f"footage {name}: {step}", done, total, None),
+                lambda step, done, total: self._report(f"footage {name}: {step}", done, total),
                 frames,
             )
             discard(place)
@@ -173,7 +170,6 @@ class _Work:
             self.failed += 1
         else:
             self.measured += 1
-            self._pace.took(job, result.seconds)
 
     def _conclude_what_is_done(self) -> None:
         """Write the findings of every experiment whose last trial has come in."""
@@ -188,8 +184,7 @@ class _Work:
             self.write_overview()
 
     def _tell(self, step: str) -> None:
-        waiting = [job for key, job in self._jobs.items() if key not in self._kept]
-        self._report(step, len(self._kept), len(self._jobs), self._pace.left(waiting))
+        self._report(step, len(self._kept), len(self._jobs))
 
 
 def conclude(planned: PlannedExperiment, kept: Mapping[str, KeptOutcome]) -> Document:
@@ -228,36 +223,6 @@ def _findings(planned: PlannedExperiment, outcomes: list[KeptOutcome]) -> Findin
         if verdict not in VERDICTS:
             raise StudioError(f"'{verdict}' is no verdict.", f"Use one of {', '.join(VERDICTS)}.")
     return found
-
-
-class TrialPace:
-    """Mean seconds of trials by what is measured on which footage."""
-
-    def __init__(self, jobs: Mapping[str, TrialJob], kept: Mapping[str, KeptOutcome], processes: int) -> None:
-        self._processes = processes
-        self._taken: dict[Kind, list[float]] = {}
-        for key, outcome in kept.items():
-            self.took(jobs[key], outcome.seconds)
-
-    def took(self, job: TrialJob, seconds: float) -> None:
-        """A trial is done."""
-        self._taken.setdefault(_kind(job), []).append(seconds)
-
-    def left(self, waiting: Iterable[TrialJob]) -> float | None:
-        """Seconds for the trials that wait, None while nothing is known."""
-        known = [seconds for taken in self._taken.values() for seconds in taken]
-        if not known:
-            return None
-        together = alone = 0.0
-        for job in waiting:
-            taken = self._taken.get(_kind(job), known)
-            seconds = sum(taken) / len(taken)
-            together, alone = (together, alone + seconds) if job.alone else (together + seconds, alone)
-        return together / self._processes + alone
-
-
-def _kind(job: TrialJob) -> Kind:
-    return f"{job.measure.__module__}.{job.measure.__qualname__}", job.footage
 
 
 def _taken(out: Path) -> ProcessLock:

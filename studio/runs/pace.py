@@ -1,10 +1,14 @@
 """How fast a run goes and how long it will take, measured over its last frames."""
 
+import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-REMEMBERED = 30
+from studio.progress import time_left
+
+REMEMBERED, RECENT = 200, 30
+"""Frames that the time left is estimated from, and those that the rate on screen is of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,7 +22,7 @@ class Progress:
 
 
 class Pace:
-    """Remembers how long the last frames took. Time spent paused is never told to it."""
+    """Remembers how long the last frames took. Time spent paused is not counted."""
 
     def __init__(self) -> None:
         self._frames: deque[tuple[float, ...]] = deque(maxlen=REMEMBERED)
@@ -28,10 +32,9 @@ class Pace:
         self._frames.append(tuple(layers))
 
     def progress(self, done: int, total: int, least: float = 0.0) -> Progress:
-        """The estimate, from the mean of the last frames. least : seconds that a layer is made to take from now
-        on."""
-        spent = sum(max(seconds, least) for layers in self._frames for seconds in layers)
-        if spent <= 0.0:
-            return Progress(done, total, float("nan"), float("nan"))
-        rate = len(self._frames) / spent
-        return Progress(done, total, rate, (total - done) / rate)
+        """The rate and the estimate. least : seconds that a layer is made to take from now on."""
+        taken = [sum(max(seconds, least) for seconds in layers) for layers in self._frames]
+        recent = taken[-RECENT:]
+        rate = len(recent) / sum(recent) if sum(recent) > 0.0 else math.nan
+        left = time_left([(seconds, 1) for seconds in taken], total - done)
+        return Progress(done, total, rate, math.nan if left is None else left)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from studio.body.dragging import Dragger
 from studio.body.mirroring import Mirror
-from studio.errors import BodyError, RunError, StudioError
+from studio.errors import BodyError, StudioError
 from studio.knobs import Value, checked
 from studio.runs.colour_tokens import colour_tokens
 from studio.runs.pose_search import BetterPose
@@ -165,32 +165,19 @@ class SceneController:
             return refuse(model, changes)
 
     def _send_knobs(self, model: Model, wanted: Mapping[str, Value]) -> Model:
-        """Make the shown run the tracking process's own and its frame the selected one, and ask for the knobs.
+        """Ask for knobs of the shown run and, while nothing is tracked, for its frame, in one command.
 
-        Raises RunError while another run is tracked, StudioError without a run.
+        Raises StudioError without a run.
         """
-        opened, state, frame = self.opened, self._process.state, model.selection.frame
-        if opened is None or opened.run is None:
+        if self.opened is None or self.opened.run is None:
             raise StudioError("No run is open.", "Open or start a run first.")
-        model = replace(model, search=state)
-        if not model.is_searched or state.state == "lost":
-            if model.is_searching:
-                raise RunError(
-                    f"Run '{state.run}' of session '{state.session}' is being tracked.",
-                    "Pause it before changing another.",
-                )
-            model = self._send(
-                model, commands.Open(session=str(opened.session.path), run=str(opened.run.folder))
-            )
-        if frame in model.frames and not model.is_searching and state.selected != frame:
-            model = self._send(model, commands.Seek(frame=frame))
-        return self._send(model, commands.ChangeSettings(changes=dict(wanted)), wanted)
-
-    def _send(
-        self, model: Model, command: commands.Command, changes: Mapping[str, Value] | None = None
-    ) -> Model:
+        frame = model.selection.frame
+        chosen = frame if frame is not None and frame in model.frames else -1
+        command = commands.ChangeSettings(
+            changes=dict(wanted), frame=chosen, **commands.about(self.opened.run.folder)
+        )
         self._process.send(command)
-        return request(model, command.identifier, changes or {})
+        return request(model, command.identifier, wanted)
 
     def save_pose(self, model: Model) -> Model:
         """Make the edited pose the session's start pose."""

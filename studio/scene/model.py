@@ -403,7 +403,7 @@ def searched_on(live: LiveSearch, event: LayerFinished | FrameFinished) -> LiveS
 
 
 def request(model: Model, identifier: str, changes: Mapping[str, Value]) -> Model:
-    """Something was sent to the tracking process. changes : the knobs that it asks for, if any."""
+    """The tracking process was asked for knobs."""
     assert model.knobs is not None
     waiting = dict([*model.knobs.requested.items(), (identifier, changes)][-REMEMBERED:])
     drafts = {name: value for name, value in model.knobs.drafts.items() if name not in changes}

@@ -19,10 +19,10 @@ from studio.runs.turned_cameras import (
 from studio.sessions.calibration_changes import CalibrationChange
 from studio.sessions.session import Session
 from studio.web.alignment_schemas import AlignmentAnswer, AlignmentJob, AlignmentLine, AlignmentWish
-from studio.web.background_jobs import Job
 from studio.web.doors import Door, Doors, let_go
 from studio.web.job_kinds import ALIGNMENT
 from studio.web.session_routes import OpenSession
+from studio.worker.jobs import Job
 
 router = APIRouter(prefix="/api/sessions/{session}/alignment", tags=["calibration"])
 
@@ -36,7 +36,7 @@ def alignment(session: OpenSession, doors: Door) -> AlignmentAnswer:
 @router.post("", status_code=202)
 async def begin(session: OpenSession, wish: AlignmentWish, doors: Door) -> AlignmentJob:
     """Begin to measure; nothing is changed. Ask `GET …/alignment` how it stands, or wait for `alignment` events."""
-    if doors.jobs.running(ALIGNMENT, session.name):
+    if doors.jobs.going(ALIGNMENT, session.name):
         raise RunError(
             f"The cameras of '{session.name}' are being compared.", "Wait until it is done, or cancel it."
         )

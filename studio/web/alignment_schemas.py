@@ -2,8 +2,8 @@
 
 from pydantic import Field
 
-from studio.web.job_schemas import SessionJob
 from studio.web.schemas import Answer, Number, Request
+from studio.worker.jobs import SessionJob
 
 
 class AlignmentLine(Answer):

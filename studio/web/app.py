@@ -151,9 +151,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         yield
     finally:
         sweeping.cancel()
-        await doors.jobs.end()
-        await asyncio.to_thread(doors.desk.close)
-        await asyncio.to_thread(doors.learning.close)
+        await asyncio.to_thread(doors.jobs.close)
         await asyncio.to_thread(doors.cameras.close)
         await doors.events.stop()
         await asyncio.to_thread(forget_composers)

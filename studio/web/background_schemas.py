@@ -5,9 +5,9 @@ from typing import Literal
 from pydantic import Field
 
 from studio.web.calibration_schemas import FindingView
-from studio.web.job_schemas import SessionJob
 from studio.web.schemas import Answer, Number, Request, RunName, Value
 from studio.web.setting_schemas import KnobView
+from studio.worker.jobs import SessionJob
 
 Source = Literal["plate", "clip", "median", "combined"]
 

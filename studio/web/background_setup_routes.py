@@ -21,7 +21,6 @@ from studio.sessions.made_from import origin_of
 from studio.sessions.names import place_in, relative_path
 from studio.sessions.session import Session
 from studio.settings import values
-from studio.web.background_jobs import Job
 from studio.web.background_routes import quality_answer
 from studio.web.background_schemas import (
     BackgroundAnswer,
@@ -35,6 +34,7 @@ from studio.web.job_kinds import BACKGROUND
 from studio.web.session_routes import OpenSession
 from studio.web.setting_views import knob_view
 from studio.web.upload_routes import forget, upload_folder
+from studio.worker.jobs import Job
 
 router = APIRouter(prefix="/api/sessions/{session}", tags=["masks"])
 
@@ -148,7 +148,7 @@ def _measured(session: Session, job: Job) -> MaskQuality | None:
 
 
 def _check_free(doors: Doors, name: str) -> None:
-    if doors.jobs.running(BACKGROUND, name):
+    if doors.jobs.going(BACKGROUND, name):
         raise RunError(f"The background of '{name}' is being set up.", "Wait until it is done, or cancel it.")
 
 

@@ -1,7 +1,6 @@
 """Learning a behaviour model from runs and uploaded motion, in the background, with progress as `learning` events."""
 
 import asyncio
-import dataclasses
 import math
 from pathlib import Path
 
@@ -20,10 +19,11 @@ from studio.training.oversampling import OversamplingSettings
 from studio.training.sources import FPS, MOTION_FILES
 from studio.web.behaviour_learning_schemas import LearningChoices, LearningProgress, LearningRequest
 from studio.web.doors import Door, Doors
+from studio.web.job_kinds import LEARNING
 from studio.web.setting_views import knob_view
 from studio.web.upload_routes import forget, upload_folder
-from studio.worker.learning_desk import LearningState
-from studio.worker.learning_process import LearningOrder
+from studio.worker.jobs import Job
+from studio.worker.learning_process import LearningOrder, learn_in_process
 
 router = APIRouter(prefix="/api/learning", tags=["behaviours"])
 
@@ -34,7 +34,6 @@ SKELETON = ".asf"
 def choices(doors: Door) -> LearningChoices:
     """What can be learnt from and with, and what is being learnt."""
     knobs = [entry for kind in (LearningSettings, OversamplingSettings) for entry in knobs_of(kind)]
-    state = doors.learning.state
     return LearningChoices(
         knobs=[knob_view(entry) for entry in knobs],
         bodies=list(list_bodies((doors.workspace.root / BODIES_NAME,))),
@@ -42,7 +41,7 @@ def choices(doors: Door) -> LearningChoices:
         fps=FPS,
         endings=[*MOTION_FILES, SKELETON, *ENDINGS],
         recipes=list(recipe_names()),
-        progress=None if state is None else progress_of(state),
+        progress=doors.jobs.last(LEARNING),
     )
 
 
@@ -51,36 +50,34 @@ async def begin(wish: LearningRequest, doors: Door) -> LearningProgress:
     """Begin to learn a model; its name must be free. 409 while another one is learnt."""
     order = await asyncio.to_thread(_order, wish, doors)
 
-    def ended() -> None:
-        if wish.upload:
-            forget(doors, wish.upload)
+    def work(job: Job) -> dict[str, object]:
+        try:
+            learnt = learn_in_process(order, job.report, job.check)
+        finally:
+            if wish.upload:
+                forget(doors, wish.upload)
+        known = {
+            name: None if isinstance(value, float) and math.isnan(value) else value
+            for name, value in learnt.items()
+        }
+        return {"learnt": known}
 
-    return progress_of(doors.learning.start(order, ended))
+    return doors.jobs.begin(LEARNING, LearningProgress(name=order.name, body=order.body), work)
 
 
 @router.delete("", status_code=202)
 def cancel(doors: Door) -> LearningProgress:
     """Stop; nothing of the model is kept."""
-    state = doors.learning.state
+    state = doors.jobs.last(LEARNING)
     if state is None:
         raise NotFoundError("Nothing is being learnt.", "Begin with a form or 'POST /api/learning'.")
-    doors.learning.cancel()
-    return progress_of(state)
-
-
-def progress_of(state: LearningState) -> LearningProgress:
-    """A state as the API tells it."""
-    told = dataclasses.asdict(state)
-    told["learnt"] = {
-        name: None if isinstance(value, float) and math.isnan(value) else value
-        for name, value in state.learnt.items()
-    }
-    return LearningProgress.model_validate(told)
+    doors.jobs.cancel(LEARNING, state.key)
+    return doors.jobs.state(LEARNING, state.key)
 
 
 def _order(wish: LearningRequest, doors: Doors) -> LearningOrder:
     """The wish, checked. Raises StudioError for a name that is taken, sources that are not there, wrong knobs."""
-    doors.learning.check_free()
+    doors.jobs.check_free(LEARNING)
     workspace = doors.workspace
     if (models_folder(workspace.root) / f"{checked_name(wish.name, 'model')}{SUFFIX}").exists():
         raise BehaviourError(

@@ -3,9 +3,9 @@
 from pydantic import Field
 
 from studio.training.sources import FPS
-from studio.web.job_schemas import Progress
 from studio.web.schemas import Answer, Request, RunName, Value
 from studio.web.setting_schemas import KnobView
+from studio.worker.jobs import SessionJob
 
 Source = str
 
@@ -26,7 +26,7 @@ class LearningRequest(Request):
     settings: dict[str, Value] = Field(default_factory=dict)
 
 
-class LearningProgress(Progress):
+class LearningProgress(SessionJob):
     """How the learning stands. learnt: frames, clusters, states, entropies and the frames that fitted badly, when it is
     done.
     """

@@ -4,8 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from studio.web.job_schemas import NumberedJob
 from studio.web.schemas import Answer, CameraMatching, Number, Numbers, Request, RunName
+from studio.worker.jobs import NumberedJob
 
 Pixel = tuple[float, float]
 Place = Annotated[str, Field(max_length=4096)]

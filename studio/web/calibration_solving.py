@@ -1,7 +1,6 @@
 """Solving cameras from board footage in the background, with `calibration` events."""
 
 import asyncio
-import time
 from pathlib import Path
 
 from fastapi import APIRouter
@@ -9,9 +8,9 @@ from fastapi import APIRouter
 from studio.calibration.board_footage_reading import find_board_footage, list_footage
 from studio.calibration.boards import Board, board_from_text
 from studio.calibration.verbs import calibrate
+from studio.progress import Progress, TimeLeft
 from studio.sessions.board_calibration import footage_sizes, how_taken
 from studio.sessions.session import Session
-from studio.web.background_jobs import Job, Report
 from studio.web.calibration_places import place_of
 from studio.web.calibration_proposals import Proposal, proposal_of_boards
 from studio.web.calibration_schemas import BoardRequest, SolveState
@@ -19,6 +18,7 @@ from studio.web.doors import Door, Doors
 from studio.web.job_kinds import CALIBRATION
 from studio.web.job_routes import add_job_routes
 from studio.web.session_routes import OpenSession
+from studio.worker.jobs import Job
 
 router = APIRouter(prefix="/api", tags=["calibration"])
 
@@ -26,6 +26,7 @@ router = APIRouter(prefix="/api", tags=["calibration"])
 LOOKING = "Looking for the board"
 LOOKING_SHARE = 0.95
 """Of all time, looking for the board takes about this much; solving the rest."""
+PARTS = 1000
 
 
 class _Folders:
@@ -70,7 +71,7 @@ class _Progress:
 
     def __init__(self, job: Job, recordings: int) -> None:
         self._job, self._recordings = job, max(recordings, 1)
-        self._began = time.monotonic()
+        self._left = TimeLeft()
         self._looked, self._last = 0, ""
 
     def report(self, step: str, done: int, total: int) -> None:
@@ -80,12 +81,12 @@ class _Progress:
             self._last = step
         looked = self._looked + (done / total if step.startswith(LOOKING) and total else 0.0)
         share = min(LOOKING_SHARE * looked / self._recordings, LOOKING_SHARE)
-        left = (time.monotonic() - self._began) * (1.0 - share) / share if share > 0.02 else None
+        left = self._left.after("all", round(PARTS * share), PARTS)
         self._job.report_or_stop(step, done, total, share=share, seconds_left=left)
 
 
 def _solved(
-    session: Session, wish: BoardRequest, board: Board, folders: _Folders, progress: Report
+    session: Session, wish: BoardRequest, board: Board, folders: _Folders, progress: Progress
 ) -> Proposal:
     """What comes of the footage, to be looked at. Raises CalibrationError, FootageError, WorkCancelledError."""
     taken = how_taken(session, wish.offsets)

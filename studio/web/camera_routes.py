@@ -24,14 +24,14 @@ from studio.web.camera_schemas import (
     CameraWish,
     LiveCameraView,
     PreviewWish,
-    RecordingView,
     RecordingWish,
     SpreadView,
 )
 from studio.web.doors import Door, Doors
 from studio.web.safe_paths import folder_to_import
+from studio.worker.camera_service import RecordingState
 from studio.worker.camera_tracking import TakeWish
-from studio.worker.commands import Open, Start
+from studio.worker.commands import Start, about
 
 router = APIRouter(prefix="/api", tags=["cameras"])
 
@@ -66,23 +66,23 @@ def picture(
 
 
 @router.get("/recordings")
-def recording(doors: Door) -> RecordingView:
+def recording(doors: Door) -> RecordingState:
     """The recording that is under way, or the last one."""
     found = doors.cameras.standing.recording
     if found is None:
         raise NotFoundError("Nothing was recorded yet.", "Begin a recording.")
-    return RecordingView.model_validate(found)
+    return found
 
 
 @router.post("/recordings", status_code=202)
-async def begin(wish: RecordingWish, doors: Door) -> RecordingView:
+async def begin(wish: RecordingWish, doors: Door) -> RecordingState:
     """Record the open cameras into a new session; with `track` follow the body at once."""
     base = doors.workspace.session(wish.calibration)
     place = doors.workspace.place_for(wish.name)
     if not wish.track:
         calibration = calibration_given(base.path)
         begun = await asyncio.to_thread(doors.cameras.record, place, calibration, wish.seconds)
-        return RecordingView.model_validate(begun)
+        return begun
     request = RunRequest(
         tracker=wish.tracker,
         weighting=wish.weighting,
@@ -94,21 +94,21 @@ async def begin(wish: RecordingWish, doors: Door) -> RecordingView:
     )
 
     def track(session: Session, run: StoredRun) -> None:
-        doors.control.send(Open(session=str(session.path), run=str(run.folder)))
-        doors.control.send(Start())
+        doors.control.send(Start(**about(run.folder)))
+        doors.events.session_changed(session.name)
 
     take = TakeWish(place, wish.seconds, keep_start=wish.keep_start)
     begun = await asyncio.to_thread(doors.cameras.track, base, take, request, track)
-    return RecordingView.model_validate(begun)
+    return begun
 
 
 @router.post("/recordings/stop", status_code=202)
-def stop(doors: Door) -> RecordingView:
+def stop(doors: Door) -> RecordingState:
     """End the recording; it becomes a session in the background."""
     found = doors.cameras.stop()
     if found is None:
         raise NotFoundError("Nothing is being recorded.", "Begin a recording.")
-    return RecordingView.model_validate(found)
+    return found
 
 
 def _address(wish: CameraWish, doors: Doors) -> CameraAddress:
@@ -136,5 +136,5 @@ def _view(doors: Doors) -> CamerasView:
         cameras=[LiveCameraView.model_validate(one) for one in standing.cameras],
         spread=SpreadView.model_validate(standing.spreads),
         fps=standing.fps,
-        recording=None if standing.recording is None else RecordingView.model_validate(standing.recording),
+        recording=standing.recording,
     )

@@ -5,6 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from studio.web.schemas import Answer, Number, Request, RunName
+from studio.worker.camera_service import RecordingState
 
 Knob = bool | int | float | str
 
@@ -51,28 +52,13 @@ class SpreadView(Answer):
     lagging: str
 
 
-class RecordingView(Answer):
-    """A recording. kind: record or track. state: getting ready, recording, importing, done, failed."""
-
-    kind: str
-    session: str
-    state: str
-    seconds: float
-    limit: float | None
-    run: str
-    words: str
-    notes: list[str]
-    message: str
-    hint: str
-
-
 class CamerasView(Answer):
     """The cameras that are open, and the last recording."""
 
     cameras: list[LiveCameraView]
     spread: SpreadView
     fps: float
-    recording: RecordingView | None
+    recording: RecordingState | None
 
 
 class RecordingWish(Request):

@@ -6,13 +6,13 @@ from fastapi import APIRouter
 
 from studio.runs.checking import RunCheck, check_run, kept_check
 from studio.runs.tracks import BEST, best_track, read_track, track_named
-from studio.web.background_jobs import Job
 from studio.web.check_schemas import CheckAnswer, CheckLine, CheckWish, JumpLine
 from studio.web.doors import Door
+from studio.web.job_routes import begin_job
 from studio.web.run_routes import RUN, OpenRun
 from studio.web.session_routes import OpenSession
-from studio.web.track_jobs import begin_job
 from studio.web.track_schemas import TrackJobState
+from studio.worker.jobs import Job
 
 router = APIRouter(prefix="/api", tags=["tracks"])
 

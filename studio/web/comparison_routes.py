@@ -19,7 +19,7 @@ from studio.comparison.folders import (
 )
 from studio.comparison.kept_comparison import FRAMES_NAME, RESULT_NAME, KeptComparison
 from studio.comparison.plan import Plan, plan_comparison
-from studio.errors import NotFoundError, StudioError
+from studio.errors import NotFoundError, StudioError, WorkCancelledError
 from studio.sessions.session import Session
 from studio.tracking.catalogue import TRACKERS
 from studio.web.comparison_schemas import (
@@ -28,20 +28,23 @@ from studio.web.comparison_schemas import (
     ComparisonLine,
     ComparisonList,
     ComparisonRequest,
+    ComparisonState,
     EntrantChoice,
     LineupChoice,
 )
 from studio.web.doors import Door, Doors
 from studio.web.error_responses import log
+from studio.web.job_kinds import COMPARISON
 from studio.web.schemas import TrashEntry
 from studio.web.session_routes import OpenSession, trash_entry
 from studio.weighting.catalogue import WEIGHTINGS
-from studio.worker.comparison_run import done_before
+from studio.worker.comparison_run import done_before, run_comparison
+from studio.worker.jobs import Job
+from studio.worker.process_executor import cores
 
 router = APIRouter(prefix="/api/comparisons", tags=["comparisons"])
 
 ONE = "/{session}/{comparison}"
-GOING = ("running", "cancelling")
 
 
 def comparison_of(session: OpenSession, comparison: str) -> KeptComparison:
@@ -91,7 +94,7 @@ def begin(wish: ComparisonRequest, doors: Door) -> ComparisonLine:
     """Begin a comparison. 409 while another one runs; 422 for a session without a truth or for wrong knobs."""
     session = doors.workspace.session(wish.session)
     plan = _plan(session, wish)
-    doors.desk.check_free()
+    doors.jobs.check_free(COMPARISON)
     kept = new_comparison(place_of(session, wish.name or ""), plan)
     return _start(doors, session, kept)
 
@@ -116,14 +119,14 @@ def detail(session: OpenSession, kept: Kept, doors: Door) -> ComparisonDetail:
 @router.post(ONE + "/cancel", status_code=202)
 def cancel(session: OpenSession, kept: Kept, doors: Door) -> ComparisonLine:
     """Stop it; what is measured stays, and it can go on."""
-    doors.desk.cancel(session.name, kept.name)
+    doors.jobs.cancel(COMPARISON, f"{session.name}/{kept.name}")
     return _line(doors, session, kept)
 
 
 @router.post(ONE + "/resume", status_code=202)
 def resume(session: OpenSession, kept: Kept, doors: Door) -> ComparisonLine:
     """Go on with what is not finished. 409 while any comparison runs."""
-    if kept.status() == "finished":
+    if kept.status() == "done":
         return _line(doors, session, kept)
     return _start(doors, session, kept)
 
@@ -169,7 +172,21 @@ def _plan(session: Session, wish: ComparisonRequest) -> Plan:
 
 
 def _start(doors: Doors, session: Session, kept: KeptComparison) -> ComparisonLine:
-    doors.desk.start(kept, session)
+    def work(job: Job) -> dict[str, object]:
+        try:
+            # One core stays free for the studio itself, which is being looked at meanwhile.
+            run_comparison(kept, session, job.report, processes=max(1, cores() - 1), checkpoint=job.check)
+        except WorkCancelledError:
+            if not job.closing:
+                kept.end("cancelled")
+            raise
+        except Exception as error:
+            words = str(error) if isinstance(error, StudioError) else f"{type(error).__name__}: {error}"
+            kept.end("failed", words)
+            raise
+        return {}
+
+    doors.jobs.begin(COMPARISON, ComparisonState(session=session.name, name=kept.name), work)
     doors.events.session_changed(session.name)
     return _line(doors, session, kept)
 
@@ -185,18 +202,14 @@ def _line_or_none(doors: Doors, session: Session, kept: KeptComparison) -> Compa
 
 def _line(doors: Doors, session: Session, kept: KeptComparison) -> ComparisonLine:
     record, plan = kept.record(), kept.plan(session)
-    state = doors.desk.state
-    mine = (
-        state is not None
-        and (state.session, state.name) == (session.name, kept.name)
-        and doors.desk.is_busy()
-    )
-    status = state.state if mine and state and state.state in GOING else kept.status()
+    job = doors.jobs.known(COMPARISON, f"{session.name}/{kept.name}")
+    going = job if job is not None and job.state.is_going else None
+    status = going.state.value if going else kept.status()
     total = len(plan.seeds) * len(plan.entrants)
-    if status == "finished":
+    if status == "done":
         done = total
     else:
-        done = state.done if mine and state and state.total else done_before(kept, plan)
+        done = going.done if going and going.total else done_before(kept, plan)
     line = ComparisonLine(
         session=session.name,
         name=kept.name,
@@ -211,9 +224,9 @@ def _line(doors: Doors, session: Session, kept: KeptComparison) -> ComparisonLin
         total=total,
         problem=record.problem,
     )
-    if mine and state and status in GOING:
-        return line.model_copy(update={"step": state.step, "seconds_left": state.seconds_left})
-    return _with_best(line, kept) if status == "finished" else line
+    if going:
+        return line.model_copy(update={"step": going.step, "seconds_left": going.seconds_left})
+    return _with_best(line, kept) if status == "done" else line
 
 
 def _with_best(line: ComparisonLine, kept: KeptComparison) -> ComparisonLine:

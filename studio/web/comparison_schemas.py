@@ -5,6 +5,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from studio.web.schemas import Answer, Request, RunName, Value
+from studio.worker.jobs import SessionJob
 
 MOST_TRACKERS = 12
 
@@ -36,13 +37,24 @@ class ComparisonRequest(Request):
     )
 
 
+class ComparisonState(SessionJob):
+    """How a comparison stands that is being worked at. step: the trial that was done last; done, total: trials."""
+
+    name: str
+
+    @property
+    def key(self) -> str:
+        """What it is asked for by."""
+        return f"{self.session}/{self.name}"
+
+
 class ComparisonLine(Answer):
-    """A comparison in a list. done, total: trials. best: the tracker with the smallest mean error, once finished."""
+    """A comparison in a list. done, total: trials. best: the tracker with the smallest mean error, once it is done."""
 
     session: str
     name: str
     created: str
-    status: Literal["running", "cancelling", "finished", "interrupted", "cancelled", "failed"]
+    status: Literal["queued", "running", "cancelling", "done", "interrupted", "cancelled", "failed"]
     trackers: list[str]
     evaluations: int
     seeds: int
@@ -64,7 +76,7 @@ class ComparisonList(Answer):
 
 
 class ComparisonDetail(Answer):
-    """A comparison. settings: by tracker its weighting and knobs; result: null until it is finished, else the numbers
+    """A comparison. settings: by tracker its weighting and knobs; result: null until it is done, else the numbers
     as `studio compare --json` prints them, every frame's error and the findings.
     """
 

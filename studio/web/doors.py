@@ -5,7 +5,6 @@ lie.
 brings them together.
 """
 
-import dataclasses
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,16 +14,16 @@ from fastapi import Depends, Request
 
 from studio.export.task import Writer
 from studio.runs.overlay_pictures import forget_composers
+from studio.sessions.session import RUNS_NAME
 from studio.sessions.workspace import Workspace
-from studio.web.background_jobs import BackgroundJobs
 from studio.web.calibration_proposals import Proposals
 from studio.web.event_stream import EventStream
+from studio.web.job_kinds import COMPARISON
 from studio.web.windows import Window
-from studio.worker.camera_desk import CameraDesk, DeskRecording
+from studio.worker.camera_service import CameraService
 from studio.worker.commands import Close, Command
-from studio.worker.comparison_desk import ComparisonDesk, ComparisonState
-from studio.worker.events import StateChanged
-from studio.worker.learning_desk import LearningDesk, LearningState
+from studio.worker.events import Event, StateChanged
+from studio.worker.jobs import JobRunner
 from studio.worker.watchers import Subscription
 
 Value = bool | int | float | str
@@ -52,11 +51,7 @@ class Control(Protocol):
         """Post a command and wait until it is acknowledged. Raises what it was refused with."""
         ...
 
-    def change_settings(self, **changes: Value) -> object:
-        """Change knobs of the open run and wait for the answer. Raises SettingsError, RunError."""
-        ...
-
-    def subscribe(self) -> Subscription:
+    def subscribe(self) -> Subscription[Event]:
         """All events from now on."""
         ...
 
@@ -219,8 +214,7 @@ class Doors:
 
     scenes : of all windows. footage_roots : folders that may be imported from. log_path :
     the server's log file. proposals : calibrations not in use yet. uploads : those under way, by their identifiers.
-    jobs : work in the background. desk : where comparisons are worked at, learning : where behaviour models are
-    learnt, cameras : where live ones are looked at and recorded.
+    jobs : work in the background. cameras : where live ones are looked at and recorded.
     """
 
     workspace: Workspace
@@ -231,34 +225,18 @@ class Doors:
     log_path: Path | None = None
     proposals: Proposals = field(default_factory=Proposals)
     uploads: dict[str, dict[str, int]] = field(default_factory=dict)
-    jobs: BackgroundJobs = field(init=False)
-    desk: ComparisonDesk = field(init=False)
-    learning: LearningDesk = field(init=False)
-    cameras: CameraDesk = field(init=False)
+    jobs: JobRunner = field(init=False)
+    cameras: CameraService = field(init=False)
 
     def __post_init__(self) -> None:
         """Give all work beside the routes its place, which tells all watchers how far it is."""
-        self.jobs = BackgroundJobs(self.events.publish, self.log_path)
-        self.desk = ComparisonDesk(self._tell_comparison)
-        self.learning = LearningDesk(self._tell_learning)
-        self.cameras = CameraDesk(self._tell_recording)
+        self.jobs = JobRunner(self.events.publish, self.log_path)
+        self.cameras = CameraService(self.jobs)
 
     @property
     def state_folder(self) -> Path:
         """Where the server keeps what is its own: preferences, presets, unfinished uploads."""
         return self.workspace.root / STATE_NAME
-
-    def _tell_comparison(self, state: ComparisonState) -> None:
-        self.events.publish({"type": "comparison", "run": "", **dataclasses.asdict(state)})
-
-    def _tell_learning(self, state: LearningState) -> None:
-        told = {name: value for name, value in dataclasses.asdict(state).items() if name != "learnt"}
-        self.events.publish({"type": "learning", "session": "", "run": "", **told})
-
-    def _tell_recording(self, recording: DeskRecording) -> None:
-        self.events.publish({"type": "recording", **dataclasses.asdict(recording)})
-        if recording.state == "done" or (recording.run and recording.state == "getting ready"):
-            self.events.session_changed(recording.session)
 
 
 def doors_of(request: Request) -> Doors:
@@ -282,12 +260,12 @@ def let_go(doors: Doors, session: str, run: str = "") -> None:
 
     Raises RunError while the run is being tracked, or trackers are being compared on the session.
     """
-    compared = doors.desk.state
-    if not run and compared is not None and compared.session == session:
-        doors.desk.check_free()
-    state = doors.control.state
-    if state.state != "lost" and state.session == session and (not run or state.run == run) and state.run:
-        doors.control.request(Close())
+    if not run and doors.jobs.going(COMPARISON, session):
+        doors.jobs.check_free(COMPARISON)
+    state, folder = doors.control.state, doors.workspace.root / session
+    # Else the process itself knows whether that is what it has open; a search elsewhere is not waited for.
+    if state.state != "lost" and (state.session == session or state.state not in ("tracking", "compiling")):
+        doors.control.request(Close(session=str(folder), run=str(folder / RUNS_NAME / run) if run else ""))
     for scene in doors.scenes.open_scenes().values():
         if scene.shown.session == session and (not run or scene.shown.run == run):
             scene.show_run(session if run else "")

@@ -15,7 +15,7 @@ from starlette.exceptions import HTTPException
 from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from studio.errors import StudioError
+from studio.errors import StudioError, UnforeseenError
 
 log = logging.getLogger("studio.web")
 
@@ -36,12 +36,6 @@ HINTS = {
     405: "The API's methods are listed at /api/openapi.json.",
     413: "Send less at a time.",
 }
-
-
-class UnforeseenError(StudioError):
-    """A fault of the studio itself."""
-
-    status, code = 500, "unforeseen"
 
 
 class TooLargeError(StudioError):

@@ -1,7 +1,7 @@
 """Events as JSON: small values only.
 
-Each message has `type` (state, acknowledged, layer, frame, settings, log; the web's own: hello, import, initialise,
-subject, synchrony, comparison, sessions, scene), `session` and `run`. NaN and infinities become null. A layer's
+Each message has `type` (state, acknowledged, layer, frame, settings, log; the web's own: sessions, scene, dropped, and
+the kinds of jobs), `session` and `run`. NaN and infinities become null. A layer's
 particles are not in it: they are fetched from
 `/api/sessions/{session}/runs/{run}/frames/{frame}/layers/{layer}/particles`, or drawn by the scene.
 """
@@ -111,10 +111,9 @@ def key_of(message: dict[str, object]) -> tuple | None:
     kind = message["type"]
     if kind in ("state", "settings", "sessions", "scene"):
         return (kind,)
-    if kind in ("import", "initialise", "subject"):
-        return (kind, message.get("identifier"))
-    if kind == "comparison":
-        return (kind, message["session"], message["name"])
+    if "step" in message:
+        # How a job stands.
+        return (kind, *(message.get(name) for name in ("session", "identifier", "name")))
     if kind == "layer":
         return (kind, message["frame"], message["layer"], message["reannealed"])
     if kind == "frame":

@@ -1,14 +1,13 @@
 """One stream of events to everyone who watches: `WebSocket /api/events`.
 
-The worker's queue is emptied by one task; each event is encoded once and offered to every watcher. A
-watcher keeps at most `LIMIT` messages: a newer one of the same kind takes the older one's place (one state,
-one message a layer), and beyond the limit the oldest goes and is counted, so a sleeping browser costs
-nothing and slows nobody.
+One task takes the tracking process's events; each is encoded once and offered to every watcher, as are the web's own
+messages. A watcher is a coalescing queue, so a sleeping browser costs nothing and slows nothing down; what it lost
+beyond the limit is counted and said.
 """
 
 import asyncio
 import queue
-from collections import OrderedDict
+import threading
 from typing import TYPE_CHECKING
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
@@ -25,38 +24,8 @@ router = APIRouter(tags=["events"])
 
 LIMIT = 256
 
-
-class Watcher:
-    """One window's messages that have not been sent yet. Used from the event loop only."""
-
-    def __init__(self, limit: int = LIMIT, window: str = "") -> None:
-        self.dropped = 0
-        self.window = window
-        self._limit = limit
-        self._number = 0
-        self._waiting: OrderedDict[object, str] = OrderedDict()
-        self._something = asyncio.Event()
-
-    def offer(self, key: tuple | None, text: str) -> None:
-        """Keep a message; never waits."""
-        self._number += 1
-        slot = key if key is not None else self._number
-        self._waiting.pop(slot, None)
-        self._waiting[slot] = text
-        if len(self._waiting) > self._limit:
-            self._waiting.popitem(last=False)
-            self.dropped += 1
-        self._something.set()
-
-    async def next(self) -> str:
-        """The oldest message that still stands; after a loss, first a message that says how much was lost."""
-        while not self._waiting:
-            self._something.clear()
-            await self._something.wait()
-        if self.dropped:
-            lost, self.dropped = self.dropped, 0
-            return as_json({"type": "dropped", "session": "", "run": "", "count": lost})
-        return self._waiting.popitem(last=False)[1]
+Watcher = Subscription[str]
+"""A window's messages, as text, that have not been sent yet."""
 
 
 class EventStream:
@@ -64,14 +33,13 @@ class EventStream:
 
     def __init__(self, control: "Control") -> None:
         self._control = control
-        self._watchers: set[Watcher] = set()
+        self._lock = threading.Lock()
+        self._watchers: dict[Watcher, str] = {}
         self._settings: dict[str, object] | None = None
         self._task: asyncio.Task[None] | None = None
-        self._loop: asyncio.AbstractEventLoop | None = None
 
     def start(self) -> None:
-        """Begin to empty the worker's queue; call on the event loop."""
-        self._loop = asyncio.get_running_loop()
+        """Begin to take the worker's events; call on the event loop."""
         self._task = asyncio.create_task(self._pump(self._control.subscribe()))
 
     async def stop(self) -> None:
@@ -83,50 +51,47 @@ class EventStream:
 
     def watch(self, window: str = "") -> Watcher:
         """A new watcher, greeted with the present state and settings. window : that it belongs to, "" for none."""
-        watcher = Watcher(window=window)
-        for message in (message_of(self._control.state), self._settings):
-            if message is not None:
-                watcher.offer(key_of(message), as_json(message))
-        self._watchers.add(watcher)
+        watcher = Watcher(LIMIT)
+        with self._lock:
+            for message in (message_of(self._control.state), self._settings):
+                if message is not None:
+                    watcher.put(as_json(message), key_of(message))
+            self._watchers[watcher] = window
         return watcher
 
     def leave(self, watcher: Watcher) -> None:
         """Forget a watcher."""
-        self._watchers.discard(watcher)
+        with self._lock:
+            self._watchers.pop(watcher, None)
 
     def windows(self) -> set[str]:
         """The windows that watch."""
-        return {watcher.window for watcher in self._watchers}
+        with self._lock:
+            return set(self._watchers.values())
 
     def publish(self, message: dict[str, object], window: str | None = None) -> None:
-        """Send a message of the web's own to one window, or to all (None); from any thread."""
-        if self._loop is not None and not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._offer, message, window)
+        """Send a message to one window, or to all (None); from any thread."""
+        with self._lock:
+            watchers = [watcher for watcher, of in self._watchers.items() if window in (None, of)]
+        if watchers:
+            text, key = as_json(message), key_of(message)
+            for watcher in watchers:
+                watcher.put(text, key)
 
     def session_changed(self, session: str, run: str = "") -> None:
         """Tell all pages that a session is not as it was; "" for the list of them. run : that it concerns, if one."""
         self.publish({"type": "sessions", "session": session, "run": run})
 
-    def _offer(self, message: dict[str, object], window: str | None = None) -> None:
-        watchers = [watcher for watcher in self._watchers if window in (None, watcher.window)]
-        if not watchers:
-            return
-        text, key = as_json(message), key_of(message)
-        for watcher in watchers:
-            watcher.offer(key, text)
-
-    def _take(self, event: Event) -> None:
-        message = message_of(event)
-        if isinstance(event, SettingsApplied):
-            self._settings = message
-        elif isinstance(event, StateChanged) and event.state == "idle":
-            self._settings = None
-        self._offer(message)
-
-    async def _pump(self, source: Subscription) -> None:
+    async def _pump(self, source: Subscription[Event]) -> None:
         try:
             while True:
-                self._take(await source.next())
+                event = await source.next()
+                message = message_of(event)
+                if isinstance(event, SettingsApplied):
+                    self._settings = message
+                elif isinstance(event, StateChanged) and event.state == "idle":
+                    self._settings = None
+                self.publish(message)
                 # A flood of events must not keep the loop from everything else.
                 await asyncio.sleep(0)
         except queue.Empty:
@@ -162,6 +127,10 @@ async def _until_it_leaves(socket: WebSocket) -> None:
 async def _send_all(socket: WebSocket, watcher: Watcher) -> None:
     try:
         while True:
-            await socket.send_text(await watcher.next())
+            text = await watcher.next()
+            lost, watcher.dropped = watcher.dropped, 0
+            if lost:
+                await socket.send_text(as_json({"type": "dropped", "session": "", "run": "", "count": lost}))
+            await socket.send_text(text)
     except WebSocketDisconnect:
         return

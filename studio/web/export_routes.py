@@ -16,7 +16,6 @@ from studio.export.kept_exports import (
 from studio.export.options import ExportOptions
 from studio.knobs import knobs_of
 from studio.runs.tracks import best_track, track_names
-from studio.web.background_jobs import Job
 from studio.web.doors import Door
 from studio.web.export_schemas import (
     ExportChoices,
@@ -31,6 +30,7 @@ from studio.web.job_routes import add_job_routes
 from studio.web.run_routes import RUN, OpenRun
 from studio.web.session_routes import OpenSession
 from studio.web.setting_views import knob_view
+from studio.worker.jobs import Job
 
 router = APIRouter(prefix="/api", tags=["exports"])
 
@@ -51,7 +51,7 @@ def choices() -> ExportChoices:
 @router.get(RUN + "/exports")
 def exports(session: OpenSession, run: OpenRun, doors: Door) -> ExportList:
     """The run's exports, newest first, and those under way."""
-    going = [state for state in doors.jobs.running(EXPORT, session.name) if state.run == run.name]
+    going = [state for state in doors.jobs.going(EXPORT, session.name) if state.run == run.name]
     lines = [
         ExportLine.model_validate(kept).model_copy(update={"stale": stale_export(run, kept)})
         for kept in kept_exports(run)

@@ -2,9 +2,9 @@
 
 from pydantic import Field
 
-from studio.web.job_schemas import NumberedJob
 from studio.web.schemas import Answer, Request, Value
 from studio.web.setting_schemas import KnobView
+from studio.worker.jobs import NumberedJob
 
 
 class FormatView(Answer):

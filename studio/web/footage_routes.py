@@ -15,7 +15,6 @@ from studio.runs.footage_pictures import bare_picture
 from studio.runs.overlay_drawing import encode_jpeg
 from studio.sessions.footage_changes import change_footage, recorded_offsets, stale_runs, synchrony_of
 from studio.sessions.session import Session
-from studio.web.background_jobs import Job
 from studio.web.doors import Door, let_go
 from studio.web.footage_schemas import (
     FootageCamera,
@@ -27,6 +26,7 @@ from studio.web.footage_schemas import (
 )
 from studio.web.job_kinds import SYNCHRONY
 from studio.web.session_routes import OpenSession
+from studio.worker.jobs import Job
 
 router = APIRouter(prefix="/api", tags=["footage"])
 
@@ -77,7 +77,7 @@ async def begin_synchrony(
     events.
     """
     known = doors.jobs.known(SYNCHRONY, session.name)
-    if known is not None and known.state == "running":
+    if known is not None and known.state.is_going:
         return known
     within = (wish or SynchronyWish.model_validate({})).within
 
@@ -96,13 +96,13 @@ async def begin_synchrony(
 
 
 @router.get("/sessions/{session}/synchrony")
-def synchrony(session: OpenSession, doors: Door) -> SynchronyState:
-    """How the estimate stands and what it found; state "none" where it was not begun."""
-    return doors.jobs.known(SYNCHRONY, session.name) or SynchronyState(session=session.name, state="none")
+def synchrony(session: OpenSession, doors: Door) -> SynchronyState | None:
+    """How the estimate stands and what it found; null where it was not begun."""
+    return doors.jobs.known(SYNCHRONY, session.name)
 
 
 @router.delete("/sessions/{session}/synchrony", status_code=202)
-def cancel_synchrony(session: OpenSession, doors: Door) -> SynchronyState:
+def cancel_synchrony(session: OpenSession, doors: Door) -> SynchronyState | None:
     """Stop an estimate."""
     doors.jobs.cancel(SYNCHRONY, session.name)
     return synchrony(session, doors)

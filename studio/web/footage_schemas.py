@@ -4,8 +4,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from studio.web.job_schemas import SessionJob
 from studio.web.schemas import Answer, Request
+from studio.worker.jobs import SessionJob
 
 MOST_OFFSET = 1_000_000
 
@@ -73,11 +73,9 @@ class PairView(Answer):
 
 class SynchronyState(SessionJob):
     """How an estimate of the offsets stands, and what it found; nothing of it is applied. confidence: peak over second
-    peak; spread: frames that it may be off. state: "none" where none was begun.
+    peak; spread: frames that it may be off.
     """
 
-    # One state more than other jobs have: it is asked for before there is any.
-    state: Literal["none", "running", "done", "failed", "cancelled"] = "running"  # pyright: ignore[reportIncompatibleVariableOverride]
     offsets: dict[str, int] = Field(default_factory=dict)
     confidence: dict[str, float] = Field(default_factory=dict)
     spread: dict[str, int] = Field(default_factory=dict)

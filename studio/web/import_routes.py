@@ -18,7 +18,6 @@ from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.archives import FOOTAGE_PARTS, only_archive, unpacked, unwrapped
 from studio.sessions.importers.importing import ImportOptions, ImportReport, add_footage, import_source
 from studio.sessions.names import PathRefused, relative_path
-from studio.web.background_jobs import Job
 from studio.web.doors import Door, Doors, let_go
 from studio.web.import_schemas import (
     FolderView,
@@ -35,6 +34,7 @@ from studio.web.samples import install_sample
 from studio.web.schemas import NewName
 from studio.web.session_routes import OpenSession
 from studio.web.upload_routes import forget, upload_folder
+from studio.worker.jobs import Job
 
 router = APIRouter(prefix="/api", tags=["importing"])
 
@@ -129,7 +129,7 @@ def folders(
 def _unpacked(folder: Path, job: Job) -> Path:
     """The uploaded folder itself: out of its archive, and without the folders that only wrap it."""
     if only_archive(folder):
-        job.tell(step="unpacking")
+        job.change(step="unpacking")
     return unwrapped(unpacked(folder), FOOTAGE_PARTS)
 
 

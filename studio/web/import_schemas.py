@@ -4,8 +4,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from studio.web.job_schemas import NumberedJob
 from studio.web.schemas import Answer, CameraMatching, Request, RunName
+from studio.worker.jobs import NumberedJob
 
 
 class SourceWish(Request):

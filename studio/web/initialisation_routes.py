@@ -8,7 +8,6 @@ from fastapi import APIRouter
 from studio.errors import StudioError
 from studio.runs.initialising import WEIGHTING, InitialPose, initialise, keep_pose
 from studio.runs.new_run import checked_frames
-from studio.web.background_jobs import Job
 from studio.web.doors import Door
 from studio.web.initialisation_schemas import InitialisationRequest, InitialisationState
 from studio.web.job_kinds import START_POSE
@@ -16,6 +15,7 @@ from studio.web.job_routes import add_job_routes
 from studio.web.session_routes import OpenSession
 from studio.web.windows import Window
 from studio.weighting.catalogue import WEIGHTINGS
+from studio.worker.jobs import Job
 
 router = APIRouter(prefix="/api", tags=["start poses"])
 

@@ -2,8 +2,8 @@
 
 from pydantic import Field
 
-from studio.web.job_schemas import NumberedJob
 from studio.web.schemas import Number, Numbers, Request, RunName
+from studio.worker.jobs import NumberedJob
 
 
 class InitialisationRequest(Request):

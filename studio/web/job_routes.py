@@ -2,9 +2,12 @@
 
 from fastapi import APIRouter
 
-from studio.web.background_jobs import JobKind, State
-from studio.web.doors import Door
-from studio.web.job_schemas import SessionJob
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.web.doors import Door, Doors
+from studio.web.job_kinds import TRACK
+from studio.web.track_schemas import TrackJobState, Verb
+from studio.worker.jobs import JobKind, SessionJob, State, Work
 
 
 def add_job_routes(router: APIRouter, path: str, kind: JobKind[State]) -> None:
@@ -20,3 +23,9 @@ def add_job_routes(router: APIRouter, path: str, kind: JobKind[State]) -> None:
         """Stop it; nothing of it is kept but what is done frame by frame."""
         doors.jobs.cancel(kind, identifier)
         return doors.jobs.state(kind, identifier)
+
+
+def begin_job(doors: Doors, verb: Verb, session: Session, run: StoredRun | None, work: Work) -> TrackJobState:
+    """Begin work on a session's poses or tracks. run : that it is about, if it is about one."""
+    state = TrackJobState(verb=verb, session=session.name, run=run.name if run else "")
+    return doors.jobs.begin(TRACK, state, work)

@@ -15,8 +15,8 @@ from studio.runs.pose_search import better_pose
 from studio.runs.start_pose_file import keep_start_pose
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.web.background_jobs import Job
 from studio.web.doors import Door, Scene
+from studio.web.job_routes import begin_job
 from studio.web.pose_schemas import (
     BetterPoseRequest,
     DragRequest,
@@ -30,8 +30,8 @@ from studio.web.pose_schemas import (
 )
 from studio.web.session_routes import OpenSession
 from studio.web.session_views import parameter_views
-from studio.web.track_jobs import begin_job
 from studio.web.track_schemas import TrackJobState
+from studio.worker.jobs import Job
 
 router = APIRouter(prefix="/api", tags=["poses"])
 

@@ -1,7 +1,7 @@
 """Runs: make, look, and everything that a person may tell the tracking process.
 
 Commands are posted and answered at once with an identifier; an `acknowledged` event with it follows on the
-event stream. A command for a run that is not the open one opens it first.
+event stream. Each names its run, which the process opens first if it is not open.
 """
 
 from typing import Annotated
@@ -160,7 +160,7 @@ def set_pace(wish: PaceRequest, doors: Door) -> Posted:
 @router.post(RUN + "/open", status_code=202)
 def open_run(run: OpenRun, doors: Door) -> Posted:
     """Make the run the one that the other commands and the sliders are about."""
-    return _post(doors, _about(commands.Open, run))
+    return _post(doors, commands.Open(**commands.about(run.folder)))
 
 
 @router.post(RUN + "/start", status_code=202)
@@ -169,76 +169,60 @@ def start(run: OpenRun, doors: Door) -> Posted:
 
     While another run is being tracked this one waits for its turn.
     """
-    if _another_is_tracked(doors, run):
-        return _post(doors, _about(commands.Enqueue, run))
-    return _post_for(doors, run, commands.Start())
+    return _post(doors, commands.Start(**commands.about(run.folder)))
 
 
 @router.post(RUN + "/dequeue", status_code=202)
 def dequeue(run: OpenRun, doors: Door) -> Posted:
     """Take the run out of those that wait to be tracked."""
-    return _post(doors, _about(commands.Dequeue, run))
+    return _post(doors, commands.Dequeue(**commands.about(run.folder)))
 
 
 @router.post(RUN + "/pause", status_code=202)
 def pause(run: OpenRun, doors: Door) -> Posted:
     """Stop after the layer in progress."""
-    return _post_for(doors, run, commands.Pause())
+    return _post_for(doors, run, commands.Pause(**commands.about(run.folder)))
 
 
 @router.post(RUN + "/step-layer", status_code=202)
 def step_layer(run: OpenRun, doors: Door) -> Posted:
     """One layer, then pause inside the frame."""
-    return _post_for(doors, run, commands.StepLayer())
+    return _post_for(doors, run, commands.StepLayer(**commands.about(run.folder)))
 
 
 @router.post(RUN + "/step-frame", status_code=202)
 def step_frame(run: OpenRun, doors: Door) -> Posted:
     """Finish the frame at hand or do the next, then pause."""
-    return _post_for(doors, run, commands.StepFrame())
+    return _post_for(doors, run, commands.StepFrame(**commands.about(run.folder)))
 
 
 @router.post(RUN + "/seek", status_code=202)
 def seek(run: OpenRun, where: Frame, doors: Door) -> Posted:
     """Choose the frame that re-annealing works on."""
-    return _post_for(doors, run, commands.Seek(frame=where.frame))
+    return _post_for(doors, run, commands.Seek(frame=where.frame, **commands.about(run.folder)))
 
 
 @router.post(RUN + "/reanneal", status_code=202)
 def reanneal(run: OpenRun, where: ReannealRequest, doors: Door) -> Posted:
     """Anneal a frame again with the knobs as they are; the stored answer stays, unless `keep` replaces it."""
-    return _post_for(doors, run, commands.Reanneal(frame=where.frame, keep=where.keep))
+    return _post_for(
+        doors, run, commands.Reanneal(frame=where.frame, keep=where.keep, **commands.about(run.folder))
+    )
 
 
 @router.post(RUN + "/cancel", status_code=202)
 def cancel(run: OpenRun, doors: Door) -> Posted:
     """End the run; what was tracked stays."""
-    return _post_for(doors, run, commands.Cancel())
+    return _post_for(doors, run, commands.Cancel(**commands.about(run.folder)))
 
 
-def ensure_open(doors: Doors, run: StoredRun) -> None:
-    """Open a run unless it is the open one; revive the process if it died.
-
-    Raises RunError while another run is being tracked, which this one would interrupt.
-    """
-    if _another_is_tracked(doors, run):
-        state = doors.control.state
+def check_free(doors: Doors, run: StoredRun) -> None:
+    """Raise RunError at once where the process would refuse: another run is being tracked, as far as is known here."""
+    state = doors.control.state
+    if state.state in SEARCHING and (state.session, state.run) != (session_name(run), run.name):
         raise RunError(
             f"Run '{state.run}' of session '{state.session}' is being tracked.", "Pause it first, or wait."
         )
-    if doors.control.state.state == "lost":
-        doors.control.restart(resume=False)
-    if not _is_open(doors, run):
-        doors.control.send(_about(commands.Open, run))
-
-
-def _is_open(doors: Doors, run: StoredRun) -> bool:
-    state = doors.control.state
-    return (state.session, state.run) == (session_name(run), run.name)
-
-
-def _another_is_tracked(doors: Doors, run: StoredRun) -> bool:
-    return doors.control.state.state in SEARCHING and not _is_open(doors, run)
 
 
 def session_name(run: StoredRun) -> str:
@@ -246,13 +230,8 @@ def session_name(run: StoredRun) -> str:
     return run.folder.parent.parent.name
 
 
-def _about(kind: type[commands.Open], run: StoredRun) -> commands.Open:
-    """A command that names a run by its folders."""
-    return kind(session=str(run.folder.parent.parent), run=str(run.folder))
-
-
 def _post_for(doors: Doors, run: StoredRun, command: commands.Command) -> Posted:
-    ensure_open(doors, run)
+    check_free(doors, run)
     return _post(doors, command)
 
 

@@ -28,7 +28,7 @@ from studio.settings import (
 from studio.tracking.catalogue import TRACKERS
 from studio.web.doors import Door, Doors
 from studio.web.presets import all_presets, drop_preset, keep_preset, preset
-from studio.web.run_routes import RUN, SEARCHING, OpenRun, ensure_open
+from studio.web.run_routes import RUN, OpenRun, check_free
 from studio.web.setting_schemas import (
     BehaviourChoice,
     BodyChoice,
@@ -168,10 +168,11 @@ def _change(
     now = settings_of(run).values
     before = settings_from_values(run.record.tracker, run.record.weighting, now)
     check_prediction(changed_settings(before, changes), bool(run.record.behaviour))
-    ensure_open(doors, run)
-    if frame is not None and doors.control.state.state not in SEARCHING:
-        doors.control.send(commands.Seek(frame=frame))
-    doors.control.change_settings(**changes)
+    check_free(doors, run)
+    chosen = -1 if frame is None else frame
+    doors.control.request(
+        commands.ChangeSettings(changes=dict(changes), frame=chosen, **commands.about(run.folder))
+    )
     return settings_of(run)
 
 

@@ -15,7 +15,6 @@ from studio.runs.subject_choice import body_of_choice, choose_subject, keep_fitt
 from studio.runs.subject_fitting import FitRequest, FittedSubject, fit_session_subject
 from studio.sessions.made_from import origin_of
 from studio.sessions.session import SUBJECT_NAME
-from studio.web.background_jobs import Job
 from studio.web.doors import Door, Doors
 from studio.web.job_kinds import SUBJECT
 from studio.web.job_routes import add_job_routes
@@ -28,6 +27,7 @@ from studio.web.subject_schemas import (
     SubjectAnswer,
     SubjectRequest,
 )
+from studio.worker.jobs import Job
 
 router = APIRouter(prefix="/api", tags=["subject"])
 

@@ -5,8 +5,8 @@ from typing import Literal
 from pydantic import Field
 
 from studio.body.subject import SHORTEST_MM, TALLEST_MM
-from studio.web.job_schemas import NumberedJob
 from studio.web.schemas import Answer, Number, Numbers, Request, RunName
+from studio.worker.jobs import NumberedJob
 
 
 class SubjectRequest(Request):

@@ -26,14 +26,12 @@ from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.tracking.refinement import RefinementSettings
 from studio.tracking.smoothing import SmoothingSettings
-from studio.web.background_jobs import Job
 from studio.web.doors import Door
 from studio.web.job_kinds import TRACK
-from studio.web.job_routes import add_job_routes
+from studio.web.job_routes import add_job_routes, begin_job
 from studio.web.run_routes import RUN, OpenRun
 from studio.web.session_routes import OpenSession
 from studio.web.setting_views import knob_view
-from studio.web.track_jobs import begin_job
 from studio.web.track_schemas import (
     CorrectionRequest,
     MakeTrackRequest,
@@ -41,6 +39,7 @@ from studio.web.track_schemas import (
     TrackLine,
     TrackList,
 )
+from studio.worker.jobs import Job
 
 router = APIRouter(prefix="/api", tags=["tracks"])
 
@@ -49,7 +48,7 @@ router = APIRouter(prefix="/api", tags=["tracks"])
 def tracks(session: OpenSession, run: OpenRun, doors: Door) -> TrackList:
     """The run's tracks with how much they jitter and, where there is a truth, how far off they are."""
     lines = [_line(session, run, name) for name in track_names(run)]
-    going = [state for state in doors.jobs.running(TRACK, session.name) if state.run == run.name]
+    going = [state for state in doors.jobs.going(TRACK, session.name) if state.run == run.name]
     return TrackList(
         tracks=lines,
         running=going,

@@ -4,9 +4,9 @@ from typing import Literal
 
 from pydantic import Field
 
-from studio.web.job_schemas import NumberedJob
 from studio.web.schemas import Answer, Number, Request, RunName, Value
 from studio.web.setting_schemas import KnobView
+from studio.worker.jobs import NumberedJob
 
 Verb = Literal["refine", "smooth", "correct", "pose", "check"]
 

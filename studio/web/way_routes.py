@@ -61,7 +61,7 @@ def running_steps(doors: Doors, session: Session) -> dict[str, str]:
     return {
         step: state.step or "beginning"
         for step, kind in jobs.items()
-        for state in doors.jobs.running(kind, session.name)
+        for state in doors.jobs.going(kind, session.name)
     }
 
 

@@ -1,51 +1,61 @@
 """What a person may ask of the tracking process. All are acknowledged by an `Acknowledged` event.
 
-Each works while a frame is being annealed: it is served between two layers.
+Each works while a frame is being annealed: it is served between two layers. A command names the run that it is about:
+that run is opened first if it is not open, in one step with what the command does, so no two windows can get between
+opening and starting. While another run is tracked it is refused, and only `Start` waits for its turn.
 """
 
 import time
 import uuid
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TypedDict
+
+
+class About(TypedDict):
+    """What makes a command one about a run."""
+
+    session: str
+    run: str
+
+
+def about(run: Path) -> About:
+    """The run of a folder, for a command: `Start(**about(folder))`."""
+    return {"session": str(run.parent.parent), "run": str(run)}
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """identifier : made by the sender, returned in the acknowledgement. asked_at : `time.monotonic()` when it
-    was made."""
+    """identifier : made by the sender, returned in the acknowledgement. asked_at : `time.monotonic()` when it was made.
+    session, run : folder paths as text of what it is about; "" : the run that is open.
+    """
 
     identifier: str = field(default_factory=lambda: uuid.uuid4().hex)
     asked_at: float = field(default_factory=time.monotonic, kw_only=True)
+    session: str = field(default="", kw_only=True)
+    run: str = field(default="", kw_only=True)
 
 
 @dataclass(frozen=True, slots=True)
 class Open(Command):
-    """Make a run the current one, where it stands. session, run : folder paths as text.
+    """Make a run the current one, where it stands.
 
     Another run that is being tracked is paused first, saved whole inside its frame; opening the open one changes
     nothing.
     """
 
-    session: str = ""
-    run: str = ""
-
 
 @dataclass(frozen=True, slots=True)
-class Enqueue(Open):
-    """Track a run: at once if none is being tracked, else after those that wait already.
+class Start(Command):
+    """Track on from the first frame that has no result: at once, or after those that are tracked and wait already.
 
-    The next one begins when the run before it finishes, fails or is cancelled; a paused run holds the others
-    up.
+    The next one begins when the run before it finishes, fails or is cancelled; a paused run holds the others up.
     """
 
 
 @dataclass(frozen=True, slots=True)
-class Dequeue(Open):
+class Dequeue(Command):
     """Take a run out of those that wait."""
-
-
-@dataclass(frozen=True, slots=True)
-class Start(Command):
-    """Track on from the first frame that has no result."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,8 +99,9 @@ class Cancel(Command):
 
 @dataclass(frozen=True, slots=True)
 class Close(Command):
-    """Let go of the open run, saved where it stands (before it is renamed or deleted); refused while it is
-    tracked.
+    """Release the open run, saved where it stands (before it is renamed or deleted); refused while it is tracked.
+
+    With a session's name or a run's only if the open one is of that session, or that run.
     """
 
 
@@ -103,10 +114,11 @@ class Stop(Command):
 class ChangeSettings(Command):
     """Change knobs by name; checked, versioned, swapped between layers.
 
-    While nothing is tracked the selected frame is annealed again at once, if it can be.
+    While nothing is tracked `frame` is selected (-1 : the one that is) and annealed again at once, if it can be.
     """
 
     changes: dict[str, bool | int | float | str] = field(default_factory=dict)
+    frame: int = -1
 
 
 @dataclass(frozen=True, slots=True)

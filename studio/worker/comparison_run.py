@@ -3,6 +3,7 @@ measured again.
 """
 
 from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,8 +16,7 @@ from studio.errors import RunError
 from studio.progress import Progress
 from studio.sessions.manifest import now
 from studio.sessions.session import Session
-from studio.worker.trial_pool import run_jobs
-from studio.worker.trial_process import TrialResult
+from studio.worker.trials import TrialResult, run_jobs
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,13 +37,13 @@ def run_comparison(
     report: Progress,
     *,
     processes: int | None = None,
+    executor: Executor | None = None,
     checkpoint: Callable[[], None] = lambda: None,
 ) -> Comparison:
     """Do what is still to be done of a comparison and write its result.
 
-    processes : how many trials at once, None for one a core. checkpoint : called several times a second; what it
-    raises ends the comparison, whose finished trials stay. Raises RunError where another process works at it or a
-    trial fails.
+    processes, executor, checkpoint : see `trials.run_jobs`. What ends it leaves the finished trials. Raises RunError
+    where another process works at it or a trial fails.
     """
     lock = kept.lock()
     if lock is None:
@@ -52,7 +52,27 @@ def run_comparison(
         )
     try:
         kept.end("")
-        comparison = _run(kept, _Work.of(kept.plan(session)), report, processes, checkpoint)
+        work = _Work.of(kept.plan(session))
+        found = _outcomes(kept, work)
+        jobs = [_job(work, key) for key in work.trials if key not in found]
+        report("", len(found), len(work.trials))
+
+        def on_result(job: TrialJob, result: TrialResult) -> None:
+            if result.measured is None:
+                raise RunError(
+                    f"{job.label} could not be tracked: {result.failure}",
+                    "Change what it says and try again.",
+                )
+            outcome = KeptOutcome(
+                result.measured, "", result.seconds, measured_by(), now(), job.label, job.arguments
+            )
+            kept.kept_trials.write(job.key, outcome)
+            found[job.key] = Outcome(work.trials[job.key], result.measured)
+            report(job.label, len(found), len(work.trials))
+
+        footage = Path(work.plan.footage).parent
+        run_jobs(jobs, footage, on_result, processes, executor=executor, checkpoint=checkpoint)
+        comparison = conclude(work.plan, [found[key] for key in work.trials])
         kept.finish(comparison)
     finally:
         lock.free()
@@ -64,46 +84,18 @@ def done_before(kept: KeptComparison, plan: Plan) -> int:
     return len(_outcomes(kept, _Work.of(plan)))
 
 
-def _run(
-    kept: KeptComparison,
-    work: _Work,
-    report: Progress,
-    processes: int | None,
-    checkpoint: Callable[[], None],
-) -> Comparison:
-    found = _outcomes(kept, work)
-    total = len(work.trials)
-    report("", len(found), total)
-    jobs = [
-        TrialJob(
-            key=key,
-            experiment="comparison",
-            label=trial.label,
-            arguments=plain(trial.arguments),
-            measure=measure_tracking,
-            footage=(work.plan.footage,),
-            frames=None,
-            alone=False,
-        )
-        for key, trial in work.trials.items()
-        if key not in found
-    ]
-
-    def on_result(job: TrialJob, result: TrialResult) -> None:
-        if result.measured is None:
-            raise RunError(
-                f"{job.label} could not be tracked: {result.failure}", "Change what it says and try again."
-            )
-        outcome = KeptOutcome(
-            result.measured, "", result.seconds, measured_by(), now(), job.label, job.arguments
-        )
-        kept.kept_trials.write(job.key, outcome)
-        found[job.key] = Outcome(work.trials[job.key], result.measured)
-        report(job.label, len(found), total)
-
-    if jobs:
-        run_jobs(jobs, Path(work.plan.footage).parent, on_result, processes, checkpoint=checkpoint)
-    return conclude(work.plan, [found[key] for key in work.trials])
+def _job(work: _Work, key: str) -> TrialJob:
+    trial = work.trials[key]
+    return TrialJob(
+        key=key,
+        experiment="comparison",
+        label=trial.label,
+        arguments=plain(trial.arguments),
+        measure=measure_tracking,
+        footage=(work.plan.footage,),
+        frames=None,
+        alone=False,
+    )
 
 
 def _outcomes(kept: KeptComparison, work: _Work) -> dict[str, Outcome]:

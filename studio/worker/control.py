@@ -9,8 +9,9 @@ says it stands.
 import contextlib
 import dataclasses
 import logging
-import math
 import threading
+from collections.abc import Mapping
+from concurrent.futures import Future
 from pathlib import Path
 
 from studio.errors import (
@@ -25,12 +26,13 @@ from studio.errors import (
 )
 from studio.sessions.workspace import Workspace
 from studio.worker import commands
-from studio.worker.events import Acknowledged, Event, StateChanged
-from studio.worker.owned_process import LOST_HINT, SILENT_SECONDS, OwnedProcess, ending
+from studio.worker.events import Acknowledged, Event, StateChanged, nothing_open
+from studio.worker.process import LOST_HINT, SILENT_SECONDS, OwnedProcess
+from studio.worker.process_executor import ending
 from studio.worker.watchers import Subscription, Watchers
 
-ANSWER_SECONDS = 60.0
-"""How long an acknowledgement may take: as long as the first compilation of the kernels."""
+ANSWER_SECONDS = 180.0
+"""How long an acknowledgement may take: as long as a start and the first compilation on a busy machine."""
 CLOSING_SECONDS = 5.0
 REFUSALS = (RunError, SettingsError, NotFoundError, SessionError, BodyError, CalibrationError, FootageError)
 
@@ -46,8 +48,9 @@ class StudioControl:
         self.workspace = workspace
         self._watchers = Watchers()
         self._lock = threading.RLock()
+        self._reviving = threading.RLock()
         self._process: OwnedProcess | None = None
-        self._answers: dict[str, _Answer] = {}
+        self._answers: dict[str, Future[Acknowledged]] = {}
         self._said = nothing_open()
         self._state = self._said
         self._places: dict[tuple[str, str], tuple[str, str]] = {}
@@ -65,19 +68,33 @@ class StudioControl:
         process = self._process
         return process.identifier if process else None
 
-    def subscribe(self) -> Subscription:
+    def subscribe(self) -> Subscription[Event]:
         """Every event from now on, newest wins; close it when done."""
         return self._watchers.subscribe()
 
     # ------------------------------------------------------------------ asking
 
     def send(self, command: commands.Command) -> None:
-        """Post a command; an `Acknowledged` event follows. Raises RunError if the process has died."""
+        """Post a command; an `Acknowledged` event follows. One that names its run revives a process that was lost.
+
+        Raises RunError if the process has died.
+        """
+        self._post(command)
+
+    def _post(self, command: commands.Command, answer: Future[Acknowledged] | None = None) -> None:
+        if command.run:
+            with self._reviving:
+                # Whoever comes second finds it revived.
+                if self._state.state == "lost":
+                    self.restart(resume=False)
         with self._lock:
             self._note(command)
             if self._process is None:
-                self._process = OwnedProcess(self)
+                self._process = OwnedProcess(self.heard, self.silent, self.ended)
             process = self._process
+            # What waits for an answer waits for this process's.
+            if answer is not None:
+                self._answers[command.identifier] = answer
         process.send(command)
 
     def request(self, command: commands.Command, timeout: float = ANSWER_SECONDS) -> Acknowledged:
@@ -86,33 +103,33 @@ class StudioControl:
         Raises what the process refused it with (RunError, SettingsError, …), RunError if no answer came in
         time.
         """
-        answer = _Answer()
-        with self._lock:
-            self._answers[command.identifier] = answer
+        answer: Future[Acknowledged] = Future()
         try:
-            self.send(command)
-            answer.arrived.wait(timeout)
-        finally:
-            with self._lock:
-                self._answers.pop(command.identifier, None)
-        if answer.event is None:
+            self._post(command, answer)
+            event = answer.result(timeout)
+        except TimeoutError:
             raise RunError(
                 f"The tracking process did not answer '{type(command).__name__}'.",
                 "Wait until it has compiled, or restart it.",
-            )
-        if not answer.event.ok:
-            raise _refusal(answer.event)
-        return answer.event
+            ) from None
+        finally:
+            with self._lock:
+                self._answers.pop(command.identifier, None)
+        if not event.ok:
+            raise _refusal(event)
+        return event
+
+    def about(self, session: str, run: str) -> commands.About:
+        """What makes a command one about a run of the workspace. Raises NotFoundError."""
+        return commands.about(self.workspace.session(session).run(run).folder)
 
     def open_run(self, session: str, run: str) -> Acknowledged:
         """Make a run of the workspace the current one. Raises NotFoundError, RunError."""
-        folders = self._folders(session, run)
-        return self.request(commands.Open(session=folders[0], run=folders[1]))
+        return self.request(commands.Open(**self.about(session, run)))
 
-    def enqueue(self, session: str, run: str) -> Acknowledged:
+    def track(self, session: str, run: str) -> Acknowledged:
         """Track a run of the workspace, now or after those that are tracked already. Raises NotFoundError."""
-        folders = self._folders(session, run)
-        return self.request(commands.Enqueue(session=folders[0], run=folders[1]))
+        return self.request(commands.Start(**self.about(session, run)))
 
     def change_settings(self, **changes: Value) -> Acknowledged:
         """Change knobs of the open run by name. Raises SettingsError naming what is allowed."""
@@ -124,7 +141,7 @@ class StudioControl:
         """Start the process ahead of the first command, so that nobody waits for it."""
         with self._lock:
             if self._process is None:
-                self._process = OwnedProcess(self)
+                self._process = OwnedProcess(self.heard, self.silent, self.ended)
 
     def restart(self, resume: bool = True) -> None:
         """Start the process again and open the run that was open; runs that waited wait again.
@@ -132,28 +149,36 @@ class StudioControl:
         resume : track on if it was tracking. Settings that were changed and not yet in use are changed again, and
         the search goes at the pace that it had. Raises StudioError if the run cannot be opened.
         """
+        with self._reviving:
+            self._restart(resume)
+
+    def _restart(self, resume: bool) -> None:
         with self._lock:
             said, changes, old = self._said, dict(self._changes), self._process
             self._process = None
+            answers, self._answers = self._answers, {}
             self._said = self._state = nothing_open(said.seconds_a_layer)
             self._changes.clear()
         if old is not None:
             old.end(0.0)
+        _leave_unanswered(answers)
         self.start()
         if said.seconds_a_layer:
             self.request(commands.SetPace(seconds_a_layer=said.seconds_a_layer))
         place = self._places.get((said.session, said.run))
         if place is not None:
-            self.request(commands.Open(session=place[0], run=place[1]))
+            about: commands.About = {"session": place[0], "run": place[1]}
             if resume and said.state in ("tracking", "compiling"):
                 # Refused if the process died just after its last frame: then nothing is left to go on with.
                 with contextlib.suppress(RunError):
-                    self.request(commands.Start())
+                    self.request(commands.Start(**about))
+            else:
+                self.request(commands.Open(**about))
             if changes:
-                self.request(commands.ChangeSettings(changes=changes))
+                self.request(commands.ChangeSettings(changes=changes, **about))
         for names in said.waiting:
             session, run = self._places[names]
-            self.request(commands.Enqueue(session=session, run=run))
+            self.request(commands.Start(session=session, run=run))
 
     def close(self) -> None:
         """End the process, its search saved where it stands, and all subscriptions."""
@@ -163,7 +188,7 @@ class StudioControl:
             process.end(CLOSING_SECONDS)
         self._watchers.close()
 
-    # ------------------------------------------------------------------ hearing (see owned_process.Listener)
+    # ------------------------------------------------------------------ hearing
 
     def heard(self, process: OwnedProcess, event: Event) -> None:
         """Pass an event on to all who watch."""
@@ -179,11 +204,11 @@ class StudioControl:
         if isinstance(event, Acknowledged):
             with self._lock:
                 changing = self._changing.pop(event.identifier, None)
-                answer = self._answers.get(event.identifier)
+                answer = self._answers.pop(event.identifier, None)
             if changing is not None and event.ok:
                 self._changes.update(changing.changes)
             if answer is not None:
-                answer.give(event)
+                answer.set_result(event)
 
     def silent(self, process: OwnedProcess, silent: bool) -> None:
         """Say that the process does not speak, or that it speaks again."""
@@ -199,7 +224,7 @@ class StudioControl:
         with self._lock:
             if process is not self._process:
                 return
-            answers = dict(self._answers)
+            answers, self._answers = self._answers, {}
             if process.exit_code == 0:
                 self._process = None
                 self._said = nothing_open()
@@ -207,9 +232,7 @@ class StudioControl:
             self._publish(self._said)
         else:
             self._lose(f"The tracking process died ({ending(process.exit_code)}).")
-        text = "The tracking process died before it answered."
-        for identifier, answer in answers.items():
-            answer.give(Acknowledged("", "", identifier, "", False, text, LOST_HINT, "run"))
+        _leave_unanswered(answers)
 
     def _lose(self, message: str) -> None:
         logger.error("%s", message)
@@ -221,33 +244,17 @@ class StudioControl:
 
     def _note(self, command: commands.Command) -> None:
         """Remember what a restart has to bring back."""
-        if isinstance(command, commands.Open):
+        if command.run:
             names = (Path(command.session).name, Path(command.run).name)
             self._places[names] = (command.session, command.run)
-        elif isinstance(command, commands.ChangeSettings):
+        if isinstance(command, commands.ChangeSettings):
             self._changing[command.identifier] = command
 
-    def _folders(self, session: str, run: str) -> tuple[str, str]:
-        stored = self.workspace.session(session).run(run)
-        return str(stored.folder.parent.parent), str(stored.folder)
 
-
-class _Answer:
-    """Where one request waits for its acknowledgement."""
-
-    def __init__(self) -> None:
-        self.arrived = threading.Event()
-        self.event: Acknowledged | None = None
-
-    def give(self, event: Acknowledged) -> None:
-        self.event = event
-        self.arrived.set()
-
-
-def nothing_open(seconds_a_layer: float = 0.0) -> StateChanged:
-    """The state of a process with no run open."""
-    nothing = (0, 0, 0, 0, 0, math.nan, math.nan)
-    return StateChanged("", "", "idle", *nothing, seconds_a_layer=seconds_a_layer)
+def _leave_unanswered(answers: Mapping[str, Future[Acknowledged]]) -> None:
+    text = "The tracking process died before it answered."
+    for identifier, answer in answers.items():
+        answer.set_result(Acknowledged("", "", identifier, "", False, text, LOST_HINT, "run"))
 
 
 def _refusal(event: Acknowledged) -> StudioError:

@@ -2,6 +2,7 @@
 the store except a layer's own cloud, which travels with `LayerFinished` so that it can be drawn at once."""
 
 import math
+from collections.abc import Hashable
 from dataclasses import dataclass, field
 
 from studio.runs.live_summary import LiveStanding
@@ -17,6 +18,11 @@ class Event:
     session: str
     run: str
 
+    @property
+    def key(self) -> Hashable:
+        """Events of one key replace each other where a watcher is slow; None: each is kept."""
+        return type(self)
+
 
 @dataclass(frozen=True, slots=True)
 class StateChanged(Event):
@@ -31,13 +37,13 @@ class StateChanged(Event):
     """
 
     state: str
-    frame: int
-    layer: int
-    first: int
-    last: int
-    done: int
-    frames_per_second: float
-    seconds_left: float
+    frame: int = 0
+    layer: int = 0
+    first: int = 0
+    last: int = 0
+    done: int = 0
+    frames_per_second: float = math.nan
+    seconds_left: float = math.nan
     message: str = ""
     hint: str = ""
     waiting: tuple[tuple[str, str], ...] = ()
@@ -57,6 +63,11 @@ class Acknowledged(Event):
     hint: str = ""
     code: str = ""
 
+    @property
+    def key(self) -> Hashable:
+        """Each is kept."""
+        return None
+
 
 @dataclass(frozen=True, slots=True)
 class LayerFinished(Event):
@@ -72,6 +83,11 @@ class LayerFinished(Event):
     asked_at: float = math.nan
     left_at: float = math.nan
 
+    @property
+    def key(self) -> Hashable:
+        """One a layer."""
+        return LayerFinished, self.record.layer, self.reannealed
+
 
 @dataclass(frozen=True, slots=True)
 class FrameFinished(Event):
@@ -83,6 +99,11 @@ class FrameFinished(Event):
     result: FrameResult
     reannealed: bool = False
     latency_ms: float = math.nan
+
+    @property
+    def key(self) -> Hashable:
+        """The newest, and the newest answer."""
+        return FrameFinished, self.reannealed
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,3 +125,13 @@ class LogLine(Event):
     level: str
     time: float
     text: str
+
+    @property
+    def key(self) -> Hashable:
+        """Each is kept."""
+        return None
+
+
+def nothing_open(seconds_a_layer: float = 0.0) -> StateChanged:
+    """The state of a process with no run open."""
+    return StateChanged("", "", "idle", seconds_a_layer=seconds_a_layer)

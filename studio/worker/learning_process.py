@@ -1,31 +1,31 @@
 """A process that learns one behaviour model: sources in, the model's file and its numbers out."""
 
 import dataclasses
-import logging
 import os
-import signal
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor, wait
 from dataclasses import dataclass, field
-from multiprocessing.connection import Connection
 from pathlib import Path
 
 from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import load_body
-from studio.errors import StudioError
+from studio.errors import BehaviourError
 from studio.knobs import Value, changed, knobs_of
 from studio.progress import Progress
+from studio.runs.behaviour_models import models_folder
 from studio.sessions.session import BODIES_NAME
 from studio.sessions.workspace import Workspace
 from studio.training.learning import learn, read_sources
 from studio.training.model_shelf import keep_model, place_for_model
 from studio.training.oversampling import OversamplingSettings
 from studio.training.sources import FPS
+from studio.worker import process_executor
+from studio.worker.process_executor import ProcessExecutor, ProcessLostError
 
 READING = "reading motion"
 PARTS = 1000
 NICENESS = 5
-logger = logging.getLogger(__name__)
+CHECK_SECONDS = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,30 +53,40 @@ class LearningOrder:
         return changed(LearningSettings(), learning), changed(OversamplingSettings(), others)
 
 
-def learn_to_order(order: LearningOrder, outbox: Connection) -> None:
-    """The process's whole life: tells ("step", words, done, total) as it goes on, then ("done", numbers) or
-    ("failed", message, hint). Nothing is written before the model is whole.
+def learn_in_process(
+    order: LearningOrder,
+    report: Progress,
+    check: Callable[[], None] = lambda: None,
+    executor: Executor | None = None,
+) -> dict[str, object]:
+    """Learn and keep a model in a process of its own; its numbers. Nothing is written before the model is whole.
+
+    check : called often; what it raises ends the work. executor : runs it instead of a process of this call's own; it
+    is left open, and what is told of the progress stays there. Raises StudioError.
     """
-    # Ctrl-C in the terminal reaches all processes; the one that asked decides.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if hasattr(os, "nice"):
-        os.nice(NICENESS)
+    own = executor is None
+    running = ProcessExecutor(1, told=report, niceness=NICENESS) if executor is None else executor
+    process = running.submit(os.getpid)
+    learning = running.submit(learn_to_order, order)
+    try:
+        while not learning.done():
+            check()
+            wait([learning], CHECK_SECONDS)
+        return learning.result()
+    except ProcessLostError as lost:
+        raise BehaviourError(lost.message, "Try again with fewer frames.") from None
+    finally:
+        learning.cancel()
+        if own:
+            running.shutdown(cancel_futures=True)
+            if process.done() and not process.cancelled():
+                for left in models_folder(order.root).glob(f"*.{process.result()}.partial"):
+                    left.unlink(missing_ok=True)
 
-    def tell(*words: object) -> None:
-        outbox.send(words)
 
-    with suppress(BrokenPipeError, ConnectionResetError):
-        try:
-            tell("done", _learnt(order, lambda step, done, total: tell("step", step, done, total)))
-        except StudioError as problem:
-            tell("failed", problem.message, problem.hint)
-        except Exception as problem:
-            logger.exception("learning '%s' failed", order.name)
-            tell("failed", f"Learning failed: {type(problem).__name__}: {problem}.", "See the log.")
-
-
-def _learnt(order: LearningOrder, tell: Progress) -> dict[str, object]:
-    """Learn and keep the model; its numbers."""
+def learn_to_order(order: LearningOrder) -> dict[str, object]:
+    """Learn and keep the model, telling how far it is; its numbers. Raises StudioError."""
+    tell: Progress = process_executor.tell
     workspace, body = Workspace(order.root), load_body(order.body, (order.root / BODIES_NAME,))
     place_for_model(order.name, workspace)
     learning, material = order.settings()

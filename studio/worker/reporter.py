@@ -2,20 +2,30 @@
 run."""
 
 import contextlib
-import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
 
 from studio.knobs import Value
 from studio.runs.live_run import LiveRun, without_particles
 from studio.runs.tracking_run import Stepped
 from studio.settings import RunSettings, values
-from studio.worker.events import Event, FrameFinished, LayerFinished, LogLine, SettingsApplied, StateChanged
+from studio.worker.events import (
+    Event,
+    FrameFinished,
+    LayerFinished,
+    LogLine,
+    SettingsApplied,
+    StateChanged,
+    nothing_open,
+)
 from studio.worker.open_run import OpenRun
 from studio.worker.search_pace import SearchPace
-from studio.worker.waiting_runs import WaitingRuns
 
 IDLE = "idle"
+Place = tuple[str, str]
+"""Folders of a session and of one of its runs, as text."""
 
 
 class Reporter:
@@ -24,7 +34,7 @@ class Reporter:
     pace : how slowly the search goes. waiting : the runs to come.
     """
 
-    def __init__(self, post: Callable[[Event], None], pace: SearchPace, waiting: WaitingRuns) -> None:
+    def __init__(self, post: Callable[[Event], None], pace: SearchPace, waiting: Sequence[Place]) -> None:
         self.post = post
         self.state_name = IDLE
         self._pace, self._waiting = pace, waiting
@@ -34,11 +44,11 @@ class Reporter:
     def state(self, run: OpenRun | None, name: str, message: str = "", hint: str = "") -> None:
         """Say where the search stands."""
         self.state_name, self._words = name, (message, hint)
-        pace, waiting = self._pace.seconds_a_layer, self._waiting.names
+        pace = self._pace.seconds_a_layer
+        waiting = tuple((Path(session).name, Path(run).name) for session, run in self._waiting)
         if run is None:
-            nothing = (0, 0, 0, 0, 0, math.nan, math.nan)
-            said = StateChanged("", "", name, *nothing, message, hint, waiting, seconds_a_layer=pace)
-            self.post(said)
+            nothing = nothing_open(pace)
+            self.post(replace(nothing, state=name, message=message, hint=hint, waiting=waiting))
             return
         tracking, record = run.tracking, run.stored.record
         progress = tracking.progress(pace)

@@ -17,13 +17,14 @@ from studio.worker import commands
 from studio.worker.events import Acknowledged, Event, FrameFinished, LayerFinished
 from studio.worker.open_live_run import opened
 from studio.worker.open_run import FINISHED, PAUSED, OpenRun
-from studio.worker.reporter import IDLE, Reporter, names_of, unforeseen
+from studio.worker.reporter import IDLE, Place, Reporter, names_of, unforeseen
 from studio.worker.search_pace import SearchPace
 from studio.worker.side_looking import SideLooking
-from studio.worker.waiting_runs import WaitingRuns
 
 COMPILING, TRACKING, REANNEALING = "compiling", "tracking", "reannealing"
 CANCELLED, FAILED = "cancelled", "failed"
+UNOPENED = (commands.Open, commands.Start, commands.Dequeue, commands.Close)
+"""What opens its run itself, or needs none."""
 RUN_ON, TO_FRAME_END, ONE_LAYER = "run on", "to the frame's end", "one layer"
 
 
@@ -33,7 +34,7 @@ class TrackingJob:
     def __init__(self, post: Callable[[Event], None], clock: Callable[[], float] = time.monotonic) -> None:
         self.stopped = False
         self._pace = SearchPace(clock)
-        self._waiting = WaitingRuns()
+        self._waiting: list[Place] = []
         self._say = Reporter(post, self._pace, self._waiting)
         self._sides = SideLooking(self._say.log)
         self._run: OpenRun | None = None
@@ -42,9 +43,8 @@ class TrackingJob:
         self._compiled: set[str] = set()
         self._actions: dict[type[commands.Command], Callable[[Any], None]] = {
             commands.Open: lambda asked: self._open(asked.session, asked.run),
-            commands.Enqueue: self._enqueue,
+            commands.Start: self._start,
             commands.Dequeue: self._dequeue,
-            commands.Start: lambda asked: self._begin(RUN_ON, asked.asked_at),
             commands.StepFrame: lambda asked: self._begin(TO_FRAME_END, asked.asked_at),
             commands.StepLayer: lambda asked: self._begin(ONE_LAYER, asked.asked_at),
             commands.Pause: self._pause,
@@ -53,7 +53,7 @@ class TrackingJob:
             commands.Cancel: self._cancel,
             commands.ChangeSettings: self._change_settings,
             commands.SetPace: self._set_pace,
-            commands.Close: self._let_go,
+            commands.Close: self._release,
             commands.Stop: self._stop,
         }
 
@@ -79,6 +79,8 @@ class TrackingJob:
         """Do what a command says and acknowledge it; a refusal says why."""
         refusal = ("", "", "")
         try:
+            if command.run and not isinstance(command, UNOPENED):
+                self._make_current(command)
             self._actions[type(command)](command)
         except StudioError as error:
             refusal = (error.message, error.hint, error.code)
@@ -168,9 +170,23 @@ class TrackingJob:
 
     # ------------------------------------------------------------------ commands
 
+    def _is_open(self, run_folder: str) -> bool:
+        return self._run is not None and self._run.stored.folder == Path(run_folder).resolve()
+
+    def _make_current(self, asked: commands.Command) -> None:
+        """Open the run that a command is about. Raises RunError while another one is tracked."""
+        if self._is_open(asked.run):
+            return
+        if self._tracking:
+            now = self._opened()
+            raise RunError(
+                f"Run '{now.run_name}' of session '{now.session_name}' is being tracked.",
+                "Pause it first, or wait.",
+            )
+        self._open(asked.session, asked.run)
+
     def _open(self, session: str, run_folder: str) -> None:
-        before = self._run
-        if before is not None and before.stored.folder == Path(run_folder).resolve():
+        if self._is_open(run_folder):
             self._say.state_again(self._run)
             return
         # The new one is opened before the old one is let go, so that a refusal changes nothing.
@@ -182,19 +198,24 @@ class TrackingJob:
         self._say.settings(following, version, settings, entry.frame, entry.layer)
         self._state(following.resting)
 
-    def _enqueue(self, asked: commands.Enqueue) -> None:
-        place, run = (asked.session, asked.run), self._run
-        if not self._tracking:
-            self._open(*place)
-            self._begin(RUN_ON)
+    def _start(self, asked: commands.Start) -> None:
+        place = (asked.session, asked.run)
+        if asked.run and self._tracking and not self._is_open(asked.run):
+            if place not in self._waiting:
+                self._waiting.append(place)
+            self._say.state_again(self._run)
             return
-        if run is not None and run.stored.folder == Path(asked.run).resolve():
-            raise RunError(f"Run '{run.run_name}' is being tracked already.", "Wait for its end.")
-        self._waiting.add(place)
-        self._state(TRACKING)
+        if asked.run:
+            self._open(*place)
+        if place in self._waiting:
+            self._waiting.remove(place)
+        self._begin(RUN_ON, asked.asked_at)
 
     def _dequeue(self, asked: commands.Dequeue) -> None:
-        self._waiting.remove((asked.session, asked.run))
+        place = (asked.session, asked.run)
+        if place not in self._waiting:
+            raise RunError(f"Run '{Path(asked.run).name}' does not wait.", "Cancel it if it is tracked.")
+        self._waiting.remove(place)
         self._say.state_again(self._run)
 
     def _begin(self, goal: str, asked_at: float = math.nan) -> None:
@@ -241,6 +262,8 @@ class TrackingJob:
 
     def _change_settings(self, asked: commands.ChangeSettings) -> None:
         run = self._opened()
+        if asked.frame >= 0 and not self._tracking:
+            run.select(asked.frame)
         moved = run.mailbox.change(asked.changes)
         if not moved:
             return
@@ -256,7 +279,13 @@ class TrackingJob:
             # The answer on its way is let out first: a slider that is dragged would else never show one.
             run.ask_again = True
 
-    def _let_go(self, _: commands.Close) -> None:
+    def _release(self, asked: commands.Close) -> None:
+        open_folder = self._run.stored.folder if self._run is not None else None
+        named = asked.run or asked.session
+        if named and (
+            open_folder is None or Path(named).resolve() not in (open_folder, open_folder.parents[1])
+        ):
+            return
         if self._tracking:
             raise RunError(f"Run '{self._opened().run_name}' is being tracked.", "Cancel it first.")
         self._close_run()
@@ -280,7 +309,8 @@ class TrackingJob:
 
     def _begin_waiting(self) -> None:
         """Track the first of those that wait that can be tracked."""
-        while (place := self._waiting.next()) is not None:
+        while self._waiting:
+            place = self._waiting.pop(0)
             try:
                 self._open(*place)
                 self._begin(RUN_ON)

@@ -1,8 +1,8 @@
-"""Events to all who watch, newest wins: a slow watcher loses what is out of date and holds nobody up.
+"""The queue of whoever watches: newest wins, so a slow watcher loses what is out of date and holds up nothing.
 
-Each watcher has a subscription of its own. An event takes the place of an older one of the same kind (one
-state, one settings message, one result, one record for each layer of a frame), so what waits is bounded
-however long a watcher sleeps; acknowledgements and log lines are kept one by one up to a limit.
+An entry takes the place of an older one of the same key (one state, one settings message, one result, one record for
+each layer), so what waits is bounded however long a watcher sleeps; those without a key (acknowledgements, log lines)
+are kept one by one up to a limit.
 """
 
 import asyncio
@@ -11,38 +11,46 @@ import queue
 import threading
 from collections import OrderedDict
 from collections.abc import Hashable
+from typing import Generic, TypeVar
 
-from studio.worker.events import Acknowledged, Event, FrameFinished, LayerFinished, LogLine
+from studio.worker.events import Event
+
+T = TypeVar("T")
 
 LIMIT = 512
 
 
-class Subscription:
-    """One watcher's events that it has not taken yet. Reads like a `queue.Queue`; thread-safe."""
+class Subscription(Generic[T]):
+    """What one watcher has not taken yet. Reads like a `queue.Queue`, and from an event loop; thread-safe.
+
+    dropped : how many entries were lost beyond the limit.
+    """
 
     def __init__(self, limit: int = LIMIT) -> None:
         self._limit = limit
         self._number = 0
-        self._waiting: OrderedDict[Hashable, Event] = OrderedDict()
+        self._waiting: OrderedDict[Hashable, T] = OrderedDict()
         self._something = threading.Condition()
         self._futures: list[tuple[asyncio.AbstractEventLoop, asyncio.Future[None]]] = []
         self.closed = False
+        self.dropped = 0
 
-    def put(self, event: Event) -> None:
-        """Offer an event; never waits."""
+    def put(self, entry: T, key: Hashable = None) -> None:
+        """Offer an entry in the place of what has its key; never waits."""
         with self._something:
             if self.closed:
                 return
             self._number += 1
-            key = _key(event) or ("one", self._number)
-            self._waiting.pop(key, None)
-            self._waiting[key] = event
-            while len(self._waiting) > self._limit:
+            slot = self._number if key is None else key
+            self._waiting.pop(slot, None)
+            self._waiting[slot] = entry
+            if len(self._waiting) > self._limit:
                 self._waiting.popitem(last=False)
+                self.dropped += 1
             self._wake()
 
-    def get(self, block: bool = True, timeout: float | None = None) -> Event:
-        """The oldest event that still stands. Raises queue.Empty after `timeout` seconds, or when closed and
+    def get(self, block: bool = True, timeout: float | None = None) -> T:
+        """The oldest entry that still stands. Raises queue.Empty after `timeout` seconds, or when closed and
         empty."""
         with self._something:
             if block:
@@ -51,11 +59,11 @@ class Subscription:
                 raise queue.Empty
             return self._waiting.popitem(last=False)[1]
 
-    def get_nowait(self) -> Event:
+    def get_nowait(self) -> T:
         """Like `get` without waiting."""
         return self.get(block=False)
 
-    async def next(self) -> Event:
+    async def next(self) -> T:
         """Like `get` for an event loop. Raises queue.Empty when closed and empty."""
         while True:
             with self._something:
@@ -88,11 +96,11 @@ class Watchers:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._subscriptions: list[Subscription] = []
+        self._subscriptions: list[Subscription[Event]] = []
 
-    def subscribe(self) -> Subscription:
+    def subscribe(self) -> Subscription[Event]:
         """A new subscription; events from now on."""
-        subscription = Subscription()
+        subscription = Subscription[Event]()
         with self._lock:
             self._subscriptions.append(subscription)
         return subscription
@@ -102,24 +110,13 @@ class Watchers:
         with self._lock:
             self._subscriptions = [entry for entry in self._subscriptions if not entry.closed]
             for entry in self._subscriptions:
-                entry.put(event)
+                entry.put(event, event.key)
 
     def close(self) -> None:
         """Close all subscriptions."""
         with self._lock:
             for entry in self._subscriptions:
                 entry.close()
-
-
-def _key(event: Event) -> Hashable:
-    """Events of one key replace each other; None: each is kept."""
-    if isinstance(event, LayerFinished):
-        return (LayerFinished, event.record.layer, event.reannealed)
-    if isinstance(event, FrameFinished):
-        return (FrameFinished, event.reannealed)
-    if isinstance(event, Acknowledged | LogLine):
-        return None
-    return type(event)
 
 
 def _settle(future: "asyncio.Future[None]") -> None:

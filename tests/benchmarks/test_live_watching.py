@@ -15,7 +15,8 @@ from studio.scene.controller import LIVE_PICTURE_SECONDS, PICTURE_SECONDS, pictu
 from studio.scene.panel import search_html
 from studio.scene.scene_server import SceneServer
 from studio.sessions.workspace import Workspace
-from studio.worker.control import StudioControl, nothing_open
+from studio.worker.control import StudioControl
+from studio.worker.events import nothing_open
 from studio.worker.live_tracking import replay_live
 
 

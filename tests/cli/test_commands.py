@@ -221,7 +221,17 @@ def test_a_cancelled_run_is_resumed_with_the_result_of_an_unbroken_one(session_o
     assert run_.summary().status == "finished"
 
 
-def test_a_log_file_getsprogress_lines_with_the_time_that_is_left(capsys: pytest.CaptureFixture[str]) -> None:
-    report = progress_lines("Tracking", seconds_between=0.0)
-    report("", 3, 9)
-    assert "Tracking: 3 of 9, about" in capsys.readouterr().err
+def test_a_log_file_gets_lines_now_and_then_with_the_time_that_is_left(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Compiling takes 211 s, each of 600 frames half a second: the first frame foretells nothing."""
+    now = 0.0
+    report = progress_lines("Tracking", clock=lambda: now)
+    report("", 0, 600)
+    now = 211.0
+    report("", 1, 600)
+    assert capsys.readouterr().err == "Tracking: 1 of 600\n"
+    for done in range(2, 103):
+        now += 0.5
+        report("", done, 600)
+    assert "Tracking: 101 of 600, about 250 s left".replace("250 s", "4 min") in capsys.readouterr().err

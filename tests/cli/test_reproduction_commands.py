@@ -41,7 +41,6 @@ def test_a_stranger_sees_what_there_is_and_what_was_found(tmp_path: Path) -> Non
     report = workspace_root() / "reproduction" / "report.html"
     assert f"Report: {report}" in found.stdout
     assert report.is_file()
-    assert "4 of 4" in found.stderr
     assert "toy-good  (reproduced, not firm)" in run("list").stdout
     listed = json.loads(run("list", "--json").stdout)["experiments"]
     assert [(line["name"], line["verdict"]) for line in listed] == [
@@ -82,11 +81,3 @@ def test_after_ctrl_c_it_is_said_how_to_go_on(monkeypatch: pytest.MonkeyPatch) -
     assert found.exit_code == 130
     assert "Go on with: studio reproduce toy-good --seeds 2" in found.stderr
     assert (workspace_root() / "reproduction" / "report.html").is_file()
-
-
-@pytest.mark.parametrize(
-    ("seconds", "words"),
-    [(None, ""), (12.0, "about 12 s left"), (600.0, "about 10 min left"), (9000.0, "about 2.5 h left")],
-)
-def test_the_time_left_in_words(seconds: float | None, words: str) -> None:
-    assert reproduction_commands._left(seconds) == words

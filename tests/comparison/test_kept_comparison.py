@@ -69,7 +69,7 @@ def test_the_newest_comes_first_and_names_are_looked_up(walk: Session, kept: Kep
 def test_a_finished_one_has_numbers_findings_and_frames(kept: KeptComparison) -> None:
     drawn = kept.plan()
     kept.finish(conclude(drawn, made_up(drawn)))
-    assert kept.status() == "finished"
+    assert kept.status() == "done"
     result = kept.result()
     assert result is not None
     assert [entry["tracker"] for entry in result["trackers"]] == ["annealed", "condensation"]

@@ -211,4 +211,5 @@ def test_progress_is_measured_over_frames(session_on_disk: Session) -> None:
             tracking.step_layer()
         progress = tracking.progress()
         assert (progress.done, progress.total) == (2, 5)
-        assert progress.seconds_left == pytest.approx(3 / progress.frames_per_second)
+        assert progress.frames_per_second > 0.0
+        assert np.isnan(progress.seconds_left), "two frames foretell nothing"

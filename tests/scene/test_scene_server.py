@@ -3,6 +3,7 @@
 import asyncio
 import dataclasses
 import socket
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -124,17 +125,16 @@ def test_a_setting_selects_the_shown_frame_and_is_asked_for(stage: SceneServer, 
     survival = panel(stage).settings.inputs["survival"]
     default = survival.knob.default
     by_hand(survival.handle, 0.7)
-    until(lambda: len(control.commands) == 2)
-    seek, change = control.commands
-    assert isinstance(seek, commands.Seek)
-    assert seek.frame == 2
+    until(lambda: control.commands)
+    (change,) = control.commands
     assert isinstance(change, commands.ChangeSettings)
+    assert (Path(change.run).name, change.frame) == ("run-1", 2)
     assert change.changes == {"survival": 0.7}
     control.answer(change, "Setting 'survival' cannot be 0.7.", "Try 0.6.")
     until(lambda: survival.handle.value == default)
     control.say(SettingsApplied("swaying", "run-1", 2, 2, 0, {"survival": 0.6}, ("survival",)))
     until(lambda: survival.handle.value == 0.6)
-    assert len(control.commands) == 2, "showing what is in use asks for nothing"
+    assert len(control.commands) == 1, "showing what is in use asks for nothing"
 
 
 def test_knobs_are_about_the_run_that_is_shown(stage: SceneServer, control: FakeControl) -> None:
@@ -146,31 +146,18 @@ def test_knobs_are_about_the_run_that_is_shown(stage: SceneServer, control: Fake
     assert control.commands == [], "no run was shown"
     survival = panel(stage).settings.inputs["survival"]
     by_hand(survival.handle, 0.7)
-    until(lambda: len(control.commands) == 3)
-    assert [type(command) for command in control.commands] == [
-        commands.Open,
-        commands.Seek,
-        commands.ChangeSettings,
-    ]
-    control.commands.clear()
-    control.say(dataclasses.replace(control.state, state="tracking"))
+    until(lambda: control.commands)
     by_hand(survival.handle, 0.6)
+    until(lambda: len(control.commands) == 2)
+    assert [Path(command.run).name for command in control.commands] == ["run-1", "run-1"]
+    control.answer(control.commands[1], "Run 'run-9' of session 'other' is being tracked.")
     until(lambda: said)
     assert "run-9" in said[0].message
-    assert control.commands == [], "another window's run goes on"
     until(lambda: survival.handle.value == 0.7)
     by_hand(survival.handle, 99.0)
     until(lambda: len(said) == 2)
     assert "99" in said[1].message
     until(lambda: survival.handle.value == 0.7)
-
-
-def test_a_frame_is_not_selected_while_tracking(stage: SceneServer, control: FakeControl) -> None:
-    open_run(stage)
-    control.say(dataclasses.replace(control.state, state="tracking"))
-    by_hand(panel(stage).settings.inputs["survival"].handle, 0.7)
-    until(lambda: control.commands)
-    assert [type(command) for command in control.commands] == [commands.ChangeSettings]
 
 
 def test_playback_shows_one_frame_after_another_and_tells_the_page(

@@ -31,7 +31,7 @@ def ended(studio: Studio) -> dict:
     deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         told = studio.client.get("/api/learning").json()["progress"]
-        if told["state"] != "running":
+        if told["state"] not in ("queued", "running", "cancelling"):
             return told
     raise AssertionError("the learning did not end")
 

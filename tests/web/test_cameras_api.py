@@ -89,7 +89,7 @@ def test_cameras_are_recorded_into_a_session(studio: Studio, streams: Streams) -
     again = studio.client.post("/api/recordings", json={"name": "take3", "calibration": "take1"})
     assert again.status_code == 409
     assert studio.client.post("/api/cameras/preview", json={"cameras": []}).status_code == 409
-    until(studio, "/api/recordings", lambda told: told["state"] == "recording" and told["seconds"] > 0.7)
+    until(studio, "/api/recordings", lambda told: told["step"] == "recording" and told["seconds"] > 0.7)
     assert studio.client.post("/api/recordings/stop").status_code == 202
     told = until(studio, "/api/recordings", lambda told: told["state"] in ("done", "failed"))
     assert told["state"] == "done", told

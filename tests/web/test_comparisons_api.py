@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import time
+from dataclasses import replace
 
 import pytest
 from sample_walk import copy_of_walk
@@ -42,9 +43,9 @@ def test_a_comparison_is_made_kept_and_downloaded(compared: Studio) -> None:
     begun = client.post("/api/comparisons", json=WISH)
     assert begun.status_code == 202, begun.text
     assert (begun.json()["name"], begun.json()["total"]) == ("comparison-1", 4)
-    told = until(compared, "comparison-1", "finished", "failed")
+    told = until(compared, "comparison-1", "done", "failed")
     line, result = told["comparison"], told["result"]
-    assert (line["status"], line["done"], line["trackers"]) == ("finished", 4, ["annealed", "annealed:eq13"])
+    assert (line["status"], line["done"], line["trackers"]) == ("done", 4, ["annealed", "annealed:eq13"])
     assert told["settings"]["annealed:eq13"]["survival"] == 0.5
     assert [entry["evaluations"] for entry in result["trackers"]] == [60, 60]
     best = min(result["trackers"], key=lambda entry: entry["mean_mm"])
@@ -89,7 +90,7 @@ def test_one_runs_at_a_time_is_cancelled_and_goes_on(compared: Studio) -> None:
     )
     until(compared, "comparison-1", "cancelled")
     assert client.get("/api/comparisons/walk/comparison-1/result.json").status_code == 404
-    assert client.post("/api/comparisons/walk/comparison-1/resume").json()["status"] == "running"
+    assert client.post("/api/comparisons/walk/comparison-1/resume").json()["status"] in ("queued", "running")
     client.post("/api/comparisons/walk/comparison-1/cancel")
     until(compared, "comparison-1", "cancelled")
     assert client.patch("/api/sessions/walk", json={"name": "other"}).status_code == 200
@@ -103,7 +104,27 @@ def test_an_interrupted_one_is_offered_to_go_on(compared: Studio) -> None:
     (line,) = compared.client.get("/api/comparisons").json()["comparisons"]
     assert (line["status"], line["done"], line["total"]) == ("interrupted", 0, 1)
     assert compared.client.post("/api/comparisons/walk/comparison-1/resume").status_code == 202
-    assert until(compared, "comparison-1", "finished")["comparison"]["best"] == "annealed"
+    assert until(compared, "comparison-1", "done")["comparison"]["best"] == "annealed"
+
+
+def test_a_server_that_ends_leaves_it_to_go_on(compared: Studio) -> None:
+    compared.client.post("/api/comparisons", json={**WISH, "seeds": 40})
+    deadline = time.monotonic() + 120.0
+    while compared.client.get("/api/comparisons").json()["comparisons"][0]["done"] == 0:
+        assert time.monotonic() < deadline
+    compared.app.state.doors.jobs.close()
+    (line,) = compared.client.get("/api/comparisons").json()["comparisons"]
+    assert line["status"] == "interrupted"
+    assert 1 <= line["done"] < 80
+
+
+def test_what_fails_is_said(compared: Studio) -> None:
+    session = compared.workspace.session("walk")
+    plan = plan_comparison(session, Lineup(("annealed",), "", 60, 3), (0,), last=2)
+    wrong = replace(plan.entrants[0], changes={"survivor": 1})
+    new_comparison(place_of(session), replace(plan, entrants=(wrong,)))
+    assert compared.client.post("/api/comparisons/walk/comparison-1/resume").status_code == 202
+    assert "survivor" in until(compared, "comparison-1", "failed")["comparison"]["problem"]
 
 
 @pytest.mark.parametrize(

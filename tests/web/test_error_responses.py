@@ -8,10 +8,10 @@ from collections.abc import Iterator
 import pytest
 from web_doubles import Studio
 
-from studio.errors import StudioError
+from studio.errors import StudioError, UnforeseenError
 from studio.web import session_routes
 from studio.web.content_policy import PAGE_POLICY
-from studio.web.error_responses import UnforeseenError, error_response, validation_words
+from studio.web.error_responses import error_response, validation_words
 
 ENTRIES = {"code", "message", "hint", "status"}
 

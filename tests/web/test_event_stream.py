@@ -3,14 +3,17 @@
 import asyncio
 import json
 import math
+import queue
 
 import numpy as np
-from web_doubles import Studio, cookie_header, state_of
+import pytest
+from fastapi import WebSocketDisconnect
+from web_doubles import RecordingControl, Studio, cookie_header, state_of
 from websockets.sync.client import ClientConnection, connect
 
 from studio.tracking.tracker import Carried, Estimate, FrameResult, LayerRecord
 from studio.web.event_encoding import effective_share, key_of, layer_summary, message_of
-from studio.web.event_stream import EventStream, Watcher
+from studio.web.event_stream import LIMIT, EventStream, Watcher, _send_all
 from studio.worker.events import Acknowledged, FrameFinished, LayerFinished, LogLine, SettingsApplied
 
 NAN = float("nan")
@@ -127,31 +130,51 @@ def test_changes_of_the_workspace_and_moves_of_the_scene_are_told(studio: Studio
         assert next_of(socket, "scene")["frame"] is None
 
 
-def test_a_watcher_keeps_the_newest_of_each_kind_and_counts_what_it_lost() -> None:
-    async def scene() -> None:
-        watcher = Watcher(limit=5)
-        for number in range(100):
-            watcher.offer(("state",), f"state {number}")
-        assert await watcher.next() == "state 99"
-        for number in range(8):
-            watcher.offer(None, f"log {number}")
-        assert json.loads(await watcher.next()) == {"type": "dropped", "session": "", "run": "", "count": 3}
-        assert [await watcher.next() for _ in range(5)] == [f"log {number}" for number in range(3, 8)]
+def test_a_sleeping_browser_is_told_how_much_it_lost() -> None:
+    """Of states it gets the newest; of what cannot be replaced the newest that its queue holds."""
 
-    asyncio.run(scene())
+    class Sleeper:
+        def __init__(self) -> None:
+            self.sent: list[dict] = []
+
+        async def send_text(self, text: str) -> None:
+            self.sent.append(json.loads(text))
+            if len(self.sent) == LIMIT + 1:
+                raise WebSocketDisconnect
+
+    stream = EventStream(RecordingControl())
+    watcher, other = stream.watch("mine"), stream.watch("other")
+    for number in range(100):
+        stream.publish({"type": "state", "session": "", "run": "", "frame": number})
+        stream.publish({"type": "scene", "session": "", "run": "", "frame": number}, "other")
+    for number in range(LIMIT + 2):
+        stream.publish({"type": "log", "session": "", "run": "", "text": str(number)}, "mine")
+    sleeper = Sleeper()
+    asyncio.run(_send_all(sleeper, watcher))  # pyright: ignore[reportArgumentType]
+    assert sleeper.sent[0] == {"type": "dropped", "session": "", "run": "", "count": 3}
+    assert [said["text"] for said in sleeper.sent[1:]] == [str(number) for number in range(2, LIMIT + 2)]
+    assert [json.loads(other.get_nowait())["frame"] for _ in range(2)] == [99, 99]
+    with pytest.raises(queue.Empty):
+        other.get_nowait()
 
 
 def test_a_watcher_that_sleeps_holds_a_bounded_number_of_messages() -> None:
-    async def scene() -> int:
-        watcher = Watcher()
-        for frame in range(200):
-            for number in range(10):
-                message = {"type": "layer", "session": "s", "run": "r", "reannealed": False}
-                message |= layer_summary(layer(number, 5)) | {"frame": frame}
-                watcher.offer(key_of(message), "x")
-        return len(watcher._waiting)
+    watcher = Watcher(LIMIT)
+    for frame in range(200):
+        for number in range(10):
+            message = {"type": "layer", "session": "s", "run": "r", "reannealed": False}
+            message |= layer_summary(layer(number, 5)) | {"frame": frame}
+            watcher.put("x", key_of(message))
+    assert len(watcher._waiting) <= LIMIT
+    assert watcher.dropped == 200 * 10 - LIMIT
 
-    assert asyncio.run(scene()) <= 256
+
+@pytest.mark.parametrize("kind", ["import", "track", "comparison", "learning", "recording"])
+def test_of_each_job_the_newest_state_stands(kind: str) -> None:
+    told = {"type": kind, "session": "s", "run": "", "step": "reading", "identifier": "1", "name": "n"}
+    assert key_of(told) == key_of({**told, "step": "writing"})
+    assert key_of(told) != key_of({**told, "identifier": "2"})
+    assert key_of(told) != key_of({**told, "name": "m"})
 
 
 def test_a_flood_of_events_does_not_hold_up_requests(studio: Studio) -> None:

@@ -16,7 +16,7 @@ def finished(studio: Studio, identifier: str) -> dict:
     """The state of an export once it is no longer running."""
     for _ in range(600):
         told = studio.client.get(f"/api/exports/{identifier}").json()
-        if told["state"] != "running":
+        if told["state"] not in ("queued", "running", "cancelling"):
             return told
         time.sleep(0.05)
     raise AssertionError("the export never ended")

@@ -41,7 +41,7 @@ def ended(studio: Studio, identifier: str) -> dict:
     deadline = time.monotonic() + 30.0
     while time.monotonic() < deadline:
         told = studio.client.get(f"/api/initialisations/{identifier}").json()
-        if told["state"] != "running":
+        if told["state"] not in ("queued", "running", "cancelling"):
             return told
     raise AssertionError("the search did not end")
 

@@ -10,7 +10,7 @@ from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 from studio.tracking.tracker import Carried, Estimate, FrameResult
 from studio.web.event_encoding import message_of, plain
-from studio.worker.control import nothing_open
+from studio.worker.events import nothing_open
 
 LIVE = "/api/sessions/take1/runs/now/live"
 

@@ -31,7 +31,7 @@ def ended(studio: Studio, identifier: str) -> dict:
     deadline = time.monotonic() + 60.0
     while True:
         state = studio.client.get(f"/api/track-jobs/{identifier}").json()
-        if state["state"] != "running":
+        if state["state"] not in ("queued", "running", "cancelling"):
             return state
         assert time.monotonic() < deadline, state
         time.sleep(0.05)

@@ -11,6 +11,7 @@ from studio.sessions.run_log import append_to_log
 from studio.sessions.stored_run import StoredRun
 from studio.tracking.settings import AnnealedSettings
 from studio.worker import commands
+from studio.worker.events import StateChanged
 
 RUN = "/api/sessions/take1/runs/first"
 
@@ -79,19 +80,19 @@ def test_what_cannot_be_is_refused_in_words_and_nothing_is_made(
         ("cancel", commands.Cancel),
     ],
 )
-def test_commands_open_the_run_first_and_only_once(
-    studio: Studio, tracked: StoredRun, path: str, kind: type
+@pytest.mark.parametrize(
+    "known", [state_of(), state_of("take1", "first", "paused"), state_of("take1", "x", "paused")]
+)
+def test_a_command_names_its_run_whatever_is_known_to_be_open(
+    studio: Studio, tracked: StoredRun, path: str, kind: type, known: StateChanged
 ) -> None:
+    studio.control.state = known
     answer = studio.client.post(f"{RUN}/{path}")
     assert answer.status_code == 202
-    assert posted(studio) == [commands.Open, kind]
-    opened, sent = studio.control.commands
-    assert isinstance(opened, commands.Open)
-    assert opened.run == str(tracked.folder)
+    assert posted(studio) == [kind]
+    (sent,) = studio.control.commands
+    assert (sent.session, sent.run) == (str(tracked.folder.parents[1]), str(tracked.folder))
     assert answer.json() == {"identifier": sent.identifier, "command": kind.__name__}
-    studio.control.state = state_of("take1", "first", "paused")
-    studio.client.post(f"{RUN}/{path}")
-    assert posted(studio) == [commands.Open, kind, kind]
 
 
 def test_frames_to_seek_and_to_anneal_again(studio: Studio, tracked: StoredRun) -> None:
@@ -112,13 +113,13 @@ def test_while_another_run_is_tracked_a_start_waits_and_the_rest_is_refused(
     studio: Studio, tracked: StoredRun
 ) -> None:
     studio.control.state = state_of("take1", "other", "tracking")
-    assert studio.client.post(f"{RUN}/start").json()["command"] == "Enqueue"
+    assert studio.client.post(f"{RUN}/start").json()["command"] == "Start"
     refused = studio.client.post(f"{RUN}/step-layer")
     assert refused.status_code == 409
     assert "'other'" in refused.json()["message"]
     assert studio.client.patch(f"{RUN}/settings", json={"survival": 0.4}).status_code == 409
     assert studio.client.post(f"{RUN}/dequeue").json()["command"] == "Dequeue"
-    assert posted(studio) == [commands.Enqueue, commands.Dequeue]
+    assert posted(studio) == [commands.Start, commands.Dequeue]
 
 
 def test_after_the_process_died_start_revives_it_and_goes_on(studio: Studio, tracked: StoredRun) -> None:
@@ -126,7 +127,7 @@ def test_after_the_process_died_start_revives_it_and_goes_on(studio: Studio, tra
     assert studio.client.get("/api/worker").json()["state"] == "lost"
     assert studio.client.post(f"{RUN}/start").status_code == 202
     assert "restart resume=False" in studio.control.calls
-    assert posted(studio) == [commands.Open, commands.Start]
+    assert posted(studio) == [commands.Start]
     studio.control.state = state_of("take1", "first", "lost")
     assert studio.client.post("/api/worker/restart").status_code == 202
     assert "restart resume=True" in studio.control.calls
@@ -219,14 +220,12 @@ def test_a_change_is_checked_here_and_handed_on(studio: Studio, tracked: StoredR
 
 
 def test_the_shown_frame_is_the_one_that_is_annealed_again(studio: Studio, tracked: StoredRun) -> None:
-    studio.control.state = state_of("take1", "first", "paused")
     studio.client.patch(f"{RUN}/settings", params={"frame": 1}, json={"survival": 0.6})
-    [seek] = studio.control.commands
-    assert isinstance(seek, commands.Seek)
-    assert seek.frame == 1
-    studio.control.state = state_of("take1", "first", "tracking")
-    studio.client.patch(f"{RUN}/settings", params={"frame": 1}, json={"survival": 0.7})
-    assert len(studio.control.commands) == 1
+    studio.client.patch(f"{RUN}/settings", json={"survival": 0.7})
+    one, other = studio.control.commands
+    assert isinstance(one, commands.ChangeSettings)
+    assert isinstance(other, commands.ChangeSettings)
+    assert (one.frame, other.frame, one.run) == (1, -1, str(tracked.folder))
 
 
 def test_reset_and_presets(studio: Studio, tracked: StoredRun) -> None:

@@ -97,9 +97,11 @@ def test_what_is_open_is_let_go_of_before_it_moves(studio: Studio, tracked: Stor
     studio.control.state = state_of("take1", "first", "finished")
     assert studio.client.patch("/api/sessions/take1", json={"name": "moved"}).status_code == 200
     assert [type(command) for command in studio.control.commands] == [Close]
-    studio.control.state = state_of("other", "first", "finished")
+    (sent,) = studio.control.commands
+    assert (sent.session, sent.run) == (str(studio.workspace.root / "take1"), "")
+    studio.control.state = state_of("other", "first", "tracking")
     assert studio.client.delete("/api/sessions/moved").status_code == 200
-    assert len(studio.control.commands) == 1
+    assert len(studio.control.commands) == 1, "a search elsewhere is not waited for"
 
 
 def test_a_run_is_renamed_and_deleted(studio: Studio, tracked: StoredRun) -> None:

@@ -9,7 +9,11 @@ from web_doubles import Studio
 
 def ended(studio: Studio, identifier: str) -> dict:
     """An import's state when it has ended."""
-    while (told := studio.client.get(f"/api/imports/{identifier}").json())["state"] == "running":
+    while (told := studio.client.get(f"/api/imports/{identifier}").json())["state"] in (
+        "queued",
+        "running",
+        "cancelling",
+    ):
         pass
     return told
 

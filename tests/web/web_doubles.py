@@ -17,7 +17,7 @@ from studio.errors import RunError
 from studio.export.task import ExportTask, Written
 from studio.scene.model import Selection
 from studio.sessions.workspace import Workspace
-from studio.worker.commands import Command
+from studio.worker.commands import ChangeSettings, Command
 from studio.worker.events import Event, StateChanged
 from studio.worker.watchers import Subscription, Watchers
 
@@ -45,14 +45,15 @@ class RecordingControl:
 
     def send(self, command: Command) -> None:
         if self.state.state == "lost":
-            raise RunError("The tracking process has died.", "Resume.")
+            if not command.run:
+                raise RunError("The tracking process has died.", "Resume.")
+            self.restart(resume=False)
         self.commands.append(command)
 
     def request(self, command: Command) -> None:
         self.send(command)
-
-    def change_settings(self, **changes: bool | int | float | str) -> None:
-        self.changes.append(dict(changes))
+        if isinstance(command, ChangeSettings):
+            self.changes.append(dict(command.changes))
 
     def subscribe(self) -> Subscription:
         return self.watchers.subscribe()

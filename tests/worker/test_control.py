@@ -10,20 +10,23 @@ import textwrap
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import psutil
 import pytest
 from toy_session import make_session, true_poses
+from waiting import until
 
 from studio.errors import RunError, SettingsError
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
-from studio.worker import commands, owned_process
+from studio.worker import commands
+from studio.worker import process as tracking_process
 from studio.worker.control import StudioControl
-from studio.worker.events import Event, FrameFinished, LayerFinished, StateChanged
+from studio.worker.events import Acknowledged, Event, FrameFinished, LayerFinished, StateChanged
 from studio.worker.watchers import Subscription
 
 PATIENCE = 120.0
@@ -67,7 +70,7 @@ def poses_of(run: StoredRun) -> np.ndarray:
 
 def track(control: StudioControl, run: StoredRun) -> np.ndarray:
     watching = control.subscribe()
-    control.enqueue(run.session_name, run.name)
+    control.track(run.session_name, run.name)
     wait_for(watching, in_state("finished"))
     watching.close()
     return poses_of(run)
@@ -78,8 +81,9 @@ def test_killed_in_mid_run_it_is_lost_and_resumes_bit_for_bit(control: StudioCon
     whole, killed = (new_run(session, name, LONG, particles=1000) for name in ("whole", "killed"))
     wanted = track(control, whole)
     watching = control.subscribe()
-    control.open_run("longer", "killed")
-    control.request(commands.Start())
+    # A second a frame: it is killed in mid-run however long a busy machine keeps this thread waiting.
+    control.request(commands.SetPace(seconds_a_layer=0.1))
+    control.track("longer", "killed")
     wait_for(watching, lambda event: isinstance(event, FrameFinished) and event.result.frame >= 2)
     first = control.process_identifier
     assert first is not None
@@ -95,6 +99,7 @@ def test_killed_in_mid_run_it_is_lost_and_resumes_bit_for_bit(control: StudioCon
     with pytest.raises(RunError, match="died"):
         control.send(commands.Pause())
     control.restart()
+    control.request(commands.SetPace())
     wait_for(watching, in_state("finished"))
     assert control.process_identifier != first
     assert np.array_equal(poses_of(killed), wanted)
@@ -157,10 +162,32 @@ def test_a_command_that_the_process_dies_of_is_answered(
     assert wait_for(watching, in_state("lost"))
 
 
+def test_a_process_that_is_slow_to_start_is_not_lost(
+    control: StudioControl, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tracking_process, "SILENT_SECONDS", 0.5)
+    watching = control.subscribe()
+    with pytest.raises(RunError, match="No run is open"):
+        control.request(commands.Pause())
+    assert isinstance(watching.get(timeout=PATIENCE), Acknowledged)
+
+
+def test_what_a_restarted_process_left_unanswered_is_refused(control: StudioControl) -> None:
+    control.start()
+    psutil.Process(control.process_identifier).suspend()
+    refused = ThreadPoolExecutor(1).submit(control.request, commands.Pause())
+    until(lambda: control._answers)
+    control.restart()
+    with pytest.raises(RunError, match="died before it answered"):
+        refused.result(PATIENCE)
+    with pytest.raises(RunError, match="No run is open"):
+        control.request(commands.Pause())
+
+
 def test_a_silent_process_is_said_to_be_lost_until_it_speaks_again(
     session_on_disk: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(owned_process, "SILENT_SECONDS", 3.0)
+    monkeypatch.setattr(tracking_process, "SILENT_SECONDS", 3.0)
     control = StudioControl(Workspace())
     watching = control.subscribe()
     new_run(session_on_disk, "a")
@@ -181,8 +208,8 @@ def test_what_waits_is_brought_back(control: StudioControl, session_on_disk: Ses
     for name in ("a", "b"):
         new_run(session_on_disk, name, particles=2000, layers=20)
     watching = control.subscribe()
-    control.enqueue("toy", "a")
-    control.enqueue("toy", "b")
+    control.track("toy", "a")
+    control.track("toy", "b")
     wait_for(watching, lambda event: isinstance(event, FrameFinished))
     process = psutil.Process(control.process_identifier)
     process.kill()
@@ -192,12 +219,63 @@ def test_what_waits_is_brought_back(control: StudioControl, session_on_disk: Ses
     assert [run.summary().status for run in session_on_disk.runs()] == ["finished", "finished"]
 
 
+@pytest.mark.parametrize("lost", [False, True])
+def test_windows_that_start_different_runs_at_once_each_get_theirs(
+    control: StudioControl, session_on_disk: Session, lost: bool
+) -> None:
+    """From any state, the process being dead included: one process, and every run that was started is tracked."""
+    names = ("a", "b", "c", "d")
+    for name in names:
+        new_run(session_on_disk, name, 2)
+    watching = control.subscribe()
+    control.start()
+    if lost:
+        control.open_run("toy", "a")
+        psutil.Process(control.process_identifier).kill()
+        wait_for(watching, in_state("lost"))
+    together = threading.Barrier(2 * len(names))
+    refused: list[Exception] = []
+
+    def window(name: str, act: Callable[[], object]) -> None:
+        together.wait()
+        try:
+            act()
+        except RunError as problem:
+            refused.append(problem)
+
+    threads = [
+        threading.Thread(target=window, args=(name, act))
+        for name in names
+        for act in (
+            lambda name=name: control.track("toy", name),
+            lambda name=name: control.request(
+                commands.ChangeSettings(changes={"survival": 0.4}, **control.about("toy", name))
+            ),
+        )
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(PATIENCE)
+
+    # The newest state wins: that one of them is finished may be out of date before it is heard of.
+    def all_are_finished(event: Event) -> bool:
+        found = session_on_disk.runs()
+        return in_state("finished")(event) and all(run.summary().status == "finished" for run in found)
+
+    wait_for(watching, all_are_finished)
+    assert all("is being tracked" in str(problem) for problem in refused)
+    here = psutil.Process()
+    tracking = [child for child in here.children() if "spawn_main" in " ".join(child.cmdline())]
+    assert len(tracking) == 1
+
+
 def test_a_process_that_dies_after_its_last_frame_is_brought_back_with_what_waits(
     control: StudioControl, session_on_disk: Session
 ) -> None:
     new_run(session_on_disk, "a", 1)
     watching = control.subscribe()
-    control.enqueue("toy", "a")
+    control.track("toy", "a")
     wait_for(watching, in_state("finished"))
     # As if it had died before it could say so.
     control._said = dataclasses.replace(control.state, state="tracking")
@@ -206,7 +284,7 @@ def test_a_process_that_dies_after_its_last_frame_is_brought_back_with_what_wait
     control.restart()
     assert control.state.state != "failed"
     new_run(session_on_disk, "b", 1)
-    control.enqueue("toy", "b")
+    control.track("toy", "b")
     wait_for(watching, lambda event: in_state("finished")(event) and event.run == "b")
 
 
@@ -215,7 +293,7 @@ def test_closing_saves_the_frame_at_hand_and_stops_the_process(
 ) -> None:
     run = new_run(session_on_disk, "a", particles=4000, layers=60)
     watching = control.subscribe()
-    control.enqueue("toy", "a")
+    control.track("toy", "a")
     process = psutil.Process(control.process_identifier)
     wait_for(watching, lambda event: isinstance(event, LayerFinished))
     control.close()

@@ -6,8 +6,7 @@ import threading
 from store_records import layer_of
 
 from studio.worker.commands import Pause, Stop
-from studio.worker.control import nothing_open
-from studio.worker.events import Acknowledged, LayerFinished
+from studio.worker.events import Acknowledged, LayerFinished, nothing_open
 from studio.worker.process import Heartbeat, _loop, _send_all
 from studio.worker.tracking_job import TrackingJob
 from studio.worker.watchers import Subscription
@@ -21,7 +20,8 @@ def test_a_server_that_reads_nothing_holds_nothing_up() -> None:
     sender.start()
     for frame in range(400):
         for layer in range(3):
-            events.put(LayerFinished("s", "r", layer_of(frame, layer, count=200)))
+            event = LayerFinished("s", "r", layer_of(frame, layer, count=200))
+            events.put(event, event.key)
     events.close()
     received: list[LayerFinished] = []
     while sender.is_alive() or reading.poll(0.0):

@@ -1,6 +1,7 @@
 """What each command does, between two layers of a frame (no process here: the job is stepped by hand)."""
 
 import errno
+import itertools
 from pathlib import Path
 
 import cv2
@@ -345,16 +346,71 @@ def test_runs_wait_for_each_other(desk: Desk, session_on_disk: Session) -> None:
     runs = [new_run(session_on_disk, name) for name in ("a", "b", "c", "d")]
     folder = str(session_on_disk.path)
     for run in runs:
-        assert desk.ask(commands.Enqueue(session=folder, run=str(run.folder))).ok
+        assert desk.ask(commands.Start(session=folder, run=str(run.folder))).ok
     assert desk.state.run == "a"
     assert desk.state.waiting == (("toy", "b"), ("toy", "c"), ("toy", "d"))
-    assert not desk.ask(commands.Enqueue(session=folder, run=str(runs[0].folder))).ok
+    assert desk.ask(commands.Start(session=folder, run=str(runs[1].folder))).ok
+    assert desk.ask(commands.Start(session=folder, run=str(runs[0].folder))).ok
+    assert desk.state.waiting == (("toy", "b"), ("toy", "c"), ("toy", "d")), "each waits once"
     assert desk.ask(commands.Dequeue(session=folder, run=str(runs[2].folder))).ok
     desk.advance(2)
     desk.ask(commands.Cancel())
     assert (desk.state.run, desk.state.state, desk.state.waiting) == ("b", "tracking", (("toy", "d"),))
     desk.work()
     assert [run.summary().status for run in runs] == ["cancelled", "finished", "new", "finished"]
+
+
+def about(run: StoredRun) -> commands.About:
+    return commands.about(run.folder)
+
+
+WINDOWS = {
+    "start a": lambda a, b: commands.Start(**about(a)),
+    "start b": lambda a, b: commands.Start(**about(b)),
+    "look at a": lambda a, b: commands.Open(**about(a)),
+    "change b": lambda a, b: commands.ChangeSettings(changes={"survival": 0.4}, **about(b)),
+}
+
+
+@pytest.mark.parametrize("order", list(itertools.permutations(WINDOWS)), ids=", ".join)
+def test_in_whatever_order_windows_are_heard_each_command_is_about_its_run(
+    desk: Desk, session_on_disk: Session, order: tuple[str, ...]
+) -> None:
+    """What each window saw before it asked is of no account: a refusal names the run that is tracked."""
+    a, b = new_run(session_on_disk, "a"), new_run(session_on_disk, "b")
+    answers: dict[str, Acknowledged] = {}
+    for what in order:
+        answers[what] = desk.ask(WINDOWS[what](a, b))
+        if answers[what].ok and what == "change b":
+            assert answers[what].run == "b"
+        if not answers[what].ok:
+            assert what == "change b"
+            assert "Run 'a' of session 'toy' is being tracked." in answers[what].message
+    # Looking at a paused b's search; whoever wants it to go on asks again.
+    for run in (a, b):
+        assert desk.ask(commands.Start(**about(run))).ok
+    desk.work()
+    assert [run.summary().status for run in (a, b)] == ["finished", "finished"]
+    with a.results() as results:
+        assert {record.settings_version for record in results.layers(0)} == {1}, "b's knob is not a's"
+    errors = [event.text for event in desk.events if isinstance(event, LogLine) and event.level == "error"]
+    assert errors == [], "what was started does not wait any more"
+
+
+def test_a_command_without_a_run_is_about_the_open_one_and_a_release_names_what_it_means(
+    desk: Desk, run: StoredRun, session_on_disk: Session
+) -> None:
+    other = new_run(session_on_disk, "b")
+    desk.open(run)
+    assert desk.ask(commands.Close(**about(other))).ok
+    assert desk.ask(commands.Close(session=str(run.folder.parents[2] / "elsewhere"))).ok
+    assert desk.state.run == "a"
+    desk.ask(commands.Start())
+    assert not desk.ask(commands.Close(**about(run))).ok
+    assert not desk.ask(commands.Close(session=about(run)["session"])).ok
+    desk.work()
+    assert desk.ask(commands.Close(session=about(run)["session"])).ok
+    assert desk.state.state == "idle"
 
 
 def test_another_run_opened_while_tracking_leaves_the_first_saved_whole(

@@ -4,17 +4,17 @@ import asyncio
 import dataclasses
 import queue
 import threading
+from typing import Any
 
 import pytest
 from store_records import layer_of, result_of
 
-from studio.worker.control import nothing_open
-from studio.worker.events import Acknowledged, Event, FrameFinished, LayerFinished, LogLine
+from studio.worker.events import Acknowledged, Event, FrameFinished, LayerFinished, LogLine, nothing_open
 from studio.worker.watchers import Subscription, Watchers
 
 
-def drained(subscription: Subscription) -> list[Event]:
-    events: list[Event] = []
+def drained(subscription: Subscription[Event]) -> list[Any]:
+    events: list[Any] = []
     while True:
         try:
             events.append(subscription.get_nowait())
@@ -26,23 +26,27 @@ def layer(frame: int, number: int, again: bool = False) -> LayerFinished:
     return LayerFinished("s", "r", layer_of(frame, number), again)
 
 
+def put(subscription: Subscription[Event], event: Event) -> None:
+    subscription.put(event, event.key)
+
+
 def test_the_newest_state_and_result_stand() -> None:
-    subscription = Subscription()
+    subscription = Subscription[Event]()
     for frame in range(50):
-        subscription.put(dataclasses.replace(nothing_open(), frame=frame))
-        subscription.put(FrameFinished("s", "r", result_of(frame)))
+        put(subscription, dataclasses.replace(nothing_open(), frame=frame))
+        put(subscription, FrameFinished("s", "r", result_of(frame)))
     state, finished = drained(subscription)
     assert state.frame == 49
     assert finished.result.frame == 49
 
 
 def test_all_layers_of_the_last_frame_are_there_in_order_and_answers_beside_them() -> None:
-    subscription = Subscription()
+    subscription = Subscription[Event]()
     for frame in range(20):
         for number in range(10):
-            subscription.put(layer(frame, number))
+            put(subscription, layer(frame, number))
     for number in range(10):
-        subscription.put(layer(7, number, again=True))
+        put(subscription, layer(7, number, again=True))
     events = drained(subscription)
     stored = [event.record for event in events if not event.reannealed]
     again = [event.record for event in events if event.reannealed]
@@ -51,36 +55,36 @@ def test_all_layers_of_the_last_frame_are_there_in_order_and_answers_beside_them
 
 
 def test_acknowledgements_are_kept_one_by_one_and_the_whole_is_bounded() -> None:
-    subscription = Subscription(limit=30)
+    subscription = Subscription[Event](limit=30)
     for number in range(10):
-        subscription.put(Acknowledged("", "", str(number), "Pause", True))
+        put(subscription, Acknowledged("", "", str(number), "Pause", True))
     assert [event.identifier for event in drained(subscription)] == [str(number) for number in range(10)]
     for number in range(1000):
-        subscription.put(LogLine("", "", "info", 0.0, str(number)))
+        put(subscription, LogLine("", "", "info", 0.0, str(number)))
     assert [event.text for event in drained(subscription)] == [str(number) for number in range(970, 1000)]
 
 
 def test_waiting_in_a_thread_ends_with_an_event_or_the_close() -> None:
-    subscription = Subscription()
+    subscription = Subscription[Event]()
     with pytest.raises(queue.Empty):
         subscription.get(timeout=0.01)
-    threading.Timer(0.02, subscription.put, [nothing_open()]).start()
+    threading.Timer(0.02, put, [subscription, nothing_open()]).start()
     assert subscription.get(timeout=10.0) == nothing_open()
     threading.Timer(0.02, subscription.close).start()
     with pytest.raises(queue.Empty):
         subscription.get()
-    subscription.put(nothing_open())
+    put(subscription, nothing_open())
     assert drained(subscription) == []
 
 
 def test_waiting_in_an_event_loop() -> None:
     async def watch() -> list[int]:
-        subscription = Subscription()
+        subscription = Subscription[Event]()
         waiting = asyncio.create_task(subscription.next())
         await asyncio.sleep(0)
-        threading.Thread(target=subscription.put, args=(layer(3, 1),)).start()
+        threading.Thread(target=put, args=(subscription, layer(3, 1))).start()
         first = await waiting
-        subscription.put(layer(3, 2))
+        put(subscription, layer(3, 2))
         second = await subscription.next()
         closing = asyncio.create_task(subscription.next())
         await asyncio.sleep(0)

@@ -2,7 +2,7 @@
 
 import { post } from "./api.js";
 import { bar, button, card, element, failure, field, files, fill, hint, lead, NAME, number, optional, pageHead, select, sends, table } from "./elements.js";
-import { progressOf } from "./jobs.js";
+import { isGoing, progressOf } from "./jobs.js";
 import { uploadFiles } from "./uploading.js";
 
 /** @type {[string, string][]} */
@@ -61,13 +61,13 @@ export function showLearningForm(content, { choices, sessions, started }) {
 }
 
 /** How far it is, in one line. */
-export const progressWords = (job) => (job.state === "running" ? progressOf(job, "beginning").words : job.state);
+export const progressWords = (job) => (isGoing(job) ? progressOf(job, "beginning").words : job.state);
 
 const shareOf = (job) => (job.total ? job.done / job.total : 0);
 
 /** The card of what is being learnt, or of why it was not. again: called for another form. */
 export function showLearning(content, job, { cancel, again }) {
-  const running = job.state === "running";
+  const running = isGoing(job);
   const ended = { cancelled: "It was cancelled; nothing of it was kept.", failed: job.message }[job.state] ?? "";
   const box = card("", running ? [element("p", { className: "lead words-of-progress" }, progressWords(job)), bar(shareOf(job), "long-progress")] : [failure({ message: ended }), job.hint && lead(job.hint)]);
   box.id = "learning";
@@ -77,7 +77,7 @@ export function showLearning(content, job, { cancel, again }) {
 /** Bring the card up to date where it shows one in the making; whether it did. */
 export function updateLearning(content, job) {
   const words = content.querySelector("#learning .words-of-progress");
-  if (!words || job.state !== "running") return false;
+  if (!words || !isGoing(job)) return false;
   words.textContent = progressWords(job);
   content.querySelector("#learning .long-progress i").style.width = `${100 * shareOf(job)}%`;
   return true;

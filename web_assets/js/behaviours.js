@@ -9,6 +9,7 @@ import { BodyDrawing } from "./body_drawing.js";
 import { openForm } from "./dialogs.js";
 import { bar, button, byId, card, dotted, element, failure, fill, lead, NAME, nothing, pageHead } from "./elements.js";
 import { drawChart } from "./findings_charts.js";
+import { isGoing } from "./jobs.js";
 import { complain, say } from "./messages.js";
 import { startTheme } from "./theme.js";
 
@@ -34,7 +35,7 @@ const percent = (share) => `${(100 * share).toFixed(share < 0.1 ? 1 : 0)} %`;
 const column = (...children) => fill(content, element("div", { className: "column" }, ...children));
 
 function drawList() {
-  const running = learning?.state === "running";
+  const running = isGoing(learning);
   const entry = (key, current, properties, name, mark, facts, ...more) => {
     const row = element("button", { type: "button", className: "entry", dataset: { key }, ...properties },
       element("span", { className: "name" }, name), element("span", { className: "mark" }, mark), element("span", { className: "facts" }, facts), ...more);
@@ -185,7 +186,7 @@ async function openNew() {
   turnTo("", "Learn a behaviour · Capture studio", "?new=");
   const choices = await fetchJson("/api/learning");
   learning = choices.progress;
-  if (learning?.state === "running") showProgress();
+  if (isGoing(learning)) showProgress();
   else {
     const { sessions } = await fetchJson("/api/sessions");
     if (!isNew) return;
@@ -201,7 +202,7 @@ function showProgress() {
 /** Ask how far it is while something is learnt; what was learnt opens, unless another model is being looked at. */
 function watchLearning() {
   clearTimeout(timer);
-  if (learning?.state !== "running") return;
+  if (!isGoing(learning)) return;
   timer = setTimeout(async () => {
     try {
       learning = (await fetchJson("/api/learning")).progress;

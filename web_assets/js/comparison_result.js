@@ -3,11 +3,12 @@
 import * as echarts from "../vendor/echarts.esm.min.js";
 import { bar, button, card, dotted, duration, element, fill, hint, lead, pageHead, spring, table } from "./elements.js";
 import { drawChart } from "./findings_charts.js";
+import { GOING } from "./jobs.js";
 import { seriesColour } from "./theme.js";
 
 /** @import { Schemas } from "./api_types" */
 
-const BADGES = { running: "good", cancelling: "warn", finished: "calm", interrupted: "warn", cancelled: "calm", failed: "bad" };
+const BADGES = { queued: "calm", running: "good", cancelling: "warn", done: "calm", interrupted: "warn", cancelled: "calm", failed: "bad" };
 const SIGNIFICANT = 0.05;
 
 let disposals = [];
@@ -19,7 +20,7 @@ export function clearComparison() {
 }
 
 /** Whether a comparison is being computed. */
-export const isGoing = (line) => ["running", "cancelling"].includes(line?.status);
+export const isGoing = (line) => GOING.includes(line?.status);
 
 const millimetres = (value) => value.toFixed(1);
 const seedWords = (count) => `${count} ${count === 1 ? "seed" : "seeds"}`;
@@ -50,7 +51,7 @@ export const shareOf = (line) => line.done / Math.max(1, line.total);
 
 function head({ comparison: line, fps }, actions) {
   const path = `/api/comparisons/${encodeURIComponent(line.session)}/${encodeURIComponent(line.name)}`;
-  const download = (words, file) => line.status === "finished" && element("a", { className: "download", href: `${path}/${file}`, download: "" }, words);
+  const download = (words, file) => line.status === "done" && element("a", { className: "download", href: `${path}/${file}`, download: "" }, words);
   return pageHead(`${line.trackers.join(", ")} on ${line.session}`,
     dotted(line.name, `${line.evaluations} evaluations a frame`, `${seedWords(line.seeds)} each`, `frames ${line.first} to ${line.last - 1} at ${fps} per second`, line.created.slice(0, 16).replace("T", " ")),
     element("div", { className: "group" }, download("JSON", "result.json"), download("CSV", "frames.csv"), button("Again…", actions.again), !isGoing(line) && button("Delete…", actions.remove, "quiet")));
@@ -69,7 +70,7 @@ function progressBox(line, actions) {
     cancelled: "Cancelled. What is measured is kept, and it can go on.", failed: line.problem,
   };
   return card("", element("div", { className: "form-foot" }, badge(line.status), element("span", { className: "progress-words" }, going ? progressWords(line) : words[line.status] ?? ""),
-    spring(), line.status === "running" && button("Cancel", actions.cancel), !going && button("Go on", actions.resume, "primary")),
+    spring(), going && line.status !== "cancelling" && button("Cancel", actions.cancel), !going && button("Go on", actions.resume, "primary")),
   bar(shareOf(line), "long-progress"), !going && hint(`${line.done} of ${line.total} trials are done.`));
 }
 

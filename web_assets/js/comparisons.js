@@ -36,7 +36,7 @@ async function refresh() {
 }
 
 function entryOf(line) {
-  const mark = line.status === "finished" && line.best ? element("span", { className: "mark", title: line.best }, `${line.best_mm.toFixed(1)} mm`) : element("span", { className: "mark" }, badge(line.status));
+  const mark = line.status === "done" && line.best ? element("span", { className: "mark", title: line.best }, `${line.best_mm.toFixed(1)} mm`) : element("span", { className: "mark" }, badge(line.status));
   const row = element("button", { type: "button", className: "entry", title: line.trackers.join(", "), dataset: { key: `${line.session}/${line.name}` }, onclick: () => openComparison(line).catch(complain) },
     element("span", { className: "name" }, line.name), mark, element("span", { className: "facts" }, sizeWords(line)), isGoing(line) && bar(shareOf(line)));
   if (same(line, open)) row.ariaCurrent = "true";

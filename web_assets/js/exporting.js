@@ -2,7 +2,7 @@
 
 import { fetchJson, post, remove, runPath } from "./api.js";
 import { bar, button, byId, check, dotted, element, failure, field, fill, hint, number, select } from "./elements.js";
-import { standing, timeLeft } from "./jobs.js";
+import { isGoing, standing, timeLeft } from "./jobs.js";
 import { onEvent } from "./live.js";
 import { complain } from "./messages.js";
 import { get, watch } from "./state.js";
@@ -124,7 +124,7 @@ async function refresh() {
 
 /** An export of this run got further, or ended. */
 function hear(job) {
-  if (job.state === "running") {
+  if (isGoing(job)) {
     if (going && going.identifier !== job.identifier) return;
     going = job;
     panel.querySelector(".export-actions")?.replaceWith(exportActions());

@@ -9,6 +9,12 @@ const WORTH_SAYING = 2;
 /** The code of the error of what a person ended. */
 export const CANCELLED = "cancelled";
 
+/** The states of what is not over. */
+export const GOING = ["queued", "running", "cancelling"];
+
+/** Whether a job is not over. */
+export const isGoing = (job) => GOING.includes(job?.state);
+
 /**
  * Follow the job at an address; resolves with its last state, "done" or "cancelled", and throws what went wrong.
  * `report` gets each state on the way; once `gone()` nothing waits any more: resolves with null.
@@ -19,7 +25,7 @@ export async function followJob(path, report = (_job) => {}, gone = () => false)
     const job = await fetchJson(path);
     if (gone()) return null;
     if (job.state === "failed") throw fault(job.message, job.hint, { code: job.code });
-    if (job.state !== "running") return job;
+    if (!isGoing(job)) return job;
     report(job);
     await new Promise((resolve) => setTimeout(resolve, POLL_MILLISECONDS));
     if (gone()) return null;

@@ -2,6 +2,7 @@
 
 import { fetchJson, post } from "./api.js";
 import { button, byId, card, check, dotted, element, failure, field, fill, number, offer, pageHead, text } from "./elements.js";
+import { isGoing } from "./jobs.js";
 import { complain } from "./messages.js";
 import { sessionWords, studioPath } from "./sessions.js";
 import { startTheme } from "./theme.js";
@@ -16,7 +17,7 @@ const STATES = { connecting: "calm", running: "good", stopped: "bad", ended: "ca
 let view = null;
 let looking = 0;
 
-const going = () => ["getting ready", "recording", "importing"].includes(view?.recording?.state);
+const going = () => isGoing(view?.recording);
 const plain = (value, digits = 1) => (value === null || value === undefined ? "–" : value.toFixed(digits));
 const clock = (seconds) => `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
 
@@ -111,7 +112,7 @@ function update() {
   form.classList.toggle("going", is);
   record.disabled = !view.cameras.length;
   stop.hidden = !is;
-  stop.disabled = view.recording?.state === "importing";
+  stop.disabled = view.recording?.step === "importing";
   drawOutcome();
 }
 
@@ -126,12 +127,12 @@ async function begin() {
 
 function drawOutcome() {
   if (!view.recording) return fill(outcome);
-  const { state, session: made, seconds: passed, limit, words, notes, run } = view.recording;
+  const { state, step, session: made, seconds: passed, limit, words, notes, run } = view.recording;
   if (state === "failed") return fill(outcome, failure(view.recording));
-  const live = state === "recording" || state === "getting ready";
+  const live = going() && step !== "importing";
   const counter = element("span", { className: `counter ${live ? "live" : ""}` }, limit ? `${clock(passed)} / ${clock(limit)}` : clock(passed));
   const target = run ? `${made} / ${run}` : made;
-  fill(outcome, element("p", { className: "recording-line", role: "status" }, live && element("i", { className: "red-dot" }), counter, element("span", {}, dotted(state !== "done" && state, words))),
+  fill(outcome, element("p", { className: "recording-line", role: "status" }, live && element("i", { className: "red-dot" }), counter, element("span", {}, dotted(step, words))),
     (state === "done" || run) && element("p", {}, element("a", { href: studioPath(made, run) }, state === "done" ? `Open ${target}` : `Watch ${target} being tracked`)),
     notes.length > 0 && element("ul", { className: "words" }, notes.map((note) => element("li", { className: "caution" }, note))));
 }

@@ -8,6 +8,7 @@ import { fetchJson, post, sessionPath } from "./api.js";
 import { closeDialog, openForm } from "./dialogs.js";
 import { actions, button, byId, element, failure, fill, lead, NAME, nothing, notice, offer, spring } from "./elements.js";
 import { listen, startEvents } from "./events.js";
+import { isGoing } from "./jobs.js";
 import { complain } from "./messages.js";
 import { loadScene } from "./scene_window.js";
 import { sessionWords } from "./sessions.js";
@@ -190,7 +191,7 @@ async function start() {
   byId("begin").onclick = beginForm;
   which.onchange = () => open(which.value);
   for (const type of ["sessions", "track", "subject", "initialise", "export", "state", "import"]) {
-    listen(type, (event) => { if (session && event.session === session && event.state !== "running") refresh().catch(() => {}); });
+    listen(type, (event) => { if (session && event.session === session && !isGoing(event)) refresh().catch(() => {}); });
   }
   const query = new URLSearchParams(location.search);
   try {

@@ -2,7 +2,7 @@
 
 import { fetchJson, post, remove, sessionPath } from "./api.js";
 import { actions, button, dotted, drawProgress, element, failure, fill, hint, notice, optional, percent, table } from "./elements.js";
-import { timeLeft } from "./jobs.js";
+import { isGoing, timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 
 const WHY = "A tripod that was touched after the calibration turns a camera by a degree, which is twenty pixels. Silhouettes show it, without a board.";
@@ -34,7 +34,7 @@ export function alignmentBox(setup, place, changed) {
     if (stopped || !alignment) return;
     const { job, possible, turned, notes } = alignment;
     place.hidden = !possible;
-    const going = job?.state === "running";
+    const going = isGoing(job);
     const done = job?.state === "done" ? job : null;
     const error = failed ?? (job?.state === "failed" ? job : null);
     const bar = optional();
@@ -77,7 +77,7 @@ export function alignmentBox(setup, place, changed) {
     if (!alignment) return;
     alignment = { ...alignment, job };
     draw();
-    if (job.state !== "running") setup.refresh().catch(complain);
+    if (!isGoing(job)) setup.refresh().catch(complain);
   });
 
   return { load, measure, stop: () => { stopped = true; } };

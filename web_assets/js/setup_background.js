@@ -2,7 +2,7 @@
 
 import { fetchJson, post, put, remove, sessionPath } from "./api.js";
 import { actions, button, check, drawProgress, element, failure, field, files, fill, hint, notice, optional, select } from "./elements.js";
-import { progressOf } from "./jobs.js";
+import { isGoing, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 import { uploadFiles } from "./uploading.js";
 import { alignmentBox } from "./setup_alignment.js";
@@ -103,7 +103,7 @@ export function mount(place, setup) {
   }
 
   function drawMake() {
-    const running = background.job?.state === "running";
+    const running = isGoing(background.job);
     fill(make, background.source === "masks" && notice("Masks came with the footage and are used as they are. Set a background up only if they are not good."),
       sourceChoices(), plates(),
       check("try what makes the views agree best", { checked: tune, onchange: ({ target }) => { tune = target.checked; } }, "Knobs under which the views agree best are chosen; those that you set below stay."),
@@ -130,12 +130,12 @@ export function mount(place, setup) {
   /** Ask how the set-up stands until it ends. */
   async function follow() {
     clearTimeout(timer);
-    if (gone || background.job?.state !== "running") return;
+    if (gone || !isGoing(background.job)) return;
     timer = setTimeout(async () => {
       await load().catch(complain);
       if (gone) return;
       const { job } = background;
-      if (job?.state === "running") { drawGoing(); return follow(); }
+      if (isGoing(job)) { drawGoing(); return follow(); }
       if (job?.state === "failed") failed = job;
       if (job?.state === "done") {
         quality = job.quality;

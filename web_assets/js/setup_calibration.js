@@ -4,7 +4,7 @@ import { accepted, fetchJson, post, remove, sessionPath } from "./api.js";
 import { findingList, plainNumbers, residualBars, rigFromAbove } from "./calibration_drawing.js";
 import { clickFloor } from "./calibration_points.js";
 import { actions, button, check, dotted, download, drawProgress, element, failure, field, files, fill, hint, notice, optional, picture, select, text } from "./elements.js";
-import { timeLeft } from "./jobs.js";
+import { isGoing, timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 import { uploadFiles } from "./uploading.js";
 import { boardForm } from "./setup_boards.js";
@@ -90,7 +90,7 @@ export function mount(place, setup) {
   /** The calibration that is being computed got further. */
   async function hear(state) {
     if (gone || state.identifier !== job) return;
-    if (state.state === "running") {
+    if (isGoing(state)) {
       const cancel = () => remove(`/api/calibrations/${job}`).catch(complain);
       return drawProgress(progress, { words: dotted(state.step || "Beginning", state.total > 1 && `${state.done} of ${state.total}`, timeLeft(state.seconds_left) && `about ${timeLeft(state.seconds_left)}`), share: state.share, cancel });
     }

@@ -2,7 +2,7 @@
 
 import { fault, fetchJson, post, put, remove, sessionPath } from "./api.js";
 import { actions, button, check, drawProgress, element, failure, field, fill, hint, number, optional, percent, select, table, text } from "./elements.js";
-import { followJob, progressOf } from "./jobs.js";
+import { followJob, isGoing, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 import { drawStature } from "./setup_stature.js";
 
@@ -92,7 +92,7 @@ export function mount(place, setup) {
 
   function drawFit() {
     saveHeight.classList.toggle("primary", !subject.saved || changed());
-    const going = fit?.state === "running";
+    const going = isGoing(fit);
     const found = fit?.state === "done";
     const isReady = subject.saved && !changed();
     const box = (name, title) => check(name === "symmetric" ? "left and right alike" : name, { checked: options[name], onchange: ({ target }) => { options[name] = target.checked; } }, title);

@@ -2,7 +2,7 @@
 
 import { accepted, post, remove, sessionPath } from "./api.js";
 import { actions, button, drawProgress, element, failure, files, fill, hint, notice, number, optional, table } from "./elements.js";
-import { followJob, progressOf } from "./jobs.js";
+import { followJob, isGoing, progressOf } from "./jobs.js";
 import { complain } from "./messages.js";
 
 /** Draw in `place`; `use(offsets)` applies offsets. @param {import("./setup.js").Setup} setup */
@@ -44,7 +44,7 @@ export function synchroniser(place, setup, use) {
       table(["camera", "offset", "found"], rows(apply), "figures offsets"),
       actions(apply, button("Estimate from motion", begin, "small"), button("From timestamps.csv…", () => times.click(), "quiet small"), times),
       bar, failure(failed), found(), footage.stale_runs.length > 0 && notice(`Tracked on the footage as it was before: ${footage.stale_runs.join(", ")}.`));
-    if (estimate?.state === "running") drawProgress(bar, progressOf(estimate, "beginning", () => remove(`${here}/synchrony`).catch(complain)));
+    if (isGoing(estimate)) drawProgress(bar, progressOf(estimate, "beginning", () => remove(`${here}/synchrony`).catch(complain)));
   }
 
   async function readTimes(file) {

@@ -2,11 +2,11 @@
 
 import pytest
 
+from studio.benchmarks.reannealing import measure_reannealing
 from studio.runs.new_run import RunRequest, prepare_run
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 from studio.worker.control import StudioControl
-from studio.worker.latency import measure_reannealing
 
 
 def test_every_answer_is_waited_for(session_on_disk: Session) -> None:

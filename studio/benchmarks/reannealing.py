@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from studio.errors import RunError
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
-from studio.worker import commands
 from studio.worker.control import StudioControl
-from studio.worker.events import FrameFinished, StateChanged
+from studio.worker.events import Event, FrameFinished, StateChanged
 from studio.worker.watchers import Subscription
 
 PATIENCE_SECONDS = 120.0
@@ -39,8 +38,7 @@ def measure_reannealing(
     """
     watcher = control.subscribe()
     try:
-        control.open_run(session.name, run.name)
-        control.request(commands.Start())
+        control.track(session.name, run.name)
         while True:
             event = watcher.get(timeout=PATIENCE_SECONDS)
             if isinstance(event, StateChanged) and event.state == "finished":
@@ -60,7 +58,7 @@ def measure_reannealing(
     )
 
 
-def _answered(control: StudioControl, watcher: Subscription, survival: float) -> float:
+def _answered(control: StudioControl, watcher: Subscription[Event], survival: float) -> float:
     """Milliseconds until a re-annealed frame has come, all its layers before it."""
     began = time.perf_counter()
     control.change_settings(survival=survival)
