@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,8 +18,8 @@ class Maps(NamedTuple):
 def joined_maps(
     views: Sequence[Sequence[tuple[NDArray[Any], NDArray[Any] | None]]], padding: Sequence[int], dtype: type
 ) -> Maps:
-    """The maps of every view, one or two, all of its picture's size. A map is a picture (H, W) and the table (256,)
-    that its values are looked up in, None for the values themselves; `padding` follows each.
+    """The maps of every view, one or two, all of its picture's size. A map is a picture (H, W) uint8 and the table
+    (256,) that its values are looked up in, None for the values themselves; `padding` follows each.
     """
     size = sum(picture.size + len(padding) for view in views for picture, _ in view)
     values, places = np.empty(size, dtype=dtype), np.zeros((len(views), 4), dtype=np.int64)
@@ -30,7 +31,7 @@ def joined_maps(
             if table is None:
                 values[start:end] = picture.ravel()
             else:
-                np.take(table, picture.ravel(), out=values[start:end])
+                values[start:end] = cv2.LUT(picture, table).ravel()
             values[end : end + len(padding)] = padding
             start = end + len(padding)
     return Maps(values, places)
