@@ -48,7 +48,7 @@ def isolated(
         return function(path, *([] if on_frame is None else [on_frame]), **options)
     child = _CHILDREN.take()
     try:
-        child.ask((function.__module__, function.__qualname__, path, on_frame is not None, options))
+        child.send((function.__module__, function.__qualname__, path, on_frame is not None, options))
         while True:
             kind, value = child.hear(SECONDS_OF_SILENCE)
             if kind == "frame" and on_frame is not None:
@@ -107,7 +107,7 @@ class _Child:
     def lives(self) -> bool:
         return self._process.poll() is None
 
-    def ask(self, question: object) -> None:
+    def send(self, question: object) -> None:
         assert self._process.stdin is not None
         self.busy = True
         try:
@@ -118,13 +118,13 @@ class _Child:
 
     def hear(self, patience: float) -> tuple[str, Any]:
         try:
-            said = self._heard.get(timeout=patience)
+            reply = self._heard.get(timeout=patience)
         except queue.Empty:
             raise _Ended(f"took more than {patience:g} s") from None
-        if said is None:
+        if reply is None:
             raise _Ended("crashed")
-        self.busy = said[0] == "frame"
-        return said
+        self.busy = reply[0] == "frame"
+        return reply
 
     def kill(self) -> None:
         with contextlib.suppress(OSError):
@@ -200,9 +200,9 @@ def serve() -> None:
         except (EOFError, OSError):
             return
         function = getattr(importlib.import_module(module), name)
-        told = [_progress(answers)] if with_frames else []
+        callbacks = [_progress(answers)] if with_frames else []
         try:
-            answer = ("result", function(path, *told, **options))
+            answer = ("result", function(path, *callbacks, **options))
         except Exception as problem:
             answer = ("raised", problem)
         try:
@@ -214,8 +214,8 @@ def serve() -> None:
 
 
 def _progress(answers: BinaryIO) -> OnFrame:
-    def tell(done: int, total: int) -> None:
+    def report(done: int, total: int) -> None:
         pickle.dump(("frame", (done, total)), answers)
         answers.flush()
 
-    return tell
+    return report

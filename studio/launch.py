@@ -70,8 +70,8 @@ def serve(
     workspace = Workspace(workspace_root)
     log_path = _log_to_file(workspace.root / STATE_NAME)
     token = new_token()
-    with _alone_on(workspace.root) as tell_address, _listening(host, port) as listener:
-        tell_address(f"http://{_named(host)}:{listener.getsockname()[1]}")
+    with _alone_on(workspace.root) as show_address, _listening(host, port) as listener:
+        show_address(f"http://{_named(host)}:{listener.getsockname()[1]}")
         control = StudioControl(workspace)
         try:
             app = build_app(
@@ -109,9 +109,9 @@ def prepare_demo(workspace_root: Path) -> Session:
 
 def address(host: str, port: int, token: str, session: str | None = None, run: str | None = None) -> str:
     """The address to open; it holds the token."""
-    wish = f"&session={session}" if session else ""
-    wish += f"&run={run}" if session and run else ""
-    return f"http://{_named(host)}:{port}/?token={token}{wish}"
+    query = f"&session={session}" if session else ""
+    query += f"&run={run}" if session and run else ""
+    return f"http://{_named(host)}:{port}/?token={token}{query}"
 
 
 def _named(host: str) -> str:

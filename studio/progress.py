@@ -30,13 +30,13 @@ def watched(progress: Progress | None, cancelled: Cancelled | None, work: str) -
     work : what is going on, as a sentence begins with it: "The export".
     """
 
-    def tell(step: str, done: int, total: int) -> None:
+    def report(step: str, done: int, total: int) -> None:
         if cancelled is not None and cancelled():
             raise WorkCancelledError(f"{work} was cancelled.", "Start it again when you like.")
         if progress is not None:
             progress(step, done, total)
 
-    return tell
+    return report
 
 
 def time_left(taken: Sequence[tuple[float, float]], left: float) -> float | None:

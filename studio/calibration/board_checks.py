@@ -86,8 +86,8 @@ def mirrored_cameras(
     if most == 0:
         return ()
     guilty = tuple(name for name in rig_names if odd[name] == most)
-    told = "the boards agree once left and right are exchanged"
-    message = f"The pictures of camera {' or '.join(guilty)} are mirrored: {told}."
+    reason = "the boards agree once left and right are exchanged"
+    message = f"The pictures of camera {' or '.join(guilty)} are mirrored: {reason}."
     remedy = "Switch mirroring off in the camera's program, or flip the footage."
     return (Finding("mirrored-video", "blocks", message, remedy, guilty),)
 

@@ -116,7 +116,7 @@ def look_for_lens(
     """
     count = frame_count(footage)
     frames = np.arange(count) if footage.video is None else frames_in_step([count], LENS_FRAMES)
-    return _looked(finder, camera, footage, count, frames, progress, taken)
+    return _examined(finder, camera, footage, count, frames, progress, taken)
 
 
 def look_together(
@@ -144,7 +144,7 @@ def look_together(
     frames = np.union1d(frames, [frame for frame in also if first <= frame < least]).astype(np.int64)
     found: list[Seen] = []
     for camera, entry in footage.items():
-        found += _looked(finder, camera, entry, counts[camera], frames, progress, taken, begins[camera])
+        found += _examined(finder, camera, entry, counts[camera], frames, progress, taken, begins[camera])
     return found
 
 
@@ -189,7 +189,7 @@ def _cells(sighting: Sighting) -> set[int]:
     return {int(place) + 64 * lean for place in 8 * places[:, 1] + places[:, 0]}
 
 
-def _looked(
+def _examined(
     finder: BoardFinder,
     camera: str,
     footage: BoardFootage,

@@ -68,14 +68,14 @@ def _exchanged(one: Camera, two: Camera) -> tuple[Camera, Camera]:
 def hypotheses(cameras: Sequence[Camera]) -> tuple[Hypothesis, ...]:
     """The faults to try: one camera's, all cameras', exchanges of two."""
     found: list[Hypothesis] = []
-    for code, change, said, remedy in _CHANGES:
+    for code, change, words, remedy in _CHANGES:
         everything = tuple(change(camera) for camera in cameras)
         for number, camera in enumerate(cameras):
             right = (*cameras[:number], everything[number], *cameras[number + 1 :])
             found.append(
-                Hypothesis(code, right, (camera.name,), said.format(f"camera {camera.name}"), remedy)
+                Hypothesis(code, right, (camera.name,), words.format(f"camera {camera.name}"), remedy)
             )
-        found.append(Hypothesis(code, everything, (), said.format("all cameras"), remedy))
+        found.append(Hypothesis(code, everything, (), words.format("all cameras"), remedy))
     for one, two in combinations(range(len(cameras)), 2):
         right = list(cameras)
         right[one], right[two] = _exchanged(cameras[one], cameras[two])
@@ -156,5 +156,5 @@ def explained(
         return (Finding("views-disagree", "blocks", message, remedy),)
     best, _, entry = tried[0]
     rivals = sorted({other.code for value, _, other in tried[1:] if value <= RUNNER_UP * best} - {entry.code})
-    told = f" Nearly as good an explanation: {', '.join(rivals)}." if rivals else ""
-    return (Finding(entry.code, "blocks", entry.message + told, entry.remedy, entry.about),)
+    rival_note = f" Nearly as good an explanation: {', '.join(rivals)}." if rivals else ""
+    return (Finding(entry.code, "blocks", entry.message + rival_note, entry.remedy, entry.about),)

@@ -47,7 +47,7 @@ def report_of(calibrated: Calibrated) -> dict[str, object]:
     }
 
 
-def told_source(calibrated: Calibrated) -> str:
+def calibration_source(calibrated: Calibrated) -> str:
     """Where a calibration comes from, in a few words: the board, and the pixels that its corners are off."""
     rig = calibrated.rig
     off = (
@@ -55,8 +55,8 @@ def told_source(calibrated: Calibrated) -> str:
     )
     board = calibrated.board
     kind = "ChArUco board" if board.kind == "charuco" else "chessboard"
-    told = f"{kind} {board.columns}x{board.rows}"
-    return f"{told}, {off:.2f} px" if math.isfinite(off) else told
+    source = f"{kind} {board.columns}x{board.rows}"
+    return f"{source}, {off:.2f} px" if math.isfinite(off) else source
 
 
 def write_calibrated(calibrated: Calibrated, path: Path, *, anyway: bool = False) -> tuple[Path, ...]:

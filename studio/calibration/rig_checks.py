@@ -48,16 +48,16 @@ def _sizes(cameras: Sequence[Camera], footage_sizes: Mapping[str, tuple[int, int
         across, down = size[0] / camera.width, size[1] / camera.height
         if max(abs(across - 1.0), abs(down - 1.0)) <= SIZE_TOLERANCE:
             continue
-        told = f"Camera {camera.name} recorded {size[0]}x{size[1]} pixels and was calibrated at"
-        told = f"{told} {camera.width}x{camera.height}"
+        mismatch = f"Camera {camera.name} recorded {size[0]}x{size[1]} pixels and was calibrated at"
+        mismatch = f"{mismatch} {camera.width}x{camera.height}"
         if abs(across / down - 1.0) < ASPECT_TOLERANCE:
-            message = f"{told}: the recording has {across:.3g} times the resolution."
+            message = f"{mismatch}: the recording has {across:.3g} times the resolution."
             remedy = "Scale the calibration to the recording, or record at the calibrated resolution."
         elif (size[0] - size[1]) * (camera.width - camera.height) < 0:
-            message = f"{told}: one is upright, the other lies on its side."
+            message = f"{mismatch}: one is upright, the other lies on its side."
             remedy = "Turn the footage as it was when it was calibrated."
         else:
-            message = f"{told}: the shape of the picture differs, so part of it was cut off."
+            message = f"{mismatch}: the shape of the picture differs, so part of it was cut off."
             remedy = "Record with the same mode of the camera as for the calibration, or calibrate again."
         yield Finding("resolution", "blocks", message, remedy, (camera.name,))
 
@@ -217,12 +217,12 @@ def unit_finding(ratio: float, known: str, tolerance: float = UNIT_TOLERANCE) ->
     """The unit that was mistaken, None for none. ratio : measured by the calibration over known. known : the length, in
     words. tolerance : of the length, a share.
     """
-    for factor, (said, remedy) in UNITS.items():
+    for factor, (explanation, remedy) in UNITS.items():
         if abs(np.log(ratio / factor)) < np.log(1.0 + tolerance):
             return Finding(
                 "scale",
                 "blocks",
-                f"By the calibration {known} is {ratio:.4g} times what it is: {said}.",
+                f"By the calibration {known} is {ratio:.4g} times what it is: {explanation}.",
                 remedy,
             )
     return None

@@ -61,11 +61,11 @@ def aligned_cameras(cameras: Sequence[Camera], outlines: Outlines) -> AlignedCam
             "Too few silhouettes are whole in two views to align the cameras by.",
             "Choose frames in which the person is whole in the pictures, or look at the masks.",
         )
-    told = np.isfinite(misses)
+    finite = np.isfinite(misses)
 
     def residuals(flat: Array) -> Array:
         turns = flat.reshape(-1, 3)
-        missed = np.nan_to_num(_misses(cameras, rays, turns)[0][told])
+        missed = np.nan_to_num(_misses(cameras, rays, turns)[0][finite])
         robust = ROBUST_PIXELS * np.sqrt(2.0 * (np.sqrt(1.0 + (missed / ROBUST_PIXELS) ** 2) - 1.0))
         return np.concatenate([robust * np.sign(missed), PULL * flat / TURN_SPREAD])
 

@@ -101,9 +101,9 @@ def silhouette_disagreement(cameras: Sequence[Camera], outlines: Mapping[int, Ma
             for views in outlines.values()
             if one.name in views and two.name in views
         ]
-        told = [miss for miss in misses if not np.isnan(miss)]
-        if told:
-            values.append(float(np.median(told)))
+        finite = [miss for miss in misses if not np.isnan(miss)]
+        if finite:
+            values.append(float(np.median(finite)))
     return float(np.mean(values)) if values else float("nan")
 
 

@@ -200,16 +200,16 @@ class LiveCamera:
                         return
                     self._take(shot)
                 ended = "its video is over" if self.address.kind == "replay" else "ended its stream"
-                said = f"Camera {self.name} ({self.address.shown}): {ended}."
+                problem_text = f"Camera {self.name} ({self.address.shown}): {ended}."
             except FootageError as problem:
-                said = problem.message
+                problem_text = problem.message
             except (
                 Exception
             ) as problem:  # a reader must not die of what a stranger's stream does to a library
-                said = f"Camera {self.name} cannot be read ({type(problem).__name__})."
+                problem_text = f"Camera {self.name} cannot be read ({type(problem).__name__})."
             delay = FIRST_WAIT if self._count > before else min(2.0 * delay, LONGEST_WAIT)
             with self._lock:
-                self._message, self._attempts = said, self._attempts + 1
+                self._message, self._attempts = problem_text, self._attempts + 1
                 self._over = self.address.kind == "replay" and self._count > before
             if self._over or self._stopping.wait(delay):
                 return

@@ -73,7 +73,7 @@ class Synchrony:
 
 
 def motion_energy(
-    read: Callable[[int], Bytes], count: int, tell: Callable[[int], None] | None = None
+    read: Callable[[int], Bytes], count: int, report: Callable[[int], None] | None = None
 ) -> Array:
     """(count - 1,) mean absolute difference of each picture to the one before it, grey levels.
 
@@ -88,8 +88,8 @@ def motion_energy(
         if before is not None:
             energy[index - 1] = float(np.abs(small - before).mean())
         before = small
-        if tell is not None:
-            tell(index + 1)
+        if report is not None:
+            report(index + 1)
     return energy
 
 
@@ -170,11 +170,11 @@ def estimate_synchrony(
     for index, camera in enumerate(source.cameras):
         count = min(camera.frame_count, MOST_FRAMES)
 
-        def tell(done: int, name: str = camera.name, total: int = count) -> None:
+        def report(done: int, name: str = camera.name, total: int = count) -> None:
             if progress is not None:
                 progress(f"motion in {name}", done, total)
 
-        energies[camera.name] = motion_energy(reader(index), count, tell)
+        energies[camera.name] = motion_energy(reader(index), count, report)
     return estimate_offsets(energies, source.fps, most_seconds)
 
 

@@ -42,14 +42,14 @@ class ExportReport:
         return sum(path.stat().st_size for path in self.files)
 
 
-def settled(form: ExportFormat, asked: Mapping[str, object]) -> ExportOptions:
+def settled(form: ExportFormat, requested: Mapping[str, object]) -> ExportOptions:
     """Options from what was asked, "auto" settled for the format.
 
     Raises SettingsError for unknown names and values, ExportError for an option that the format does not take, or a
     range of frames that is none.
     """
-    options = changed(ExportOptions(), asked)
-    for name in asked:
+    options = changed(ExportOptions(), requested)
+    for name in requested:
         if name not in form.takes and getattr(options, name) != getattr(ExportOptions(), name):
             raise ExportError(
                 f"Option '{name}' means nothing to {form.title} ({form.name}).",
@@ -77,7 +77,7 @@ def export_run(
     session: Session,
     run: StoredRun,
     form: ExportFormat,
-    asked: Mapping[str, object],
+    requested: Mapping[str, object],
     place: Path,
     *,
     progress: Progress | None = None,
@@ -91,7 +91,7 @@ def export_run(
     cancelled : asked often; True ends it with WorkCancelledError. Raises ExportError and whatever a run raises that
     cannot be read.
     """
-    options = settled(form, asked)
+    options = settled(form, requested)
     writer = form.write or record_scene
     if writer is None:
         raise ExportError(

@@ -207,13 +207,15 @@ def _add_animation(
         add(joint, "rotation", quaternions[:, joint], gltf.VEC4)
         if skeleton.tree.moving[joint]:
             add(joint, "translation", AXES.points(moves[:, joint]), gltf.VEC3)
-    told = {
+    animation_extras = {
         "fps": motion.fps,
         "first_frame": float(motion.frames[0]),
         "gaps": [list(gap) for gap in motion.gaps],
     }
     name = f"{task.run.session_name} {task.run.name}"
-    document.animations.append(gltf.Animation(name=name, channels=channels, samplers=samplers, extras=told))
+    document.animations.append(
+        gltf.Animation(name=name, channels=channels, samplers=samplers, extras=animation_extras)
+    )
 
 
 def _read_back(task: ExportTask, skeleton: Skeleton, wanted: tuple[Array, Array]) -> str:

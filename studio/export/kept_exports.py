@@ -51,7 +51,7 @@ def export_into_run(
     session: Session,
     run: StoredRun,
     form: ExportFormat,
-    asked: Mapping[str, str | int | float | bool],
+    requested: Mapping[str, str | int | float | bool],
     *,
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
@@ -67,15 +67,15 @@ def export_into_run(
         session,
         run,
         form,
-        asked,
-        folder / f"{_stem(session, run, form, asked)}.{form.name}",
+        requested,
+        folder / f"{_stem(session, run, form, requested)}.{form.name}",
         progress=progress,
         cancelled=cancelled,
         record_scene=record_scene,
         pack=True,
     )
     content = _content(run, report.track) if report.track else ""
-    kept = msgspec.structs.replace(_said(report, asked), track=report.track, content=content)
+    kept = msgspec.structs.replace(_kept_export(report, requested), track=report.track, content=content)
     _RECORD.write(folder / f"{kept.file}{SAID}", kept)
     return kept
 
@@ -128,21 +128,21 @@ def discard_export(run: StoredRun, name: str) -> None:
 
 
 def _stem(
-    session: Session, run: StoredRun, form: ExportFormat, asked: Mapping[str, str | int | float | bool]
+    session: Session, run: StoredRun, form: ExportFormat, requested: Mapping[str, str | int | float | bool]
 ) -> str:
     """A file name that says what is in it: session, run, its track unless that is the raw one, and what differs from
     the usual.
     """
     usual = ExportOptions(track=RAW)
-    parts, chosen = [session.name, run.name], dict(asked)
+    parts, chosen = [session.name, run.name], dict(requested)
     if "track" in form.takes and chosen.get("track", BEST) == BEST:
         chosen["track"] = best_track(run).name
     for name, value in sorted(chosen.items()):
         if name != "last" and getattr(usual, name, value) != value:
             word = value if isinstance(value, str) else f"{name}{value}"
             parts.append({True: name, False: ""}[value] if isinstance(value, bool) else word)
-    if asked.get("last"):
-        parts.append(f"to{asked['last']}")
+    if requested.get("last"):
+        parts.append(f"to{requested['last']}")
     return "-".join(
         "".join(sign if sign.isalnum() or sign in "_.-" else "_" for sign in part) for part in parts if part
     )
@@ -152,9 +152,17 @@ def _content(run: StoredRun, track: str) -> str:
     return track_digest(read_track(run, track))
 
 
-def _said(report: ExportReport, asked: Mapping[str, str | int | float | bool]) -> KeptExport:
+def _kept_export(report: ExportReport, requested: Mapping[str, str | int | float | bool]) -> KeptExport:
     made = datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
     size, file = report.size, report.files[0].name
     return KeptExport(
-        file, report.format, made, size, report.frames, report.fps, report.checked, report.notes, dict(asked)
+        file,
+        report.format,
+        made,
+        size,
+        report.frames,
+        report.fps,
+        report.checked,
+        report.notes,
+        dict(requested),
     )

@@ -91,19 +91,19 @@ def joint_names(own: tuple[str, ...], names: str) -> tuple[tuple[str, ...], str]
     if names == OWN:
         return own, ""
     known = name_map(names).joints
-    told, kept = [], []
+    renames, kept = [], []
     for name in own:
         renamed = known.get(name, name)
-        if name not in known or renamed in told:
+        if name not in known or renamed in renames:
             kept.append(name)
             renamed = name
-        told.append(renamed)
+        renames.append(renamed)
     note = (
         f"{name_map(names).title} has no name for {_listed(kept)}: these joints keep their own."
         if kept
         else ""
     )
-    return tuple(told), note
+    return tuple(renames), note
 
 
 def _place(body: BodyModel, entries: tuple[PlaceEntry, ...]) -> tuple[int, Array] | None:

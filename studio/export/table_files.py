@@ -64,14 +64,14 @@ def write_parquet(task: ExportTask) -> Written:
         **{axis: pa.array(converted[:, at], from_pandas=True) for at, axis in enumerate("xyz")},
         "conf": pa.array(np.repeat(motion.confidence, count), from_pandas=True),
     }
-    told = {
+    metadata = {
         **task.source,
         "unit": task.options.unit,
         "up": task.options.up,
         "fps": f"{motion.fps:.12g}",
         "names": task.options.names,
     }
-    table = pa.table(columns).replace_schema_metadata(told)
+    table = pa.table(columns).replace_schema_metadata(metadata)
     task.step("writing", 0, 2)
     pq.write_table(table, task.place, compression="zstd")
     task.step("reading back", 1, 2)

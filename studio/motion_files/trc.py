@@ -139,10 +139,10 @@ def _header(path: Path, lines: list[str]) -> _Header:
     names = [name.strip() for name in lines[3].split("\t")[FIRST_COLUMNS::3]]
     while names and not names[-1]:
         names.pop()
-    said = int(_header_number(path, fields, "NumMarkers"))
-    if len(names) != said or not names or not all(names) or len(set(names)) != len(names):
+    declared = int(_header_number(path, fields, "NumMarkers"))
+    if len(names) != declared or not names or not all(names) or len(set(names)) != len(names):
         raise TruthError(
-            f"'{path.name}' line 4 names {len(set(filter(None, names)))} markers and line 3 says {said}.",
+            f"'{path.name}' line 4 names {len(set(filter(None, names)))} markers and line 3 says {declared}.",
             "Give each marker its own name, one for every three columns.",
         )
     return _Header(tuple(names), unit, rate, int(_header_number(path, fields, "NumFrames")))

@@ -22,26 +22,26 @@ Bytes = NDArray[np.uint8]
 
 FRAMES = 16
 WORTHWHILE = 3.0
-"""Pixels by which tangents miss (the worst camera's median) from which on aligning is advised."""
+"""Pixels by which tangents miss (the worst camera's median) from which aligning is advised."""
 BETTER = 0.8
-"""An alignment whose worst camera misses more than this share of before has found nothing."""
+"""An alignment that leaves the worst camera more than this share of its former miss explains nothing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SessionAlignment:
-    """What aligning found. names : of the cameras, as `found` has them. better : whether it explains the misses."""
+    """The result of an alignment. names : of the cameras, in the order of `found`."""
 
     names: tuple[str, ...]
     found: AlignedCameras
 
     @property
     def needed(self) -> bool:
-        """Whether the cameras as they are miss by enough to matter."""
+        """Whether the cameras miss by enough to matter."""
         return bool(np.nanmax(self.found.before) > WORTHWHILE)
 
     @property
     def better(self) -> bool:
-        """Whether turning the cameras explains most of it."""
+        """Whether turning the cameras explains most of the misses."""
         return bool(np.nanmax(self.found.after) < BETTER * np.nanmax(self.found.before))
 
     def in_words(self) -> tuple[str, ...]:
@@ -58,16 +58,16 @@ class SessionAlignment:
 def align_cameras(
     session: Session, frames: Sequence[int] = (), *, progress: Progress | None = None
 ) -> SessionAlignment:
-    """How a session's cameras should be turned; nothing is written (`keep_alignment`).
+    """The turns that make a session's silhouettes agree; nothing is written (see `keep_alignment`).
 
-    frames : to look at; default: sixteen, evenly spread. Raises CalibrationError for a single camera or too few whole
+    frames : default: sixteen, evenly spread. Raises CalibrationError for a single camera or too few whole
     silhouettes, FootageError, NotFoundError.
     """
     cameras = session.cameras()
     if len(cameras) < 2:
         raise CalibrationError(
             f"Session '{session.name}' has one camera: there is nothing to align it with.",
-            "Look at the outlines instead.",
+            "Check the outlines instead.",
         )
     footage = session.footage()
     try:
@@ -77,18 +77,18 @@ def align_cameras(
         masks: dict[int, dict[str, Bytes]] = {}
         for done, frame in enumerate(chosen):
             if progress is not None:
-                progress("looking at silhouettes", done, len(chosen))
+                progress("reading silhouettes", done, len(chosen))
             masks[frame] = {view.camera: largest_piece(view.mask) for view in maker.evidence(frame).views}
     finally:
         footage.close()
     found = aligned_cameras(cameras, outlines_of(cameras, masks))
     if progress is not None:
-        progress("looking at silhouettes", len(chosen), len(chosen))
+        progress("reading silhouettes", len(chosen), len(chosen))
     return SessionAlignment(tuple(camera.name for camera in cameras), found)
 
 
 def keep_alignment(session: Session, aligned: SessionAlignment) -> CalibrationChange:
-    """Let the session use the aligned cameras; the calibration before is kept. Raises SessionError while tracking."""
+    """Make the aligned cameras the session's; the earlier calibration is kept. Raises SessionError while tracking."""
     source = session.manifest.calibration_source
     turned = ", ".join(
         f"{name} {turn:.2f}°" for name, turn in zip(aligned.names, aligned.found.turns, strict=True)
@@ -99,7 +99,7 @@ def keep_alignment(session: Session, aligned: SessionAlignment) -> CalibrationCh
 
 
 def largest_piece(mask: Bytes) -> Bytes:
-    """(H, W) the largest connected piece of a mask: specks would be touched first."""
+    """(H, W) the largest connected piece of a mask, so that no tangent touches a speck."""
     count, labels, stats, _ = cv2.connectedComponentsWithStats((mask > 0).astype(np.uint8))
     if count < 2:
         return mask

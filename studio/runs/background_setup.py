@@ -1,9 +1,9 @@
-"""How a session's masks are set up: which background, with what knobs, and what does not count.
+"""Sets up a session's masks: the background, its knobs and the excluded regions.
 
-Sources: "plate" and "clip" (what was given, as it is), "median" (the footage's own), "combined" (plate and footage by
-region, `evidence.combined_background`; with three cameras or more cleaned by the other views, `runs.clean_plates`).
-Knobs that the person did not choose may be chosen by trying: those under which the views agree best in the hull, which
-needs no truth (`runs.mask_quality`).
+Sources: "plate" and "clip" (as given), "median" (of the footage), "combined" (plate and footage by region,
+`evidence.combined_background`; with three cameras or more cleaned by the other views, `runs.clean_plates`).
+Knobs that the user did not set can be tuned: the setting under which the views agree best in the visual hull wins,
+which needs no ground truth (`runs.mask_quality`).
 """
 
 import dataclasses
@@ -55,19 +55,21 @@ TRIALS: tuple[dict[str, Knob], ...] = (
         "mask_keep_components": 3,
     },
 )
-"""Knobs that are tried, beside what the session or the person has. Three pieces: legs may be cut off by a gap."""
+"""Knobs to try, besides those already set. Three pieces, because a gap may cut off the legs."""
 TRIED_CLEANING = ((1.0, 0), (2.0, 0), (2.0, 1))
-"""What is tried with the best of these: how much more gaps, holes and pieces are cleaned away than the picture's size
-asks for, and how many pieces are kept then, 0 for as many as before."""
+"""Tried with the best of these: cleaning of gaps, holes and pieces as a multiple of what the picture's size requires,
+and the number of pieces kept (0: as before)."""
 USUAL_SIDE = 480.0
-"""Pixels of the shorter side of pictures that the usual knobs of cleaning suit."""
+"""Shorter side (pixels) of the pictures that the default cleaning knobs suit."""
 HOLE_AREA = 4.0
-"""Of the usual area of holes and pieces, each time: a belt in the background's colour is wider than noise."""
+"""Factor on the default area of holes and pieces: a belt in the background's colour is wider than noise."""
 
 
 @dataclass(frozen=True, slots=True)
 class BackgroundSetup:
-    """What was set. knobs : of the session's evidence. notes : for a person. quality : of the masks, where measured."""
+    """The background that was set. knobs : of the session's evidence. notes : for the user. quality : None if
+    unmeasured.
+    """
 
     source: str
     knobs: dict[str, Knob]
@@ -85,11 +87,11 @@ def set_up_background(
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> BackgroundSetup:
-    """Choose a session's background and keep it. knobs : of masks, as they shall be. tune : try others for the rest.
+    """Set a session's background and store it. knobs : of the masks, fixed. tune : try values for the others.
 
-    exclude_unused : what no hull comes near in any frame does not count (only where backgrounds are cleaned; exclusions
-    that are there stay). What fails or is cancelled leaves the session's backgrounds and knobs as they were. Raises
-    FootageError for a source that is not there, SettingsError for a knob.
+    exclude_unused : also exclude regions that no hull comes near in any frame (only where backgrounds are cleaned;
+    existing exclusions stay). On failure or cancellation the session's backgrounds and knobs are unchanged. Raises
+    FootageError for a missing source, SettingsError for an invalid knob.
     """
     _check_source(session, source)
     chosen = dict(knobs or {})
@@ -116,7 +118,7 @@ def _set_up(
     progress: Progress | None,
     cancelled: Callable[[], bool] | None,
 ) -> BackgroundSetup:
-    """`set_up_background` for what was checked."""
+    """`set_up_background` with checked arguments."""
     session = given_backgrounds(session)
     notes: list[str] = []
     model = MODEL_OF[source]
@@ -137,14 +139,12 @@ def _set_up(
     return BackgroundSetup(source, own, tuple(notes), quality)
 
 
-def _tuned(session: Session, own: dict[str, Knob], tell: Progress) -> tuple[dict[str, Knob], MaskQuality]:
-    """The knobs among TRIALS and then TRIED_CLEANING (beside `own`, which stay) whose worst camera agrees best, and the
-    quality.
-    """
+def _tuned(session: Session, own: dict[str, Knob], report: Progress) -> tuple[dict[str, Knob], MaskQuality]:
+    """The knobs among TRIALS, then TRIED_CLEANING (`own` stay fixed) whose worst camera agrees best, and the quality."""
     cameras, footage = session.cameras(), session.footage()
     small = tuple(camera.reduced(JUDGED_SIDE) for camera in cameras)
     try:
-        trying = _Trying(session, footage, cameras, tell)
+        trying = _Trying(session, footage, cameras, report)
         trials: list[dict[str, Knob]] = [{**trial, **own} for trial in TRIALS]
         trying.look(trials)
 
@@ -166,27 +166,27 @@ def _tuned(session: Session, own: dict[str, Knob], tell: Progress) -> tuple[dict
 
 
 class _Trying:
-    """Masks of a few frames with one set of knobs after another: the footage is read once, a camera at a time, and what
-    its pixels say before any cleaning is kept, packed.
+    """Masks of a few frames under several sets of knobs. The footage is read once, a camera at a time; the masks before
+    cleaning are kept, packed.
     """
 
     def __init__(
-        self, session: Session, footage: Footage, cameras: tuple[Camera, ...], tell: Progress
+        self, session: Session, footage: Footage, cameras: tuple[Camera, ...], report: Progress
     ) -> None:
         self.frames = spread_frames(footage.frame_count, TRIED_FRAMES)
-        self._session, self._footage, self._cameras, self._tell = session, footage, cameras, tell
+        self._session, self._footage, self._cameras, self._report = session, footage, cameras, report
         self._backgrounds = Backgrounds(footage)
         self._raw: dict[EvidenceSettings, dict[tuple[int, str], tuple[PackedMask, bool]]] = {}
         self._tried, self._total = 0, len(TRIALS) + len(TRIED_CLEANING)
 
     def look(self, trials: Sequence[Mapping[str, Knob]]) -> None:
-        """Read the footage for all trials that are to come; others may differ from these in their cleaning only."""
+        """Read the footage for these trials; later ones may differ from them only in their cleaning."""
         settings = [_settings(self._session, knobs) for knobs in trials]
         makers = {uncleaned(one): self._maker(one) for one in settings}
         self._raw = {key: {} for key in makers}
         for camera in self._cameras:
             for frame in self.frames:
-                self._tell("trying knobs", 0, self._total)
+                self._report("trying knobs", 0, self._total)
                 picture = self._footage.picture(camera.name, frame)
                 for key, maker in makers.items():
                     raw = maker.raw_mask(camera.name, frame, picture)
@@ -195,8 +195,8 @@ class _Trying:
             self._backgrounds.release(camera.name)
 
     def masks(self, knobs: Mapping[str, Knob], small: tuple[Camera, ...]) -> Iterator[list[Bytes]]:
-        """Each frame's masks with some knobs, as large as the pictures of `small`."""
-        self._tell("trying knobs", self._tried, self._total)
+        """Each frame's masks under some knobs, at the resolution of `small`."""
+        self._report("trying knobs", self._tried, self._total)
         self._tried += 1
         settings = _settings(self._session, knobs)
         maker, raw = self._maker(settings), self._raw[uncleaned(settings)]
@@ -213,7 +213,7 @@ class _Trying:
 
 
 def _cleaning(side: int, more: float, pieces: int) -> dict[str, Knob]:
-    """Knobs of cleaning for pictures whose shorter side is so many pixels."""
+    """Cleaning knobs for pictures whose shorter side is `side` pixels."""
     usual, scale = EvidenceSettings(), max(1.0, side / USUAL_SIDE)
     area = HOLE_AREA * scale**2
     knobs: dict[str, Knob] = {
@@ -225,7 +225,7 @@ def _cleaning(side: int, more: float, pieces: int) -> dict[str, Knob]:
 
 
 def _settings(session: Session, knobs: Mapping[str, Knob]) -> EvidenceSettings:
-    """The studio's evidence settings with some knobs, whatever the session had."""
+    """The default evidence settings with these knobs, ignoring the session's own."""
     bare = dataclasses.replace(session_settings(session), evidence=EvidenceSettings())
     return changed_settings(bare, knobs).evidence
 

@@ -1,7 +1,7 @@
-"""Where a run's behaviour model comes from: the models folder, what each model is of, and which one a run gets.
+"""The behaviour models of a workspace, and the choice of one for a run.
 
-Models lie in `models/NAME.behaviour` of the workspace; a run names one, and keeps a copy of its file in its own folder,
-so that it replays whatever becomes of the model. A model fits any body of the same parameters, whatever its dimensions.
+Models lie in `models/NAME.behaviour` of the workspace. A run names one and keeps a copy of its file, so that it can be
+replayed when the model changes. A model fits any body with the same parameters, whatever its dimensions.
 """
 
 import contextlib
@@ -26,7 +26,7 @@ MODELS_NAME, SUFFIX = "models", ".behaviour"
 
 @dataclass(frozen=True, slots=True)
 class ModelLine:
-    """A model as a line of a list. parameters : of its body's pose. fps : it was learnt at. frames : of training.
+    """A model in a list. parameters : of its body's pose. fps : of the training data. frames : of training.
     problem : why it cannot be read, "" if it can.
     """
 
@@ -43,7 +43,7 @@ class ModelLine:
 
 @dataclass(frozen=True, slots=True)
 class ChosenModel:
-    """The model of a new run. note : where it came from, where nobody asked for it; "" else."""
+    """The model of a new run. note : why it was chosen, "" if it was requested."""
 
     name: str
     path: Path
@@ -51,22 +51,21 @@ class ChosenModel:
 
 
 def models_folder(root: Path) -> Path:
-    """The folder of a workspace's models."""
     return root / MODELS_NAME
 
 
 def model_folders(session: Session) -> tuple[Path, ...]:
-    """Where a session's models are looked for: in the workspace around it, then in the user's own."""
+    """The folders searched for a session's models: its workspace's, then the user's own."""
     folders = (models_folder(session.path.parent), models_folder(workspace_root().absolute()))
     return tuple(dict.fromkeys(folder for folder in folders if folder.is_dir()))
 
 
 def models_in(folders: Sequence[Path]) -> tuple[ModelLine, ...]:
-    """The models of some folders by name; of two with the same name the first folder's."""
+    """The models in some folders by name; of two with one name, the first folder's."""
     found: dict[str, ModelLine] = {}
     for folder in folders:
         for path in sorted(folder.glob(f"*{SUFFIX}")):
-            # One that is gone by now is none.
+            # A file deleted meanwhile is skipped.
             with contextlib.suppress(FileNotFoundError):
                 about = path.stat()
                 found.setdefault(path.stem, _line(path, about.st_mtime_ns, about.st_size))
@@ -105,12 +104,12 @@ def fitting(model: BehaviourModel, body: BodyModel, fps: float) -> BehaviourMode
 
 
 def needs_model(tracker: str, settings: object) -> bool:
-    """Whether a tracker with these knobs of its own cannot go without a behaviour model."""
+    """Whether a tracker with these knobs requires a behaviour model."""
     return TRACKERS[tracker].needs_behaviour or getattr(settings, "prediction", "") == BEHAVIOUR
 
 
 def check_prediction(settings: RunSettings, has_model: bool) -> None:
-    """Raise SettingsError where settings ask for a model that a run does not have."""
+    """Raises SettingsError if the settings require a model and the run has none."""
     if not has_model and needs_model(settings.tracker_name, settings.tracker):
         raise SettingsError(
             "Setting 'prediction' cannot be 'behaviour': the run has no behaviour model.",
@@ -118,15 +117,17 @@ def check_prediction(settings: RunSettings, has_model: bool) -> None:
         )
 
 
-def chosen_model(session: Session, body: BodyModel, settings: RunSettings, asked: str) -> ChosenModel | None:
-    """The model of a new run: the one asked for, else (where the settings need one) the only one of that body.
+def chosen_model(
+    session: Session, body: BodyModel, settings: RunSettings, requested: str
+) -> ChosenModel | None:
+    """The model of a new run: the requested one, else (where the settings need one) the only one of that body.
 
-    Raises NotFoundError for a model that is not there, BehaviourError for one that does not fit, and where the
-    settings need a model and none, or more than one, would fit.
+    Raises NotFoundError for a missing model, BehaviourError for one that does not fit, and where the settings need a
+    model and none or several fit.
     """
     folders = model_folders(session)
-    if asked:
-        path = model_path(folders, asked)
+    if requested:
+        path = model_path(folders, requested)
         fitting(read_model(path), body, session.manifest.fps)
         return ChosenModel(path.stem, path)
     if not needs_model(settings.tracker_name, settings.tracker):
@@ -153,7 +154,7 @@ def chosen_model(session: Session, body: BodyModel, settings: RunSettings, asked
 
 @lru_cache(maxsize=256)
 def _line(path: Path, _written: int, _size: int) -> ModelLine:
-    """The line of a model's file as it was at a moment."""
+    """The list entry of a model's file; cached by write time and size."""
     try:
         model = read_model(path)
     except StudioError as error:

@@ -1,9 +1,8 @@
-"""How well a track fits its pictures, measured in every few frames and kept beside the run.
+"""How well a track fits its pictures, measured every few frames and stored with the run.
 
-`checks/<track>.json`: for each looked-at frame and camera the share of the model's pixels that lie in the mask, and of
-the mask's that the model covers; beside them frames that were lost, that are doubtful, in which the body turns round
-faster than people can, into which a limb leaps (`jumps`), limbs that the masks deny (`tracking.agreement`), and how
-much the markers jitter.
+`checks/<track>.json`: for each checked frame and camera the share of the model's pixels that lie in the mask, and of
+the mask's pixels that the model covers; also lost and doubtful frames, turns faster than a person can make, jumps of
+limbs (`jumps`), limbs contradicted by the masks (`tracking.agreement`), and the jitter of the markers.
 """
 
 import contextlib
@@ -44,18 +43,18 @@ FOLDER = "checks"
 SCHEMA_VERSION = 1
 EVERY = 10
 GOOD_SHARE = 0.85
-"""Share of the model's pixels that lie in the masks of a frame, below which it does not fit."""
+"""A frame with a smaller share of the model's pixels in the masks does not fit."""
 DOUBTFUL = 0.6
 """Agreement of the silhouettes (f_s) below which a frame is marked."""
 FASTEST_TURN = 2700.0
-"""Degrees a second about the vertical, beyond what people do; left and right changed places then."""
+"""Degrees a second about the vertical, more than people reach: left and right were exchanged."""
 LOST = ("lost", "no evidence")
 NAMED = 4
-"""So many leaps are named in a line."""
+"""Jumps named in one line."""
 
 
 class DeniedLimb(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A limb that the masks of a frame deny. share : of its area, what disagrees."""
+    """A limb contradicted by the masks of a frame. share : of its area that disagrees."""
 
     frame: int
     limb: str
@@ -63,10 +62,10 @@ class DeniedLimb(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What was measured. track : its name; stamp, count : of the track then. frames : those looked at. inside, covered
-    : (F, V) shares, None where there is nothing to divide by. lost, doubtful, turned : numbers of frames. jitter_mm :
-    root mean square second difference of the markers. jumps : into which frames which limb leaps. denied : limbs that
-    the masks deny in frames looked at. None: not looked for.
+    """Measurements of a track. stamp, count : of the track when it was checked. frames : checked. inside, covered :
+    (F, V) shares, None where there is nothing to divide by. lost, doubtful, turned : frame numbers. jitter_mm : root
+    mean square second difference of the markers. jumps, denied : limbs that jump, and limbs contradicted by the masks
+    of checked frames; None: not measured.
     """
 
     schema: int = SCHEMA_VERSION
@@ -86,7 +85,7 @@ class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
     @property
     def poor(self) -> tuple[int, ...]:
-        """Frames whose views have too little of the model in the masks, on average."""
+        """Frames with too little of the model in the masks, averaged over the views."""
         shares = [[share for share in row if share is not None] for row in self.inside]
         return tuple(
             frame
@@ -96,19 +95,19 @@ class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
     @property
     def inside_mean(self) -> float:
-        """Share of the model's pixels in the masks, over all looked-at frames and cameras; NaN if there is none."""
+        """Mean share of the model's pixels in the masks over all checked frames and cameras; NaN if there is none."""
         known = [share for row in self.inside for share in row if share is not None]
         return float(np.mean(known)) if known else float("nan")
 
     @property
     def good(self) -> bool:
-        """Whether nothing stands out."""
+        """Whether nothing needs attention."""
         return not (self.poor or self.lost or self.turned or self.jumps or self.lost_limbs)
 
     @property
     def lost_limbs(self) -> dict[str, tuple[int, ...]]:
-        """Limbs that the masks deny in more than one of the frames looked at, with these frames; one in fifty sound
-        frames is denied one.
+        """Limbs contradicted by the masks in more than one checked frame, with these frames. (One limb is contradicted
+        in one of fifty correct frames.)
         """
         frames: dict[str, tuple[int, ...]] = {}
         for one in self.denied or ():
@@ -116,9 +115,9 @@ class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
         return {limb: own for limb, own in frames.items() if len(own) > 1 or len(self.frames) == 1}
 
     def in_words(self) -> str:
-        """One line; leaps by frame and limb."""
+        """A one-line summary; jumps by frame and limb."""
         parts = [f"{100 * self.inside_mean:.0f} % of the model in the masks"]
-        parts += [f"{len(self.poor)} of {len(self.frames)} looked-at frames do not fit"] if self.poor else []
+        parts += [f"{len(self.poor)} of {len(self.frames)} checked frames do not fit"] if self.poor else []
         parts += [f"{len(self.lost)} lost"] if self.lost else []
         parts += [f"{limb} off the masks in {len(own)} of them" for limb, own in self.lost_limbs.items()]
         parts += [f"{len(self.turned)} sudden turns"] if self.turned else []
@@ -128,7 +127,7 @@ class RunCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
 _RECORD = RecordFile(
     RunCheck,
-    "what was measured of a track",
+    "the check of a track",
     "Check the run again.",
     ("The track was not checked.", "Check it."),
     SCHEMA_VERSION,
@@ -144,7 +143,7 @@ def check_run(
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> RunCheck:
-    """Measure a track in every so-many-th of its frames and keep that.
+    """Measure a track in every `every`-th of its frames and store the result.
 
     Raises RunError for a run without frames, NotFoundError, FootageError; WorkCancelledError when stopped.
     """
@@ -155,13 +154,13 @@ def check_run(
     rows = range(0, len(chosen.frames), max(1, every))
     settings = _settings(run)
 
-    tell = watched(progress, cancelled, "The check")
+    report = watched(progress, cancelled, "The check")
     shares, denied, agreement = [], list[DeniedLimb](), Agreement(body, cameras)
     with contextlib.closing(footage_of(session, run)) as footage, run.results() as results:
         known = set(results.frames())
         maker = EvidenceMaker(cameras, footage, Backgrounds(footage), settings.evidence, "none")
         for done, row in enumerate(rows):
-            tell("comparing with the masks", done, len(rows))
+            report("comparing with the masks", done, len(rows))
             evidence = maker.evidence(int(chosen.frames[row]))
             frame, pose = evidence.frame, chosen.poses[row]
             shares.append(frame_shares(body, cameras, pose, evidence, settings))
@@ -188,7 +187,7 @@ def check_run(
 
 
 def kept_check(run: StoredRun, track: str) -> RunCheck | None:
-    """What was measured of a track as it is now; None where it was not, or the track is another one since."""
+    """The stored check of a track; None if there is none or the track has changed since."""
     path = _path(run, track)
     if not path.is_file():
         return None
@@ -201,7 +200,7 @@ def kept_check(run: StoredRun, track: str) -> RunCheck | None:
 def frame_shares(
     body: BodyModel, cameras: tuple[Camera, ...], pose: Array, evidence: FrameEvidence, settings: RunSettings
 ) -> tuple[tuple[float | None, ...], tuple[float | None, ...]]:
-    """Of each camera: the share of the model's pixels in the mask, and of the mask's under the model."""
+    """For each camera: the share of the model's pixels in the mask, and of the mask's pixels under the model."""
     views = {view.camera: view for view in evidence.views}
     inside: list[float | None] = []
     covered: list[float | None] = []
@@ -222,7 +221,7 @@ def frame_shares(
 def _denied(
     agreement: Agreement, pose: Array, evidence: FrameEvidence, hidden: Mapping[str, Array]
 ) -> list[DeniedLimb]:
-    """The limbs of a pose (D,) that a frame's masks deny. hidden : what the run knew to be hidden there."""
+    """The limbs of a pose (D,) contradicted by a frame's masks. hidden : known occlusions by camera."""
     if len(evidence.views) < len(agreement.cameras) or not anything_seen(evidence):
         return []
     mm = agreement.mm_per_pixel(pose)
@@ -236,7 +235,7 @@ def _denied(
 
 
 def sudden_turns(body: BodyModel, track: Track, fps: float) -> tuple[int, ...]:
-    """Frames in which the body faces another way than just before, faster than FASTEST_TURN about the vertical."""
+    """Frames in which the body turned about the vertical faster than FASTEST_TURN."""
     if len(track.frames) < 2:
         return ()
     toward = facing(body, track.poses)[:, :2]
@@ -244,13 +243,13 @@ def sudden_turns(body: BodyModel, track: Track, fps: float) -> tuple[int, ...]:
     length = np.linalg.norm(toward, axis=1)
     apart = np.diff(track.frames)
     rate = np.degrees(np.abs(np.diff(angle))) * fps / apart
-    # A body that lies down faces up: its direction over the floor says nothing.
+    # A body that lies down faces up: its direction over the floor is meaningless.
     upright = np.minimum(length[1:], length[:-1]) > 0.5
     return tuple(int(frame) for frame in track.frames[1:][(rate > FASTEST_TURN) & upright])
 
 
 def _leaps(jumps: Sequence[Jump]) -> str:
-    """How many, and the first few."""
+    """The number of jumps, and the first few."""
     some = "; ".join(jump.in_words() for jump in jumps[:NAMED])
     more = f"; and {len(jumps) - NAMED} more" if len(jumps) > NAMED else ""
     return f"{len(jumps)} {'jump' if len(jumps) == 1 else 'jumps'} ({some}{more})"
@@ -269,7 +268,7 @@ def _path(run: StoredRun, track: str) -> Path:
 
 
 def _settings(run: StoredRun) -> RunSettings:
-    """The run's settings as they were last."""
+    """The run's latest settings."""
     with run.results() as results:
         history = results.settings_history()
     found = history[-1].values if history else run.record.settings

@@ -1,14 +1,14 @@
-"""Backgrounds of all cameras made clean together: each camera is told by the others when a place is empty.
+"""Backgrounds of all cameras cleaned together: the other views show when a place is empty.
 
-One camera cannot tell a background from a person who hardly leaves the place, nor from the same person in its plate.
-The others can: carve the visual hull from their masks only, and where its silhouette in this camera does not reach,
-this camera sees background in that frame, whatever it looks like. The background is the median of what a pixel showed
-when it was empty so. Where it never was, it is plate and footage combined (`evidence.combined_background`); where that
-is in doubt too, as on somebody who stood in the plate, it is filled in from around: seldom right, but no one. Masks
-made with it are better, so is their hull: two rounds.
+One camera cannot distinguish background from a person who hardly moves, or who also stands in its plate. The others
+can: outside the silhouette of the visual hull carved from their masks only, this camera sees background in that frame.
+The background is the median of a pixel over the frames in which it was empty. Where it never was, plate and footage are
+combined (`evidence.combined_background`); where that is doubtful too (a person stood in the plate), the hole is filled
+in from its surroundings: seldom right, but no person. Masks made with this background are better, and so is their hull:
+two rounds.
 
-Where nobody stands needs no fine pictures, so all of that is found in small ones. The footage is read twice, a camera
-at a time: for the small pictures, and for the backgrounds themselves, whose frames are laid aside on the disk.
+Empty regions are found in small pictures. The footage is read twice, a camera at a time: for the small pictures, and
+for the backgrounds, whose frames are spooled to disk.
 """
 
 import dataclasses
@@ -44,21 +44,21 @@ Part = TypeVar("Part")
 FRAMES = 20
 ROUNDS = 2
 CARVING = HullSettings(hull_depth=7, hull_edge_share=0.05, hull_least_views=2)
-"""Generous: a place is empty only where no hull comes near."""
+"""Coarse on purpose: a place is empty only where no hull comes near."""
 FIRST_CARVING = dataclasses.replace(CARVING, hull_depth=6)
-"""Of the first round, whose backgrounds are looked at once."""
+"""Of the first round, whose backgrounds are used once."""
 COMBINED_SIDE, COVER_SIDE = 480, 240
-"""Pixels of the shorter side, at least, of the pictures in which plate and footage are combined, and of those in which
-is found who covers what."""
+"""Least shorter side (pixels) of the pictures in which plate and footage are combined, and of those in which occlusion
+is computed."""
 REACH = 12
-"""Pixels of the footage: how far around a silhouette nothing counts as empty."""
+"""Pixels of the footage: margin around a silhouette that does not count as empty."""
 BLUR = 2.0
 """Small pixels by which a hull of small masks is wider on each side."""
 FEWEST_EMPTY = 1
 WIDE_REACH = 48
-"""The same: how far beyond all silhouettes a person may get in frames that were not looked at."""
+"""Small pixels: margin around all silhouettes for frames that were not read."""
 FILLING = 4
-"""Times smaller are the pictures in which holes are filled in."""
+"""Reduction of the pictures in which holes are filled in."""
 CLEARED = {"mask_shadow_test": False, "mask_gain_fit": True}
 """Knobs while backgrounds are cleaned: a hole that the shadow test tears costs more than a shadow does."""
 
@@ -68,7 +68,7 @@ class CleanPlate:
     """One camera's background.
 
     picture : (H, W, 3) uint8 BGR. never_empty : share of pixels that no frame showed empty. never_taken : (H, W) uint8,
-    255 where the others' hull came near in no frame: what moves there is a shadow, a reflection or a bystander.
+    255 where the others' hull came near in no frame: motion there is a shadow, a reflection or a bystander.
     """
 
     picture: Bytes
@@ -84,10 +84,10 @@ def clean_plates(
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> Mapping[str, CleanPlate]:
-    """Clean backgrounds by camera, from the plates, clips or medians that the session has.
+    """Clean backgrounds by camera, from the session's plates, clips or medians.
 
-    settings : of the masks. frames : how many of the footage are looked at, evenly spread. Raises RunError for fewer
-    than three cameras (the hull of one says too little about another) or where it was cancelled, FootageError.
+    settings : of the masks. frames : number read from the footage, evenly spread. Raises RunError for fewer than three
+    cameras (too few for a hull without one of them) or where it was cancelled, FootageError.
     """
     cameras = session.cameras()
     if len(cameras) < 3:
@@ -97,8 +97,8 @@ def clean_plates(
         )
     footage = session.footage()
     try:
-        tell = watched(progress, cancelled, "Making the background")
-        cleaning = _Cleaning(cameras, footage, dataclasses.replace(settings, **CLEARED), frames, tell)
+        report = watched(progress, cancelled, "Making the background")
+        cleaning = _Cleaning(cameras, footage, dataclasses.replace(settings, **CLEARED), frames, report)
         return cleaning.run(session.path)
     finally:
         footage.close()
@@ -106,8 +106,8 @@ def clean_plates(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _First:
-    """What plate and footage of one camera say together, in small. picture : (h, w, 3) uint8. doubtful : (h, w) 0 or 1.
-    combination : how it came about, None without a plate.
+    """Plate and footage of one camera combined at low resolution. picture : (h, w, 3) uint8. doubtful : (h, w) 0 or 1.
+    combination : its parts, None without a plate.
     """
 
     picture: Bytes
@@ -116,7 +116,7 @@ class _First:
 
 
 class _Cleaning:
-    """The rounds of one session."""
+    """Cleans the backgrounds of one session in rounds."""
 
     def __init__(
         self,
@@ -124,9 +124,9 @@ class _Cleaning:
         footage: Footage,
         settings: EvidenceSettings,
         frames: int,
-        tell: Progress,
+        report: Progress,
     ) -> None:
-        self.footage, self.tell = footage, tell
+        self.footage, self.report = footage, report
         self.cameras = cameras
         self.middle = tuple(camera.reduced(COMBINED_SIDE) for camera in cameras)
         self.small = tuple(camera.reduced(COVER_SIDE) for camera in cameras)
@@ -157,11 +157,11 @@ class _Cleaning:
         plates = {}
         for camera, first, covers in zip(self.cameras, firsts, taken, strict=True):
             plates[camera.name] = self._plate(camera, first, covers, folder)
-        self.tell("making the background", self.total, self.total)
+        self.report("making the background", self.total, self.total)
         return plates
 
     def _carvers(self, space: Box, fineness: HullSettings) -> list[Reconstructor]:
-        """Of hulls without each camera."""
+        """One carver for each camera left out."""
         return [Reconstructor(_without(self.small, k), space, fineness) for k in range(len(self.cameras))]
 
     def _first(self, camera: Camera, middle: Camera, small: Camera) -> tuple[_First, Bytes, list[Bytes]]:
@@ -172,7 +172,7 @@ class _Cleaning:
         stack = np.empty((len(self.frames), middle.height, middle.width, 3), np.uint8)
         seen = np.empty((len(self.frames), small.height, small.width, 3), np.uint8)
         for row, frame in enumerate(self.frames):
-            self._step("finding where nobody stands")
+            self._step("finding empty regions")
             picture = self.footage.picture(camera.name, frame)
             stack[row] = _resized(picture, middle)
             seen[row] = _resized(picture, small)
@@ -190,7 +190,7 @@ class _Cleaning:
     def _cleaner_masks(
         self, camera: Camera, small: Camera, first: _First, pictures: Bytes, taken: Bytes
     ) -> list[Bytes]:
-        """Masks of small pictures (K, h, w, 3) by the background that they make where nobody stands."""
+        """Masks of small pictures (K, h, w, 3) with the background computed from their empty pixels."""
         picture, empty = median_of_empty(pictures, taken, _resized(first.picture, small))
         doubtful = _enlarged(first.doubtful, small)
         factor = camera.width / small.width
@@ -207,7 +207,7 @@ class _Cleaning:
         """
         found = [np.empty((len(self.frames), small.height, small.width), np.uint8) for small in self.small]
         for row in range(len(self.frames)):
-            self._step("finding where nobody stands")
+            self._step("finding empty regions")
             seen = [of_camera[row] for of_camera in masks]
             for left_out, (camera, small) in enumerate(zip(self.cameras, self.small, strict=True)):
                 hull = carvers[left_out].shape(_without(seen, left_out))
@@ -238,7 +238,7 @@ class _Cleaning:
         return CleanPlate(filled, float(np.mean(never)), np.asarray(unused, dtype=np.uint8))
 
     def _step(self, step: str) -> None:
-        self.tell(step, self.done, self.total)
+        self.report(step, self.done, self.total)
         self.done += 1
 
 
@@ -270,7 +270,7 @@ def _rounded(mean: NDArray[np.uint8 | np.float32]) -> Bytes:
 
 
 def _filled_in(picture: Bytes, holes: NDArray[np.bool_], factor: int) -> Bytes:
-    """The picture with holes (H, W) closed from around, coarsely: in a picture so many times smaller."""
+    """The picture with holes (H, W) filled in from their surroundings, in a picture `factor` times smaller."""
     if not holes.any():
         return picture
     height, width = picture.shape[:2]
@@ -284,7 +284,8 @@ def _filled_in(picture: Bytes, holes: NDArray[np.bool_], factor: int) -> Bytes:
 def median_of_empty(frames: Bytes, taken: Bytes, fallback: Bytes) -> tuple[Bytes, Bytes]:
     """The median (H, W, 3) over the frames in which a pixel is empty, and their number (H, W).
 
-    frames : (K, H, W, 3) uint8. taken : (K, h, w), 1 where it is not. fallback : (H, W, 3), where too few are.
+    frames : (K, H, W, 3) uint8. taken : (K, h, w), 1 where not empty. fallback : (H, W, 3), used where too few are
+    empty.
     """
     out, empty = fallback.copy(), np.zeros(fallback.shape[:2], np.uint8)
     fill_medians_of_empty(frames, taken, 0, out, empty)
@@ -296,8 +297,8 @@ def fill_medians_of_empty(frames, taken, top, out, empty):
     """`median_of_empty` of a band of rows from `top` on: frames (K, rows, W, 3). out (H, W, 3) and empty (H, W) are
     filled there, out only where enough is empty.
 
-    What is taken counts as 255 and so is sorted to the end, all pixels of a row at once: exchanges of neighbours, as
-    often as there are frames, order any row.
+    Taken pixels count as 255, so that they sort to the end. All pixels of a row are sorted at once by K rounds of
+    exchanging neighbours (odd-even transposition sort).
     """
     count, rows, width = frames.shape[:3]
     height, tall, wide = len(out), taken.shape[1], taken.shape[2]

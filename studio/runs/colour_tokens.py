@@ -1,4 +1,4 @@
-"""The studio's colours as numbers, read from the page's one file of tokens (`tokens.css`).
+"""The studio's colours, read from the pages' style sheet (`tokens.css`).
 
 The pages use the same file, so a colour means one thing in the scene, on the overlays and in the charts.
 """
@@ -40,7 +40,7 @@ class ColourTokens:
         return self.colours[token]
 
     def layer(self, index: int, count: int) -> Colour:
-        """The RGB of layer `index` of `count`: the whole ramp from cool to warm, whatever the count."""
+        """The RGB of layer `index` of `count`, from cool to warm."""
         share = 1.0 if count <= 1 else index / (count - 1)
         red, green, blue = self.ramp(np.array([share]))[0]
         return int(red), int(green), int(blue)
@@ -54,7 +54,7 @@ class ColourTokens:
 
 
 def tokens_file() -> Path:
-    """Where `tokens.css` lies: in an installed package beside the pages, in a checkout in `web_assets`."""
+    """The path of `tokens.css`: beside the pages in an installed package, in `web_assets` in a checkout."""
     package = Path(studio.__file__).parent
     installed = package / "web" / "assets" / "tokens.css"
     return installed if installed.is_file() else package.parent / "web_assets" / "tokens.css"

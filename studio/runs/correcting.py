@@ -1,13 +1,13 @@
-"""A run corrected in the middle: the pose of one frame is given, and the run goes on from it, forwards or backwards.
+"""Corrects a run: the pose of one frame is given, and tracking continues from it, forwards or backwards.
 
-What was tracked stays: the corrected run is a new one that keeps the old one's body, cameras, behaviour model and the
-frames that the correction does not reach, and whose record names the old run, the frame and the pose. The given pose
-is to the frame what a start pose is to a run's first: the search begins there (as many times as `start_repeats` says).
+The old run is unchanged: the corrected run is a new one with the old one's body, cameras, behaviour model and the
+frames that the correction does not affect; its record names the old run, the frame and the pose. The given pose serves
+as a start pose of the frame: the search begins there (`start_repeats` times).
 
-Forwards, the frames before the corrected one are copied; it and all after it are tracked like those of any run, which
-may be stopped and resumed. Backwards, all frames are copied; the corrected one is searched, then the one before it
-from what that ended with, and so on down; each takes the old one's place when it is done, so that a cancelled
-correction keeps what it reached.
+Forwards, the frames before the corrected one are copied; it and all after it are tracked as in any run, which can be
+stopped and resumed. Backwards, all frames are copied; the corrected one is searched, then the frame before it from
+that result, and so on. Each result replaces the old frame when it is done, so that a cancelled correction keeps the
+frames done so far.
 """
 
 import shutil
@@ -51,10 +51,9 @@ def prepare_correction(
 ) -> StoredRun:
     """Make the corrected run's folder; then track it (`worker.batch.track_to_end`), or call `track_backwards`.
 
-    frame : one that the run has, or (forwards) the one after its last. pose : (D,) radians and mm, in that frame.
-    source : where it came from, in words. backwards_to : the last frame that is to be tracked backwards, which may lie
-    before the run's first (a run that began in the middle of its footage); None: forwards to the run's end.
-    Raises RunError, SessionError naming what is wrong; then nothing was made.
+    frame : of the run, or (forwards) the one after its last. pose : (D,) radians and mm, in that frame. source : of the
+    pose, as text. backwards_to : the last frame to track backwards; it may lie before the run's first frame; None:
+    forwards to the run's end. Raises RunError, SessionError; then nothing was made.
     """
     record, body = run.record, run.body()
     given = np.asarray(pose, dtype=np.float64)
@@ -91,14 +90,14 @@ def track_backwards(
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> int:
-    """Track a prepared correction backwards; returns how many frames have new poses. The others are the old run's.
+    """Track a prepared correction backwards; returns the number of frames with new poses.
 
-    progress : told after each frame. cancelled : asked before each layer; True ends it and keeps the frames that are
-    done. Raises RunError for a run that was not prepared so, or that another process has open.
+    progress : called after each frame. cancelled : checked before each layer; True stops and keeps the frames done.
+    Raises RunError for a run that was not prepared for this, or that another process has open.
     """
     record = run.record
     if record.corrected is None or record.backwards_to is None:
-        raise RunError(f"Run '{run.name}' is not one that is tracked backwards.", "Track it on instead.")
+        raise RunError(f"Run '{run.name}' was not prepared for tracking backwards.", "Resume it instead.")
     total = record.corrected - record.backwards_to + 1
     problems = ProblemSource(session, run.body(), run.cameras())
     try:
@@ -117,7 +116,7 @@ def track_backwards(
 
 
 def _track_again(tracking: TrackingRun, frame: int, cancelled: Callable[[], bool] | None) -> bool:
-    """Search a frame with the settings that it had and put it in the old one's place; False if cancelled."""
+    """Search a frame with its old settings and replace the old result; False if cancelled."""
     entry, record = tracking.history.in_use(frame, 0) or tracking.history.entries[0], tracking.record
     settings = settings_from_values(record.tracker, record.weighting, entry.values)
     search = Reannealing(tracking, frame, entry.version, settings)
@@ -133,12 +132,12 @@ def _check_frames(run: StoredRun, frame: int, backwards_to: int | None) -> None:
     record = run.record
     if record.to_and_fro:
         raise RunError(
-            f"Run '{run.name}' goes to and fro over its footage.", "Track the footage once instead."
+            f"Run '{run.name}' plays its footage forwards and backwards.", "Track the footage once instead."
         )
     with run.results() as results:
         frames = results.frames()
     if not frames:
-        raise RunError(f"Run '{run.name}' has no finished frame.", "Track it first, or begin a new run.")
+        raise RunError(f"Run '{run.name}' has no finished frame.", "Track it first, or start a new run.")
     latest = frames[-1] if backwards_to is not None else min(frames[-1] + 1, record.last - 1)
     if not frames[0] <= frame <= latest:
         raise RunError(
@@ -161,7 +160,7 @@ def _check_frames(run: StoredRun, frame: int, backwards_to: int | None) -> None:
 
 
 def _new_folder(run: StoredRun, record: RunRecord, last: int | None) -> StoredRun:
-    """The corrected run's folder with the old one's snapshots and its frames before `last`; whole or not at all."""
+    """The corrected run's folder with the old run's snapshots and its frames before `last`; atomic."""
     place = run.folder.parent / checked_name(record.name, "run")
     folder = atomic_files.new_folder_beside(place)
     try:

@@ -1,4 +1,4 @@
-"""Frames that follow each other, searched one after the other in memory: a run without its store, events and "
+"""Consecutive frames searched one after the other in memory: a run without its store, events and "
 "recovery."""
 
 import dataclasses
@@ -24,9 +24,9 @@ Array = NDArray[np.float64]
 
 @dataclass(eq=False)
 class Following:
-    """Give `step` the frames in order. carried : into the next frame. refiner : None where frames end with the search.
+    """Tracks consecutive frames given to `step`. carried : state for the next frame. refiner : None: no refinement.
 
-    poses, log_weights, memories : found so far, and what the search knew, a frame each.
+    poses, log_weights, memories : results and the search's memory so far, one each frame.
     """
 
     settings: RunSettings
@@ -40,7 +40,6 @@ class Following:
     memories: list[Mapping[str, Array]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        """Nothing is learnt yet."""
         self._learner = learner_of(self.space.behaviour, self.settings, self.seed)
 
     @property
@@ -51,7 +50,7 @@ class Following:
         return self._learner.model_in(len(self.poses), self._tracked)
 
     def step(self, frame: int, problem: FrameProblem, seen: FrameEvidence | None = None) -> FrameResult:
-        """Search a frame. seen : its masks, where it is to be refined."""
+        """Search a frame. seen : its masks, if it is to be refined."""
         settings, number, space = self.settings, len(self.poses), self.space
         if self._learner is not None:
             space = dataclasses.replace(space, behaviour=self.model)

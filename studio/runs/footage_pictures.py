@@ -1,4 +1,4 @@
-"""Pictures of a session's footage by themselves, before there is a calibration."""
+"""Pictures of a session's footage, also before there is a calibration."""
 
 import dataclasses
 
@@ -14,9 +14,9 @@ Bytes = NDArray[np.uint8]
 
 
 def bare_picture(session: Session, camera: str, frame: int, height: int | None = None) -> Bytes:
-    """A camera's picture (h, w, 3) BGR with its offset and turn, shrunk to `height` where that is less.
+    """A camera's picture (h, w, 3) BGR with its offset and rotation applied, scaled down to at most `height`.
 
-    Raises NotFoundError for a camera or frame that is not there, FootageError.
+    Raises NotFoundError for an unknown camera or frame, FootageError.
     """
     source = session.manifest.footage
     found = [entry for entry in source.cameras if entry.name == camera]

@@ -1,9 +1,9 @@
-"""Frames that were not tracked between two that were: what a search then starts from.
+"""The start of a search after dropped frames.
 
-σ0 and the last movement (Eq. 10 of Deutscher & Reid 2005) hold from one frame to the next. σ0 is a share of the largest
-movement expected in the time between two frames (`search_space.default_sigma`), so over k frames it is k times as
-large: a run that drops every second frame searches as one of footage at half the rate does. The last movement is as
-long as it was and is stretched to the frames ahead; a behaviour model propagates once a frame (`SearchSpace.steps`).
+σ0 and the last movement (Eq. 10 of Deutscher & Reid 2005) are given from one frame to the next. σ0 is a share of the
+largest movement expected in the time between two frames (`search_space.default_sigma`), so over k frames it is k times
+as large: a run that drops every second frame searches as one of footage at half the rate does. The last movement is
+scaled to the number of frames ahead; a behaviour model propagates once a frame (`SearchSpace.steps`).
 """
 
 import dataclasses
@@ -14,25 +14,25 @@ from studio.sessions.run_record import RunRecord
 from studio.tracking.tracker import Carried, FrameResult, SearchSpace, start_of
 
 LONGEST_SECONDS = 0.25
-"""Limbs swing to and fro: after longer than this a body is no further from where it was."""
+"""Limbs swing: after a longer time than this a body is no further from where it was."""
 
 
 def steps_between(before: int | None, frame: int, fps: float) -> int:
-    """Frames from the one tracked last to the one to be tracked, 1 in a run's first; no more than LONGEST_SECONDS."""
+    """Frames from the last tracked one to the next one, 1 in a run's first; at most LONGEST_SECONDS."""
     if before is None:
         return 1
     return max(1, min(frame - before, round(LONGEST_SECONDS * fps)))
 
 
 def space_over(space: SearchSpace, steps: int) -> SearchSpace:
-    """The search space of a frame so many frames after the one tracked last."""
+    """The search space of a frame `steps` frames after the last tracked one."""
     if steps == 1:
         return space
     return dataclasses.replace(space, sigma=steps * space.sigma, steps=steps)
 
 
 def carried_over(carried: Carried, steps: int, steps_before: int) -> Carried:
-    """What the last frame handed on, its last movement stretched from the frames that it took to those ahead."""
+    """The last frame's state with its last movement scaled from `steps_before` frames to `steps`."""
     last, before = carried.estimate, carried.previous_estimate
     if steps == steps_before or last is None or before is None:
         return carried
@@ -40,9 +40,9 @@ def carried_over(carried: Carried, steps: int, steps_before: int) -> Carried:
 
 
 class HandedOn:
-    """What each frame of a run starts from. results : of the run. tracked : its finished frames, ascending.
+    """The state that each frame of a run starts from. results : of the run. tracked : its finished frames, ascending.
 
-    The last frames are known without reading, so that a live run may store them a little later.
+    The last frames are kept in memory, so that a live run may store them a little later.
     """
 
     def __init__(self, results: ResultsReader, record: RunRecord, tracked: Sequence[int]) -> None:
@@ -51,23 +51,23 @@ class HandedOn:
         self._carried: tuple[int, Carried] | None = None
 
     def stored(self, result: FrameResult) -> None:
-        """Take note of the next finished frame."""
+        """Add the next finished frame."""
         self._carried = (result.frame, result.carried)
         self._recent = (*self._recent[-1:], result.frame)
 
     def is_first(self, frame: int) -> bool:
-        """Whether the search begins here: no frame before this one was tracked, or its start was corrected."""
+        """Whether the search begins here: no earlier frame was tracked, or this one was corrected."""
         return frame == self._record.corrected or self._before(frame)[0] is None
 
     def steps_to(self, frame: int) -> int:
-        """Frames that passed since the one tracked before this one."""
+        """Frames since the previously tracked one."""
         if self._record.is_anew(frame):
             return 1
         return steps_between(self._before(frame)[0], frame, self._record.fps)
 
     def into(self, frame: int) -> Carried:
-        """What a frame starts from: the end of the frame tracked before, in a run's first frame its start pose, in a
-        corrected one what it was corrected to; where that was tracked backwards, the end of the frame after.
+        """The state that a frame starts from: the result of the frame tracked before; in a run's first frame its start
+        pose; in a corrected frame the given pose; when tracking backwards, the result of the frame after it.
         """
         if frame == self._record.corrected:
             return start_of(self._record.corrected_pose)
@@ -82,7 +82,7 @@ class HandedOn:
         return carried_over(self._carried[1], self.steps_to(frame), steps_before)
 
     def _before(self, frame: int) -> tuple[int | None, int | None]:
-        """The last frame tracked before one, and the one tracked before that."""
+        """The last two frames tracked before this one."""
         if self._recent and self._recent[-1] < frame:
             return self._recent[-1], self._recent[-2] if len(self._recent) > 1 else None
         before = self._results.last_before(frame)

@@ -1,6 +1,6 @@
-"""A body's tree as searches use it that take a part of the pose at a time: which parameters come first.
+"""The order of a body's pose parameters for searches that take one part of the pose at a time.
 
-Everything is read off the tree, so that it holds for any body: the root is what hangs on the world; a limb (an
+It is derived from the tree and so holds for any body: the root is what hangs on the world; a limb (an
 arm, the head; the groups of the body file) is cut in two behind the first of its two longest drawn parts, at the
 elbow or the knee; limbs of one kind (both legs) are those whose names differ in their side only.
 """
@@ -61,7 +61,7 @@ def _cut(body: BodyModel, joints: set[int]) -> int:
 
 
 def _subspaces(body: BodyModel, joint: Indices, depth: Indices, position: NDArray[np.bool_]) -> Indices:
-    """(D,) numbers of the subspaces in the order of the tree: what others hang on comes first."""
+    """(D,) subspace numbers in the order of the tree, parents first."""
     limbs = _limbs(body)
     first_joint = {limb: _least(joint, [entry.limb == limb for entry in body.parameters]) for limb in limbs}
     keys = []

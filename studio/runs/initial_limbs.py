@@ -1,9 +1,9 @@
-"""A start pose gone over limb by limb on the silhouettes, and refined.
+"""A start pose corrected limb by limb on the silhouettes, and refined.
 
-The search for a start pose judges poses as a whole, with the weighting that is asked for; where the room is full of
-edges it likes an arm before the chest, whose edges there explain everything. What the silhouettes show beside the trunk
-then stays bare. So the pose goes down to the silhouettes' borders, and limbs that they deny are drawn anew, as in the
-frames that follow (`tracking.frame_refinement`).
+The search for a start pose scores whole poses with the requested likelihood. In a room full of edges that prefers an
+arm in front of the chest and leaves silhouette beside the trunk unexplained. So the pose is refined on the
+silhouettes' borders, and limbs contradicted by the silhouettes are redrawn, as in tracking
+(`tracking.frame_refinement`).
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ from studio.tracking.refinement import RefinementSettings, Refiner
 Array = NDArray[np.float64]
 
 ROUNDS = 3
-"""A limb may be found only where another one has left."""
+"""Passes: a limb may be found only once another one has moved away."""
 
 
 def limbs_put_right(
@@ -33,8 +33,8 @@ def limbs_put_right(
     *,
     draw: bool = True,
 ) -> Hypothesis:
-    """The pose (D,) with its limbs where a frame's masks show them, and what still disagrees. draw : whether limbs may
-    be drawn anew; else the pose stays as it is.
+    """The pose (D,) with its limbs corrected to a frame's masks, and what still disagrees. draw : whether limbs may be
+    redrawn; else the pose is unchanged.
     """
     refiner = Refiner(body, cameras, RefinementSettings())
     frame = SeenFrame(refiner, Agreement(body, cameras), silhouette_distances(evidence))

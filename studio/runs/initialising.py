@@ -1,7 +1,7 @@
-"""Where the body is and how it stands in a frame of a session, with nothing given but its dimensions.
+"""The start pose of a body in a frame of a session, from the pictures and the body's dimensions alone.
 
-The masks' visual hull says where (Caillette, Galata & Howard 2007, section 6.2), `tracking.initialisation` how. All of
-it is a function of the frame's pictures, the body, the settings and the seed.
+The masks' visual hull gives the place (Caillette, Galata & Howard 2007, section 6.2), `tracking.initialisation` the
+pose. The result is a function of the frame's pictures, the body, the settings and the seed.
 """
 
 from collections.abc import Callable
@@ -43,26 +43,26 @@ from studio.weighting.catalogue import WEIGHTINGS
 Array = NDArray[np.float64]
 
 WEIGHTING = "edge-silhouette"
-"""The one that tells poses apart best: of 20 moments of the Lee walk's twin (human31) it found all, 24 mm off on
+"""The likelihood that separates poses best: of 20 moments of the Lee walk's twin (human31) it found all, 24 mm off on
 average, and with samples of the region beside them 19, at 48 mm; on the balancing man, whose room is full of edges,
-those put an arm before the chest.
+those put an arm in front of the chest.
 """
 HULL_DEPTH = 6
 FEWEST_VIEWS = 2
 HIPS, NEAR, FAR, AHEAD, AROUND = 950.0, 1500.0, 8000.0, 3500.0, 1500.0
-"""mm, where a single camera looks: height of hips, how far they may be, how far they are taken to be, and about."""
+"""mm, for a single camera: height of the hips, their largest distance, their assumed distance, and its spread."""
 EVEN_SHARE, STEEPNESS = 0.1, 4.0
-"""Of `trust`: where right and wrong are as likely, and how quickly that changes."""
+"""Of `trust`: the share at which right and wrong are equally likely, and the width of the transition."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InitialPose:
-    """A start pose that was found.
+    """An estimated start pose.
 
-    names : of the parameters. pose : (D,). body : its name. confidence : 0 to 1, that the body stands so and faces so.
-    margin : log weight by which the best pose that faces the other way is beaten, inf without one. rival : that pose.
-    agreement : share of the last searches that face this way. overlap : f_s. hull_litres : volume of the hull, 0 where
-    there was none. note : what a person should know, "" if nothing.
+    names : of the parameters. pose : (D,). body : its name. confidence : 0 to 1, that pose and heading are right.
+    margin : log weight above the best pose that faces the other way, inf without one. rival : that pose.
+    agreement : share of the last searches with this heading. overlap : f_s. hull_litres : volume of the hull, 0
+    without one. note : for the user, or "".
     """
 
     frame: int
@@ -80,7 +80,7 @@ class InitialPose:
 
     @property
     def source(self) -> str:
-        """Where the pose came from, in words for a run's record."""
+        """The origin of the pose, for a run's record."""
         return f"found in frame {self.frame}, confidence {100.0 * self.confidence:.0f} %"
 
 
@@ -98,11 +98,11 @@ def initialise(
     """The pose of the session's body in a frame.
 
     body : the session's own by default. behaviour : name or path of a model whose prototypes are candidates. cancelled
-    : asked often; True ends the search with WorkCancelledError. Raises RunError where nothing is to be seen
-    in the frame, NotFoundError for a frame that is not there.
+    : checked often; True ends the search with WorkCancelledError. Raises RunError where the frame shows no body,
+    NotFoundError for an unknown frame.
     """
     tree = body or session.body()
-    tell = watched(progress, cancelled, "The search for a start pose")
+    report = watched(progress, cancelled, "The search for a start pose")
     settings = session_settings(session, DEFAULT_TRACKER, weighting)
     prototypes = None
     if behaviour:
@@ -110,7 +110,7 @@ def initialise(
         prototypes = fitting(model, tree, session.manifest.fps).prototypes.poses
     problems = ProblemSource(session, tree)
     try:
-        tell("looking at the frame", 0, 1)
+        report("reading the frame", 0, 1)
         evidence = problems.evidence(frame, settings)
         masks = problems.evidence(frame, session_settings(session, DEFAULT_TRACKER, WEIGHTING))
         cameras = problems.cameras_in(frame)
@@ -118,7 +118,7 @@ def initialise(
         problems.close()
     if not anything_seen(masks):
         raise RunError(
-            f"Nothing is to be seen of a body in frame {frame} of session '{session.name}'.",
+            f"Frame {frame} of session '{session.name}' shows no body.",
             "Choose a frame in which the person is in view, or check the masks.",
         )
     hull, box, note = hull_of(tree, cameras, masks)
@@ -132,14 +132,14 @@ def initialise(
         cameras=len(cameras),
         seed=seed,
         prototypes=prototypes,
-        progress=lambda done, total: tell("searching for the pose", done, total),
+        progress=lambda done, total: report("searching for the pose", done, total),
     )
-    tell("looking for each limb", 0, 1)
+    report("checking each limb", 0, 1)
     stands = limbs_put_right(tree, cameras, masks, found.pose, seed, draw=len(cameras) >= FEWEST_VIEWS)
     shares = stands.off.shares()
     denied = [limb for limb, share in shares.items() if share > LIMB_LOST_SHARE]
     if denied:
-        note = f"{note} The masks do not agree with the {enumerated(denied)}: look there.".strip()
+        note = f"{note} The masks do not agree with the {enumerated(denied)}: check there.".strip()
     return InitialPose(
         frame=evidence.frame,
         body=tree.name,
@@ -157,11 +157,11 @@ def initialise(
 
 
 def trust(most: float) -> float:
-    """How sure it is that a start pose is right whose most denied limb disagrees by a share of its area.
+    """The confidence in a start pose, from the largest share of a limb's area that the masks contradict.
 
     Measured on drawn footage (initialised in three frames of each clip, right: mean marker error at most 100 mm): of
     the choosing half the right ones have at most 0.08, the wrong ones 0.12 and more. On the reporting half 30 of 30
-    that are called 90 % or more are right.
+    rated 90 % or more are right.
     """
     return 1.0 / (1.0 + (most / EVEN_SHARE) ** STEEPNESS)
 
@@ -169,9 +169,9 @@ def trust(most: float) -> float:
 def keep_pose(session: Session, found: InitialPose, replace: bool = False) -> Path:
     """Write a found pose into the session's folder; returns the file.
 
-    It becomes the session's start pose if that has none, or with `replace` (the old one then stays beside it as
-    start_pose-before.csv, numbered if there are more). Else it is a file of its own for `--start-pose`, named after
-    its frame. Nothing that is stored is lost. A pose of another body than the session's never is its start pose.
+    It becomes the session's start pose if there is none, or with `replace` (the old one is kept beside it as
+    start_pose-before.csv, numbered if there are more). Otherwise, and for any other body than the session's, it is a
+    separate file for `--start-pose`, named after its frame.
     """
     own, taken = session.path / START_POSE_NAME, {path.name for path in session.path.glob("*.csv")}
     if found.body == session.manifest.body and (replace or not own.exists()):
@@ -194,23 +194,23 @@ def _free(stem: str, taken: set[str]) -> str:
 def hull_of(
     body: BodyModel, cameras: tuple[Camera, ...], evidence: FrameEvidence
 ) -> tuple[Hull | None, Box, str]:
-    """The hull of a frame's masks, the space it was sought in, and in words why there is none."""
+    """The hull of a frame's masks (None if there is none), the search volume, and why there is no hull."""
     if len(cameras) < FEWEST_VIEWS:
         box = _before(cameras[0]) if len(root_parameters(body)) else space_of(body, cameras)
-        return None, box, "One camera makes no hull: the body was sought anywhere in the middle of its view."
+        return None, box, "One camera makes no hull: the body was searched for in the middle of its view."
     box = space_of(body, cameras)
     hull = reconstruct(evidence, cameras, box, HullSettings(hull_depth=HULL_DEPTH))
     if hull.empty:
         return (
             None,
             box,
-            "The masks have no volume in common: the body was sought in the middle of the views.",
+            "The masks have no volume in common: the body was searched for in the middle of the views.",
         )
     return hull, box, ""
 
 
 def _before(camera: Camera) -> Box:
-    """The space in the middle of one camera's view: about where its axis is at the height of hips, if that is near."""
+    """The search volume in the middle of one camera's view: around its axis at hip height, if that is near."""
     ahead, centre = camera.rotation[2], camera.centre
     distance = (HIPS - centre[2]) / ahead[2] if ahead[2] else np.inf
     place = centre + ahead * (distance if NEAR < distance < FAR else AHEAD)
@@ -221,8 +221,8 @@ def _before(camera: Camera) -> Box:
 def whole_problem(
     body: BodyModel, cameras: tuple[Camera, ...], settings: RunSettings, evidence: FrameEvidence
 ) -> FrameProblem:
-    """A frame as a function of the body's poses, the body having feet even where it is tracked without: which way they
-    point tells front from back.
+    """A frame as a function of the body's poses, with feet also where the body is tracked without: their direction
+    distinguishes front from back.
     """
     whole = with_usual_feet(body)
     weigher = WEIGHTINGS[settings.weighting_name].prepare(whole, cameras, settings.weighting)
@@ -243,7 +243,7 @@ def seek(
     known: Array | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> FoundStart:
-    """The search itself, for a frame that is a problem already. known : (K, D) poses to try as they are."""
+    """Search a prepared frame for the start pose. known : (K, D) poses to try unchanged."""
     rng = np.random.default_rng(np.random.SeedSequence((seed, 0xB0D1)))
     candidates = start_candidates(rng, body, hull, box, PER_FAMILY, prototypes)
     search = StartSearch(

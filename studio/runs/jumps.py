@@ -1,8 +1,8 @@
-"""Frames in which a limb leaps: where the second difference of its markers is far above what is usual for it.
+"""Frames in which a limb jumps: the second difference of its markers is far above its usual value.
 
-A search that loses an arm and finds it again moves it from one frame to the next as no arm moves. The root mean square
-of all frames (jitter) hides a few of these; they are what a person sees first. What is usual differs from limb to limb
-and from moment to moment, so each limb is compared with its own median over the track, and with its neighbours in time.
+A search that loses an arm and finds it again moves it between two frames as no arm moves. The root mean square over all
+frames (jitter) hides a few of these, though a viewer notices them first. The usual value differs between limbs and
+moments, so each limb is compared with its own median over the track and with the frames around.
 """
 
 import msgspec
@@ -16,11 +16,11 @@ from studio.runs.tracks import Track, stretches
 Array = NDArray[np.float64]
 
 LEAST_MM = 25.0
-"""A second difference (mm a frame²) below this is no leap, however still the limb is otherwise."""
+"""A second difference (mm a frame²) below this is no jump, however still the limb is otherwise."""
 SPREADS = 8.0
-"""Above the median of the track, in robust standard deviations."""
+"""Threshold above the median of the track, in robust standard deviations."""
 TIMES = 4.0
-"""Above the median of the frames around it: a punch is quick for longer than a frame."""
+"""Factor above the median of the frames around: a punch is quick for longer than a frame."""
 AROUND = 12
 """Frames before and after that count as around it."""
 DEVIATION = 1.4826
@@ -30,8 +30,8 @@ WHOLE = "whole body"
 
 
 class Jump(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """frame : into which the limb leaps. limb : its name, "whole body" where all leap. mm : the largest second
-    difference of its markers. usual_mm : the median over the track.
+    """A jump of a limb into `frame`. limb : its name, or "whole body". mm : the largest second difference of its
+    markers. usual_mm : the median over the track.
     """
 
     frame: int
@@ -45,7 +45,7 @@ class Jump(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def jumps_of(body: BodyModel, track: Track) -> tuple[Jump, ...]:
-    """All leaps of a track, ascending by frame; none for a body without markers."""
+    """The jumps of a track, ascending by frame; none for a body without markers."""
     if not body.markers:
         return ()
     points = marker_points(body, track.poses)
@@ -56,13 +56,13 @@ def jumps_of(body: BodyModel, track: Track) -> tuple[Jump, ...]:
         for jump in _limb_jumps(limb, track.frames, own):
             found.setdefault(jump.frame, []).append(jump)
     several = len(set(limbs)) > 2
-    told: list[Jump] = []
+    result: list[Jump] = []
     for _, jumps in sorted(found.items()):
         if several and len(jumps) == len(set(limbs)):
             far = max(jumps, key=lambda jump: jump.mm)
             jumps = [msgspec.structs.replace(far, limb=WHOLE)]
-        told += jumps
-    return tuple(told)
+        result += jumps
+    return tuple(result)
 
 
 def marker_limbs(body: BodyModel) -> tuple[str, ...]:
@@ -75,7 +75,7 @@ def marker_limbs(body: BodyModel) -> tuple[str, ...]:
 
 
 def _limb_jumps(limb: str, frames: NDArray[np.int64], points: Array) -> list[Jump]:
-    """Leaps of one limb. points : (K, M, 3) its markers."""
+    """The jumps of one limb. points : (K, M, 3) its markers."""
     bends = np.full(len(frames), np.nan)
     parts = [part for part in stretches(frames) if part.stop - part.start > 2]
     for part in parts:
@@ -97,7 +97,7 @@ def _limb_jumps(limb: str, frames: NDArray[np.int64], points: Array) -> list[Jum
 
 
 def _runs(rows: list[int]) -> list[list[int]]:
-    """Rows that follow each other, together."""
+    """Groups of consecutive rows."""
     found: list[list[int]] = []
     for row in rows:
         if found and row == found[-1][-1] + 1:
@@ -117,8 +117,8 @@ def _usual_around(bends: Array, run: list[int]) -> float:
 def _jump(
     limb: str, frames: NDArray[np.int64], points: Array, bends: Array, run: list[int], usual: float
 ) -> Jump:
-    """The leap that a run of high second differences tells of: into the frame with the longest step, the first of two
-    that are about as long (there and back).
+    """The jump in a run of high second differences: into the frame with the longest step, or the first of two about
+    equal steps (there and back).
     """
     steps = np.linalg.norm(np.diff(points[run[0] - 1 : run[-1] + 2], axis=0), axis=-1).max(axis=1)
     row = run[0] + int(np.argmax(steps >= ABOUT * steps.max()))

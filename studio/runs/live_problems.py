@@ -1,8 +1,7 @@
-"""The frames of a live run: one made ready while another is searched.
+"""The frames of a live run: one is prepared while another is searched.
 
-Whoever makes frames ready and whoever searches them are two threads that share nothing but finished frames (`Ready`),
-so neither waits for the other. What else is asked for, a frame with other settings or the masks that a lost body is
-looked for in, comes from the run's `ProblemSource`.
+The preparing and the searching thread share only prepared frames (`Ready`), so neither waits for the other. Anything
+else, such as a frame with other settings or the masks for recovery, comes from the run's `ProblemSource`.
 """
 
 import time
@@ -20,8 +19,8 @@ from studio.tracking.tracker import FrameProblem
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ready:
-    """A frame that can be searched. arrival : when its pictures came. began, done : when it was begun to be made ready,
-    and when it was. evidence_key, problem_key : what they hold for (`problem_source`).
+    """A prepared frame. arrival : of its pictures. began, done : start and end of its preparation, seconds.
+    evidence_key, problem_key : what evidence and problem depend on (`problem_source`).
     """
 
     arrival: Arrival
@@ -34,14 +33,13 @@ class Ready:
 
     @property
     def frame(self) -> int:
-        """Its number."""
         return self.arrival.frame
 
 
 class LiveProblems:
-    """A run's frames, the one at hand without a wait. `ready` in one thread, all else in another.
+    """The frames of a live run. Call `ready` in one thread and all else in another.
 
-    clock : the arrivals', seconds.
+    clock : that of the arrivals, seconds.
     """
 
     def __init__(self, source: ProblemSource, clock: Callable[[], float] = time.monotonic) -> None:
@@ -50,7 +48,6 @@ class LiveProblems:
 
     @property
     def body(self) -> BodyModel:
-        """The body that is tracked."""
         return self._source.body
 
     @property
@@ -59,7 +56,7 @@ class LiveProblems:
         return self._source.cameras
 
     def ready(self, arrival: Arrival, settings: RunSettings) -> Ready:
-        """Decode a set's pictures and make of them what is searched. Raises FootageError, NotFoundError."""
+        """Decode a set's pictures and prepare the frame. Raises FootageError, NotFoundError."""
         began, frame = self._clock(), arrival.frame
         evidence = self._source.evidence(frame, settings)
         problem = self._source.problem(frame, settings)
@@ -67,7 +64,7 @@ class LiveProblems:
         return Ready(arrival, evidence, problem, *keys, began, self._clock())
 
     def take(self, ready: Ready) -> None:
-        """Make a frame the one at hand."""
+        """Make a prepared frame the current one."""
         self._at_hand = ready
 
     def problem(self, frame: int, settings: RunSettings) -> FrameProblem:
@@ -78,7 +75,7 @@ class LiveProblems:
         return self._source.problem(frame, settings)
 
     def evidence(self, frame: int, settings: RunSettings) -> FrameEvidence:
-        """What is seen in it."""
+        """The frame's evidence."""
         ready = self._at_hand
         if ready is not None and ready.evidence_key == evidence_key(frame, settings):
             return ready.evidence

@@ -1,7 +1,7 @@
-"""A live run tracked once more without the clock: the same frames, the same settings at the same layers.
+"""Replay of a live run without the clock: the same frames, the same settings at the same layers.
 
-Poses and weights come out bit for bit the same, whatever the machine did meanwhile. So what was seen live can be looked
-at again, and a live result can be checked by whoever has the footage.
+Poses and weights are bit for bit the same, whatever the machine's load was. So a live result can be examined again, and
+checked by anyone who has the footage.
 """
 
 from collections.abc import Iterator
@@ -24,15 +24,15 @@ from studio.settings import RunSettings, SettingsHistory, settings_from_values
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """frames : compared. different : those whose pose or log-weight differs in any bit."""
+    """Two runs compared. frames : number compared. different : those whose pose or log-weight differs in any bit."""
 
     frames: int
     different: tuple[int, ...]
 
 
 def prepare_replay(session: Session, run: StoredRun, name: str = "") -> StoredRun:
-    """A new run like a live one. Raises RunError for a run that was not live or has no frames, SessionError where the
-    name is taken.
+    """A new run with the frames and settings of a live one. Raises RunError for a run that was not live or has no
+    frames, SessionError if the name is taken.
     """
     record = run.record
     with run.results() as results:
@@ -53,7 +53,7 @@ def prepare_replay(session: Session, run: StoredRun, name: str = "") -> StoredRu
 
 
 def replay(source: StoredRun, into: StoredRun, problems: ProblemSource) -> Iterator[int]:
-    """Track the frames of a live run again; yields each when it is done. Raises what tracking raises."""
+    """Track the frames of a live run again; yields each frame when done. Raises the errors of tracking."""
     with source.results() as results:
         frames, history = results.frames(), SettingsHistory(tuple(results.settings_history()))
     run = LiveRun(into, LiveProblems(problems))
@@ -71,7 +71,7 @@ def replay(source: StoredRun, into: StoredRun, problems: ProblemSource) -> Itera
 
 
 def compare(one: StoredRun, other: StoredRun) -> Comparison:
-    """Two runs that should be the same, frame by frame; a frame that one of them lacks differs."""
+    """Compare two runs frame by frame; a frame that one of them lacks counts as different."""
     found: list[dict[int, bytes]] = []
     for run in (one, other):
         with run.results() as results:
@@ -86,7 +86,7 @@ def compare(one: StoredRun, other: StoredRun) -> Comparison:
 
 
 def _settings_at(history: SettingsHistory, source: StoredRun, run: LiveRun) -> tuple[int, RunSettings]:
-    """What the live run used in the layer that is to be done next, and its version there."""
+    """The settings of the live run in the next layer, and their version."""
     entry = history.in_use(run.next_frame, run.layers_done) or history.entries[0]
     record = source.record
     return entry.version, settings_from_values(record.tracker, record.weighting, entry.values)

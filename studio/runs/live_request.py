@@ -1,8 +1,8 @@
-"""What is different in a run that is tracked live, before it is made.
+"""Checks and defaults of a live run before it is made.
 
-A live run has no time to lose. Searching a lost body from nothing takes seconds, in which hundreds of frames would be
-dropped and the body be elsewhere; so unless asked otherwise a lost body is caught by spreading the particles, as the
-paper does (Caillette et al. 2007, section 6.3). A lesson for a behaviour model takes as long and is refused.
+Searching for a lost body without a start pose takes seconds, in which hundreds of frames would be dropped. So by
+default a live run recovers by spreading the particles, as in the paper (Caillette et al. 2007, section 6.3). Online
+learning of a behaviour model takes as long and is refused.
 """
 
 import math
@@ -15,26 +15,26 @@ from studio.tracking.recovery_settings import SPREAD
 
 
 def live_changes(changes: Mapping[str, object]) -> dict[str, object]:
-    """The knobs of a live run that differ from the defaults: those asked for, and a quick recovery."""
+    """The knobs of a live run that differ from the defaults: the requested ones and a quick recovery."""
     return {"recovery": SPREAD, **changes}
 
 
 def check_live(settings: RunSettings, *, live: bool, to_and_fro: bool) -> None:
-    """Raises RunError for what cannot be done live, or only live."""
+    """Raises RunError for what is possible only live, or not live."""
     if to_and_fro and not live:
         raise RunError(
-            "Only a live run goes forth and back through its footage.",
-            "Make it a live run, or leave that out.",
+            "Only a live run can play its footage forwards and backwards.",
+            "Make it a live run, or leave this option out.",
         )
     if live and getattr(settings.tracker, "online_learning", False):
         raise RunError(
-            "A live run cannot teach its behaviour model: a lesson takes seconds.",
+            "A live run cannot train its behaviour model: an update takes seconds.",
             "Set online_learning to false, or track the footage without the clock.",
         )
 
 
 def last_of(session: Session, first: int, seconds: float | None, to_and_fro: bool) -> int | None:
-    """The frame after the last one of a live run of so many seconds; None: the footage's end. Raises RunError."""
+    """The frame after the last one of a live run of `seconds`; None: the footage's end. Raises RunError."""
     if seconds is None:
         return None
     if not (math.isfinite(seconds) and seconds > 0.0):

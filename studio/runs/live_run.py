@@ -1,11 +1,10 @@
-"""A run that keeps up with its pictures: of the sets that came while a frame was searched only the newest is tracked.
+"""A live run: of the sets that arrive while a frame is searched, only the newest is tracked.
 
-Which frames it tracks depends on the machine and on what else that has to do. Everything else does not: the frames that
-were tracked stand in the results store, and given them every pose follows bit for bit from the run's record, as with
-any run (`live_replay` tracks them again and compares). What a dropped frame does to the search: `frame_steps`.
+Which frames are tracked depends on the machine and its load. Nothing else does: the results store lists the tracked
+frames, and given these every pose follows bit for bit from the run's record (`live_replay` tracks them again and
+compares). `frame_steps` has the effect of dropped frames on the search.
 
-Frames come by `take`; a frame at hand is searched by `step_layer` as always. Its results are stored by an executor, in
-order, a moment later.
+Frames are set by `take` and searched by `step_layer`. An executor stores the results in order, a moment later.
 """
 
 import contextlib
@@ -28,12 +27,12 @@ from studio.tracking.tracker import FrameResult, LayerRecord
 
 OVER = "finished"
 REHEARSALS = 3
-"""Predictions by a model need two frames before."""
+"""A behaviour model predicts from the two frames before."""
 
 
 class LiveRun(TrackingRun):
-    """The one who tracks a stored live run. storing : writes results, one after the other; None: they are written at
-    once. clock : seconds, the same as the arrivals'.
+    """Tracks a stored live run. storing : an executor of one thread that writes results; None: they are written at
+    once. clock : that of the arrivals, seconds.
     """
 
     def __init__(
@@ -53,12 +52,12 @@ class LiveRun(TrackingRun):
 
     @property
     def standing(self) -> LiveStanding:
-        """Dropped frames, rate and latency at this moment."""
+        """Dropped frames, rate and latency now."""
         return self.meter.standing
 
     @property
     def finished(self) -> bool:
-        """Whether the last frame was tracked, or dropped."""
+        """Whether the last frame was tracked or dropped."""
         return self._over or super().finished
 
     @property
@@ -67,7 +66,7 @@ class LiveRun(TrackingRun):
         return self._astray or self._search is None
 
     def take(self, ready: Ready) -> None:
-        """Make a frame the next one to be searched; those between are dropped."""
+        """Make a frame the next one to search; the frames between are dropped."""
         if self._astray:
             self._load_again()
         self._live_problems.take(ready)
@@ -75,47 +74,45 @@ class LiveRun(TrackingRun):
         self._came = (ready.frame, ready.arrival.complete)
 
     def go_to(self, frame: int) -> None:
-        """Search `frame` next, however long ago it came. Raises RunError inside another frame."""
+        """Search `frame` next, however old it is. Raises RunError inside another frame."""
         if not self.between_frames and frame != self.next_frame:
-            raise RunError(
-                f"Frame {self.next_frame} is not searched to its end.", "Do the layers that are left."
-            )
+            raise RunError(f"Frame {self.next_frame} is not finished.", "Do its remaining layers first.")
         self.next_frame, self._came = frame, None
 
     def end(self) -> None:
-        """No further frame will come."""
+        """End the run: no further frame will arrive."""
         self.meter.passed(self.record.last - 1)
         self._wait_for_disk()
         self._over = True
         self._writer.mark_ended(OVER)
 
     def when_stored(self, action: Callable[[], None]) -> None:
-        """Do something once all that is finished is stored: in the thread that stores, at the run's end at once."""
+        """Call `action` once all finished frames are stored: in the storing thread, or at once after the run's end."""
         with self._astray_where_it_fails():
             self._behind.do(action)
         if self.finished:
             self._wait_for_disk()
 
     def save(self) -> None:
-        """As `TrackingRun.save`, with everything stored that waits to be."""
+        """As `TrackingRun.save`, after all waiting results are stored."""
         self._wait_for_disk()
         self._came = None
         self.meter.paused()
         super().save()
 
     def mark_going_on(self) -> None:
-        """Note that a cancelled run goes on after all."""
+        """Note that a cancelled run is resumed."""
         super().mark_going_on()
         self._over = False
 
     def progress(self, least: float = 0.0) -> Progress:
-        """How far the run got, by its frames' numbers; it lasts as long as its footage does."""
+        """The run's progress by frame number; it takes as long as its footage."""
         passed, total = self.next_frame - self.record.first, self.record.frame_count
         passed = total if self.finished else passed
         return Progress(self.done, total, self.standing.frames_per_second, (total - passed) / self.record.fps)
 
     def rehearse(self) -> None:
-        """Search the next frame some times over and keep nothing of it, so that all is compiled and loaded."""
+        """Search the next frame several times and discard the results, so that everything is compiled and loaded."""
         version, settings = self.settings_source()
         frame = min(self.next_frame, self.record.last - 1)
         carried = self.carried_into(frame)
@@ -140,7 +137,7 @@ class LiveRun(TrackingRun):
             times = (came[1], ready)
             self.meter.tracked(result.frame, *times)
         else:
-            # Gone on with after a pause: nobody waited for it.
+            # Continued after a pause: its latency does not count.
             self.meter.passed(result.frame)
         self.latency_ms = 1e3 * (times[1] - times[0]) if times else float("nan")
         layers, kept = tuple(self._layers), settings.recording.record_particles
@@ -155,13 +152,13 @@ class LiveRun(TrackingRun):
         *,
         alone: bool = False,
     ) -> None:
-        """As `TrackingRun.keep`; a run that was over goes on from there."""
+        """As `TrackingRun.keep`; a finished run continues from there."""
         self._wait_for_disk()
         super().keep(result, layers, version, settings, alone=alone)
         self._over = False
 
     def _wait_for_disk(self) -> None:
-        """Return when all is stored. Raises SessionError where a frame was not: those after it are not either."""
+        """Wait until all is stored. Raises SessionError if a frame, and so all after it, could not be."""
         with self._astray_where_it_fails():
             self._behind.wait()
 
@@ -184,6 +181,6 @@ class LiveRun(TrackingRun):
 
 
 def without_particles(result: FrameResult) -> FrameResult:
-    """A result for those who look on: all but what the next frame starts from, which is large."""
+    """The result without its particles, which are large and which viewers do not need."""
     carried = dataclasses.replace(result.carried, particles=None, memory={})
     return dataclasses.replace(result, carried=carried)

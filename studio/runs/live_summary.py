@@ -1,4 +1,4 @@
-"""How a live run went: which frames it dropped, how fast it was, how long a pose took to come."""
+"""A live run's dropped frames, rate and latency."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -15,15 +15,15 @@ from studio.sessions.takes import read_sets
 Array = NDArray[np.float64]
 
 WATCHED = 60
-"""Frames that the rate and the latency on screen are of."""
+"""Frames over which rate and latency on screen are computed."""
 
 
 @dataclass(frozen=True, slots=True)
 class LiveStanding:
-    """A live run at this moment. dropped : frames that came and were not tracked, so far. dropped_share : of all that
-    came. latency_ms : median over the last frames, NaN before the first. frames_per_second : over the same, NaN before
-    the second. incomplete : moments of a take at which not every camera's picture came in time: nothing that could have
-    been tracked.
+    """A live run now. dropped : frames that arrived and were not tracked. dropped_share : of all arrived frames.
+    latency_ms : median over the last frames, NaN before the first. frames_per_second : over the same, NaN before the
+    second. incomplete : moments of a recording at which a camera's picture was missing, so that nothing could be
+    tracked.
     """
 
     dropped: int
@@ -34,7 +34,7 @@ class LiveStanding:
 
     @property
     def in_words(self) -> str:
-        """As a status line says it."""
+        """The text of a status line."""
         parts = ["live"]
         if self.frames_per_second == self.frames_per_second:
             parts.append(f"{self.frames_per_second:.1f} fps")
@@ -45,11 +45,11 @@ class LiveStanding:
 
 
 class LiveMeter:
-    """Measures a live run as it goes."""
+    """Measures rate and latency of a live run."""
 
     def __init__(self, tracked: Sequence[int] = (), sets: SetNumbers | None = None) -> None:
-        """tracked : the frames it has already. sets : of a take, whose numbers tell the time; None: every number has
-        its pictures.
+        """tracked : frames done already. sets : of a recording, where a number without a set was incomplete; None:
+        every number has its pictures.
         """
         self._sets = sets if sets is not None and sets.of_a_take else None
         self._came, self._incomplete = 0, 0
@@ -59,10 +59,10 @@ class LiveMeter:
         self._last: deque[tuple[float, float]] = deque(maxlen=WATCHED)
 
     def passed(self, frame: int) -> None:
-        """Frames up to this one came; it need not be tracked."""
+        """Frames up to this one arrived; it need not be tracked."""
         before = frame - 1 if self._newest is None else self._newest
         if self._sets is not None:
-            # A take may end before its time: what comes after the last set never was.
+            # A recording may end early: there is nothing after the last set.
             frame = min(frame, self._sets.last)
         passed = max(0, frame - before)
         came = passed if self._sets is None else self._sets.between(before, max(frame, before))
@@ -71,18 +71,18 @@ class LiveMeter:
         self._newest = max(frame, before)
 
     def tracked(self, frame: int, came: float, ready: float) -> None:
-        """A frame was tracked. came, ready : when its pictures had come and when its pose was ready, seconds."""
+        """Add a tracked frame. came, ready : times of its pictures and of its pose, seconds."""
         self.passed(frame)
         self._tracked += 1
         self._last.append((came, ready))
 
     def paused(self) -> None:
-        """Forget what rates are measured by: time that passes now is nobody's."""
+        """Restart the measurement of the rate: the pause does not count."""
         self._last.clear()
 
     @property
     def standing(self) -> LiveStanding:
-        """Where the run stands."""
+        """The run's current figures."""
         times = np.array(self._last).reshape(-1, 2)
         dropped = self._came - self._tracked
         return LiveStanding(
@@ -96,10 +96,10 @@ class LiveMeter:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LiveSummary:
-    """tracked, dropped : frame numbers, ascending; together all from the first tracked one to the last that came, but
-    for those of a take that are incomplete: at these moments not every camera's picture came in time.
-    frames_per_second : tracked ones from the first pose to the last, pauses left out; NaN for fewer than two. latencies
-    (K,) : ms from the last picture of a set to its pose, frame by frame.
+    """Figures of a stored live run. tracked, dropped, incomplete : frame numbers, ascending; together all from the
+    first tracked one to the last that arrived; at incomplete ones a camera's picture was missing. frames_per_second :
+    of tracked frames from the first pose to the last without pauses; NaN for fewer than two. latencies (K,) : ms from
+    the last picture of a set to its pose, by frame.
     """
 
     tracked: tuple[int, ...]
@@ -110,17 +110,17 @@ class LiveSummary:
 
     @property
     def dropped_share(self) -> float:
-        """Of all frames that came."""
+        """Of all frames that arrived."""
         came = len(self.tracked) + len(self.dropped)
         return len(self.dropped) / came if came else 0.0
 
     def latency(self, share: float) -> float:
-        """The latency, ms, that so large a share of the frames keeps under; NaN without frames."""
+        """The latency (ms) at a quantile `share` of the frames; NaN without frames."""
         return float(np.quantile(self.latencies, share)) if len(self.latencies) else float("nan")
 
 
 def summary_of(run: StoredRun) -> LiveSummary:
-    """How a stored live run went. Raises NotFoundError for a run that was not live."""
+    """The figures of a stored live run. Raises NotFoundError for a run that was not live."""
     if not run.record.live:
         raise NotFoundError(f"Run '{run.name}' was not tracked live.", "Choose a live run.")
     with run.results() as results:
@@ -130,7 +130,7 @@ def summary_of(run: StoredRun) -> LiveSummary:
     came = range(tracked[0], run.record.last if over else tracked[-1] + 1) if tracked else range(0)
     known, sets = set(tracked), read_sets(run.folder.parents[1]).sets
     if sets and tracked:
-        # Of a take, the sets that live cameras gave: numbers between them tell only the time.
+        # Of a recording, only the sets that exist: numbers between them only mark the time.
         came = [one.frame for one in sets if one.frame >= tracked[0]]
         there = set(came)
         incomplete = tuple(frame for frame in range(tracked[0], came[-1]) if frame not in there)
@@ -144,14 +144,14 @@ def summary_of(run: StoredRun) -> LiveSummary:
 
 
 def rate_of(ready: Array) -> float:
-    """Frames a second of frames that were ready at these times (K,), seconds; gaps over a second are pauses."""
+    """Frames a second, from the times (K,) at which they were ready, seconds; gaps over a second are pauses."""
     gaps = np.diff(ready)
     gaps = gaps[(gaps > 0.0) & (gaps <= PAUSE_SECONDS)]
     return len(gaps) / float(gaps.sum()) if len(gaps) else float("nan")
 
 
 def in_words(dropped: Sequence[int], most: int = 8) -> str:
-    """Frame numbers as a person reads them, neighbours joined: "3, 7-9"."""
+    """Frame numbers as text with ranges: "3, 7-9"."""
     runs: list[tuple[int, int]] = []
     for frame in dropped:
         if runs and frame == runs[-1][1] + 1:

@@ -1,9 +1,9 @@
-"""Which markers of a body a stick figure joins, read from the body's tree.
+"""The lines of a body's stick figure: which markers to join, from the body's tree.
 
 The first marker on a joint hangs on the nearest marker (in the rest pose) of the nearest joint above that has any;
 or on an earlier one that hangs there as well, where that is less than half as far (a shoulder on the neck, though its
-joint hangs on the torso's). Further markers on a joint hang on its first. So any body has a stick figure, and markers
-of other names are left alone.
+joint hangs on the torso's). Further markers on a joint hang on its first. So any body has a stick figure; markers
+of other names are ignored.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ _MUCH_NEARER = 0.5
 
 
 def marker_links(body: BodyModel, names: Sequence[str]) -> list[tuple[int, int]]:
-    """Pairs of indices into `names` to be joined; names that the body does not carry are left alone."""
+    """Pairs of indices into `names` to join; names that the body lacks are ignored."""
     carried: dict[int, list[Marker]] = {}
     for marker in body.markers:
         if marker.name in names:

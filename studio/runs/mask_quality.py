@@ -1,9 +1,9 @@
-"""How good the masks are, camera by camera, told without truth: by how far the views agree in the visual hull.
+"""The quality of each camera's masks without ground truth: how far the views agree in the visual hull.
 
-A hull is what every view allows. Where a mask holds something that is no one (a bystander, a reflection), the other
-views carve it away, and the hull's silhouette leaves that part of the mask uncovered. Where a mask has a hole, its own
-camera carves the person, and it is the *other* masks that stay uncovered: so for each camera the hull is carved once
-more without it, and what of the other masks comes back is what this camera alone denies.
+Where a mask contains something else than the person (a bystander, a reflection), the other views carve it away, and
+the hull's silhouette leaves that part of the mask uncovered. Where a mask has a hole, its own camera carves the
+person, and the *other* masks stay uncovered. So for each camera the hull is carved once more without it: the part of
+the other masks that is then covered is removed by this camera alone.
 """
 
 import dataclasses
@@ -38,17 +38,17 @@ FRAMES = 5
 COARSE = HullSettings(hull_depth=6)
 FINE = HullSettings(hull_depth=8, hull_edge_share=0.5, hull_least_views=2)
 ROUGH = dataclasses.replace(FINE, hull_depth=7)
-"""For what is asked of many hulls: which camera denies something, which knobs are better."""
+"""Hull settings where many hulls are needed: to find which camera removes something, which knobs are better."""
 MARGIN = 120.0
-"""mm around the coarse hull in which the fine one is carved."""
+"""Margin (mm) around the coarse hull in which the fine one is carved."""
 LEAST_PIECE = 0.05
 """Of the largest piece's volume."""
 JUDGED_SIDE = 480
-"""Pixels of the shorter side, at least, of the masks that are compared: a voxel of the fine hull is wider than one."""
+"""Least shorter side (pixels) of the compared masks: a voxel of the fine hull is wider than one of their pixels."""
 USABLE = 0.9
-"""Agreement from which on masks are called usable (issue 5)."""
+"""Agreement from which masks are usable (issue 5)."""
 BLAMED = 0.05
-"""Share of the other masks that one camera may deny before it is named."""
+"""Share of the other masks that one camera may remove before it is named."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class ViewQuality:
     """One camera's masks against the hull, pixels of all frames together.
 
     covered : share of the mask that the hull's silhouette covers. inside : share of the silhouette that lies in the
-    mask. denied : share of the other cameras' masks that only this camera's mask keeps out of the hull. frames :
+    mask. denied : share of the other cameras' masks that only this camera's mask removes from the hull. frames :
     (covered, inside) of each frame; NaN where there is nothing.
     """
 
@@ -77,27 +77,27 @@ class ViewQuality:
         return self.agreement >= USABLE
 
     def in_words(self) -> str:
-        """What a person should look for, "" if the masks are good."""
+        """What the user should check, "" if the masks are good."""
         if np.isnan(self.agreement):
-            return "The mask, or the hull that all views allow, is empty: look at the masks of all cameras."
-        said = []
+            return "The mask, or the hull that all views allow, is empty: check the masks of all cameras."
+        sentences = []
         if self.denied > BLAMED:
             share = f"{100.0 * self.denied:.0f} %"
-            said.append(f"The mask has holes: it alone denies {share} of what the other cameras see.")
+            sentences.append(f"The mask has holes: it alone removes {share} of what the other cameras see.")
         if self.covered < USABLE:
             share = f"{100.0 * (1.0 - self.covered):.0f} %"
-            said.append(
-                f"{share} of the mask is seen by no other camera: exclude what is no one, or see who has holes."
+            sentences.append(
+                f"{share} of the mask is seen by no other camera: exclude it, or find the camera whose mask has holes."
             )
         if self.inside < USABLE:
-            said.append("The mask lacks parts of what the other cameras see.")
-        return " ".join(said)
+            sentences.append("The mask lacks parts of what the other cameras see.")
+        return " ".join(sentences)
 
 
 @dataclass(frozen=True, slots=True)
 class MaskQuality:
-    """All cameras' masks in some frames. hull_litres : the hull's volume in each. doubts : what the silhouettes say
-    against the calibration.
+    """The quality of all cameras' masks in some frames. hull_litres : the hull's volume in each. doubts : findings of
+    the silhouettes on the calibration.
     """
 
     frames: tuple[int, ...]
@@ -107,13 +107,13 @@ class MaskQuality:
 
     @property
     def usable(self) -> bool:
-        """Whether every camera's masks are, and no fault of the calibration is seen in them."""
+        """Whether every camera's masks are usable and show no fault of the calibration."""
         return all(view.usable for view in self.views) and not blocking(self.doubts)
 
     @property
     def worst(self) -> str:
-        """The camera to look at first, "" where all are usable: one that denies what the others see is the cause of
-        their poor agreement, else the one that agrees least.
+        """The camera to check first, "" where all are usable: one that removes what the others see causes their poor
+        agreement; else the one that agrees least.
         """
         if all(view.usable for view in self.views):
             return ""
@@ -123,13 +123,13 @@ class MaskQuality:
         return min(self.views, key=lambda view: np.nan_to_num(view.agreement, nan=-1.0)).camera
 
     def in_words(self) -> str:
-        """How the worst camera agrees, for a line."""
+        """The agreement of the worst camera, as text."""
         if stops := blocking(self.doubts):
             return f"the calibration is in doubt: {stops[0].message}"
         least = min(float(np.nan_to_num(view.agreement)) for view in self.views)
         if self.usable:
             return f"every view agrees by {least:.2f} or more"
-        return f"camera {self.worst} to look at, least agreement {least:.2f}"
+        return f"check camera {self.worst}, least agreement {least:.2f}"
 
 
 def mask_quality(
@@ -142,15 +142,15 @@ def mask_quality(
 ) -> MaskQuality:
     """The quality of a session's masks in some frames (default: five, evenly spread).
 
-    blame : find out what each camera denies, which takes most of the time (else 0), and whether the silhouettes speak
-    against the calibration. Only one camera's pictures are held at a time. Raises RunError for a single camera,
+    blame : compute what each camera alone removes (most of the time; else 0), and check the calibration by the
+    silhouettes. Only one camera's pictures are held at a time. Raises RunError for a single camera,
     FootageError, NotFoundError.
     """
     cameras = session.cameras()
     if len(cameras) < 2:
         raise RunError(
             f"Session '{session.name}' has one camera: masks cannot be compared between views.",
-            "Look at its masks instead.",
+            "Check its masks by eye instead.",
         )
     small = tuple(camera.reduced(JUDGED_SIDE) for camera in cameras)
     footage = session.footage()
@@ -186,8 +186,8 @@ def mask_quality(
 def measure_masks(
     session: Session, frames: Sequence[int] = (), progress: Progress | None = None
 ) -> MaskQuality:
-    """The quality of the masks as the session makes them. In the usual frames it is remembered: a blocking doubt keeps
-    runs from being made (`silhouette_doubts.accepted_doubts`). Raises as `mask_quality` does.
+    """The quality of the session's masks. For the default frames it is stored: a blocking finding then refuses new runs
+    (`silhouette_doubts.accepted_doubts`). Raises as `mask_quality` does.
     """
     found = mask_quality(session, session_settings(session).evidence, frames, progress=progress)
     if frames:
@@ -205,7 +205,7 @@ def spread_frames(count: int, wanted: int) -> tuple[int, ...]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameCounts:
-    """Pixels of one frame, (V,) each: of mask, silhouette, both; denied[v]: of the other masks, uncovered only by v."""
+    """Pixels of one frame, (V,) each: of mask, silhouette, both; denied[v]: of the other masks, removed only by v."""
 
     mask: NDArray[np.int64]
     hull: NDArray[np.int64]
@@ -236,7 +236,7 @@ def count_frame(
 def denied_pixels(
     masks: Sequence[Bytes], cameras: tuple[Camera, ...], carver: Reconstructor
 ) -> NDArray[np.int64]:
-    """(V,) pixels of the other cameras' masks that the hull covers once a camera denies nothing."""
+    """(V,) pixels of the other cameras' masks that the hull covers only when a camera is left out."""
     whole = _large_hull(carver, masks)
     open_yet = [mask & ~_silhouette(whole, camera) for mask, camera in zip(masks, cameras, strict=True)]
     denied = np.zeros(len(cameras), dtype=np.int64)
@@ -249,7 +249,7 @@ def denied_pixels(
 
 
 def person_box(masks: Sequence[Bytes], cameras: tuple[Camera, ...]) -> Box | None:
-    """Around the large pieces of a coarse hull; None where there is nothing."""
+    """A box around the large pieces of a coarse hull; None for an empty hull."""
     coarse = Reconstructor(cameras, box_of(cameras), COARSE).shape(masks)
     if coarse.empty:
         return None
@@ -259,19 +259,19 @@ def person_box(masks: Sequence[Bytes], cameras: tuple[Camera, ...]) -> Box | Non
 
 
 def _large_hull(carver: Reconstructor, masks: Sequence[Bytes]) -> Hull | None:
-    """The large pieces, None where there is nothing."""
+    """The large pieces of the hull, None if it is empty."""
     found = carver.shape(masks)
     return None if found.empty else _large_pieces(found)
 
 
 def _large_pieces(hull: Hull) -> Hull:
-    """The hull without crumbs and ghosts: a wrong mask may cut a person in two, both of which stay."""
+    """The hull without small pieces and ghosts. (A wrong mask may cut a person in two; both parts stay.)"""
     numbers, volumes = piece_numbers(hull)
     return chosen_voxels(hull, volumes[numbers] >= LEAST_PIECE * volumes[0])
 
 
 def without(masks: Sequence[Bytes], left_out: int) -> list[Bytes]:
-    """The masks with one camera denying nothing."""
+    """The masks with one camera's filled, so that it removes nothing."""
     changed = list(masks)
     changed[left_out] = np.full_like(masks[left_out], 255)
     return changed
@@ -284,7 +284,7 @@ def _silhouette(hull: Hull | None, camera: Camera) -> Bytes:
 
 
 def summed(frames: tuple[int, ...], names: tuple[str, ...], counted: Sequence[FrameCounts]) -> MaskQuality:
-    """All frames' pixels together. names : of the cameras. counted : one a frame."""
+    """The quality over all frames' pixels. names : of the cameras. counted : one entry a frame."""
     mask, hull = np.stack([one.mask for one in counted]), np.stack([one.hull for one in counted])
     both, denied = np.stack([one.both for one in counted]), np.stack([one.denied for one in counted])
     covered, inside = _share(both, mask), _share(both, hull)

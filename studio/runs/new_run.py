@@ -1,8 +1,7 @@
-"""A new run of a session: what was not asked for is filled in, everything is checked, then it is written
-down.
+"""Makes a new run: fills in defaults, checks everything, then writes the record.
 
-What is filled in comes from the session (body, subject, start pose, σ0, tracker, weighting) and else from the
-studio's defaults, so that a run's record says everything that its poses depend on.
+Defaults come from the session (body, subject, start pose, σ0, tracker, likelihood), else from the studio, so that a
+run's record has everything that its poses depend on.
 """
 
 from collections.abc import Mapping
@@ -35,22 +34,22 @@ Array = NDArray[np.float64]
 
 DISTRIBUTION = "capture-studio"
 DESPITE = "Tracked despite: "
-"""How a run's note on an accepted fault of the calibration begins."""
+"""Prefix of a run's note on an accepted fault of the calibration."""
 
 
 @dataclass(frozen=True, slots=True)
 class RunRequest:
-    """What a person asks of a new run; everything has a default.
+    """The parameters of a new run; all have defaults.
 
     tracker, weighting, body : names, "" for the session's own. subject : measures instead of the session's.
-    start_pose : (D,) radians and mm, instead of the session's; start_source : where it came from, in words.
+    start_pose : (D,) radians and mm, instead of the session's; start_source : its origin, as text.
     first, last : frames, half open; first None means the frame that the session's start pose is of (0 where none is
     used, and live), last None all. changes : knobs by flat name. name : "" for run-1,
     run-2, … behaviour : a behaviour model, by its name in the workspace's models or by path; "" for the only one that
     fits where the settings need one. live : frames come on the footage's clock and are dropped where they come too
-    fast (`live_run`). to_and_fro : a live run goes forth and back through the footage; `last` may lie behind its end.
-    despite_findings : also where the footage speaks against the calibration. fit_shape : the first frames show the
-    body's radii, hands, feet and head (`shape_on_the_way`); not for live runs, which cannot look ahead.
+    fast (`live_run`). to_and_fro : a live run plays the footage forwards and backwards; `last` may lie behind its end.
+    despite_findings : also where the footage contradicts the calibration. fit_shape : fit the body's radii, hands,
+    feet and head to the first frames (`shape_on_the_way`); not for live runs, which cannot look ahead.
     """
 
     tracker: str = ""
@@ -74,44 +73,44 @@ class RunRequest:
 def prepare_run(
     session: Session, request: RunRequest | None = None, progress: Progress | None = None
 ) -> StoredRun:
-    """Make a run's folder, ready to be tracked. Raises StudioError naming what is wrong; then nothing was made.
+    """Make a run's folder, ready to be tracked. Raises StudioError; then nothing was made.
 
-    Where neither the request nor the session has a start pose and the body has no limits to begin between, the first
-    frame is searched for one, which takes a while. progress : told how far that is.
+    Without a start pose in request and session, and limits of the body to start between, the first frame is searched
+    for one, which takes a while. progress : of that search.
     """
-    asked = request or RunRequest()
-    doubts = accepted_doubts(session, asked.despite_findings)
-    tracker = asked.tracker or session.manifest.tracker or DEFAULT_TRACKER
-    weighting = asked.weighting or session.manifest.weighting or DEFAULT_WEIGHTING
-    changes = live_changes(asked.changes) if asked.live else asked.changes
+    request = request or RunRequest()
+    doubts = accepted_doubts(session, request.despite_findings)
+    tracker = request.tracker or session.manifest.tracker or DEFAULT_TRACKER
+    weighting = request.weighting or session.manifest.weighting or DEFAULT_WEIGHTING
+    changes = live_changes(request.changes) if request.live else request.changes
     settings = session_settings(session, tracker, weighting, changes)
-    check_live(settings, live=asked.live, to_and_fro=asked.to_and_fro)
-    own_start = asked.start_pose is None and not asked.live
+    check_live(settings, live=request.live, to_and_fro=request.to_and_fro)
+    own_start = request.start_pose is None and not request.live
     first, last = checked_frames(
-        session, _first(session, asked, own_start), asked.last, endless=asked.to_and_fro
+        session, _first(session, request, own_start), request.last, endless=request.to_and_fro
     )
-    if not 0 <= asked.seed < 2**63:
-        raise RunError(f"The seed {asked.seed} cannot be used.", "Give a whole number of 0 or more.")
-    body, notes = session.body_with_notes(asked.body or None, asked.subject)
+    if not 0 <= request.seed < 2**63:
+        raise RunError(f"The seed {request.seed} cannot be used.", "Give a whole number of 0 or more.")
+    body, notes = session.body_with_notes(request.body or None, request.subject)
     notes = (*notes, *(f"{DESPITE}{doubt}" for doubt in doubts))
-    behaviour = chosen_model(session, body, settings, asked.behaviour)
+    behaviour = chosen_model(session, body, settings, request.behaviour)
     if behaviour is not None and behaviour.note:
         notes = (*notes, behaviour.note)
-    start, source = start_pose(session, body, asked.start_pose, asked.start_source)
+    start, source = start_pose(session, body, request.start_pose, request.start_source)
     if own_start and start is not None and first != session.start_pose_frame():
         of = session.start_pose_frame()
         notes = (*notes, f"The run begins in frame {first}, the session's start pose is of frame {of}.")
     if start is None and not _limited(body):
         model = str(behaviour.path) if behaviour else ""
-        found = _found(session, first, body, model, asked.seed, progress)
+        found = _found(session, first, body, model, request.seed, progress)
         start, source = within_limits(body, found.pose), found.source
         notes = (*notes, *([found.note] if found.note else []))
     subject = dict(body.dimensions)
-    if asked.fit_shape and not asked.live and start is not None:
+    if request.fit_shape and not request.live and start is not None:
         body, start, words = session_shape(session, body, settings, start, first, progress)
         notes = (*notes, *([words] if words else []))
     record = RunRecord(
-        name=asked.name or free_run_name(session),
+        name=request.name or free_run_name(session),
         session=session.name,
         created=now(),
         tracker=tracker,
@@ -119,7 +118,7 @@ def prepare_run(
         body=body.name,
         dimensions=dict(body.dimensions),
         parameters=parameter_names(body),
-        seed=asked.seed,
+        seed=request.seed,
         first=first,
         last=last,
         fps=session.manifest.fps,
@@ -130,24 +129,24 @@ def prepare_run(
         software=software_version(),
         notes=tuple(notes),
         behaviour=behaviour.name if behaviour else "",
-        live=asked.live,
-        to_and_fro=asked.to_and_fro,
+        live=request.live,
+        to_and_fro=request.to_and_fro,
         subject_dimensions=subject if subject != body.dimensions else {},
     )
-    text = _body_text(session, asked.body or body.name)
+    text = _body_text(session, request.body or body.name)
     return session.new_run(record, text, behaviour.path if behaviour else None)
 
 
-def _first(session: Session, asked: RunRequest, own_start: bool) -> int:
+def _first(session: Session, request: RunRequest, own_start: bool) -> int:
     """The frame that a run begins in. Raises RunError where it would end before its start pose."""
-    if asked.first is not None:
-        return asked.first
+    if request.first is not None:
+        return request.first
     first = session.start_pose_frame() if own_start else 0
-    if first and asked.last is not None and asked.last <= first:
+    if first and request.last is not None and request.last <= first:
         raise RunError(
-            f"The start pose of session '{session.name}' is of frame {first}, after the last frame wanted"
-            f" ({asked.last - 1}).",
-            "Name the first frame, too, or find a start pose in an earlier frame.",
+            f"The start pose of session '{session.name}' is of frame {first}, after the last requested frame"
+            f" ({request.last - 1}).",
+            "Give the first frame, too, or find a start pose in an earlier frame.",
         )
     return first
 
@@ -158,7 +157,7 @@ def checked_frames(
     """The frames of a run, half open. endless : the last may lie behind the footage's end. Raises RunError if any lies
     outside the footage, or there are none.
     """
-    session.cameras()  # what a session lacks altogether is said first
+    session.cameras()  # report missing footage or calibration first
     count = session.manifest.frame_count
     end = count if last is None else last
     if not 0 <= first < (min(end, count) if endless else end) <= count:
@@ -174,8 +173,8 @@ def start_pose(
 ) -> tuple[Array | None, str]:
     """The pose that the first frame starts from (its angles rewritten into the limits), and where it came from.
 
-    None, where neither the request nor the session has one: then a search starts uniformly between the limits (Fig.
-    12a), or where there are none the body is looked for. Raises BodyError for a wrong one.
+    None, if neither the request nor the session has one: then the search starts uniformly between the limits (Fig.
+    12a), or without limits the first frame is searched for one. Raises BodyError for a wrong one.
     """
     if given is not None:
         pose = np.asarray(given, dtype=np.float64)
@@ -194,7 +193,7 @@ def start_pose(
 def _found(
     session: Session, frame: int, body: BodyModel, model: str, seed: int, progress: Progress | None
 ) -> InitialPose:
-    """The pose in a run's first frame. Raises RunError where there is none to be found."""
+    """The start pose found in a run's first frame. Raises RunError if there is none."""
     try:
         return initialise(session, frame, body=body, behaviour=model, seed=seed, progress=progress)
     except StudioError as error:
@@ -209,7 +208,7 @@ def _limited(body: BodyModel) -> bool:
 
 
 def software_version() -> str:
-    """The studio's version, for records."""
+    """The studio's version."""
     try:
         return metadata.version(DISTRIBUTION)
     except metadata.PackageNotFoundError:
@@ -217,7 +216,7 @@ def software_version() -> str:
 
 
 def _body_text(session: Session, name: str) -> str:
-    """The body's file as it is now, so that a later version of it cannot change what a run means."""
+    """The text of the body's file, stored so that later changes of it do not affect the run."""
     if name.endswith(".toml"):
         return Path(name).read_text(encoding="utf-8")
     for folder in session.body_folders:

@@ -1,4 +1,4 @@
-"""Drawing on a camera's picture what was seen and what was projected (OpenCV; pictures are BGR).
+"""Draws evidence and projected body onto a camera's picture (OpenCV; pictures are BGR).
 
 Silhouettes are coloured as in the paper's figures: red observed only, blue projected only, yellow both.
 Everything is drawn for pictures resized by `scale`; pixel (0, 0) is the centre of the top-left pixel at
@@ -27,8 +27,7 @@ _FARTHEST = 1.0e5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewMarks:
-    """What is projected into one camera, in pixels of the stored picture; NaN where a point is behind the
-    camera.
+    """What to draw in one camera, in pixels of the stored picture; NaN where a point is behind the camera.
 
     contours : L closed polylines (K, 2), one a limb; empty for a limb that is not seen. sides : L times "left",
     "right" or "middle".
@@ -144,7 +143,7 @@ def _with_lines(picture: Bytes, lines: Array, colour: Colour, scale: float) -> B
 
 def _with_dots(picture: Bytes, points: Array, colour: Colour, scale: float, *, radius: float) -> Bytes:
     """Small discs, all at once: there may be ten thousand particles in a picture."""
-    # A point behind the camera is NaN, and NaN is not nearer than anything.
+    # A point behind the camera is NaN, which compares false.
     near = points[(np.abs(points) < _FARTHEST).all(axis=1)]
     reach = max(1, round(radius * scale))
     around = np.mgrid[-reach : reach + 1, -reach : reach + 1].reshape(2, -1).T[:, ::-1]
@@ -157,7 +156,7 @@ def _with_dots(picture: Bytes, points: Array, colour: Colour, scale: float, *, r
 
 
 def _is_drawable(points: Array) -> bool:
-    """Whether there are points, all before the camera and near enough to be drawn (NaN is not near)."""
+    """Whether there are points, all in front of the camera and near enough to be drawn (NaN is not)."""
     return len(points) > 0 and bool((np.abs(points) < _FARTHEST).all())
 
 

@@ -1,8 +1,7 @@
-"""A session's pictures with what was seen and what was projected drawn over them, for the scene and the
-page.
+"""A session's pictures with evidence and projected body drawn over them, for the scene and the page.
 
-A composer opens a session's footage once and keeps it; `compose_view` keeps the composers last used, so
-that a route can ask for one picture after another.
+A composer opens a session's footage once and keeps it; `compose_view` keeps the composers last used, so that a route
+can request one picture after another.
 """
 
 import threading
@@ -47,8 +46,8 @@ Found = TypeVar("Found")
 REST_SECONDS = 20.0
 _NEED_EVIDENCE = {"mask", "edges"}
 _KEPT_COMPOSERS, _KEPT_PIXELS = 3, 18_000_000
-"""How many are kept at most, and pixels of all their cameras. A pixel holds about 100 bytes (decoder, background,
-pictures), so two sessions of four full-HD cameras are 1.7 GB.
+"""Composers kept at most, and pixels of all their cameras. A pixel takes about 100 bytes (decoder, background,
+pictures), so two sessions of four full-HD cameras take 1.7 GB.
 """
 
 
@@ -71,7 +70,7 @@ class ViewComposer:
 
     @property
     def pixels(self) -> int:
-        """Of all cameras' pictures together."""
+        """Pixels of all cameras' pictures together."""
         return sum(camera.width * camera.height for camera in self.cameras.values())
 
     def use(self, settings: RunSettings) -> None:
@@ -107,13 +106,13 @@ class ViewComposer:
         return draw_view(view, marks, tuple(layers), colour_tokens(dark=True), scale=scale)
 
     def close(self) -> None:
-        """Let go of the footage."""
+        """Release the footage."""
         with self._lock:
             self._footage.close()
 
     def rest(self, before: float) -> bool:
-        """Let go of files, pictures and background models where nothing was asked since a time (`time.monotonic`); they
-        are made again when needed. Whether there was anything to let go.
+        """Release files, pictures and background models unless used since `before` (`time.monotonic`); they are made
+        again when needed. Returns whether there was anything to release.
         """
         with self._lock:
             if self._rests or self._used >= before:
@@ -133,7 +132,7 @@ class ViewComposer:
             nothing = np.zeros((0, 0), dtype=np.uint8)
             return ViewEvidence(camera, self._footage.picture(camera, frame), nothing, nothing)
         kind = WEIGHTINGS[self._settings.weighting_name].edge_kind if "edges" in layers else "none"
-        # A hull may be carved without masks; a picture that is drawn on shows one all the same.
+        # A hull may be carved without masks; the overlay shows one all the same.
         kind = "none" if kind == "hull" else kind
         lenses = tuple(self.cameras.values())
         maker = EvidenceMaker(lenses, self._footage, self._backgrounds, self._settings.evidence, kind)
@@ -205,11 +204,11 @@ def compose_view(
     settings: RunSettings | None = None,
     body: BodyModel | None = None,
 ) -> Bytes:
-    """(h, w, 3) BGR: what a camera saw in a frame, upright (`turned`), with layers of `OVERLAYS` over it.
+    """(h, w, 3) BGR: a camera's picture of a frame, upright (`turned`), with layers of `OVERLAYS` over it.
 
-    pose : (D,) instead of the run's stored answer. height : of the picture as shown. settings : other than
-    the run's, for masks and samples in the making. body : that `pose` is of, other than the run's or session's. Raises
-    StudioError for what does not exist.
+    pose : (D,) instead of the run's stored pose. height : of the picture as shown. settings : other than
+    the run's, for masks and samples. body : of `pose`, if not the run's or session's. Raises StudioError for
+    what does not exist.
     """
     composer = _composer(session, run)
     composer.use(settings or _settings_of(session, run))
@@ -234,9 +233,7 @@ def compose_view(
 
 
 def forget_composers() -> None:
-    """Close the footage that `compose_view` keeps open (before a session is moved or deleted, and at the
-    end).
-    """
+    """Close the footage that `compose_view` keeps open (before a session is moved or deleted, and at the end)."""
     with _composers_lock:
         for composer in _composers.values():
             composer.close()
@@ -244,7 +241,7 @@ def forget_composers() -> None:
 
 
 def let_composers_rest(seconds: float = REST_SECONDS) -> None:
-    """Give back what composers hold that were not asked for so long, the scene's too."""
+    """Release what composers unused for `seconds` hold, the scene's too."""
     before = time.monotonic() - seconds
     if any([composer.rest(before) for composer in list(_all_composers)]):
         give_back_freed_memory()

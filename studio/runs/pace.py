@@ -1,4 +1,4 @@
-"""How fast a run goes and how long it will take, measured over its last frames."""
+"""The rate of a run and its time left, measured over its last frames."""
 
 import math
 from collections import deque
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from studio.progress import time_left
 
 REMEMBERED, RECENT = 200, 30
-"""Frames that the time left is estimated from, and those that the rate on screen is of."""
+"""Frames for the estimate of the time left, and for the rate on screen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,17 +22,17 @@ class Progress:
 
 
 class Pace:
-    """Remembers how long the last frames took. Time spent paused is not counted."""
+    """The durations of the last frames, without pauses."""
 
     def __init__(self) -> None:
         self._frames: deque[tuple[float, ...]] = deque(maxlen=REMEMBERED)
 
     def add(self, layers: Sequence[float]) -> None:
-        """Note how many seconds each layer of a frame took, evidence and storing included."""
+        """Add the seconds of each layer of a frame, evidence and storing included."""
         self._frames.append(tuple(layers))
 
     def progress(self, done: int, total: int, least: float = 0.0) -> Progress:
-        """The rate and the estimate. least : seconds that a layer is made to take from now on."""
+        """The rate and the estimate. least : seconds that a layer is slowed down to from now on."""
         taken = [sum(max(seconds, least) for seconds in layers) for layers in self._frames]
         recent = taken[-RECENT:]
         rate = len(recent) / sum(recent) if sum(recent) > 0.0 else math.nan

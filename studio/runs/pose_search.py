@@ -1,6 +1,6 @@
-"""A pose set by hand made better: a short search around it with the session's weighting, then local refinement.
+"""Refines a pose set by hand: a short search around it with the session's likelihood, then local refinement.
 
-The weighting judges: what comes out is never worse in its eyes than what was given.
+The result never has a lower likelihood than the given pose.
 """
 
 from dataclasses import dataclass, replace
@@ -32,14 +32,14 @@ Array = NDArray[np.float64]
 TRACKER = "annealed"
 SHORT = {"particles": 150, "layers": 8, "start_repeats": 1}
 HAND_FPS = 15.0
-"""A hand is as far off as a body moves in one frame at that rate."""
+"""Frame rate whose σ0 matches the error of a pose set by hand."""
 STEP = "searching around the pose"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BetterPose:
-    """pose : (D,). gain : of the weighting's log-weight, 0 where the given pose was best. overlap_before, overlap : of
-    the silhouettes, 0 to 1, NaN where none is seen.
+    """A refined pose. pose : (D,). gain : of the log-likelihood, 0 where the given pose was best. overlap_before,
+    overlap : of the silhouettes, 0 to 1, NaN without a silhouette.
     """
 
     pose: Array
@@ -58,11 +58,11 @@ def better_pose(
     progress: Progress | None = None,
     cancelled: Cancelled | None = None,
 ) -> BetterPose:
-    """The best pose near a given one (D,) in a frame. run : whose body, cameras and weighting count; None: the
+    """The best pose near a given one (D,) in a frame. run : whose body, cameras and likelihood are used; None: the
     session's.
 
-    cancelled : asked before each layer; True ends it with WorkCancelledError. Raises RunError where nothing is to
-    be seen in the frame or the pose does not fit the body.
+    cancelled : checked before each layer; True ends it with WorkCancelledError. Raises RunError where the frame shows
+    no body or the pose does not fit it.
     """
     body = run.body() if run else session.body()
     given = np.asarray(pose, dtype=np.float64)
@@ -80,18 +80,18 @@ def better_pose(
         problems.close()
     if not anything_seen(evidence):
         raise RunError(
-            f"Nothing is to be seen of a body in frame {frame} of session '{session.name}'.",
+            f"Frame {frame} of session '{session.name}' shows no body.",
             "Choose a frame in which the person is in view, or check the masks.",
         )
     layers, done = int(SHORT["layers"]), 0
-    tell = watched(progress, cancelled, "The search around the pose")
+    report = watched(progress, cancelled, "The search around the pose")
 
     def checked(_: object) -> None:
         nonlocal done
         done += 1
-        tell(STEP, done, layers + 1)
+        report(STEP, done, layers + 1)
 
-    tell(STEP, done, layers + 1)
+    report(STEP, done, layers + 1)
     space = search_space(body, session_sigma(session, body, min(HAND_FPS, session.manifest.fps)))
     found = search_frame(
         TRACKERS[TRACKER],
@@ -110,7 +110,7 @@ def better_pose(
     weights = problem.weigh(np.stack([given, begin, refined]))
     best = [given, begin, refined][int(np.argmax(weights))]
     onlooker = Onlooker(body, problems.cameras)
-    tell(STEP, layers + 1, layers + 1)
+    report(STEP, layers + 1, layers + 1)
     return BetterPose(
         pose=best,
         gain=float(weights.max() - weights[0]),
@@ -120,7 +120,7 @@ def better_pose(
 
 
 def _short_settings(session: Session, run: StoredRun | None) -> RunSettings:
-    """Settings of a short search with the weighting in use, or the judge where that reads no masks."""
+    """Settings of a short search with the likelihood in use, or the default one where that uses no masks."""
     weighting = run.record.weighting if run else session.manifest.weighting
     if weighting not in WEIGHTINGS or WEIGHTINGS[weighting].reads_pictures:
         weighting = JUDGE

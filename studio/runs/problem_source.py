@@ -1,8 +1,8 @@
 """Frames of a session as functions of poses: footage → evidence → weighting, with the last few kept.
 
-Annealing a frame again, or looking at it, decodes and computes nothing twice: evidence is kept by frame and
-evidence settings, problems by frame and all settings that they depend on. With an executor the next frame is
-made ready while this one is searched: who asks for what is there already never waits for what is being made.
+Evidence is cached by frame and evidence settings, problems by frame and all settings that they depend on, so that
+annealing or displaying a frame again decodes and computes nothing twice. With an executor the next frame is prepared
+while this one is searched; a request for a cached frame never waits for one in preparation.
 """
 
 import threading
@@ -24,7 +24,7 @@ from studio.tracking.tracker import FrameProblem
 from studio.weighting.catalogue import WEIGHTINGS
 
 KEPT_FRAMES = 4
-"""Evidence kept: the frame at hand, the one made ready, and two to go back to."""
+"""Evidence kept: the current frame, the prepared one, and two earlier ones."""
 KEPT_WEIGHERS = 4
 """For two settings, each with all cameras and without one that has stopped."""
 
@@ -32,11 +32,11 @@ T = TypeVar("T")
 
 
 class ProblemSource:
-    """Every frame of a session for one body. May be used by several threads. Close it when done.
+    """The frames of a session for one body. Thread-safe. Close it when done.
 
-    cameras : the run's snapshot, by default the session's. executor : makes the next frame ready; None:
-    nobody does. views : another executor, which shares out a frame's cameras. last : the frame after the last
-    one that is worth making ready. footage : to be closed with this, by default the session's.
+    cameras : the run's snapshot, by default the session's. executor : prepares the next frame; None:
+    no preparation. views : another executor, for a frame's cameras in parallel. last : the frame after the last one to
+    prepare. footage : closed with this, by default the session's.
     """
 
     def __init__(
@@ -72,8 +72,7 @@ class ProblemSource:
         return problem
 
     def evidence(self, frame: int, settings: RunSettings) -> FrameEvidence:
-        """What is seen in the frame, as the settings' weighting wants it. Raises FootageError,
-        NotFoundError."""
+        """The frame's evidence for the settings' likelihood. Raises FootageError, NotFoundError."""
         key = evidence_key(frame, settings)
         found = self._kept(self._evidence, key)
         if found is not None:
@@ -98,9 +97,9 @@ class ProblemSource:
         return tuple(camera for camera in self.cameras if camera.name not in absent)
 
     def close(self) -> None:
-        """Let go of the footage and of everything kept."""
+        """Release the footage and the caches."""
         if self._coming is not None and not self._coming[1].cancel():
-            # The thread that makes the next frame ready must be out of the files before they close.
+            # The preparing thread must be done with the files before they close.
             self._coming[1].exception()
         self._coming = None
         with self._making, self._keeping:
@@ -139,8 +138,7 @@ class ProblemSource:
         self._coming = (key, executor.submit(self._problem, frame, settings))
 
     def _await(self, key: Hashable) -> None:
-        """If this very frame is being made ready, wait for it; what went wrong comes up again where it is
-        used."""
+        """Wait for this frame if it is in preparation; its error is raised again where the frame is used."""
         coming = self._coming
         if coming is not None and coming[0] == key:
             self._coming = None

@@ -1,8 +1,6 @@
-"""What a frame would have become with other settings: the same start, the same random keys, only the knobs
-differ.
+"""Anneals a frame again with other settings: the same start and random keys, only the knobs differ.
 
-Nothing of it reaches the store unless it is kept. One set of settings holds for the whole frame, so that the
-answer is to one question.
+Nothing is stored unless it is kept. One set of settings holds for the whole frame.
 """
 
 from studio.errors import RunError
@@ -23,7 +21,6 @@ class Reannealing:
 
     @property
     def finished(self) -> bool:
-        """Whether the last layer is done."""
         return self._search.finished
 
     def step_layer(self) -> LayerRecord:
@@ -38,9 +35,7 @@ class Reannealing:
         return self._tracking.result_of(self._search, self.settings)
 
     def keep(self, *, alone: bool = False) -> None:
-        """Make this the run's own frame; later frames are dropped, as they followed from the old one, unless it stands
-        `alone`.
-        """
+        """Make this the run's frame; later frames, which followed from the old one, are dropped unless `alone`."""
         if not self.finished:
-            raise RunError(f"Frame {self.frame} is not annealed to its end.", "Wait for its last layer.")
+            raise RunError(f"Frame {self.frame} is not finished.", "Wait for its last layer.")
         self._tracking.keep(self.result(), self.layers, self.version, self.settings, alone=alone)

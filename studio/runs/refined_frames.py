@@ -1,10 +1,10 @@
 """A run's frames refined on their silhouettes, with the cameras, body and settings that they were tracked with.
 
-Frames that follow each other are refined together (`tracking.refinement_over_time`), so that the movement is one that a
-body can make. Frames whose silhouettes agree too little even then say nothing: a platform or a shadow is in the masks.
-They keep the pose that was found, as far as their neighbours' movement lets them. Frames in which the body was lost
-part the movement and are refined alone, as all are where the acceleration is 0: then a frame is never worse in the eyes
-of the run's own weighting, and one that says nothing keeps its pose. Frames without evidence are left as they are.
+Consecutive frames are refined together (`tracking.refinement_over_time`), so that the movement is one that a body can
+make. Frames whose silhouettes agree too little even then (a platform or a shadow in the masks) are not fitted: they
+keep their pose as far as the neighbours' movement allows. Frames in which the body was lost split the movement and are
+refined alone, as are all frames where the acceleration is 0: then no frame gets a lower likelihood than before, and
+one with poor masks keeps its pose. Frames without evidence are unchanged.
 """
 
 from collections.abc import Callable
@@ -30,13 +30,13 @@ from studio.weighting.catalogue import WEIGHTINGS
 Array = NDArray[np.float64]
 
 JUDGE = "edge-region-silhouette"
-"""Judges where the run's own weighting reads pictures instead of masks (blobs must be told what is expected)."""
+"""The likelihood used where the run's own reads pictures instead of masks (blobs need a prediction)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RefinedFrames:
-    """poses : (K, D). agreement : (K,) f_s of each, what the track said where nothing was looked at. agreement_before,
-    agreement_after : means over the frames that were looked at, NaN without any.
+    """Refined poses (K, D). agreement : (K,) f_s of each, the track's own value where a frame was not refined.
+    agreement_before, agreement_after : means over the refined frames, NaN without any.
     """
 
     poses: Array
@@ -48,7 +48,7 @@ class RefinedFrames:
 def refined_frames(
     session: Session, run: StoredRun, track: Track, knobs: RefinementSettings, read: Callable[[int], None]
 ) -> RefinedFrames:
-    """The frames of a track refined. read : told how many were read after each; what it raises ends the work."""
+    """Refine the frames of a track. read : called with the number of frames read; its exception ends the work."""
     work = _Work(session, run, track, knobs, read)
     try:
         together = knobs.refinement_acceleration > 0.0
@@ -66,7 +66,7 @@ def refined_frames(
 
 
 def _parts(frames: NDArray[np.int64], sure: NDArray[np.bool_]) -> list[NDArray[np.int64]]:
-    """Rows that are refined together: sure frames that follow each other; every other row alone."""
+    """Groups of rows refined together: consecutive sure frames; every other row alone."""
     parts: list[NDArray[np.int64]] = []
     rows = np.flatnonzero(sure)
     parts += [rows[part] for part in stretches(frames[rows] + np.cumsum(~sure)[rows])]
@@ -75,7 +75,7 @@ def _parts(frames: NDArray[np.int64], sure: NDArray[np.bool_]) -> list[NDArray[n
 
 
 class MaskSettings:
-    """The settings that a run's frames were tracked with, with a weighting that reads masks."""
+    """The settings of a run's frames, with a likelihood that uses masks."""
 
     def __init__(self, run: StoredRun) -> None:
         self._record = run.record
@@ -83,7 +83,7 @@ class MaskSettings:
             self._history = SettingsHistory(tuple(results.settings_history()))
 
     def of(self, frame: int) -> RunSettings:
-        """Those in use in a frame."""
+        """The settings in use in a frame."""
         entry = self._history.in_use(frame, 0)
         values = self._record.settings if entry is None else entry.values
         settings: RunSettings = settings_from_values(self._record.tracker, self._record.weighting, values)
@@ -95,7 +95,7 @@ class MaskSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _SeenFrame:
-    """What is kept of a frame while its neighbours are read."""
+    """Data of a frame kept while its neighbours are read."""
 
     start: Array
     loss: FrameLoss
@@ -115,7 +115,7 @@ class _Work:
     ) -> None:
         body, self._cameras = run.body(), run.cameras()
         self._results, self._settings = run.results(), MaskSettings(run)
-        self._record, self._track, self._knobs, self._tell = run.record, track, knobs, read
+        self._record, self._track, self._knobs, self._report = run.record, track, knobs, read
         self._refiner = Refiner(body, self._cameras, knobs)
         self._onlooker = Onlooker(body, self._cameras)
         self._problems = ProblemSource(session, body, self._cameras)
@@ -125,21 +125,22 @@ class _Work:
         self._read = 0
 
     def close(self) -> None:
-        """Let go of footage and store."""
+        """Close footage and store."""
         self._problems.close()
         self._results.close()
 
     def result(self) -> RefinedFrames:
-        """What has come of it."""
-        before, after = (float(np.nanmean(told)) if told else np.nan for told in (self._before, self._after))
+        before, after = (
+            float(np.nanmean(shares)) if shares else np.nan for shares in (self._before, self._after)
+        )
         return RefinedFrames(self._poses, self._agreement, before, after)
 
     def leave(self) -> None:
-        """A frame that stays as it is."""
-        self._told()
+        """Leave a frame unchanged."""
+        self._count_read()
 
     def refine_alone(self, row: int) -> None:
-        """One frame by itself."""
+        """Refine one frame alone."""
         frame, pose = int(self._track.frames[row]), self._track.poses[row]
         settings = self._settings.of(frame)
         evidence = self._problems.evidence(frame, settings)
@@ -149,10 +150,10 @@ class _Work:
         sight = self._onlooker.looking(evidence)
         kept = sight(found.pose).overlap < self._knobs.refinement_least_overlap
         self._keep(row, pose if kept else found.pose, sight)
-        self._told()
+        self._count_read()
 
     def refine_together(self, rows: NDArray[np.int64]) -> None:
-        """Frames that follow each other."""
+        """Refine consecutive frames together."""
         mover = MovementRefiner(self._refiner, self._record.fps, self._knobs.refinement_acceleration)
         seen: list[_SeenFrame] = []
         for first, after, kept in windows(len(rows)):
@@ -165,7 +166,7 @@ class _Work:
             seen = seen[kept - first :]
 
     def _moved(self, mover: MovementRefiner, seen: list[_SeenFrame], held: Array) -> Array:
-        """The poses of a window; again without the frames that turn out to say nothing."""
+        """The poses of a window; computed again without the frames whose masks prove poor."""
         starts, losses = np.array([one.start for one in seen]), [one.loss for one in seen]
         poses = mover.refine(Window(starts, losses, held))
         silent = [
@@ -185,13 +186,13 @@ class _Work:
         evidence = self._problems.evidence(frame, self._settings.of(frame))
         refiner = self._refiner_of(tuple(view.camera for view in evidence.views))
         loss = refiner.frame_loss(pose, self._silhouettes(refiner, frame, pose, evidence))
-        self._told()
+        self._count_read()
         return _SeenFrame(pose, loss, self._onlooker.looking(evidence))
 
     def _silhouettes(
         self, refiner: Refiner, frame: int, pose: Array, evidence: FrameEvidence
     ) -> list[Distances]:
-        """A frame's silhouettes without what the run knew to be hidden."""
+        """A frame's silhouettes without known occlusions."""
         known = self._results.result(frame).carried.memory
         mm = mm_at(refiner.body, refiner.cameras, pose)
         return without_hidden(silhouette_distances(evidence), refiner.cameras, mm, known)
@@ -201,12 +202,12 @@ class _Work:
         self._poses[row], self._agreement[row] = pose, sight(pose).overlap
         self._after.append(float(self._agreement[row]))
 
-    def _told(self) -> None:
+    def _count_read(self) -> None:
         self._read += 1
-        self._tell(self._read)
+        self._report(self._read)
 
     def _refiner_of(self, views: tuple[str, ...]) -> Refiner:
-        """For the views that a frame has: of a live camera that had stopped there is none."""
+        """The refiner for the views that a frame has (a live camera that had stopped has none)."""
         if len(views) == len(self._cameras):
             return self._refiner
         cameras = tuple(camera for camera in self._cameras if camera.name in views)

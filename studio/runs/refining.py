@@ -1,6 +1,6 @@
-"""What is made of a run after the search: refined on the silhouettes, smoothed in time; each a track of its own.
+"""Derived tracks of a run: refined on the silhouettes, or smoothed in time.
 
-A track says in `made_by` what it was made from and how, so that it can be made again.
+`made_by` of a track has its source and settings, so that it can be made again.
 """
 
 from contextlib import closing
@@ -43,10 +43,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MadeTrack:
-    """A track that was made. moved : frames whose pose changed (refine). agreement_before, agreement_after : of the
-    silhouettes, f_s, mean over the frames that show any (refine). filled, left_out : frames (smooth). jitter_before,
-    jitter_after : root mean square second difference of the body's markers, mm a frame², over frames that follow each
-    other.
+    """A derived track with its figures. moved : frames whose pose changed (refine). agreement_before, agreement_after
+    : of the silhouettes, f_s, mean over the frames that show any (refine). filled, left_out : frames (smooth).
+    jitter_before, jitter_after : root mean square second difference of the body's markers, mm a frame², over
+    consecutive frames.
     """
 
     track: Track
@@ -70,21 +70,21 @@ def refine_run(
     progress: Progress | None = None,
     cancelled: Cancelled | None = None,
 ) -> MadeTrack:
-    """Refine every frame of a track and keep the result as another (`runs.refined_frames` says how).
+    """Refine every frame of a track and store the result as another (see `runs.refined_frames`).
 
-    source : "" for what was tracked, with its sides put right first (`runs.sides`) where they are not yet. progress :
-    told after each frame. cancelled : asked before each; True ends it with WorkCancelledError, nothing is kept. Raises
-    SessionError where `into` is taken, RunError for a run without frames, and what reading the footage raises.
+    source : "" for the tracked poses, with sides corrected first (`runs.sides`) if they are not yet. progress : called
+    after each frame. cancelled : checked before each; True ends it with WorkCancelledError, and nothing is stored.
+    Raises SessionError if `into` is taken, RunError for a run without frames, and the errors of reading the footage.
     """
     knobs = settings or RefinementSettings()
     track = _begun(run, source or RAW, into, replace)
-    tell, step, total = watched(progress, cancelled, "Refining"), f"refining {run.name}", len(track.frames)
-    tell(step, 0, total)
+    report, step, total = watched(progress, cancelled, "Refining"), f"refining {run.name}", len(track.frames)
+    report(step, 0, total)
     if not source and into != SIDES:
         with closing(ProblemSource(session, run.body(), run.cameras())) as problems:
-            put_sides_right(run, problems, lambda _: tell(step, 0, total))
+            put_sides_right(run, problems, lambda _: report(step, 0, total))
         track = read_track(run, best_track(run, (SIDES,)).name)
-    found = refined_frames(session, run, track, knobs, lambda done: tell(step, done, total))
+    found = refined_frames(session, run, track, knobs, lambda done: report(step, done, total))
     moved = int(np.count_nonzero((found.poses != track.poses).any(axis=1)))
     made_by = {"verb": "refine", **_origin(track), **asdict(knobs), "moved": moved}
     made = Track(into, track.frames, found.poses, found.agreement, track.states, made_by)
@@ -107,11 +107,11 @@ def smooth_run(
     settings: SmoothingSettings | None = None,
     replace: bool = False,
 ) -> MadeTrack:
-    """Smooth a track and keep the result as another. source : "" for the refined one, else that with its
-    sides put right, else the raw.
+    """Smooth a track and store the result as another. source : "" for the refined one, else that with corrected sides,
+    else the raw one.
 
-    Frames that were filled keep their state ("" where the run has none) and have confidence 0. Raises SessionError,
-    RunError, SettingsError where no frame may be believed.
+    Filled frames keep their state ("" where the run has none) and have confidence 0. Raises SessionError, RunError,
+    SettingsError if no frame is reliable.
     """
     knobs = settings or SmoothingSettings()
     chosen = source or best_track(run, (SIDES,) if into == REFINED else (REFINED, SIDES)).name
@@ -138,7 +138,7 @@ def smooth_run(
 
 
 def jitter(run: StoredRun, track: Track) -> float:
-    """Root mean square second difference of the body's markers, mm a frame²; 0 where no three frames follow."""
+    """Root mean square second difference of the body's markers, mm a frame²; 0 without three consecutive frames."""
     body = run.body()
     if not body.markers or len(track.frames) < 3:
         return 0.0
@@ -151,13 +151,13 @@ def jitter(run: StoredRun, track: Track) -> float:
 
 
 def check_making(run: StoredRun, source: str, into: str, replace: bool) -> None:
-    """Refuse, before anything is done, a track that could not be kept. source : "" for the usual one. Raises RunError,
-    SessionError, NotFoundError.
+    """Check that a derived track can be stored. source : "" for the default one. Raises RunError, SessionError,
+    NotFoundError.
     """
     source = track_named(run, source)
     if checked_name(into, "track").lower() == RAW or into == source:
         raise RunError(
-            f"Track '{into}' cannot be written over by what is made from it.", "Choose another --into."
+            f"Track '{into}' cannot be replaced by a track made from it.", "Choose another --into."
         )
     if into in track_names(run) and not replace:
         raise RunError(
@@ -165,14 +165,14 @@ def check_making(run: StoredRun, source: str, into: str, replace: bool) -> None:
         )
     if run.record.to_and_fro:
         raise RunError(
-            f"Run '{run.name}' goes to and fro over its footage.", "Track the footage once instead."
+            f"Run '{run.name}' plays its footage forwards and backwards.", "Track the footage once instead."
         )
     if source and source not in track_names(run):
         read_track(run, source)
 
 
 def _begun(run: StoredRun, source: str, into: str, replace: bool) -> Track:
-    """The track to start from, once it is known that the result may be kept."""
+    """The track to start from, after checking that the result can be stored."""
     check_making(run, source, into, replace)
     track = read_track(run, source)
     if not len(track.frames):
@@ -181,12 +181,12 @@ def _begun(run: StoredRun, source: str, into: str, replace: bool) -> Track:
 
 
 def _origin(track: Track) -> dict[str, str]:
-    """What a track that is made keeps of the one that it is made from."""
+    """The entries of `made_by` that name the source track."""
     return {SOURCE: track.name, SOURCE_DIGEST: track_digest(track)}
 
 
 def _standing(track: Track, found: Smoothed) -> tuple[Array, tuple[str, ...]]:
-    """Confidence and states of the smoothed frames: their own, 0 where they were filled."""
+    """Confidence and states of the smoothed frames; confidence 0 where they were filled."""
     own = {frame: at for at, frame in enumerate(track.frames.tolist())}
     rows = [own.get(frame, -1) for frame in found.frames.tolist()]
     confidence = np.array([track.confidence[at] if at >= 0 else 0.0 for at in rows])

@@ -1,4 +1,4 @@
-"""The behaviour model that each frame of a run is searched with: the run's own, or what it has taught itself since."""
+"""The behaviour model that each frame of a run is searched with: the run's own, or one learnt online since."""
 
 import dataclasses
 
@@ -17,18 +17,18 @@ from studio.tracking.tracker import Carried, SearchSpace
 Array = NDArray[np.float64]
 
 LEARNT_NAME = "learnt.behaviour"
-"""In the run's folder: what it knew at its end, for other runs."""
+"""In the run's folder: the learnt model at its end, for other runs."""
 
 
 def learner_of(model: BehaviourModel | None, settings: RunSettings, seed: int) -> OnlineLearner | None:
-    """Who teaches a run's model, None where nobody does or there is none."""
+    """The online learner of a run's model; None without a model or online learning."""
     if model is None or not getattr(settings.tracker, "online_learning", False):
         return None
     return OnlineLearner(model, settings.tracker.learning_interval, seed)
 
 
 class RunBehaviour:
-    """A run's search spaces, frame by frame. results : of the run, read when a lesson is held."""
+    """A run's search spaces, frame by frame. results : of the run, read when the model is updated."""
 
     def __init__(self, run: StoredRun, results: ResultsReader) -> None:
         self._run, self._results = run, results
@@ -38,7 +38,7 @@ class RunBehaviour:
         self.forget()
 
     def forget(self) -> None:
-        """Unlearn everything: frames that were learnt from have changed."""
+        """Discard what was learnt, because frames of the training data have changed."""
         self._learner = learner_of(self.space.behaviour, self._settings, self._run.record.seed)
 
     def space_in(self, frame: int) -> SearchSpace:
@@ -49,18 +49,18 @@ class RunBehaviour:
         return dataclasses.replace(self.space, behaviour=model)
 
     def carried_into(self, frame: int, carried: Carried) -> Carried:
-        """What the frame before handed on, in terms of the frame's own model."""
+        """The state from the frame before, in terms of this frame's model."""
         if self._learner is None:
             return carried
         return self._learner.carried_into(frame - self._run.record.first, carried, self._tracked)
 
     def keep_missing(self) -> None:
-        """As `keep`, where that failed before."""
+        """As `keep`, if that failed before."""
         if self._learner is not None and not (self._run.folder / LEARNT_NAME).exists():
             self.keep()
 
     def keep(self) -> None:
-        """Write what the run has learnt beside its results, once all its frames have some. Raises BehaviourError."""
+        """Store the learnt model beside the run's results once all frames have one. Raises BehaviourError."""
         record = self._run.record
         model = self.space_in(record.last).behaviour
         if self._learner is not None and model is not None:

@@ -1,4 +1,4 @@
-"""The footage of a run, whose frame numbers are not always the files' own."""
+"""The footage of a run, whose frame numbers may differ from the files'."""
 
 from studio.capture.footage import Footage, ToAndFro
 from studio.sessions.session import Session

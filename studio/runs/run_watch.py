@@ -1,7 +1,7 @@
-"""How each frame of a run went, and where the next one starts when the body was lost.
+"""Loss detection and recovery in a run: each frame's tracking state, and the next start when the body is lost.
 
-All of it is a function of what is stored of the frames before, of the frame's own evidence, the settings and the seed,
-so that a run which is taken up again, or a frame that is annealed again, goes the same way bit for bit.
+Everything is a function of the stored frames before, the frame's evidence, the settings and the seed, so that a resumed
+run or a frame annealed again gives the same result bit for bit.
 """
 
 import dataclasses
@@ -40,19 +40,17 @@ from studio.weighting.catalogue import WEIGHTINGS, LossLimit
 Array = NDArray[np.float64]
 
 SEEKING = "edge-region-silhouette"
-"""The weighting that a lost body is looked for with; recovery was measured with it."""
+"""The likelihood used for recovery; recovery was measured with it."""
 SHORT_GAP_S = 0.1
 """After less time without evidence the body is still about where it was."""
 
 
 @runtime_checkable
 class Sightings(Protocol):
-    """Problems that can show the evidence that they are made of (`ProblemSource`)."""
+    """A source of problems and their evidence (`ProblemSource`)."""
 
     @property
-    def body(self) -> BodyModel:
-        """The body that is tracked."""
-        ...
+    def body(self) -> BodyModel: ...
 
     @property
     def cameras(self) -> tuple[Camera, ...]:
@@ -64,14 +62,14 @@ class Sightings(Protocol):
         ...
 
     def evidence(self, frame: int, settings: RunSettings) -> FrameEvidence:
-        """What is seen in it."""
+        """The frame's evidence."""
         ...
 
 
 @dataclass(slots=True)
 class Standing:
-    """What the frames before one say. state : of the last. streak : how many frames in a row went so. doubts : of the
-    last. weighed : settings of weighting and evidence that the distribution holds for.
+    """The state before a frame. state : of the last frame. streak : number of frames in a row with it. doubts : of the
+    last. weighed : settings of likelihood and evidence that the distribution holds for.
     """
 
     watch: WeightWatch
@@ -82,8 +80,8 @@ class Standing:
 
 
 class RunWatch:
-    """The watch over one run. settings_in : of a frame, as its first layer has them. anew : frames that a correction
-    started: nobody looks for the body there, and what went before is not held against them.
+    """Loss detection and recovery of one run. settings_in : of a frame's first layer. anew : frames restarted by a
+    correction: the body is not searched for there, and the frames before do not count.
     """
 
     def __init__(
@@ -107,11 +105,11 @@ class RunWatch:
         self._sought: tuple[object, ParticleSet] | None = None
 
     def forget(self) -> None:
-        """Frames that are stored have changed."""
+        """Forget what was read, because stored frames have changed."""
         self._known = self._sought = None
 
     def start(self, frame: int, carried: Carried, space: SearchSpace) -> tuple[Carried, bool]:
-        """What a frame's search starts from, and whether that is a search for the body that was lost."""
+        """The start of a frame's search, and whether it is a search for a lost body."""
         settings = self._settings_in(frame)
         if self._problems is None or settings.recovery.recovery == OFF or not self._is_due(frame, settings):
             return carried, False
@@ -125,7 +123,7 @@ class RunWatch:
         return Carried(self._sought[1], memory=carried.memory), True
 
     def is_sought(self, frame: int) -> bool:
-        """Whether `start` looks for the body in that frame, as far as the frames before decide that."""
+        """Whether `start` searches for a lost body in that frame, as far as the frames before decide it."""
         settings = self._settings_in(frame)
         if self._problems is None or settings.recovery.recovery == OFF or not self._is_due(frame, settings):
             return False
@@ -134,10 +132,10 @@ class RunWatch:
     def judged(
         self, result: FrameResult, carried: Carried, problem: FrameProblem | None, sought: bool
     ) -> FrameResult:
-        """The result with how its frame went; without evidence, with the pose held that came into it.
+        """The result with its tracking state; without evidence, the incoming pose is held.
 
-        carried : into the frame. problem : the frame's, as the search was told it. sought : whether the search was
-        one for a body that was lost.
+        carried : into the frame. problem : the frame's, as it was searched. sought : whether the search was for a
+        lost body.
         """
         settings = self._settings_in(result.frame)
         if self._problems is None or self._onlooker is None or settings.recovery.recovery == OFF:
@@ -161,10 +159,10 @@ class RunWatch:
         )
 
     def stored(self, result: FrameResult) -> None:
-        """A result is in the store."""
+        """Add a stored result."""
         if self._known is not None and self._known[0] == result.frame:
             standing = self._known[1]
-            self._tell(
+            self._update(
                 standing,
                 result.frame,
                 result.tracking,
@@ -179,11 +177,11 @@ class RunWatch:
     # ------------------------------------------------------------------ the frames before
 
     def _standing(self, frame: int) -> Standing:
-        """What all frames before one say."""
+        """The state before a frame."""
         if self._known is None or self._known[0] != frame:
             line, standing = self._results.timeline(), Standing(WeightWatch(LossLimit()))
             for at in np.flatnonzero(line.frames < frame):
-                self._tell(
+                self._update(
                     standing,
                     int(line.frames[at]),
                     line.tracking[at],
@@ -194,7 +192,7 @@ class RunWatch:
             self._known = (frame, standing)
         return self._known[1]
 
-    def _tell(
+    def _update(
         self, standing: Standing, frame: int, state: str, doubts: int, log_weight: float, overlap: float
     ) -> None:
         settings = self._settings_in(frame)
@@ -206,7 +204,7 @@ class RunWatch:
         standing.state, standing.doubts = state, doubts
 
     def _is_due(self, frame: int, settings: RunSettings) -> bool:
-        """Whether the body is looked for: at once when lost, then at intervals; and after a time without evidence."""
+        """Whether to search for the body: at once when lost, then at intervals; and after a time without evidence."""
         if frame == self._first or self._anew(frame):
             return False
         before = self._standing(frame)
@@ -253,7 +251,7 @@ class RunWatch:
 
 
 def _seeking(settings: RunSettings) -> RunSettings:
-    """The settings that a lost body is looked for with: the run's evidence, the weighting that tells most."""
+    """The settings of the search for a lost body: the run's evidence and the likelihood WEIGHTING."""
     return dataclasses.replace(
         default_settings(settings.tracker_name, SEEKING),
         evidence=settings.evidence,
@@ -270,7 +268,7 @@ def _weighed(settings: RunSettings) -> tuple[object, ...]:
 
 
 def _held(result: FrameResult, carried: Carried) -> FrameResult:
-    """The frame's result with the pose and the particles that came into it, at rest."""
+    """The frame's result with the incoming pose and particles, at rest."""
     estimate, pose = result.estimate, carried.estimate
     if pose is None and carried.particles is not None:
         pose = np.exp(carried.particles.log_weights) @ carried.particles.poses

@@ -1,4 +1,4 @@
-"""What a tracker needs to know of a body: names, limits, σ0, which parameters belong to one limb, and the tree."""
+"""The search space of a body: names, limits, σ0, the parameters of each limb, and the tree."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ def session_sigma(session: Session, body: BodyModel, fps: float) -> Array:
 
 
 def search_space(body: BodyModel, sigma: Array, behaviour: BehaviourModel | None = None) -> SearchSpace:
-    """The body's pose vectors as a tracker sees them. sigma : (D,) σ0, mm and rad. behaviour : at the rate of σ0."""
+    """The search space of a body's pose vectors. sigma : (D,) σ0, mm and rad. behaviour : at the rate of σ0."""
     limbs = [entry.limb for entry in body.parameters]
     number = {limb: index for index, limb in enumerate(dict.fromkeys(limbs))}
     return SearchSpace(

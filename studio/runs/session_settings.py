@@ -1,4 +1,4 @@
-"""The settings that a session begins with: the studio's defaults, and what the session says of its masks."""
+"""The initial settings of a session: the studio's defaults with the session's mask knobs."""
 
 from collections.abc import Mapping
 
@@ -17,10 +17,9 @@ from studio.settings import (
 def session_settings(
     session: Session, tracker: str = "", weighting: str = "", changes: Mapping[str, object] | None = None
 ) -> RunSettings:
-    """Settings for a session. tracker, weighting : "" for the usual ones. changes : knobs by flat name, above all.
+    """Settings for a session. tracker, weighting : "" for the defaults. changes : knobs by flat name, which override.
 
-    Raises SettingsError for a knob that there is none of, or a value out of its range; what the session says about
-    knobs of another version is passed over.
+    Raises SettingsError for an unknown knob or a value out of range; stored knobs of another version are ignored.
     """
     tracker = tracker or DEFAULT_TRACKER
     settings = default_settings(tracker, weighting or DEFAULT_WEIGHTING)

@@ -1,10 +1,10 @@
 """The subject's shape from the first frames of a run: all radii, and the lengths that no tape measures.
 
-Cones that are too thin or too thick for the clothed body pull joints along (arms ride up by centimetres), and hands,
-feet and head end where the silhouettes say. So before a run begins, its first frames are tracked, the shape is fitted
+Cones too thin or too thick for the clothed body shift the joints (arms ride up by centimetres), and the silhouettes
+give the ends of hands, feet and head. So before a run begins, its first frames are tracked, the shape is fitted
 to the most different of them (`tracking.shape_refinement`), and the run begins again with it. Bone lengths are kept: a
-fit of all of them is unsafe, as silhouettes hardly tell a knee ten millimetres higher from one that is bent a little
-more (`subject_fitting` does that with more frames and more care).
+fit of all of them is unsafe, as silhouettes hardly separate a knee ten millimetres higher from one that is bent a
+little more (`subject_fitting` does that with more frames and priors).
 
 The frames are tracked with the default tracker and seed 0 whatever the run has, so that all runs of a session have one
 body; it is kept in the session's folder `shapes` until footage, calibration, masks, subject or start pose change.
@@ -48,15 +48,15 @@ Array = NDArray[np.float64]
 
 TRACKER, WEIGHTING = "annealed", "edge-region-silhouette"
 FIRST_FRAMES, FEWEST_FRAMES, FITTED_FRAMES = 30, 8, 8
-"""Frames tracked before the fit (with fewer there is none), and the most different of them that it looks at."""
+"""Frames tracked before the fit (with fewer there is none), and the number of most different ones it uses."""
 FEWEST_CAMERAS = 2
-"""One camera does not tell a larger body from a nearer one."""
+"""One camera cannot separate a larger body from a nearer one."""
 LEAST_OVERLAP = 0.6
 """Masks that agree less with the body, even with the shape, show something else."""
 STEP = "fitting the shape"
 SCHEMA_VERSION, FOLDER = 1, "shapes"
 WORDED = 5.0
-"""mm: smaller changes are not worth a word."""
+"""mm: smaller changes are not reported."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,8 +72,8 @@ class FittedShape:
 
 
 class _Kept(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A fit as it lies in a session. dimensions : of the fitted body, mm. words : for a run's notes; a fit that was of
-    no use has the reason there, and no dimensions.
+    """A stored fit. dimensions : of the fitted body, mm. words : for a run's notes; a failed fit has its reason there
+    and no dimensions.
     """
 
     schema: int = SCHEMA_VERSION
@@ -95,10 +95,10 @@ def session_shape(
     first: int,
     progress: Progress | None = None,
 ) -> tuple[BodyModel, Array, str]:
-    """The body in the shape that a session's frames from `first` on show, its pose there (D,), and words for the notes.
+    """The body with the shape of a session's frames from `first` on, its pose there (D,), and a text for the notes.
 
-    settings : whose evidence counts. How long a run is does not. The body as it is, and "", where it has no radii to
-    fit or there are too few frames or cameras.
+    settings : whose evidence is used. The unchanged body and "", if it has no radii to fit or there are too few frames
+    or cameras.
     """
     frames = range(first, min(session.manifest.frame_count, first + FIRST_FRAMES))
     few = len(frames) < FEWEST_FRAMES or len(session.cameras()) < FEWEST_CAMERAS
@@ -164,7 +164,7 @@ def shaped_body(
     *,
     progress: Progress | None = None,
 ) -> FittedShape:
-    """The shape of a body that the first frames show. evidence : of a frame, with edge proximity maps. start : (D,) of
+    """The shape of a body in the first frames. evidence : of a frame, with edge proximity maps. start : (D,) of
     the first of `frames`. sigma : (D,) σ0 from frame to frame.
     """
     rules = default_settings(TRACKER, WEIGHTING)
@@ -216,7 +216,7 @@ def _overlap(
 
 
 def _judging(settings: RunSettings) -> RunSettings:
-    """The settings that the first frames are tracked with: the run's evidence, all else the studio's defaults."""
+    """The settings for tracking the first frames: the run's evidence, all else the studio's defaults."""
     return dataclasses.replace(default_settings(TRACKER, WEIGHTING), evidence=settings.evidence)
 
 

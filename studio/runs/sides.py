@@ -1,7 +1,7 @@
-"""A finished run looked at once more as a whole: left and right, front and back put right (`tracking.side_exchange`).
+"""Corrects exchanged sides (left and right, front and back) of a finished run (`tracking.side_exchange`).
 
-What was tracked stays. Where something was exchanged, the poses with sides put right are a track of their own, which
-says in `made_by` what was exchanged; where nothing was, there is no such track.
+The tracked poses stay. If sides were exchanged, the corrected poses are the track "sides", with the exchanges in its
+`made_by`; otherwise there is no such track.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -38,16 +38,16 @@ Array = NDArray[np.float64]
 
 BORDER_POINTS = 150
 EXCHANGED = "exchanged"
-"""Entry of `made_by`: what was exchanged, a line each."""
+"""Entry of `made_by`: the exchanges, a line each."""
 
 
 def put_sides_right(
     run: StoredRun, problems: Sightings, read: Callable[[int], None] = lambda frame: None
 ) -> tuple[str, ...]:
-    """Look at a run's frames again and keep the track "sides" if that changes anything; returns what was exchanged.
+    """Check a run's sides and store the track "sides" if any were exchanged; returns the exchanges.
 
-    Live runs and runs to and fro are left alone. A track that was made before and is up to date stays. read : told of
-    each frame that is looked at; what it raises ends the work. Raises what reading the footage raises.
+    Live runs and runs that play their footage back and forth are skipped. An up-to-date track stays. read : called with
+    each frame read; its exception ends the work. Raises the errors of reading the footage.
     """
     if not can_be_looked_at(run):
         return ()
@@ -85,7 +85,7 @@ def known_silhouettes(
     pose: Array,
     memory: Mapping[str, Array],
 ) -> Mapping[str, Distances]:
-    """A frame's silhouettes by camera, without what was known to be hidden there. pose (D,), memory : of the frame."""
+    """A frame's silhouettes by camera, without known occlusions. pose (D,), memory : of the frame."""
     seen = silhouettes_by_camera(evidence, BORDER_POINTS)
     own = [camera for camera in cameras if camera.name in seen]
     shown = without_hidden([seen[camera.name] for camera in own], own, mm_at(body, own, pose), memory)
@@ -93,26 +93,26 @@ def known_silhouettes(
 
 
 def can_be_looked_at(run: StoredRun) -> bool:
-    """Whether the run's frames are those of its footage, one after the other."""
+    """Whether the run's frames are those of its footage in order."""
     return not (run.record.live or run.record.to_and_fro)
 
 
 def exchanged_sides(run: StoredRun) -> tuple[str, ...]:
-    """What was exchanged in the run's track "sides"; nothing where there is none, or the run has changed since."""
+    """The exchanges of the run's track "sides"; none without one or if the run has changed since."""
     if best_track(run, (SIDES,)).name != SIDES:
         return ()
     return tuple(read_track(run, SIDES).made_by.get(EXCHANGED, ()))
 
 
 def notes_of(run: StoredRun) -> tuple[str, ...]:
-    """The run's notes, with what was made of its sides."""
+    """The run's notes, with the exchanged sides."""
     words = exchanged_sides(run)
     return (*run.record.notes, *([in_words(words)] if words else []))
 
 
 def in_words(words: tuple[str, ...]) -> str:
-    """A sentence on what was exchanged."""
-    return f"Sides were put right in track '{SIDES}': {'; '.join(words)}. What was tracked stays in track '{RAW}'."
+    """The exchanges as a sentence."""
+    return f"Sides were corrected in track '{SIDES}': {'; '.join(words)}. The tracked poses stay in '{RAW}'."
 
 
 def _seen(

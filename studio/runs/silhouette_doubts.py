@@ -1,5 +1,5 @@
-"""What a session's own silhouettes say against its calibration: a mirrored video, cameras exchanged, half the
-resolution, metres for millimetres. A calibration file alone cannot show these, and without a board nothing else does.
+"""Checks a calibration by the session's silhouettes: a mirrored video, exchanged cameras, half the resolution,
+metres for millimetres. A calibration file alone cannot show these, and without a board nothing else does.
 """
 
 import dataclasses
@@ -24,22 +24,22 @@ PERSON_ALONE = EvidenceSettings(
 )
 UNEXPLAINED = "views-disagree"
 MEASURED = "background"
-"""The part of a session whose measuring tells of doubts."""
+"""The part of a session whose measurement is stored with the findings."""
 SIZES = ("scale", "square-size")
 
 
 def person_alone(mask: Bytes) -> Bytes:
-    """The largest piece of a mask (H, W): specks would be touched first."""
+    """The largest piece of a mask (H, W), so that no tangent touches a speck."""
     return cleaned(mask, PERSON_ALONE)
 
 
 def silhouette_doubts(
     cameras: tuple[Camera, ...], masks: Mapping[int, Mapping[str, Bytes]], height_mm: float | None
 ) -> tuple[Finding, ...]:
-    """Faults of a calibration that the silhouettes name; none where they agree, or where nothing explains them (poor
-    masks disagree too, and are told of camera by camera). masks : frame → camera → (H, W).
+    """Faults of a calibration that explain the silhouettes; none where they agree, or where nothing explains them (poor
+    masks disagree too, and are reported by camera). masks : frame → camera → (H, W).
 
-    A wrong size only warns where a height is given: that may be the wrong one.
+    A wrong size only warns if a height is given: the height may be wrong.
     """
     known = {finding.code for finding in check_calibration(cameras)}
     seen: Masks = masks
@@ -53,9 +53,7 @@ def silhouette_doubts(
 
 
 def standing_doubts(session: Session) -> tuple[str, ...]:
-    """What the silhouettes said, when they were measured last, that makes all results wrong: sentences. None where the
-    footage or the calibration is another one since.
-    """
+    """The blocking findings of the last measurement, as sentences; none if footage or calibration has changed since."""
     measured = origin_of(session, MEASURED)
     if measured is None or changed_inputs(session, MEASURED, ("footage", "calibration")):
         return ()
@@ -67,14 +65,14 @@ def accepted_doubts(session: Session, despite: bool) -> tuple[str, ...]:
     doubts = standing_doubts(session)
     if doubts and not despite:
         raise CalibrationError(
-            f"The footage of '{session.name}' speaks against its calibration: {doubts[0]}",
-            "Set it right and measure the masks again, or track all the same (--despite-findings; the forms ask).",
+            f"The footage of '{session.name}' contradicts its calibration: {doubts[0]}",
+            "Correct it and measure the masks again, or track anyway (--despite-findings; a checkbox in the forms).",
         )
     return doubts
 
 
 def height_of(session: Session) -> float | None:
-    """The person's height as the session has it; None where nobody said, or it cannot be read."""
+    """The person's height from the session; None if it is not given or cannot be read."""
     try:
         subject = session.subject()
     except StudioError:

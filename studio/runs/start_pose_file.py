@@ -1,5 +1,5 @@
-"""A start pose from a file: a CSV row of parameters, or a TRC whose markers are met by inverse kinematics; and kept in
-the session.
+"""Reads a start pose from a file: a CSV row of parameters, or a TRC whose markers are fitted by inverse kinematics; and
+stores it in the session.
 """
 
 from pathlib import Path
@@ -24,11 +24,11 @@ FEWEST_MARKERS = 4
 
 
 def keep_start_pose(session: Session, body: BodyModel, pose: Array, frame: int | None = None) -> Path:
-    """Make a pose (D,) the session's start pose; returns the file. The one it had stays beside it as
+    """Make a pose (D,) the session's start pose; returns the file. The old one is kept beside it as
     start_pose-before.csv, numbered if there are more.
 
-    frame : that it is of; None: the same as the one before. Raises RunError for a pose of another body than the
-    session's, or a frame that the footage does not have.
+    frame : of the pose; None: that of the old one. Raises RunError for a pose of another body than the session's, or
+    a frame outside the footage.
     """
     given = np.asarray(pose, dtype=np.float64)
     if body.name != session.manifest.body or given.shape != (len(body.parameters),):
@@ -54,16 +54,16 @@ def keep_start_pose(session: Session, body: BodyModel, pose: Array, frame: int |
 
 
 def frame_of_file(path: Path) -> int:
-    """The frame that a file's start pose is of: what a CSV says, else 0. Raises BodyError."""
+    """The frame of a file's start pose: from a CSV, else 0. Raises BodyError."""
     known = pose_frame(path) if path.is_file() and path.suffix.lower() != ".trc" else None
     return known or 0
 
 
 def start_pose_from_file(path: Path, body: BodyModel, frame: int, fps: float) -> tuple[Array, str]:
-    """The pose (D,), radians and mm, that a file gives for a frame, and in words where it came from.
+    """The pose (D,), radians and mm, that a file gives for a frame, and its origin as text.
 
     A CSV has one row, its header the body's parameters. Of a TRC the row whose `Time` × fps is the frame is
-    taken (its first row is frame 0) and the body is fitted to the markers that both know. Raises RunError,
+    taken (its first row is frame 0) and the body is fitted to the markers that both have. Raises RunError,
     BodyError, TruthError naming the file.
     """
     if not path.is_file():
@@ -85,9 +85,9 @@ def start_pose_from_file(path: Path, body: BodyModel, frame: int, fps: float) ->
     if len(kept) < FEWEST_MARKERS:
         known = ", ".join(sorted(marker.name for marker in body.markers)) or "the body has no markers"
         raise TruthError(
-            f"'{path.name}' has {len(kept)} markers that body '{body.name}' knows in frame {frame}.",
+            f"'{path.name}' has {len(kept)} markers of body '{body.name}' in frame {frame}.",
             f"Name at least {FEWEST_MARKERS} of: {known}.",
         )
     names = tuple(motion.names[at] for at in kept)
     pose, error = pose_from_markers(body, names, points[kept], body.neutral)
-    return pose, f"{len(kept)} markers of {path.name}, met to {error:.0f} mm"
+    return pose, f"{len(kept)} markers of {path.name}, fitted to {error:.0f} mm"

@@ -5,11 +5,13 @@ from collections.abc import Callable
 from concurrent.futures import Executor, Future
 
 MOST_WAITING = 60
-"""Frames that may wait to be stored: then the search waits for the disk after all."""
+"""Frames that may wait to be stored; beyond that the search waits for the disk."""
 
 
 class StoringBehind:
-    """executor : of one thread, which keeps the order; None: everything is done at once. Used by one thread."""
+    """Stores results in order in another thread. executor : of one thread; None: everything is done at once. Not
+    thread-safe.
+    """
 
     def __init__(self, executor: Executor | None) -> None:
         self._executor = executor
@@ -17,9 +19,7 @@ class StoringBehind:
         self._failed: BaseException | None = None
 
     def do(self, action: Callable[[], None]) -> None:
-        """Do something after all that was asked before. Raises what one of those failed with; then none of what was
-        asked after that one is done, as it follows from it.
-        """
+        """Queue an action. Raises the error of an earlier one; actions queued after a failed one are not done."""
         if self._executor is None:
             action()
             return
@@ -28,12 +28,12 @@ class StoringBehind:
         self._waiting.append(self._executor.submit(self._done_unless_failed, action))
 
     def wait(self) -> None:
-        """Return when all is done. Raises what one of it failed with."""
+        """Wait for all actions. Raises the error of one that failed."""
         while self._waiting:
             self._next_done()
 
     def _done_unless_failed(self, action: Callable[[], None]) -> None:
-        """In the executor's thread."""
+        """Do an action in the executor's thread, unless an earlier one failed."""
         if self._failed is None:
             try:
                 action()
@@ -41,7 +41,7 @@ class StoringBehind:
                 self._failed = problem
 
     def _next_done(self) -> None:
-        """Wait for the oldest; where it failed, for all of them, and raise what it failed with."""
+        """Wait for the oldest action; if it failed, for all of them, and raise its error."""
         self._waiting.popleft().result()
         if self._failed is not None:
             while self._waiting:

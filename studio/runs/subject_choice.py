@@ -1,4 +1,4 @@
-"""Who is in front of a session's cameras, said by a person or kept after a fit: one place writes it down."""
+"""Stores a session's subject, as chosen by the user or after a fit."""
 
 from pathlib import Path
 
@@ -16,9 +16,9 @@ LEAST_HEIGHT, MOST_HEIGHT = 300.0, 3000.0
 
 
 def body_of_choice(session: Session, subject: Subject) -> tuple[BodyModel, tuple[str, ...]]:
-    """The body that a subject would have in a session, and notes on measures that it cannot follow. Writes nothing.
+    """The body of a subject in a session, and notes on measures that it cannot use. Writes nothing.
 
-    Raises BodyError for a body that is not there, or a height that is no person's.
+    Raises BodyError for an unknown body or an impossible height.
     """
     if subject.height_mm is not None and not LEAST_HEIGHT <= subject.height_mm <= MOST_HEIGHT:
         raise BodyError(
@@ -28,14 +28,14 @@ def body_of_choice(session: Session, subject: Subject) -> tuple[BodyModel, tuple
 
 
 def choose_subject(session: Session, subject: Subject) -> Session:
-    """Write a subject down as the session's, whose new runs then have its body. Raises as `body_of_choice`."""
+    """Make a subject the session's own, so that new runs use its body. Raises as `body_of_choice`."""
     body_of_choice(session, subject)
     write_subject(subject, session.path / SUBJECT_NAME)
     return _with_body(session, subject.body)
 
 
 def keep_fitted(session: Session, found: FittedSubject) -> Path:
-    """Keep a fitted subject as the session's own, and what it was made from."""
+    """Make a fitted subject the session's own, and record its provenance."""
     place = keep_subject(session, found)
     note(_with_body(session, found.subject.body), "subject")
     return place

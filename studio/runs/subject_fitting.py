@@ -1,9 +1,9 @@
-"""Fit the subject of a session: limb lengths and radii found on the silhouettes of a few frames, with their poses.
+"""Fits a session's subject: limb lengths and radii from the silhouettes of a few frames, with their poses.
 
-The frames are those in which the person stands most differently (`runs.subject_frames`). Their first poses come from a
-run of the session where one has them, else each frame is searched for one (`runs.initialising`). A population finds the
-valley (`tracking.shape_search`), a descent its floor (`tracking.shape_refinement`). What is found is a subject whose
-dimensions are written out, so that every later run of the session has this body.
+The frames are those with the most different postures (`runs.subject_frames`). Their initial poses come from a run of
+the session, else each frame is searched for one (`runs.initialising`). A population finds the basin of the optimum
+(`tracking.shape_search`), a local descent the optimum (`tracking.shape_refinement`). The result is a subject with all
+dimensions, so that every later run of the session has this body.
 """
 
 from collections.abc import Sequence
@@ -44,17 +44,17 @@ Array = NDArray[np.float64]
 COUNT = 5
 MOST_FRAMES = 24
 ANGLE_SPREAD, PLACE_SPREAD = 0.35, 60.0
-"""rad and mm: how far the first poses may be off."""
+"""rad and mm: spread of the initial poses."""
 
 
 @dataclass(frozen=True, slots=True)
 class FitRequest:
-    """What a fit is asked for.
+    """The parameters of a fit.
 
-    frames : to look at; () chooses `count`. symmetric : left and right alike. lengths, radii : what may change. run :
-    whose poses to begin with, "" for the session's newest run of this body that has them. body : "" for the session's.
+    frames : to use; () chooses `count`. symmetric : left and right alike. lengths, radii : what may change. run :
+    whose poses to start from, "" for the session's newest run of this body that has them. body : "" for the session's.
     height_mm : as known to a few centimetres; None takes the subject's. height_spread : mm, its standard deviation;
-    silhouettes overrule a height that is many times that off.
+    silhouettes override a height that is off by many times that.
     """
 
     frames: tuple[int, ...] = ()
@@ -85,7 +85,7 @@ class FittedSize:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FittedSubject:
-    """A subject that was found. frames, poses (F, D) : with it. overlap_before, overlap : (F,) f_s."""
+    """A fitted subject. frames, poses (F, D) : of the fit. overlap_before, overlap : (F,) f_s."""
 
     subject: Subject
     body: BodyModel
@@ -107,21 +107,21 @@ def fit_session_subject(
 ) -> FittedSubject:
     """The subject of a session, fitted to its silhouettes. Nothing is written: see `keep_subject`.
 
-    progress : the step in words, how much of it is done, and how much there is. Raises RunError where nothing is to be
-    seen in a frame or nothing may change, NotFoundError for a frame or run that is not there, WorkCancelledError.
+    progress : the step, the number of parts done, and of all. Raises RunError where a frame shows no body or nothing
+    may change, NotFoundError for an unknown frame or run, WorkCancelledError.
     """
-    asked = request or FitRequest()
-    if not asked.lengths and not asked.radii:
+    request = request or FitRequest()
+    if not request.lengths and not request.radii:
         raise RunError("Neither lengths nor radii are to be fitted.", "Choose at least one of them.")
-    tell = watched(progress, cancelled, "Fitting the subject")
-    body, subject = _first_body(session, asked)
-    tell("choosing frames", 0, 1)
-    frames, start, poses_from = _first_poses(session, body, asked, tell)
-    evidence = _evidence(session, frames, tell)
-    space = shape_space(body, symmetric=asked.symmetric, lengths=asked.lengths, radii=asked.radii)
-    space = levelled(space) if asked.symmetric else space
+    report = watched(progress, cancelled, "Fitting the subject")
+    body, subject = _first_body(session, request)
+    report("choosing frames", 0, 1)
+    frames, start, poses_from = _first_poses(session, body, request, report)
+    evidence = _evidence(session, frames, report)
+    space = shape_space(body, symmetric=request.symmetric, lengths=request.lengths, radii=request.radii)
+    space = levelled(space) if request.symmetric else space
     limbs = {name: number for number, name in enumerate(dict.fromkeys(p.limb for p in body.parameters))}
-    prior = ShapePrior(space, ShapeSpreads(height=asked.height_spread), subject.height_mm)
+    prior = ShapePrior(space, ShapeSpreads(height=request.height_spread), subject.height_mm)
     silhouettes = ShapeSilhouettes(space, session.cameras(), evidence)
     search = ShapeSearch(
         silhouettes,
@@ -129,15 +129,15 @@ def fit_session_subject(
         np.array([ANGLE_SPREAD if entry.kind == "angle" else PLACE_SPREAD for entry in body.parameters]),
         np.array([limbs[entry.limb] for entry in body.parameters]),
         prior,
-        settings=ShapeSearchSettings(particles=asked.particles, layers=asked.layers),
-        seed=asked.seed,
-        progress=lambda done, total: tell("fitting lengths and radii", done, total),
+        settings=ShapeSearchSettings(particles=request.particles, layers=request.layers),
+        seed=request.seed,
+        progress=lambda done, total: report("fitting lengths and radii", done, total),
     )
     found = search.run(start)
-    tell("refining lengths and radii", 0, 1)
+    report("refining lengths and radii", 0, 1)
     borders = [silhouette_distances(one) for one in evidence]
     refiner = ShapeRefiner(silhouettes.programs, session.cameras(), borders, prior)
-    refined = refiner.refine(found.shape, found.poses, asked.seed, others=(start,))
+    refined = refiner.refine(found.shape, found.poses, request.seed, others=(start,))
     fitted = space.body_of(refined.shape)
     return FittedSubject(
         subject_of(subject, fitted),
@@ -161,7 +161,7 @@ def _sizes(space: ShapeSpace, refined: RefinedShape) -> tuple[FittedSize, ...]:
 
 
 def keep_subject(session: Session, found: FittedSubject, into: Path | None = None) -> Path:
-    """Write a fitted subject: into a file, or as the session's own (the old one stays as subject-before.toml)."""
+    """Write a fitted subject to a file, or as the session's own (the old one is kept as subject-before.toml)."""
     if into is not None:
         write_subject(found.subject, into)
         return into
@@ -173,53 +173,55 @@ def keep_subject(session: Session, found: FittedSubject, into: Path | None = Non
     return own
 
 
-def _first_body(session: Session, asked: FitRequest) -> tuple[BodyModel, Subject]:
-    """The body to begin with and what is known of the subject."""
+def _first_body(session: Session, request: FitRequest) -> tuple[BodyModel, Subject]:
+    """The initial body and the known measures of the subject."""
     known = session.subject() or Subject(body=session.manifest.body)
-    if asked.height_mm is not None:
-        known = Subject(body=known.body, height_mm=asked.height_mm)
-    tree = load_body(asked.body or session.manifest.body, session.body_folders)
+    if request.height_mm is not None:
+        known = Subject(body=known.body, height_mm=request.height_mm)
+    tree = load_body(request.body or session.manifest.body, session.body_folders)
     return fit_subject(tree, known, session.body_folders)[0], msgspec.structs.replace(known, body=tree.name)
 
 
 def _first_poses(
-    session: Session, body: BodyModel, asked: FitRequest, tell: Progress
+    session: Session, body: BodyModel, request: FitRequest, report: Progress
 ) -> tuple[tuple[int, ...], Array, str]:
-    """The frames, a pose in each (F, D), and where the poses are from."""
+    """The frames, a pose in each (F, D), and the origin of the poses."""
     count = session.manifest.frame_count
-    for frame in asked.frames:
+    for frame in request.frames:
         if not 0 <= frame < count:
             raise RunError(
                 f"Frame {frame} does not lie in the footage of '{session.name}'.", f"It has frames 0:{count}."
             )
-    if not 1 <= (len(asked.frames) or asked.count) <= MOST_FRAMES:
+    if not 1 <= (len(request.frames) or request.count) <= MOST_FRAMES:
         raise RunError("A subject is fitted to 1 to 24 frames.", "Choose fewer, or at least one.")
-    stored = _stored_poses(session, body, asked.run)
+    stored = _stored_poses(session, body, request.run)
     if stored is not None:
         numbers, poses, name = stored
-        frames = asked.frames or varied_frames(body, numbers, poses, asked.count)
+        frames = request.frames or varied_frames(body, numbers, poses, request.count)
         rows = {int(number): row for row, number in enumerate(numbers)}
         if all(frame in rows for frame in frames):
             return frames, poses[[rows[frame] for frame in frames]], f"run {name}"
-    frames = asked.frames or varied_frames(body, np.arange(count), None, asked.count)
+    frames = request.frames or varied_frames(body, np.arange(count), None, request.count)
     found = []
     for done, frame in enumerate(frames):
 
-        def told(step: str, part: int, whole: int, done: int = done) -> None:
-            tell(
+        def report_frame(step: str, part: int, whole: int, done: int = done) -> None:
+            report(
                 f"{step} in frame {frames[done]}", done * 100 + 100 * part // max(whole, 1), 100 * len(frames)
             )
 
         found.append(
-            within_limits(body, initialise(session, frame, body=body, seed=asked.seed, progress=told).pose)
+            within_limits(
+                body, initialise(session, frame, body=body, seed=request.seed, progress=report_frame).pose
+            )
         )
-    return frames, np.array(found), "searched for in each frame"
+    return frames, np.array(found), "a search in each frame"
 
 
 def _stored_poses(
     session: Session, body: BodyModel, wanted: str
 ) -> tuple[NDArray[np.int64], Array, str] | None:
-    """Frames, poses and name of the run asked for, or of the newest one of this body and calibration with any."""
+    """Frames, poses and name of the requested run, or of the newest one of this body and calibration with poses."""
     stale = stale_runs(session)
     usual = [run for run in reversed(session.runs()) if run.name not in stale]
     runs = [session.run(wanted)] if wanted else usual
@@ -234,19 +236,19 @@ def _stored_poses(
     return None
 
 
-def _evidence(session: Session, frames: Sequence[int], tell: Progress) -> tuple[FrameEvidence, ...]:
-    """The masks of the frames. Raises RunError where nothing is to be seen."""
+def _evidence(session: Session, frames: Sequence[int], report: Progress) -> tuple[FrameEvidence, ...]:
+    """The masks of the frames. Raises RunError for a frame that shows no body."""
     footage = session.footage()
     try:
         settings = session_settings(session).evidence
         maker = EvidenceMaker(session.cameras(), footage, Backgrounds(footage), settings, "none")
         found = []
         for done, frame in enumerate(frames):
-            tell("looking at the frames", done, len(frames))
+            report("reading the frames", done, len(frames))
             evidence = maker.evidence(frame)
             if not anything_seen(evidence):
                 raise RunError(
-                    f"Nothing is to be seen of a body in frame {frame} of session '{session.name}'.",
+                    f"Frame {frame} of session '{session.name}' shows no body.",
                     "Choose other frames, or check the masks.",
                 )
             found.append(evidence)
@@ -256,7 +258,7 @@ def _evidence(session: Session, frames: Sequence[int], tell: Progress) -> tuple[
 
 
 def subject_of(subject: Subject, body: BodyModel) -> Subject:
-    """The subject with all of a body's dimensions, from which that very body comes back."""
+    """The subject with all dimensions of a body, which reproduces that body exactly."""
     entries = body.definition.dimensions if body.definition else {}
     lengths = {name: value for name, value in body.dimensions.items() if entries[name].ratio is None}
     ratios = {name: value for name, value in body.dimensions.items() if entries[name].ratio is not None}

@@ -1,4 +1,4 @@
-"""Which frames a subject is fitted to: those in which the person stands most differently."""
+"""Chooses the frames for fitting a subject: those with the most different postures."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,6 +1,6 @@
-"""A take that is being recorded as a live run's source of sets: follows what its recorder writes down.
+"""Follows a recording in progress: its sets are the source of a live run.
 
-Recorder and tracker may be two threads or two processes; they share the take's folder and the machine's clock.
+Recorder and tracker may be two threads or two processes; they share the recording's folder and the machine's clock.
 """
 
 import time
@@ -12,13 +12,13 @@ from studio.capture.frame_clock import PATIENCE_SECONDS, Arrival
 from studio.sessions.takes import END, LIVE, SETS_NAME, is_being_recorded, let_go_on, taken_set
 
 LOOK_SECONDS = 0.004
-"""A new line is noticed after at most so long."""
+"""Polling interval for new lines, seconds."""
 LOCK_SECONDS = 1.0
-"""How often it is looked whether the recorder still lives."""
+"""Interval between checks that the recorder is alive, seconds."""
 
 
 class TakeFollower:
-    """The newest set of a take. folder : the session's. sleep : lets so many seconds pass."""
+    """The newest set of a recording. folder : the session's. sleep : waits for seconds."""
 
     def __init__(
         self,
@@ -31,16 +31,15 @@ class TakeFollower:
         self._offset, self._rest = 0, b""
         self._newest: Arrival | None = None
         self._before = -1
-        self._ended, self._looked = False, clock()
+        self._ended, self._checked = False, clock()
 
     def begin(self, frame: int) -> None:
-        """Let the sets come; one that came before, to get ready with, is not tracked late."""
+        """Start the sets; one that came before, for warming up, is not tracked."""
         self._look()
         self._before = self._newest.frame if self._newest else -1
         let_go_on(self._folder)
 
     def newest(self, after: int) -> Arrival | None:
-        """The newest set."""
         self._look()
         found = self._newest
         return None if found is None or found.frame <= max(after, self._before) else found
@@ -54,8 +53,8 @@ class TakeFollower:
     def over(self, after: int) -> bool:
         """Whether the recorder has ended, or died."""
         self._look()
-        if not self._ended and self._clock() - self._looked > LOCK_SECONDS:
-            self._looked = self._clock()
+        if not self._ended and self._clock() - self._checked > LOCK_SECONDS:
+            self._checked = self._clock()
             self._ended = not is_being_recorded(self._folder)
         return self._ended and self.newest(after) is None
 
@@ -79,7 +78,7 @@ class TakeFollower:
 
 
 class SetNumbers:
-    """Which numbers of a take have a set, read on as its recorder writes. folder : the session's."""
+    """The numbers of a recording that have a set, read as its recorder writes. folder : the session's."""
 
     def __init__(self, folder: Path) -> None:
         self._path = folder / LIVE / SETS_NAME
@@ -88,7 +87,7 @@ class SetNumbers:
 
     @property
     def of_a_take(self) -> bool:
-        """Whether the session is one: of footage, every number has its pictures."""
+        """Whether the session is a recording; in other footage every number has its pictures."""
         return bool(self._numbers) or self._path.exists()
 
     @property
@@ -98,7 +97,7 @@ class SetNumbers:
         return self._numbers[-1] if self._numbers else -1
 
     def between(self, after: int, to: int) -> int:
-        """How many sets there are of numbers above `after`, up to `to`."""
+        """The number of sets above `after` up to `to`."""
         self._look()
         return bisect_right(self._numbers, to) - bisect_right(self._numbers, after)
 

@@ -1,10 +1,9 @@
-"""A run, a layer at a time: searched, recorded, stopped, resumed and annealed again.
+"""Tracks a run layer by layer: searches, stores, stops, resumes and anneals frames again.
 
-What a layer depends on is all on disk before it runs: the particles that the frame before ended with (or the
-run's start pose), the settings with the layer at which they came into use, and the seed. So a run that is
-taken up again, after a pause inside a frame or after its process was killed, gives the same poses bit for bit
-as one that was never interrupted: settings that were already in use in an unfinished frame come into use
-again at the same layers.
+Everything that a layer depends on is on disk before it runs: the final particles of the frame before (or the run's
+start pose), the settings with the layer at which they were applied, and the seed. So a run resumed after a pause inside
+a frame, or after its process was killed, gives the same poses bit for bit as an uninterrupted one: settings applied in
+an unfinished frame are applied again at the same layers.
 """
 
 import dataclasses
@@ -31,12 +30,12 @@ from studio.tracking.frame_loop import FrameSearch, SearchState, held_over
 from studio.tracking.frame_refinement import FrameRefiner, space_after
 from studio.tracking.tracker import Carried, FrameProblem, FrameResult, LayerRecord
 
-# The newest settings and their version; asked before each layer.
+# The newest settings and their version; called before each layer.
 SettingsSource = Callable[[], tuple[int, RunSettings]]
 
 
 class Problems(Protocol):
-    """Where frames come from (`ProblemSource`, or a toy in tests)."""
+    """A source of frames (`ProblemSource`, or a toy in tests)."""
 
     def problem(self, frame: int, settings: RunSettings) -> FrameProblem:
         """The frame as a function of poses."""
@@ -45,8 +44,8 @@ class Problems(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stepped:
-    """What one layer brought. result : of the frame, if this was its last layer. applied : the settings that came into
-    use with this layer, None if they were in use before.
+    """The outcome of one layer. result : of the frame, if this was its last layer. applied : settings used from this
+    layer on, None if unchanged.
     """
 
     record: LayerRecord
@@ -55,7 +54,7 @@ class Stepped:
 
 
 class TrackingRun:
-    """The one who tracks a stored run; a second one for it is refused with RunError. Close it when done."""
+    """Tracks a stored run. A second one for the same run raises RunError. Close it when done."""
 
     def __init__(self, run: StoredRun, problems: Problems) -> None:
         self.run, self.record, self.problems = run, run.record, problems
@@ -82,9 +81,7 @@ class TrackingRun:
             raise
 
     def close(self) -> None:
-        """Save the frame at hand, if the search stands inside one, and free the run for others, also where saving
-        fails.
-        """
+        """Save an unfinished frame, and release the run even if saving fails."""
         try:
             self.save()
         finally:
@@ -95,9 +92,9 @@ class TrackingRun:
         self._reader.close()
 
     def _load(self) -> None:
-        """Take up the run where its store says it stands."""
+        """Load the run's state from its store."""
         self._astray = False
-        """Whether a frame is searched to its end but not stored: what is in memory is no place to go on from."""
+        """Whether a finished frame is not stored yet, so that the state in memory must not be continued."""
         self.history = SettingsHistory(tuple(self._reader.settings_history()))
         self.settings_source: SettingsSource = self.latest_settings
         self._settings: dict[int, RunSettings] = {}
@@ -114,14 +111,14 @@ class TrackingRun:
             self._behaviour.keep_missing()
 
     def _go_to_next(self) -> None:
-        """Stand before the next frame: a damaged one first, those tracked backwards from the last down. The frames of a
-        live run came on a clock, and are not tracked again.
+        """Go to the next frame: damaged ones first, those tracked backwards from the last one down. Frames of a live
+        run came on a clock and are not tracked again.
         """
         frames = self._reader.frames()
         damaged = {} if self.record.live else self._reader.damaged()
         backwards = [frame for frame in damaged if self.record.is_anew(frame)]
         self.damaged = len(damaged)
-        """How many damaged frames are to be tracked again, before any other."""
+        """Number of damaged frames to track again before any other."""
         end = max([*frames, *damaged], default=self.record.first - 1) + 1
         self.next_frame = max(backwards, default=min(damaged, default=end))
         self.done = len(frames)
@@ -134,7 +131,7 @@ class TrackingRun:
         numbers = partial.state["search_numbers"]
         held = self._settings_at(partial.frame)[1].tracker
         particles = particles_from(partial.state)
-        # Of the search of a whole frame more is needed than was saved: older versions stored such.
+        # Older versions stored too little to resume the search of a whole frame.
         state = SearchState(
             layers_done=partial.next_layer,
             layer_count=int(numbers[0]),
@@ -150,7 +147,7 @@ class TrackingRun:
             self._search, self._layers = search, self._reader.layers(partial.frame)
 
     def _load_again(self) -> None:
-        """Forget all that is not in the store; the source of the settings stays."""
+        """Discard everything not in the store, except the source of the settings."""
         source = self.settings_source
         self._behaviour.forget()
         self._watch.forget()
@@ -168,8 +165,8 @@ class TrackingRun:
         return self._search.state.layers_done if self._search else 0
 
     def step_layer(self) -> Stepped:
-        """Do one layer of the next frame; with its last layer the frame is stored. Raises RunError when finished,
-        SessionError where it cannot be stored: then the run goes on from what is.
+        """Do one layer of the next frame; after its last layer the frame is stored. Raises RunError when finished,
+        SessionError if it cannot be stored: then the run continues from the stored frames.
         """
         if self._astray:
             self._load_again()
@@ -195,7 +192,7 @@ class TrackingRun:
         return Stepped(record, result, settings if is_new else None)
 
     def result_of(self, search: FrameSearch, settings: RunSettings) -> FrameResult:
-        """The result of a finished search of a frame, with how the frame went."""
+        """The result of a finished search of a frame, with its tracking state."""
         found = search.result(settings.tracker)
         held = self._held_in(search.frame, settings)
         problem = search.problem or self.problems.problem(search.frame, held)
@@ -223,9 +220,9 @@ class TrackingRun:
             self._behaviour.keep()
 
     def save(self) -> None:
-        """Store where the search stands inside a frame, whole, so that another process can go on from there.
+        """Store the state of an unfinished frame, so that another process can continue it.
 
-        A frame that is searched to its end, but could not be stored, is none of these: it is searched again.
+        A finished frame that could not be stored is not saved; it is searched again.
         """
         if self._astray or self._search is None or self._saved or self._search.state.particles is None:
             return
@@ -239,12 +236,12 @@ class TrackingRun:
         self._saved = True
 
     def mark_cancelled(self) -> None:
-        """Note in the store that a person ended the run."""
+        """Note in the store that the user cancelled the run."""
         self.save()
         self._writer.mark_ended("cancelled")
 
     def mark_going_on(self) -> None:
-        """Note that a cancelled run goes on after all, or one whose disk was full."""
+        """Note that a run is resumed that was cancelled or whose disk was full."""
         if self._astray:
             self._load_again()
         if self._reader.ended():
@@ -252,21 +249,21 @@ class TrackingRun:
 
     @property
     def ended(self) -> str:
-        """ "cancelled" if a person ended the run, else ""."""
+        """ "cancelled" if the user cancelled the run, else ""."""
         return self._reader.ended()
 
     def progress(self, least: float = 0.0) -> Progress:
-        """How far the run got and how long the rest will take. least : seconds that a layer is made to take."""
+        """The run's progress and time left. least : seconds that a layer is slowed down to."""
         return self._pace.progress(self.done, self.record.frame_count, least)
 
     def latest_settings(self) -> tuple[int, RunSettings]:
-        """The newest settings that this run has used, and their version."""
+        """The run's latest settings and their version."""
         entry = self.history.entries[-1]
         return entry.version, self._read(entry)
 
     def _settings_for(self, frame: int, layer: int) -> tuple[int, RunSettings, bool]:
-        """The settings of a layer: new ones if there are, else those that the history has for it."""
-        # A damaged frame is tracked again as it was.
+        """The settings of a layer: new ones if there are any, else those of the history."""
+        # A damaged frame is tracked again with its old settings.
         version, settings = self.latest_settings() if self.damaged else self.settings_source()
         if version > self.history.entries[-1].version:
             self._apply(version, settings, frame, layer)
@@ -278,7 +275,7 @@ class TrackingRun:
         return entry.version, self._read(entry)
 
     def _held_in(self, frame: int, settings: RunSettings) -> RunSettings:
-        """The settings with what cannot change inside a frame as it was at its first layer."""
+        """The settings, with those that cannot change inside a frame as at its first layer."""
         held = self._settings_at(frame)[1]
         return dataclasses.replace(
             settings,
@@ -292,7 +289,7 @@ class TrackingRun:
         self.history = history
 
     def _read(self, entry: SettingsEntry) -> RunSettings:
-        """The settings of an entry; those in use are read once."""
+        """The settings of a history entry; those in use are read once."""
         if entry.version not in self._settings:
             recorded = settings_from_values(self.record.tracker, self.record.weighting, entry.values)
             self._settings[entry.version] = recorded
@@ -304,7 +301,7 @@ class TrackingRun:
         if state is None:
             carried, sought = self._watch.start(frame, carried, space)
         elif sought := self._watch.is_sought(frame):
-            # What it found is in the state already.
+            # The state already has its result.
             carried = Carried(None, memory=carried.memory)
         repeats = 1
         if self._handed.is_first(frame) or sought:
@@ -321,11 +318,11 @@ class TrackingRun:
         )
 
     def carried_into(self, frame: int) -> Carried:
-        """What a frame starts from (`frame_steps.HandedOn.into`)."""
+        """The state that a frame starts from (`frame_steps.HandedOn.into`)."""
         return self._handed.into(frame)
 
     def search_again(self, frame: int) -> FrameSearch:
-        """A new search of a frame that can be searched: same start and random keys; nothing of it is stored.
+        """A new search of a frame with the same start and random keys; nothing is stored.
 
         Raises NotFoundError for a frame outside the run, or one whose predecessor has no result.
         """
@@ -345,9 +342,9 @@ class TrackingRun:
         *,
         alone: bool = False,
     ) -> None:
-        """Make a frame annealed again the run's own; later frames, which followed from the old one, are dropped.
+        """Replace a frame by one annealed again; later frames, which followed from the old one, are dropped.
 
-        alone : only this one changes, as others do not follow from it.
+        alone : keep the later frames, which do not depend on it.
         """
         if alone:
             self._writer.write_frame(result, layers, settings.recording.record_particles)

@@ -1,8 +1,8 @@
-"""The tracks of a run: what the search found, and what was made of it since, side by side.
+"""The tracks of a run: the search's own, and those derived from it.
 
-`raw` is what the results store holds; every other track is one file `tracks/<name>.npz` in the run's folder, so that
-refining or smoothing never writes over what was found. Frames that are missing from a track are gaps. A track that was
-made of another keeps a digest of it, so that it is known when the run has gone on since (`best_track`).
+`raw` is in the results store; every other track is one file `tracks/<name>.npz` in the run's folder, so that refining
+or smoothing never overwrites the search's result. Frames missing from a track are gaps. A derived track keeps a digest
+of its source, which shows whether the run has changed since (`best_track`).
 """
 
 import hashlib
@@ -33,9 +33,9 @@ Plain = Any
 
 RAW, SIDES, REFINED, SMOOTHED = "raw", "sides", "refined", "smoothed"
 BEST = "best"
-"""Stands for the best track there is (`best_track`) wherever a track is named."""
+"""Names the best track available (`best_track`)."""
 SOURCE, SOURCE_DIGEST = "from", "from_digest"
-"""Entries of `made_by`: the track that one was made from, and what that held then."""
+"""Entries of `made_by`: the source track, and its digest."""
 FOLDER, ENDING = "tracks", ".npz"
 SCHEMA_VERSION = 1
 ENTRIES = ("frames", "poses", "confidence", "states", "made_by", "schema")
@@ -44,12 +44,12 @@ KNOWN_STATES = (*TRACKING_STATES, "")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """The poses of a run's frames, found or made.
+    """The poses of a run's frames, tracked or derived.
 
     name : "raw", "refined", "smoothed", … frames : (K,) ascending; a missing number is a gap. poses : (K, D) radians
     and mm. confidence : (K,) 0 to 1, NaN unknown (of the search: how well the silhouettes agree, f_s). states : K words
-    of `tracking.tracker.TRACKING_STATES`, "" unknown. made_by : how the track was made, {} for raw: "verb", "from" and
-    the settings.
+    of `tracking.tracker.TRACKING_STATES`, "" unknown. made_by : the track's provenance, {} for raw: "verb", "from"
+    and the settings.
     """
 
     name: str
@@ -69,7 +69,7 @@ def track_names(run: StoredRun) -> tuple[str, ...]:
 @dataclass(frozen=True, slots=True)
 class BestTrack:
     """The best track of a run. name : "smoothed", else "refined", else "sides", else "raw". outdated : better ones
-    that were made before the run, or what they were made from, changed.
+    whose run or source track has changed since.
     """
 
     name: str
@@ -77,7 +77,7 @@ class BestTrack:
 
     @property
     def note(self) -> str:
-        """A sentence on the tracks that were passed over; "" for none."""
+        """A sentence on the outdated tracks; "" for none."""
         if not self.outdated:
             return ""
         which = " and ".join(f"'{name}'" for name in self.outdated)
@@ -89,9 +89,8 @@ class BestTrack:
 
 
 def best_track(run: StoredRun, among: Sequence[str] = (SMOOTHED, REFINED, SIDES)) -> BestTrack:
-    """The first track of `among` that there is, by default the smoothed, else the refined one, else that
-    with sides put right; else the raw one. A track that was made of poses that have changed since does not count.
-    Raises SessionError where one is damaged.
+    """The first existing track of `among` (by default smoothed, refined, sides), else the raw one. Tracks whose source
+    has changed since do not count. Raises SessionError if one is damaged.
     """
     names, outdated = track_names(run), []
     for name in among:
@@ -103,20 +102,20 @@ def best_track(run: StoredRun, among: Sequence[str] = (SMOOTHED, REFINED, SIDES)
 
 
 def track_digest(track: Track) -> str:
-    """24 hex digits that tell a track's frames and poses from any others."""
+    """A digest (24 hex digits) of a track's frames and poses."""
     made = hashlib.sha256(track.frames.tobytes())
     made.update(track.poses.tobytes())
     return made.hexdigest()[:24]
 
 
 def track_named(run: StoredRun, name: str) -> str:
-    """The name of a track, of the best one for BEST."""
+    """The name of a track; for BEST that of the best one."""
     return best_track(run).name if name == BEST else name
 
 
 def _up_to_date(run: StoredRun, track: Track, names: tuple[str, ...]) -> bool:
-    """Whether what the track was made from is as it was then, down to the raw one. One of which that cannot be told
-    counts while it goes on to the raw track's end.
+    """Whether the track's sources, down to the raw one, are unchanged. Without a digest a track counts as up to date
+    while it reaches the raw track's end.
     """
     seen = {track.name}
     while track.name != RAW:
@@ -133,9 +132,7 @@ def _up_to_date(run: StoredRun, track: Track, names: tuple[str, ...]) -> bool:
 
 
 def read_track(run: StoredRun, name: str = RAW) -> Track:
-    """A track by its name, BEST for the best. Raises NotFoundError where there is none, SessionError where it is
-    damaged.
-    """
+    """A track by its name, BEST for the best. Raises NotFoundError if there is none, SessionError if it is damaged."""
     name = track_named(run, name)
     if name == RAW:
         return _raw_track(run)
@@ -155,7 +152,7 @@ def read_track(run: StoredRun, name: str = RAW) -> Track:
 
 
 def pose_in_track(run: StoredRun, name: str, frame: int) -> Array:
-    """(D,) the pose of a track in a frame. Raises NotFoundError where there is no such track or it has a gap there."""
+    """(D,) the pose of a track in a frame. Raises NotFoundError for no such track or a gap there."""
     track = read_track(run, name)
     row = int(np.searchsorted(track.frames, frame))
     if row == len(track.frames) or track.frames[row] != frame:
@@ -174,16 +171,16 @@ def track_stamp(run: StoredRun, name: str) -> int:
 
 
 def write_track(run: StoredRun, track: Track, *, replace: bool = False) -> Path:
-    """Keep a track beside the run's others, in one step; returns its file.
+    """Store a track with the run's others, atomically; returns its file.
 
-    replace : write over a derived track of that name. Raises SessionError for "raw", a name that is taken, or arrays
+    replace : overwrite a derived track of that name. Raises SessionError for "raw", a name that is taken, or arrays
     that do not fit each other or the run.
     """
     if track.name.lower() in (RAW, BEST):
         what = (
-            "what the search found and stays as it is"
+            "the search's own and cannot be changed"
             if track.name.lower() == RAW
-            else "whichever is the best"
+            else "reserved for the best one"
         )
         raise SessionError(f"Track '{track.name}' is {what}.", "Choose another name with --into.")
     path = _path(run, track.name)
@@ -213,12 +210,12 @@ def write_track(run: StoredRun, track: Track, *, replace: bool = False) -> Path:
 
 
 def drop_track(run: StoredRun, name: str) -> None:
-    """Remove a derived track; where there is none, nothing."""
+    """Remove a derived track, if there is one."""
     _path(run, name).unlink(missing_ok=True)
 
 
 def stretches(frames: NDArray[np.int64]) -> tuple[slice, ...]:
-    """Slices of rows whose frames (K,) follow each other without a gap."""
+    """Slices of rows whose frames (K,) are consecutive."""
     breaks = np.flatnonzero(np.diff(frames) != 1) + 1
     edges = [0, *breaks.tolist(), len(frames)]
     return tuple(slice(first, last) for first, last in itertools.pairwise(edges) if last > first)
@@ -229,14 +226,14 @@ def _path(run: StoredRun, name: str) -> Path:
 
 
 def _raw_track(run: StoredRun) -> Track:
-    """What the results store holds; a run that has no frame yet has an empty track."""
+    """The track in the results store; empty for a run without frames."""
     with run.results() as results:
         frames, poses = results.poses()
         timeline = results.timeline()
-    told = dict(
+    recorded = dict(
         zip(timeline.frames.tolist(), zip(timeline.overlaps, timeline.tracking, strict=True), strict=True)
     )
-    known = [told.get(frame, (math.nan, "")) for frame in frames.tolist()]
+    known = [recorded.get(frame, (math.nan, "")) for frame in frames.tolist()]
     return Track(
         RAW,
         frames,
@@ -252,7 +249,7 @@ def _from_entries(name: str, entries: Mapping[str, NDArray[Any]]) -> Track:
         raise ValueError(f"schema version {int(entries['schema'])} is newer than this studio")
     codes = entries["states"].tolist()
     if any(code >= len(KNOWN_STATES) for code in codes):
-        raise ValueError("a state that is not known")
+        raise ValueError("an unknown state")
     return Track(
         name,
         entries["frames"].astype(np.int64),
@@ -275,4 +272,4 @@ def _check(track: Track, dimension: int) -> None:
     if not np.isfinite(track.poses).all():
         raise ValueError("a pose has a number that is not finite")
     if any(state not in KNOWN_STATES for state in track.states):
-        raise ValueError("a state that is not known")
+        raise ValueError("an unknown state")

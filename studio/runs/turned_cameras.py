@@ -1,5 +1,5 @@
-"""Cameras that were turned by their silhouettes (`runs.aligning`): what was measured is remembered for the guided way,
-and the calibration before comes back when it is asked for, byte for byte.
+"""Cameras turned by their silhouettes (`runs.aligning`): stores the measurement for the guided set-up, and restores the
+earlier calibration on request, byte for byte.
 
 calibration/cameras.alignment.json     which calibration the one in use was turned from
 """
@@ -20,12 +20,12 @@ from studio.sessions.session import CAMERAS_PATH, Session
 RECORD_PATH = CAMERAS_PATH.with_name("cameras.alignment.json")
 PART = "alignment"
 SAME_DEGREES, SAME_MM = 1e-3, 0.1
-"""Files keep cameras to fewer digits than memory does."""
+"""Files keep cameras to fewer digits than memory."""
 
 
 class Turned(msgspec.Struct, frozen=True):
-    """Beside turned cameras. before : name of the earlier calibration that they were turned from; source : where that
-    came from, in words; content : digest of the turned cameras' file, which says whether it is still the one in use.
+    """Stored with turned cameras. before : name of the earlier calibration; source : its origin, as text; content :
+    digest of the turned cameras' file, which shows whether it is still in use.
     """
 
     before: str
@@ -34,24 +34,24 @@ class Turned(msgspec.Struct, frozen=True):
 
 
 def remember_alignment(session: Session, aligned: SessionAlignment) -> None:
-    """Let the guided way say how far the silhouettes miss with the calibration that is in use now."""
+    """Store how far the silhouettes miss with the calibration in use, for the guided set-up."""
     note(session, PART, _missed(aligned, aligned.found.before), not aligned.needed)
 
 
 def alignment_words(aligned: SessionAlignment) -> str:
-    """How far the silhouettes miss, and what helps: a sentence."""
+    """How far the silhouettes miss and the remedy, as a sentence."""
     found, missed = aligned.found, _missed(aligned, aligned.found.before)
     if not aligned.needed:
         return f"{missed}: the cameras agree."
     if not aligned.better:
-        return f"{missed}, and turning cameras does not explain it: look at the masks and the calibration."
+        return f"{missed}, and turning cameras does not explain it: check the masks and the calibration."
     turn, after = float(np.nanmax(found.turns)), float(np.nanmax(found.after))
     return f"{missed}; with cameras turned by up to {turn:.2f}° they would miss by {after:.1f} px."
 
 
 def misses_in_words(session: Session) -> str:
-    """Why the calibration in use does not fit the silhouettes, as it was measured last; "" where it does, or where
-    footage, masks or calibration are other ones since.
+    """Why the calibration in use does not fit the silhouettes, from the last measurement; "" if it fits, or if footage,
+    masks or calibration have changed since.
     """
     known = origin_of(session, PART)
     if known is None or known.good or changed_inputs(session, PART):
@@ -65,12 +65,12 @@ def _missed(aligned: SessionAlignment, pixels: NDArray[np.float64]) -> str:
 
 
 def turn_cameras(session: Session, aligned: SessionAlignment) -> CalibrationChange:
-    """Let the session use the turned cameras from now on. Raises SessionError while a run is being tracked, and
-    CalibrationError where the calibration is another one than that which was aligned.
+    """Make the turned cameras the session's. Raises SessionError while a run is being tracked, CalibrationError if the
+    calibration has changed since the alignment.
     """
     if not is_of(session, aligned):
         raise CalibrationError(
-            "The calibration is another one than that which was looked at.", "Measure the cameras again."
+            "The calibration has changed since it was measured.", "Measure the cameras again."
         )
     source = session.manifest.calibration_source
     change = keep_alignment(session, aligned)
@@ -85,14 +85,14 @@ def turn_cameras(session: Session, aligned: SessionAlignment) -> CalibrationChan
 
 
 def turned_from(session: Session) -> str:
-    """Name of the earlier calibration that the cameras in use were turned from; "" where they were not."""
+    """Name of the earlier calibration that the cameras in use were turned from; "" if they were not."""
     found = _turned(session)
     return "" if found is None else found.before
 
 
 def turn_back(session: Session) -> CalibrationChange:
-    """Let the session use the calibration again that it had before its cameras were turned. Raises NotFoundError where
-    they were not, SessionError while a run is being tracked.
+    """Restore the calibration from before the cameras were turned. Raises NotFoundError if they were not, SessionError
+    while a run is being tracked.
     """
     found = _turned(session)
     if found is None:
@@ -104,7 +104,7 @@ def turn_back(session: Session) -> CalibrationChange:
 
 
 def is_of(session: Session, aligned: SessionAlignment) -> bool:
-    """Whether the cameras in use are those that were looked at: as far from the turned ones as these were turned by."""
+    """Whether the cameras in use are those that were measured: they differ from the turned ones by the found turns."""
     now, found = session.cameras(), aligned.found
     if tuple(camera.name for camera in now) != aligned.names:
         return False

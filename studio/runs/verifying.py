@@ -1,7 +1,7 @@
-"""Everything that a session stores compared with its checksums; damaged frames tracked again as they were.
+"""Compares everything that a session stores with its checksums; tracks damaged frames again.
 
 Files have theirs in `.checksums.json` (`sessions.file_checksums`), frames, layers and settings in the results store
-(`sessions.results_codec`). What was stored before there were checksums is unpacked, and counted as unchecked.
+(`sessions.results_codec`). Data from before there were checksums is unpacked and counted as unchecked.
 """
 
 import contextlib
@@ -30,9 +30,7 @@ REPAIR = "Track it again: studio verify --repair, or resume the run."
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Something that is no longer what was written. place : a path in the session, and in a store what of it. remedy :
-    what to do. run, frame : of a damaged frame.
-    """
+    """Damaged data. place : a path in the session, and for a store the part of it. run, frame : of a damaged frame."""
 
     place: str
     what: str
@@ -43,8 +41,8 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """files, frames : read. unchecked : frames without checksums, all of which could be unpacked. written_again : files
-    that were written since; they are no faults. new : files noted for the first time.
+    """The result of a verification. files, frames : read. unchecked : frames without checksums, all of which could be
+    unpacked. written_again : files written since, not faults. new : files with a checksum for the first time.
     """
 
     files: int
@@ -57,8 +55,8 @@ class Verification:
 
 @dataclass(frozen=True, slots=True)
 class Repair:
-    """run : its name. frames : tracked again. same : how many of them have bit for bit the pose that was stored, of
-    `compared` whose stored pose was whole. problem : why not all could be, "" if they were.
+    """The result of a repair. frames : tracked again. same : number of them with bit for bit the stored pose, of
+    `compared` whose stored pose was intact. problem : why not all could be tracked, or "".
     """
 
     run: str
@@ -71,7 +69,7 @@ class Repair:
 def verify(
     session: Session, progress: Progress | None = None, cancelled: Callable[[], bool] | None = None
 ) -> Verification:
-    """Read all that is stored. Raises WorkCancelledError."""
+    """Verify all stored data. Raises WorkCancelledError."""
     step = watched(progress, cancelled, "The verification")
     runs = session.runs()
     faults: list[Fault] = []
@@ -93,7 +91,7 @@ def verify(
 
 
 def _verify_results(run: StoredRun) -> tuple[int, int, list[Fault]]:
-    """How many frames were read, how many of them have no checksums, and what is wrong."""
+    """The number of frames read, of those without checksums, and the faults."""
     place = f"runs/{run.name}/{FILE_NAME}"
     broken = [
         Fault(place, f"the database is damaged ({text})", REPAIR, run.name)
@@ -115,19 +113,21 @@ def _verify_results(run: StoredRun) -> tuple[int, int, list[Fault]]:
                 for version in results.damaged_settings()
             ]
             if results.partial_is_damaged():
-                remedy = "The frame at hand is searched from its first layer when the run is resumed."
+                remedy = "The unfinished frame is searched from its first layer when the run is resumed."
                 faults.append(
-                    Fault(f"{place}: the frame at hand", "is not what was written", remedy, run.name)
+                    Fault(f"{place}: the unfinished frame", "is not what was written", remedy, run.name)
                 )
             if results.ended() not in ENDINGS:
-                faults.append(Fault(f"{place}: how it ended", "is not what was written", REPAIR, run.name))
+                faults.append(
+                    Fault(f"{place}: the end of the run", "is not what was written", REPAIR, run.name)
+                )
         except SessionError as error:
             return 0, 0, broken or [Fault(place, error.message, REPAIR, run.name)]
     return len(whole) + len(damaged), len(unchecked), broken + faults
 
 
 def _is_live(run: StoredRun) -> bool:
-    """Whether its frames came on a clock; a record that cannot be read is a fault of its own."""
+    """Whether the run was live; an unreadable record is reported separately."""
     with contextlib.suppress(SessionError):
         return run.record.live
     return False
@@ -136,7 +136,7 @@ def _is_live(run: StoredRun) -> bool:
 def repair(
     session: Session, faults: tuple[Fault, ...], progress: Progress | None = None
 ) -> tuple[Repair, ...]:
-    """Track the damaged frames of each run again, from what is stored before them. Other faults stay."""
+    """Track the damaged frames of each run again from the stored frames before them. Other faults stay."""
     names = dict.fromkeys(fault.run for fault in faults if fault.run)
     return tuple(_repair_run(session, session.run(name), faults, progress) for name in names)
 
@@ -171,7 +171,7 @@ def _repair_run(
 
 
 def _mend_rest(run: StoredRun, writer: ResultsWriter) -> None:
-    """The first settings are the record's; a half-searched frame that is damaged is forgotten. Raises SessionError."""
+    """Restore the first settings from the record, and drop a damaged unfinished frame. Raises SessionError."""
     record = run.record
     with run.results() as results:
         wrong, partial, ended = results.damaged_settings(), results.partial_is_damaged(), results.ended()
@@ -190,7 +190,7 @@ def _mend_rest(run: StoredRun, writer: ResultsWriter) -> None:
 
 
 def _track_damaged(session: Session, run: StoredRun, progress: Progress | None) -> list[int]:
-    """Track what is damaged, and nothing else; the frames in the order that they were tracked in."""
+    """Track only the damaged frames; returns them in the order of tracking."""
     with run.results() as results:
         if not results.damaged():
             return []

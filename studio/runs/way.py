@@ -1,8 +1,8 @@
-"""The guided way: how far a session is, step by step, computed from what is there.
+"""The guided set-up: the status of each step of a session, computed from its files.
 
-A step is "done", "ready" to be done, "blocked" by an earlier one, "stale" where what it was made from has changed
-since, or "running". Nothing of it is kept; `sessions.made_from` and the snapshots in the runs' folders say what a
-result was made from.
+A step is "done", "ready" to be done, "blocked" by an earlier one, "stale" if its inputs have changed since, or
+"running". The status is not stored; `sessions.made_from` and the snapshots in the runs' folders have the inputs of a
+result.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -30,12 +30,12 @@ NEEDS: Mapping[str, tuple[str, ...]] = {
     "check": ("track",),
     "export": ("track",),
 }
-"""Step to those that have to be done (stale counts) before it."""
+"""Steps that have to be done (stale counts) before a step."""
 
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """All steps in order. next : the first that wants something, "" if none does."""
+    """All steps in order. next : the first that needs work, "" if none does."""
 
     steps: tuple[StepStatus, ...]
     next: str
@@ -44,10 +44,10 @@ class Way:
 def way_of(
     session: Session, running: Mapping[str, str] | None = None, exports: Sequence[ExportedFile] | None = None
 ) -> Way:
-    """How far a session is. running : step to how far its job is, in words. exports : files that were exported from
-    the newest run, None where nobody looked.
+    """The status of a session. running : step to the progress of its job. exports : files exported from the newest run,
+    None if unknown.
 
-    Never raises for a part that cannot be read: that step says so.
+    Never raises for a part that cannot be read: its step reports it.
     """
     makers: dict[StepName, Callable[[], StepStatus]] = {
         "footage": lambda: footage_step(session),
@@ -85,7 +85,7 @@ LACKING = {"footage": "footage", "calibration": "a calibration", "track": "a run
 
 
 def _next(steps: Sequence[StepStatus]) -> str:
-    """The first step that has to be done or redone; else the first optional one that is ready."""
+    """The first step to do or redo; else the first optional one that is ready."""
     pressing = [
         step.step for step in steps if not step.optional and step.state in ("stale", "ready", "running")
     ]

@@ -1,4 +1,4 @@
-"""The steps of the guided way from tracking on: track, check, export."""
+"""The steps of the guided set-up from tracking on: track, check, export."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,25 +14,23 @@ from studio.sessions.stored_run import StoredRun, damage_in_words
 
 @dataclass(frozen=True, slots=True)
 class ExportedFile:
-    """A file that was exported from the newest run. stale : why it does not hold what is there now, a clause; "" where
-    it does.
-    """
+    """A file exported from the newest run. stale : why it is out of date, a clause; "" if it is not."""
 
     name: str
     stale: str = ""
 
 
-NOT_EVERYWHERE = "It does not fit everywhere: look at the marked frames."
+NOT_EVERYWHERE = "It does not fit everywhere: check the marked frames."
 
 
 def newest_run(session: Session) -> StoredRun | None:
-    """The run that the way is about: the newest one of footage that has an end; None without."""
+    """The run of the guided set-up: the newest one that plays its footage once; None without one."""
     runs = [run for run in session.runs() if not run.record.to_and_fro]
     return runs[-1] if runs else None
 
 
 def run_changes(session: Session, run: StoredRun) -> list[str]:
-    """What a run was made with that is another one now, in words."""
+    """The inputs of a run that have changed since, in words."""
     changed = []
     if run.name in stale_runs(session):
         changed.append("the footage's offsets or turns")
@@ -46,7 +44,7 @@ def run_changes(session: Session, run: StoredRun) -> list[str]:
 
 
 def track_step(session: Session) -> StepStatus:
-    """The newest run, and whether what it was made with still holds."""
+    """The newest run, and whether its inputs are unchanged."""
     run = newest_run(session)
     if run is None:
         return StepStatus("track", "ready", "nothing tracked yet")
@@ -66,14 +64,14 @@ def track_step(session: Session) -> StepStatus:
 
 
 def check_step(session: Session) -> StepStatus:
-    """How good the newest run is."""
+    """The check of the newest run."""
     run = newest_run(session)
     if run is None:
         return StepStatus("check", "blocked", "", "It needs a run.")
     name = best_track(run).name
     check = kept_check(run, name)
     if check is None:
-        return StepStatus("check", "ready", f"{run.name}, track {name}: not looked at yet")
+        return StepStatus("check", "ready", f"{run.name}, track {name}: not checked yet")
     words = f"{name}: {check.in_words()}"
     changed = run_changes(session, run)
     if changed:
@@ -82,7 +80,7 @@ def check_step(session: Session) -> StepStatus:
 
 
 def export_step(session: Session, exports: Sequence[ExportedFile]) -> StepStatus:
-    """The files that were exported from the newest run, and whether they hold its tracks as they are now."""
+    """The files exported from the newest run, and whether they are up to date."""
     run = newest_run(session)
     if run is None or not exports:
         return StepStatus("export", "ready", "no file yet")

@@ -1,4 +1,4 @@
-"""The steps of the guided way before tracking: footage, calibration, background, subject, start pose."""
+"""The steps of the guided set-up before tracking: footage, calibration, background, subject, start pose."""
 
 from studio.body.forward_kinematics import limb_ends
 from studio.runs.silhouette_doubts import standing_doubts
@@ -17,14 +17,14 @@ CHANGED = {
 
 
 def footage_step(session: Session) -> StepStatus:
-    """Cameras, frames, rate; refused where a file is gone."""
+    """Cameras, frames, rate; stale if a file is missing."""
     source = session.manifest.footage
     if not source.cameras:
         return StepStatus("footage", "ready", "no footage yet")
     words = f"{counted(len(source.cameras), 'camera')}, {counted(source.frame_count, 'frame')}, {source.fps:g} fps"
-    gone = [camera.name for camera in source.cameras if not (session.path / camera.path).exists()]
-    if gone:
-        return StepStatus("footage", "stale", words, f"The file of camera {enumerated(gone)} is gone.")
+    missing = [camera.name for camera in source.cameras if not (session.path / camera.path).exists()]
+    if missing:
+        return StepStatus("footage", "stale", words, f"The file of camera {enumerated(missing)} is missing.")
     return StepStatus("footage", "done", words)
 
 
@@ -49,14 +49,14 @@ def calibration_step(session: Session) -> StepStatus:
             f"The footage of camera {enumerated(other)} is of another size now.",
         )
     if doubts := standing_doubts(session):
-        return StepStatus("calibration", "stale", words, f"The footage speaks against it: {doubts[0]}")
+        return StepStatus("calibration", "stale", words, f"The footage contradicts it: {doubts[0]}")
     return StepStatus(
         "calibration", "done", f"{words}, {source}" if source else words, misses_in_words(session)
     )
 
 
 def background_step(session: Session) -> StepStatus:
-    """Whether masks can be made well: given, or from a background that was set; their measured quality."""
+    """The masks: given, or from a background that was set; their measured quality."""
     sources = session.manifest.footage.cameras
     masks = sum(bool(source.masks) for source in sources)
     plates = sum(bool(source.background) for source in sources)
@@ -67,7 +67,7 @@ def background_step(session: Session) -> StepStatus:
     elif plates:
         words = f"backgrounds of {counted(plates, 'camera')}"
     else:
-        words = "taken from the footage itself"
+        words = "background from the footage"
     if known is None:
         is_set = given or plates == len(sources) or bool(read_evidence(session).knobs)
         return StepStatus("background", "done" if is_set else "ready", words)
@@ -80,35 +80,35 @@ def background_step(session: Session) -> StepStatus:
 
 
 def _what_to_look_at(session: Session) -> str:
-    """Masks disagree because they are poor, or because the cameras are not where the calibration has them."""
+    """The remedy for masks that disagree: they are poor, or the calibration is wrong."""
     if misses_in_words(session) or standing_doubts(session):
         return "the cameras are not what the calibration says, see there"
-    return "look at the masks, and ask whether the cameras agree"
+    return "check the masks, and measure whether the cameras agree"
 
 
 def _standing_mm(session: Session) -> float:
-    """How tall the session's body stands."""
+    """The standing height of the session's body."""
     body = session.body()
     return float(limb_ends(body, body.neutral)[0, ..., 2].max())
 
 
 def subject_step(session: Session) -> StepStatus:
-    """The person: by height, or fitted."""
+    """The subject: by height, or fitted."""
     if not (session.path / SUBJECT_NAME).exists():
         return StepStatus("subject", "ready", f"body {session.manifest.body}, of usual size", optional=True)
     subject = session.subject()
     known = origin_of(session, "subject")
-    told = subject.height_mm if subject else None
-    stands = _standing_mm(session) if known else told
+    given = subject.height_mm if subject else None
+    stands = _standing_mm(session) if known else given
     parts = [subject.body if subject else session.manifest.body]
-    parts += [f"{stands / 1000:.2f} m"] if stands and told else []
-    parts += ["fitted to the footage"] if known else ["by height"] if told else ["measures given"]
+    parts += [f"{stands / 1000:.2f} m"] if stands and given else []
+    parts += ["fitted to the footage"] if known else ["by height"] if given else ["measures given"]
     words = ", ".join(parts)
     return _stale(session, "subject", words, "Fitted with") or StepStatus("subject", "done", words)
 
 
 def start_pose_step(session: Session) -> StepStatus:
-    """The pose in the first frame; bodies with limits everywhere can begin without one."""
+    """The pose in the first frame; optional for bodies with limits on all parameters."""
     if not (session.path / START_POSE_NAME).exists():
         optional = all(_is_bounded(entry.lower, entry.upper) for entry in session.body().parameters)
         return StepStatus("start-pose", "ready", "not set yet", optional=optional)
@@ -119,12 +119,12 @@ def start_pose_step(session: Session) -> StepStatus:
 
 
 def _stale(session: Session, step: StepName, words: str, how: str) -> StepStatus | None:
-    """The step as stale where what it was made from has changed, else None."""
+    """The step as stale if its inputs have changed, else None."""
     changed = [CHANGED[name] for name in changed_inputs(session, step)]
     if not changed:
         return None
     has = "have" if len(changed) > 1 or changed[0].endswith("masks") else "has"
-    why = f"{how} {enumerated(changed)} as it was before; {enumerated(changed)} {has} changed since."
+    why = f"{how} an earlier state of {enumerated(changed)}, which {has} changed since."
     return StepStatus(step, "stale", words, why)
 
 

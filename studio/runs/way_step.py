@@ -1,4 +1,4 @@
-"""One step of the guided way and how it stands."""
+"""One step of the guided set-up and its status."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -21,8 +21,8 @@ STEPS: tuple[StepName, ...] = (
 
 @dataclass(frozen=True, slots=True)
 class StepStatus:
-    """A step. words : what is there; why : why it is stale, blocked, or cannot be read, sentences. optional : tracking
-    goes without it.
+    """A step. words : its result; why : why it is stale, blocked or unreadable, sentences. optional : tracking works
+    without it.
     """
 
     step: StepName
@@ -38,7 +38,7 @@ def counted(number: int, one: str, many: str = "") -> str:
 
 
 def enumerated(words: list[str]) -> str:
-    """Words as a sentence has them: "a, b and c"."""
+    """A list as text: "a, b and c"."""
     if len(words) < 2:
         return "".join(words)
     return f"{', '.join(words[:-1])} and {words[-1]}"

@@ -106,9 +106,9 @@ class SceneController:
             self._thread.join(timeout=10.0)
         self._close()
 
-    def post(self, change: Change, *values: Any, told: bool = True) -> None:  # noqa: ANN401 - what the change takes
+    def post(self, change: Change, *values: Any, announce: bool = True) -> None:  # noqa: ANN401 - what the change takes
         """Let a change happen soon. told : whether `moved` hears of it; who asks from outside knows already."""
-        self._inbox.append((change, values, told))
+        self._inbox.append((change, values, announce))
         self._events.put(_WAKE)
 
     def refused(self, problem: StudioError) -> None:
@@ -123,16 +123,16 @@ class SceneController:
         """Show a session ("" : none) and one of its runs ("" : none), a frame (None: as it is), a layer."""
         return select(show_frame(self._open(model, session, run), frame), layer=layer)
 
-    def propose_pose(self, model: Model, session: str, pose: Array, said: str, frame: int | None) -> Model:
+    def propose_pose(self, model: Model, session: str, pose: Array, text: str, frame: int | None) -> Model:
         """Show a start pose (D,) that was found, with its session alone, if it is one of the session's body.
 
         It stays until a person saves it or ends the editing, opens a run or another session, or tracks.
         """
-        notify(self._server, "Start pose found", said)
+        notify(self._server, "Start pose found", text)
         model = self.show_run(model, session, "")
         if model.subject is None or len(model.subject.body.parameters) != len(pose):
             return model
-        return show_frame(edit_pose(model, lambda edit: begun(edit, pose, found=said)), frame)
+        return show_frame(edit_pose(model, lambda edit: begun(edit, pose, found=text)), frame)
 
     def begin_edit(
         self, model: Model, session: str, run: str, frame: int | None, pose: Array | None
@@ -316,12 +316,12 @@ class SceneController:
     def _take_posts(self) -> None:
         """Let happen what was posted; of a drag only the newest place, so that solving never lags behind the hand."""
         while self._inbox:
-            change, values, told = self._inbox.popleft()
+            change, values, announce = self._inbox.popleft()
             if change is drag and self._inbox and not values[-1]:
                 following, newer, _ = self._inbox[0]
                 if following is drag and newer[0] == values[0]:
                     continue
-            self._happen(change, values, told=told)
+            self._happen(change, values, announce=announce)
 
     def _hear(self, model: Model, event: Event) -> Model:
         if isinstance(event, Acknowledged):
@@ -340,7 +340,7 @@ class SceneController:
         frames = (*model.frames, frame) if frame == newest + 1 else tuple(self.opened.frames())
         return hear(model, event, frames)
 
-    def _happen(self, change: Change, values: tuple[Any, ...], *, told: bool = True) -> None:
+    def _happen(self, change: Change, values: tuple[Any, ...], *, announce: bool = True) -> None:
         before = self.model
         after = self._guarded(lambda: change(before, *values))
         if after is not None:
@@ -353,7 +353,7 @@ class SceneController:
         if self._refining is not None and (edit is None or edit.refining is None):
             self._refining.stop()
             self._refining = None
-        if told and self.model.selection != before.selection:
+        if announce and self.model.selection != before.selection:
             self._moved(self.model.selection)
 
     def _guarded(self, action: Callable[[], Any]) -> Any:  # noqa: ANN401 - what the action gives

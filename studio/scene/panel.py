@@ -94,15 +94,15 @@ def search_html(state: StateChanged) -> str:
     if not state.run:
         return _two_lines("No run is open", "Open one in the list on the left.")
     name = f"{state.session} / {state.run} — {STATE_WORDS.get(state.state, state.state)}"
-    said = [part for part in (state.message, state.hint) if part]
+    messages = [part for part in (state.message, state.hint) if part]
     if state.live is not None:
-        return _two_lines(name, " · ".join(said) or state.live.in_words)
+        return _two_lines(name, " · ".join(messages) or state.live.in_words)
     parts = [f"frame {state.frame}", f"{state.done} of {state.last - state.first} done"]
     if state.state == "tracking" and state.frames_per_second == state.frames_per_second:
         parts.append(f"{state.frames_per_second:.3g} fps")
     if state.state == "tracking" and state.seconds_left == state.seconds_left:
         parts.append(f"{clock(state.seconds_left)} left")
-    return _two_lines(name, " · ".join(said if state.message else parts))
+    return _two_lines(name, " · ".join(messages if state.message else parts))
 
 
 def mark_html(model: Model, moment: Moment | None, tokens: ColourTokens) -> str:

@@ -70,15 +70,15 @@ class SceneServer:
         self, session: str, run: str = "", frame: int | None = None, layer: int | None = None
     ) -> None:
         """Show a session and one of its runs ("" : the session alone), a frame, one layer's cloud (None: all)."""
-        self._controller.post(self._controller.show_run, session, run, frame, layer, told=False)
+        self._controller.post(self._controller.show_run, session, run, frame, layer, announce=False)
 
     def show_frame(self, frame: int) -> None:
         """Show a stored frame; where it is not stored the nearest one."""
-        self._controller.post(show_frame, frame, told=False)
+        self._controller.post(show_frame, frame, announce=False)
 
     def select(self, **changes: object) -> None:
         """Select a layer, limb, parameter, particle or camera, by the names of `Selection`; None: none."""
-        self._controller.post(lambda model: select(model, **changes), told=False)
+        self._controller.post(lambda model: select(model, **changes), announce=False)
 
     def show_layer(self, layer: int | None) -> None:
         """Show one layer's cloud, or all (None)."""
@@ -90,7 +90,7 @@ class SceneServer:
 
     def look_through(self, camera: str | None) -> None:
         """Put the viewers into a camera's place, or back where they were (None or "")."""
-        self._controller.post(look_through, camera or None, told=False)
+        self._controller.post(look_through, camera or None, announce=False)
 
     def set_options(self, **changes: object) -> None:
         """Change what is drawn, by the names of `ViewOptions`. Raises SettingsError for a name that is none."""
@@ -98,13 +98,13 @@ class SceneServer:
         for name in changes:
             if name not in known:
                 raise SettingsError(f"The scene has no option '{name}'.", f"Known: {', '.join(known)}.")
-        self._controller.post(change_options, changes, told=False)
+        self._controller.post(change_options, changes, announce=False)
 
     def play(
         self, playing: bool | None = None, *, speed: float | None = None, loop: bool | None = None
     ) -> None:
         """Play stored frames, or stop. speed : 1 is real time. loop : start over at the end. None leaves each."""
-        self._controller.post(set_playback, playing, speed, loop, told=False)
+        self._controller.post(set_playback, playing, speed, loop, announce=False)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,12 +135,12 @@ class ScenePoses:
             return None
         return Editing(selection.session, selection.run, edit.frame, edit.pose.copy(), edit.is_moved)
 
-    def propose(self, session: str, pose: Sequence[float], said: str, frame: int | None = None) -> None:
+    def propose(self, session: str, pose: Sequence[float], text: str, frame: int | None = None) -> None:
         """Show a start pose (D,) that was found for a session. said : how sure it is, for the viewers. frame : that it
         was found in.
         """
         given = np.array(pose, dtype=np.float64)
-        self._controller.post(self._controller.propose_pose, session, given, said, frame)
+        self._controller.post(self._controller.propose_pose, session, given, text, frame)
 
     def edit(
         self, session: str, run: str = "", frame: int | None = None, pose: Sequence[float] | None = None

@@ -7,7 +7,7 @@ from pathlib import Path
 from studio.calibration.board_footage_reading import HowTaken, find_board_footage
 from studio.calibration.boards import Board
 from studio.calibration.findings import Finding, blocking
-from studio.calibration.report import told_source, write_calibrated
+from studio.calibration.report import calibration_source, write_calibrated
 from studio.calibration.verbs import Calibrated, calibrate
 from studio.errors import CalibrationError, NotFoundError
 from studio.progress import Progress
@@ -132,7 +132,11 @@ def keep_boards(place: BoardPlace, found: Calibrated, target: Path, *, anyway: b
     if own is not None and found.rig is not None and not stops:
         fitted = fit_to_session(own, found.rig.cameras)
         new = NewCalibration(
-            fitted.cameras, told_source(found), crops=fitted.crops, matching=fitted.matching, calibrated=found
+            fitted.cameras,
+            calibration_source(found),
+            crops=fitted.crops,
+            matching=fitted.matching,
+            calibrated=found,
         )
         change = replace_calibration(own, new)
         files = tuple(sorted(path for path in target.parent.iterdir() if path.name.startswith("cameras.")))

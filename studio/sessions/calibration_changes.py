@@ -229,11 +229,11 @@ def _consequences(
     far = [float(np.linalg.norm(camera.centre - old[camera.name])) for camera in after if camera.name in old]
     if not far or max(far) < MOVED_MM:
         return notes
-    told = f"The cameras stand up to {max(far):.0f} mm from where they were"
+    moved = f"The cameras stand up to {max(far):.0f} mm from where they were"
     if (session.path / made_from.FILES["start-pose"]).exists():
-        notes.append(f"{told}: look whether the start pose still fits, or find it again.")
+        notes.append(f"{moved}: look whether the start pose still fits, or find it again.")
     if session.truth_path is not None:
-        notes.append(f"{told}: the truth stays in the world as it was.")
+        notes.append(f"{moved}: the truth stays in the world as it was.")
     return notes
 
 

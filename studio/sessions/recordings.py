@@ -81,7 +81,7 @@ def import_recording(
     report = import_source(folder, into, calibration=None, progress=progress)
     spreads = spreads_of(folder / TIMES_NAME, report.session)
     shutil.copyfile(folder / TIMES_NAME, report.session.path / TIMES_NAME)
-    said = f"{spreads.in_words[0].upper()}{spreads.in_words[1:]}."
+    spread_note = f"{spreads.in_words[0].upper()}{spreads.in_words[1:]}."
     manifest = report.session.manifest
     described = described_anew(
         report.session,
@@ -89,13 +89,13 @@ def import_recording(
             manifest,
             title=into.name,
             imported_from="live cameras",
-            notes=(*manifest.notes, "Recorded from live cameras.", said),
-            warnings=(*manifest.warnings, *notes, *((said,) if spreads.apart else ())),
+            notes=(*manifest.notes, "Recorded from live cameras.", spread_note),
+            warnings=(*manifest.warnings, *notes, *((spread_note,) if spreads.apart else ())),
         ),
     )
     shutil.rmtree(folder, ignore_errors=True)
     found = ImportReport(
-        described, report.matching, (*report.notes, said), (*report.warnings, *notes), report.layout
+        described, report.matching, (*report.notes, spread_note), (*report.warnings, *notes), report.layout
     )
     return found, spreads
 

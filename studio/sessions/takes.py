@@ -220,14 +220,14 @@ def finish_take(session: Session, notes: tuple[str, ...] = ()) -> Session:
         for path in (session.path / source.path).glob("*.jpg"):
             if path.stem.isdigit() and int(path.stem) >= count:
                 path.unlink()
-    said = [f"{taken.spreads.in_words[0].upper()}{taken.spreads.in_words[1:]}."]
-    said += [f"The recording ended: {taken.ended}."] if taken.ended else ["The recording was cut off."]
+    ending = [f"{taken.spreads.in_words[0].upper()}{taken.spreads.in_words[1:]}."]
+    ending += [f"The recording ended: {taken.ended}."] if taken.ended else ["The recording was cut off."]
     manifest = msgspec.structs.replace(
         session.manifest,
         layout=TAKEN,
         footage=FootageSource(footage.fps, count, cameras),
-        notes=(*session.manifest.notes, *said, *notes),
-        warnings=(*session.manifest.warnings, *(said[:1] if taken.spreads.apart else ())),
+        notes=(*session.manifest.notes, *ending, *notes),
+        warnings=(*session.manifest.warnings, *(ending[:1] if taken.spreads.apart else ())),
     )
     return described_anew(session, manifest)
 

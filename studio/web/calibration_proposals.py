@@ -14,7 +14,7 @@ from studio.calibration.checks import check_calibration
 from studio.calibration.extrinsics import moved, moved_cameras
 from studio.calibration.findings import Finding, blocking
 from studio.calibration.floor import Click, ClickedFloor, Clicks, clicked_floor
-from studio.calibration.report import told_source
+from studio.calibration.report import calibration_source
 from studio.calibration.verbs import Calibrated
 from studio.capture.calibration_files import AssumedCrop, Calibration, read_calibration
 from studio.capture.naming import CameraMatch
@@ -124,13 +124,13 @@ def proposal_of_boards(
     if found.rig is None:
         findings = (WITHOUT_PLACES, *found.findings)
         return Proposal(
-            secrets.token_hex(8), session.name, told_source(found), (), findings, calibrated=found
+            secrets.token_hex(8), session.name, calibration_source(found), (), findings, calibrated=found
         )
     fitted = fit_to_session(session, found.rig.cameras)
     return Proposal(
         secrets.token_hex(8),
         session.name,
-        told_source(found),
+        calibration_source(found),
         fitted.cameras,
         found.findings,
         notes=fitted.warnings,

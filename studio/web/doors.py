@@ -111,7 +111,7 @@ class ScenePoses(Protocol):
         """What is being edited, None while nothing is."""
         ...
 
-    def propose(self, session: str, pose: Sequence[float], said: str, frame: int | None = None) -> None:
+    def propose(self, session: str, pose: Sequence[float], text: str, frame: int | None = None) -> None:
         """Show a start pose that was found for a session, and what is said of it."""
         ...
 

@@ -137,7 +137,7 @@ def test_a_doubted_calibration_is_tracked_only_if_wished(
     page.screenshot(path=artefacts / "way-track-doubted.png")
     track = page.get_by_role("button", name="Track again", exact=True)
     track.click()
-    expect(page.locator("form .wrong")).to_contain_text("speaks against its calibration")
+    expect(page.locator("form .wrong")).to_contain_text("contradicts its calibration")
     assert len(session.runs()) == made
     page.get_by_label("track all the same").check()
     track.click()

@@ -65,9 +65,9 @@ def test_the_command_writes_calibration_report_and_pictures(footage: Path, tmp_p
     words = ["calibrate", str(footage), "--board", BOARD.spelling, "--to", str(target), "--json"]
     result = CliRunner().invoke(main, words)
     assert result.exit_code == 0, result.output
-    told = msgspec.json.decode(result.stdout)
-    assert told["usable"] is True
-    assert "no-floor" in {finding["code"] for finding in told["findings"]}
+    report = msgspec.json.decode(result.stdout)
+    assert report["usable"] is True
+    assert "no-floor" in {finding["code"] for finding in report["findings"]}
     cameras = read_calibration(target).cameras
     assert same_rig(cameras) < 10.0
     assert all(camera.centre[2] > 0.0 for camera in cameras)
@@ -136,7 +136,7 @@ def test_a_mirrored_video_blocks(footage: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (["--board", "circles:4x4,3"], "cannot be understood"),
         (["--board", BOARD.spelling, "--extrinsics", "nowhere"], "no folder"),
@@ -144,11 +144,11 @@ def test_a_mirrored_video_blocks(footage: Path, tmp_path: Path) -> None:
         (["--board", BOARD.spelling, "--extrinsics", "extrinsics", "--floor", "frame:x"], "is no number"),
     ],
 )
-def test_refusals_have_remedies(footage: Path, words: list[str], said: str) -> None:
+def test_refusals_have_remedies(footage: Path, words: list[str], message: str) -> None:
     words = [str(footage / word) if word == "extrinsics" else word for word in words]
     result = CliRunner().invoke(main, ["calibrate", str(footage), *words])
     assert result.exit_code == 2
-    assert said in " ".join(result.stderr.split())
+    assert message in " ".join(result.stderr.split())
     assert "remedy" in result.stderr
 
 

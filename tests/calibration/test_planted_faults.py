@@ -201,9 +201,9 @@ def test_wrong_square_size(factor: float) -> None:
     findings = with_board(cameras)
     assert code_of(findings) == "square-size"
     distance = float(np.linalg.norm(RIG[0].centre - RIG[1].centre))
-    told = checked(cameras, board=CHARUCO, distances_mm={("cam1", "cam2"): distance})
-    assert code_of(told) == "square-size"
-    assert f"{CHARUCO.square_mm / factor:.4g} mm instead of" in told[0].remedy
+    findings = checked(cameras, board=CHARUCO, distances_mm={("cam1", "cam2"): distance})
+    assert code_of(findings) == "square-size"
+    assert f"{CHARUCO.square_mm / factor:.4g} mm instead of" in findings[0].remedy
     if abs(factor - 1.0) > 0.15:
         assert code_of(with_masks(cameras)) == "square-size"
 

@@ -71,8 +71,8 @@ def test_who_stands_tells_of_a_wrong_size_and_of_a_right_one(rig: str, factor: f
     assert finding.code == "square-size"
     assert "who stands" in finding.message
     assert "Check the height" in finding.remedy
-    told = float(finding.remedy.rsplit(" ", 1)[1].rstrip("."))
-    assert told == pytest.approx(factor, rel=0.07)
+    named = float(finding.remedy.rsplit(" ", 1)[1].rstrip("."))
+    assert named == pytest.approx(factor, rel=0.07)
 
 
 def test_a_few_frames_upright_are_enough_among_others() -> None:

@@ -72,8 +72,8 @@ def contradicting(intri: Path) -> Path:
 
 @pytest.mark.parametrize("name", BROKEN)
 def test_a_broken_file_gives_a_cause_and_a_remedy(tmp_path: Path, name: str) -> None:
-    make, said = BROKEN[name]
-    with pytest.raises(CalibrationError, match=said) as caught:
+    make, message = BROKEN[name]
+    with pytest.raises(CalibrationError, match=message) as caught:
         read_calibration(make(tmp_path))
     assert caught.value.hint.endswith(".")
     assert caught.value.message.count(". ") == 0

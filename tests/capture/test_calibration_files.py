@@ -121,7 +121,7 @@ MIRRORED = np.diag([1.0, 1.0, -1.0])
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "message"),
     [
         ({"rotation": (MIRRORED @ CAMERAS[0].rotation).tolist()}, "mirrors the world"),
         ({"rotation": (1.01 * CAMERAS[0].rotation).tolist()}, "is no rotation"),
@@ -138,23 +138,23 @@ MIRRORED = np.diag([1.0, 1.0, -1.0])
     ],
 )
 def test_a_wrong_entry_names_file_camera_and_remedy(
-    tmp_path: Path, changes: dict[str, object], said: str
+    tmp_path: Path, changes: dict[str, object], message: str
 ) -> None:
     path = write(tmp_path / "c.toml", {"cam_0": table(CAMERAS[0], **changes)})
     with pytest.raises(CalibrationError) as caught:
         read_calibration(path)
-    assert said in caught.value.message
+    assert message in caught.value.message
     assert "c.toml" in caught.value.message
     assert "cam1" in caught.value.message
     assert caught.value.hint
 
 
 @pytest.mark.parametrize(
-    ("rotation", "said"),
+    ("rotation", "message"),
     [(MIRRORED @ CAMERAS[0].rotation, "mirrors"), (0.99 * CAMERAS[0].rotation, "no rotation")],
 )
-def test_a_wrong_rotation_in_a_cal_file(tmp_path: Path, rotation: np.ndarray, said: str) -> None:
-    with pytest.raises(CalibrationError, match=said):
+def test_a_wrong_rotation_in_a_cal_file(tmp_path: Path, rotation: np.ndarray, message: str) -> None:
+    with pytest.raises(CalibrationError, match=message):
         read_calibration(write_cal(tmp_path / "a.cal", CAMERAS[0], rotation))
 
 

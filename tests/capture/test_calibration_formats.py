@@ -136,11 +136,11 @@ def test_chessboards_tell_the_qualisys_lenses_from_those_divided_by_64(real_data
             if not found:
                 continue
             seen = corners.reshape(-1, 2)
-            for divisor, told in errors.items():
+            for divisor, values in errors.items():
                 lens = camera.distortion / divisor
                 _, turn, shift = cv2.solvePnP(squares, seen, camera.matrix, lens)
                 guess = cv2.projectPoints(squares, turn, shift, camera.matrix, lens)[0].reshape(-1, 2)
-                told.append(float(np.mean(np.sum((guess - seen) ** 2, axis=1))))
+                values.append(float(np.mean(np.sum((guess - seen) ** 2, axis=1))))
     assert len(errors[1.0]) >= 7
     assert np.mean(errors[1.0]) < np.mean(errors[64.0])
 

@@ -88,8 +88,8 @@ def test_malformed_files_are_refused_by_name_and_the_process_lives(tmp_path: Pat
         (tmp_path / f"{name}.yml").write_text(text)
     outcomes = read_in_a_child(tmp_path)
     assert set(outcomes) == set(MALFORMED)
-    for name, (_, said) in MALFORMED.items():
-        assert said in outcomes[name], name
+    for name, (_, message) in MALFORMED.items():
+        assert message in outcomes[name], name
         assert f"'{name}.yml'" in outcomes[name]
 
 

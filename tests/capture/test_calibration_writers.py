@@ -110,10 +110,10 @@ def test_the_studio_reads_what_it_wrote(tmp_path: Path, writer: str) -> None:
 
 def test_pose2sim_has_no_k3_and_the_note_says_by_how_much(tmp_path: Path) -> None:
     written = export_calibration(BENT, tmp_path / "c.toml", "pose2sim")
-    said = [float(note.split("at most ")[1].split(" px")[0]) for note in written.notes]
-    assert len(said) == 2
+    largest = [float(note.split("at most ")[1].split(" px")[0]) for note in written.notes]
+    assert len(largest) == 2
     document = tomllib.loads(written.files[0].read_text())
-    for camera, most in zip(BENT, said, strict=True):
+    for camera, most in zip(BENT, largest, strict=True):
         table = document[camera.name]
         place = (table["rotation"], table["translation"], 1000.0, WIDE)
         wanted = truth(camera, WIDE)

@@ -87,11 +87,11 @@ def test_an_rtsp_camera_that_leads_elsewhere_is_not_followed() -> None:
 def test_a_name_that_leads_elsewhere_later_is_refused_then(monkeypatch: pytest.MonkeyPatch) -> None:
     """It is resolved once for each connection, and what was checked is what is connected to."""
     answers = ["93.184.216.34", "127.0.0.1"]
-    asked: list[str] = []
+    resolved: list[str] = []
 
     def resolve(host: str, port: int, *_: object, **__: object) -> list[object]:
-        asked.append(host)
-        return [(socket.AF_INET, socket.SOCK_STREAM, 6, "", (answers[min(len(asked), 2) - 1], port))]
+        resolved.append(host)
+        return [(socket.AF_INET, socket.SOCK_STREAM, 6, "", (answers[min(len(resolved), 2) - 1], port))]
 
     with listening(b"") as secret:
         with monkeypatch.context() as patched:
@@ -101,7 +101,7 @@ def test_a_name_that_leads_elsewhere_later_is_refused_then(monkeypatch: pytest.M
             )
             with pytest.raises(FootageError, match="is no camera"):
                 next(open_stream(address, NEVER))
-        assert asked == ["rebind.example"] * 2
+        assert resolved == ["rebind.example"] * 2
         assert secret.requests == []
 
 

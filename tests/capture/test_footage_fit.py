@@ -72,7 +72,7 @@ def test_a_dark_scene_is_no_bar() -> None:
 
 
 @pytest.mark.parametrize(
-    ("size", "said"),
+    ("size", "message"),
     [
         ((1060, 1920), "2.6%"),
         ((1088, 1870), "2.6%"),
@@ -80,8 +80,8 @@ def test_a_dark_scene_is_no_bar() -> None:
         ((544, 960), "50.0%"),
     ],
 )
-def test_another_size_is_refused(size: tuple[int, int], said: str) -> None:
+def test_another_size_is_refused(size: tuple[int, int], message: str) -> None:
     with pytest.raises(CalibrationError) as caught:
         fit_camera(CAMERA, *size)
-    assert said in caught.value.message
+    assert message in caught.value.message
     assert "1088x1920" in caught.value.message

@@ -36,26 +36,26 @@ def test_it_may_be_asked_at_any_time() -> None:
 def test_a_measured_video_leaves_little_behind(real_data: Path) -> None:
     """Full HD, a hundred frames: 330 MB stayed."""
     video = real_data / "pose2sim-balance" / "videos" / "cam01.mp4"
-    told = subprocess.run(
+    calls = subprocess.run(
         [sys.executable, "-c", MEASURED, str(video)], capture_output=True, text=True, check=True
     )
-    assert float(told.stdout) < 60.0
+    assert float(calls.stdout) < 60.0
 
 
 @pytest.mark.parametrize(("pictures", "given_back"), [(1, 0), (4, 1)])
 def test_only_footage_that_was_read_much_makes_others_wait(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pictures: int, given_back: int
 ) -> None:
-    told: list[int] = []
+    calls: list[int] = []
     monkeypatch.setattr(footage, "MANY_PICTURES", 4)
-    monkeypatch.setattr(footage, "give_back_freed_memory", lambda: told.append(1))
+    monkeypatch.setattr(footage, "give_back_freed_memory", lambda: calls.append(1))
     opened = make_session(tmp_path / "toy").footage()
     names = list(opened.cameras)
     reads = ((name, frame) for frame in range(opened.frame_count) for name in names)
     for name, frame in itertools.islice(reads, pictures):
         opened.picture(name, frame)
     opened.close()
-    assert len(told) == given_back
+    assert len(calls) == given_back
 
 
 def test_all_open_footage_keeps_no_more_than_so_many_bytes(

@@ -95,15 +95,15 @@ def test_trusted_pairs_that_contradict_each_other_are_said(monkeypatch: pytest.M
 
 
 @pytest.mark.parametrize(
-    ("energies", "said"),
+    ("energies", "message"),
     [
         ({"a": np.ones(50)}, "One camera alone"),
         ({"a": seen(bursts(), 1.0, 1), "b": np.full(240, 0.4)}, "What moves in camera b stays the same"),
         ({"a": np.ones(5), "b": np.ones(5)}, "Camera a has 6 frames"),
     ],
 )
-def test_too_little_is_refused(energies: dict[str, np.ndarray], said: str) -> None:
-    with pytest.raises(FootageError, match=said) as caught:
+def test_too_little_is_refused(energies: dict[str, np.ndarray], message: str) -> None:
+    with pytest.raises(FootageError, match=message) as caught:
         estimate_offsets(energies, FPS)
     assert caught.value.hint
 
@@ -128,13 +128,13 @@ def test_videos_are_put_in_step(tmp_path: Path) -> None:
         write_video(tmp_path / f"{name}.mp4", scene(shift, first, 130, view), fps=60)
     cameras = tuple(CameraSource(name, "video", f"{name}.mp4", 128, 96, 130) for name in starts)
     readers = [camera_reader(camera, tmp_path) for camera in cameras]
-    told: list[tuple[str, int, int]] = []
+    reports: list[tuple[str, int, int]] = []
     reads: list[Callable[[int], np.ndarray]] = [reader.read for reader in readers]
     found = estimate_synchrony(
-        FootageSource(FPS, 130, cameras), lambda k: reads[k], lambda *step: told.append(step)
+        FootageSource(FPS, 130, cameras), lambda k: reads[k], lambda *step: reports.append(step)
     )
     assert found.offsets == {"a": 0, "b": 5}
-    assert told[-1] == ("motion in b", 130, 130)
+    assert reports[-1] == ("motion in b", 130, 130)
     for reader in readers:
         reader.close()
 

@@ -65,7 +65,7 @@ def test_drift_and_lost_frames_are_said() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("a,b\n1,2\n", "no column 'cam_id'"),
         ("cam_id,frame_time\n", "holds no times"),
@@ -76,10 +76,10 @@ def test_drift_and_lost_frames_are_said() -> None:
         ("cam_id,frame_time\n0,1.0\n", "do not rise"),
     ],
 )
-def test_what_is_no_such_file(tmp_path: Path, text: str, said: str) -> None:
+def test_what_is_no_such_file(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "timestamps.csv"
     path.write_text(text)
-    with pytest.raises(FootageError, match=said) as caught:
+    with pytest.raises(FootageError, match=message) as caught:
         read_timestamps(path)
     assert caught.value.hint
 

@@ -85,7 +85,7 @@ def _measured_here(path: Path) -> object:
 
 
 def test_limits_hold_before_anything_is_decoded(plain: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, limit, said in (
+    for name, limit, message in (
         ("MAX_PIXELS", WIDTH * HEIGHT - 1, f"is {WIDTH}x{HEIGHT} pixels, more than"),
         ("MAX_FRAMES", COUNT - 1, f"announces {COUNT} frames"),
         ("MAX_SECONDS", 0.2, "announces"),
@@ -94,7 +94,7 @@ def test_limits_hold_before_anything_is_decoded(plain: Path, monkeypatch: pytest
         with monkeypatch.context() as patch:
             patch.setattr(video, name, limit)
             for look in (video._probed, _measured_here):
-                with pytest.raises(FootageError, match=said):
+                with pytest.raises(FootageError, match=message):
                     look(plain)
     assert probe_video(plain).frame_count == COUNT
 

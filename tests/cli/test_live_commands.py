@@ -56,7 +56,7 @@ def test_words_for_a_person(started: Session) -> None:
         (("--repeat",), "has no end"),
         (("--seconds", "0"), "cannot take 0 seconds"),
         (("--seconds", "nan"), "cannot take nan seconds"),
-        (("--set", "online_learning=true"), "cannot teach"),
+        (("--set", "online_learning=true"), "cannot train"),
         (("--from", "8"), "do not lie in the footage"),
         (("--replay", "nobody"), "nobody"),
     ],

@@ -18,6 +18,6 @@ FEET = {"LHeel", "RHeel", "LBigToe", "RBigToe"}
 def test_points_that_bodies_lack(body: str, absent: set[str]) -> None:
     found = points_of(load_body(body), "halpe26")
     assert set(name_map("halpe26").points) - set(found.names) == absent
-    said = next(entry for entry in knobs_of(ExportOptions) if entry.name == "names").help
+    help_text = next(entry for entry in knobs_of(ExportOptions) if entry.name == "names").help
     for word in ("nose", "eyes", "ears", "small toes", "heels", "big toes", "human31"):
-        assert word in said
+        assert word in help_text

@@ -69,8 +69,8 @@ def test_every_frame_is_read_as_recordings_are(
 ) -> None:
     """All 450 frames; the other reader knows every order of axes and turns y up into its own z up."""
     session, run = make_run("human29", lambda body: track_of(moving_poses(body)))
-    wish = {"track": MADE, "unit": unit, "euler": order}
-    report = export_run(session, run, BVH, wish, tmp_path / "walk.bvh")
+    requested = {"track": MADE, "unit": unit, "euler": order}
+    report = export_run(session, run, BVH, requested, tmp_path / "walk.bvh")
     skeleton, places, _ = meant("human29")
     read = read_bvh(report.files[0], unit_mm=mm)
     assert read.fps == pytest.approx(60.0, abs=1e-3)
@@ -81,8 +81,8 @@ def test_every_frame_is_read_as_recordings_are(
 
 def test_z_up_and_other_names(make_run, tmp_path: Path) -> None:
     session, run = make_run("human34", lambda body: track_of(moving_poses(body)))
-    wish = {"track": MADE, "up": "z", "names": "mixamo", "unit": "cm"}
-    report = export_run(session, run, BVH, wish, tmp_path / "walk.bvh")
+    requested = {"track": MADE, "up": "z", "names": "mixamo", "unit": "cm"}
+    report = export_run(session, run, BVH, requested, tmp_path / "walk.bvh")
     _, places, _ = meant("human34")
     seen, _ = seen_by_bvhsdk(report.files[0], ("Hips", "LeftForeArm", "RightFoot"), range(0, FRAMES, 50))
     skeleton = skeleton_of(load_body("human34"))

@@ -44,7 +44,7 @@ def test_auto_becomes_what_the_format_expects() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "asked", "error", "words"),
+    ("name", "requested", "error", "words"),
     [
         ("glb", {"unit": "cm"}, ExportError, "Option 'unit' means nothing to GLB"),
         ("bvh", {"unit": "inch"}, SettingsError, "'unit' cannot be 'inch'"),
@@ -53,9 +53,9 @@ def test_auto_becomes_what_the_format_expects() -> None:
         ("trc", {"first": 9, "last": 9}, ExportError, "No frame lies from 9 to before 9"),
     ],
 )
-def test_wrong_options_are_refused(name: str, asked: dict, error: type[Exception], words: str) -> None:
+def test_wrong_options_are_refused(name: str, requested: dict, error: type[Exception], words: str) -> None:
     with pytest.raises(error, match=words):
-        settled(FORMATS[name], asked)
+        settled(FORMATS[name], requested)
 
 
 def test_an_unknown_ending_names_the_formats() -> None:
@@ -88,17 +88,17 @@ def test_a_file_that_does_not_read_back_is_not_offered(arm, tmp_path: Path) -> N
 
 
 def test_cancelling_leaves_nothing(arm, tmp_path: Path) -> None:
-    told: list[str] = []
+    reported: list[str] = []
     with pytest.raises(WorkCancelledError):
         export_run(
             *arm,
             FORMATS["csv"],
             {"track": MADE},
             tmp_path / "arm.csv",
-            progress=lambda step, *_: told.append(step),
-            cancelled=lambda: bool(told),
+            progress=lambda step, *_: reported.append(step),
+            cancelled=lambda: bool(reported),
         )
-    assert told == ["writing"]
+    assert reported == ["writing"]
     assert left_behind(tmp_path) == set()
 
 
@@ -148,9 +148,9 @@ def test_calibrations_for_other_tools(arm, tmp_path: Path) -> None:
     session, run = arm
     camera = run.cameras()[0]
     report = export_run(session, run, FORMATS["toml"], {}, tmp_path / "Calib.toml")
-    told = tomllib.loads(report.files[0].read_text())[camera.name]
-    np.testing.assert_allclose(np.array(told["translation"]) * 1000.0, camera.translation, atol=1e-6)
-    np.testing.assert_allclose(cv2.Rodrigues(np.array(told["rotation"]))[0], camera.rotation, atol=1e-9)
+    reported = tomllib.loads(report.files[0].read_text())[camera.name]
+    np.testing.assert_allclose(np.array(reported["translation"]) * 1000.0, camera.translation, atol=1e-6)
+    np.testing.assert_allclose(cv2.Rodrigues(np.array(reported["rotation"]))[0], camera.rotation, atol=1e-9)
     report = export_run(session, run, FORMATS["yml"], {}, tmp_path / "cameras.yml")
     storage = cv2.FileStorage(str(report.files[0]), cv2.FILE_STORAGE_READ)
     np.testing.assert_allclose(storage.getNode("camera_matrix").mat(), camera.matrix, atol=1e-9)
@@ -162,9 +162,9 @@ def test_calibrations_for_other_tools(arm, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["halpe26", "mixamo", "opensim"])
 def test_maps_give_each_joint_and_point_one_name(name: str) -> None:
-    told = name_map(name)
-    assert len(set(told.joints.values())) == len(told.joints)
-    assert all(place.marker or place.limb for places in told.points.values() for place in places)
+    reported = name_map(name)
+    assert len(set(reported.joints.values())) == len(reported.joints)
+    assert all(place.marker or place.limb for places in reported.points.values() for place in places)
     own = ("pelvis", "thorax", "tail")
     names, note = joint_names(own, name)
     assert len(set(names)) == 3

@@ -34,20 +34,20 @@ class Gltf:
         size, kind = struct.unpack_from("<I4s", content, 12)
         assert kind == b"JSON"
         assert size % 4 == 0
-        self.told = json.loads(content[20 : 20 + size])
+        self.document = json.loads(content[20 : 20 + size])
         binary, kind = struct.unpack_from("<I4s", content, 20 + size)
         assert kind == b"BIN\0"
         self.blob = content[28 + size : 28 + size + binary]
 
     def rows(self, index: int) -> np.ndarray:
-        accessor = self.told["accessors"][index]
-        view = self.told["bufferViews"][accessor["bufferView"]]
+        accessor = self.document["accessors"][index]
+        view = self.document["bufferViews"][accessor["bufferView"]]
         start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
         assert start % 4 == 0
         width = TYPES[accessor["type"]]
         stored = np.dtype(STORED[accessor["componentType"]])
         assert accessor["count"] * width * stored.itemsize <= view["byteLength"]
-        assert view.get("byteOffset", 0) + view["byteLength"] <= self.told["buffers"][0]["byteLength"]
+        assert view.get("byteOffset", 0) + view["byteLength"] <= self.document["buffers"][0]["byteLength"]
         values = np.frombuffer(self.blob, stored, accessor["count"] * width, start).reshape(-1, width)
         if "min" in accessor:
             np.testing.assert_array_equal(values.min(axis=0), np.array(accessor["min"], dtype=stored))
@@ -56,8 +56,8 @@ class Gltf:
 
     def sampled(self, time: float) -> dict[int, np.ndarray]:
         """World matrices (4, 4) of all nodes at a time, each channel by linear or spherical interpolation."""
-        nodes, moved = self.told["nodes"], {}
-        animation = self.told["animations"][0]
+        nodes, moved = self.document["nodes"], {}
+        animation = self.document["animations"][0]
         for channel in animation["channels"]:
             sampler = animation["samplers"][channel["sampler"]]
             times, values = self.rows(sampler["input"])[:, 0], self.rows(sampler["output"])
@@ -79,7 +79,7 @@ class Gltf:
             for child in nodes[node].get("children") or ():
                 walk(child, worlds[node])
 
-        for root in self.told["scenes"][0]["nodes"]:
+        for root in self.document["scenes"][0]["nodes"]:
             walk(root, np.eye(4))
         return worlds
 
@@ -114,7 +114,7 @@ def test_the_joints_are_where_they_are_meant_in_every_ninth_frame(
     body = load_body(name)
     skeleton = skeleton_of(body)
     places, turns = followed(skeleton.tree.parents, *skeleton.animated(moving_poses(body)))
-    index = {node["name"]: at for at, node in enumerate(read.told["nodes"])}
+    index = {node["name"]: at for at, node in enumerate(read.document["nodes"])}
     far = turned = 0.0
     for row in range(0, FRAMES, 9):
         worlds = read.sampled(np.float32(row / 60.0))
@@ -132,16 +132,16 @@ def test_the_skin_carries_the_cones(make_run, tmp_path: Path) -> None:
     session, run = make_run("human29", lambda body: track_of(moving_poses(body)))
     report = export_run(session, run, GLB, {"track": MADE}, tmp_path / "walk.glb")
     read, body = Gltf(report.files[0]), load_body("human29")
-    told = read.told
-    skin = told["skins"][0]
+    document = read.document
+    skin = document["skins"][0]
     inverse = read.rows(skin["inverseBindMatrices"]).reshape(-1, 4, 4).transpose(0, 2, 1)
     row = 200
     worlds = read.sampled(row / 60.0)
     frames = limb_frames(body, moving_poses(body)[row])[0]
     middle = {limb.name: at for at, limb in enumerate(body.drawn)}
-    sides = [told["materials"][part["material"]]["name"] for part in told["meshes"][0]["primitives"]]
+    sides = [document["materials"][part["material"]]["name"] for part in document["meshes"][0]["primitives"]]
     assert sides == ["left", "right", "middle"]
-    for side, part in zip(sides, told["meshes"][0]["primitives"], strict=True):
+    for side, part in zip(sides, document["meshes"][0]["primitives"], strict=True):
         points, normals = (read.rows(part["attributes"][name]) for name in ("POSITION", "NORMAL"))
         joints, weights = (read.rows(part["attributes"][name]) for name in ("JOINTS_0", "WEIGHTS_0"))
         np.testing.assert_array_equal(weights.sum(axis=1), 1.0)
@@ -201,7 +201,7 @@ def test_an_hour_is_long_for_32_bit_times_and_yet_reads_back(make_run, tmp_path:
     session, run = make_run("planar_arm4", lambda body: track_of(moving_poses(body, count)))
     report = export_run(session, run, GLB, {"track": MADE}, tmp_path / "arm.glb")
     read = Gltf(report.files[0])
-    times = read.rows(read.told["animations"][0]["samplers"][0]["input"])[:, 0]
+    times = read.rows(read.document["animations"][0]["samplers"][0]["input"])[:, 0]
     assert len(times) == count
     assert np.all(np.diff(times) > 0.0)
 
@@ -213,7 +213,7 @@ def test_gaps_are_told(make_run, tmp_path: Path) -> None:
         "planar_arm4", lambda body: track_of(moving_poses(body)[kept], frames=track[kept])
     )
     report = export_run(session, run, GLB, {"track": MADE}, tmp_path / "arm.glb")
-    animation = Gltf(report.files[0]).told["animations"][0]
+    animation = Gltf(report.files[0]).document["animations"][0]
     assert animation["extras"]["gaps"] == [[10, 30]]
     assert report.frames == FRAMES
     assert any("20 of 450 frames are interpolated" in note for note in report.notes)

@@ -61,8 +61,8 @@ def test_trc_in_metres_y_up(make_run, tmp_path: Path) -> None:
 
 def test_trc_z_up_in_millimetres(make_run, tmp_path: Path) -> None:
     session, run = make_run("dog", lambda body: track_of(moving_poses(body, 50)))
-    wish = {"track": MADE, "up": "z", "unit": "mm"}
-    report = export_run(session, run, FORMATS["trc"], wish, tmp_path / "dog.trc")
+    requested = {"track": MADE, "up": "z", "unit": "mm"}
+    report = export_run(session, run, FORMATS["trc"], requested, tmp_path / "dog.trc")
     body = load_body("dog")
     _, header, _, points = read_trc_by_hand(report.files[0])
     assert header["Units"] == "mm"
@@ -85,8 +85,8 @@ def test_c3d_is_what_py_c3d_reads(make_run, tmp_path: Path) -> None:
 
 def test_c3d_y_up_in_metres(make_run, tmp_path: Path) -> None:
     session, run = make_run("human25", lambda body: track_of(moving_poses(body, 30)))
-    wish = {"track": MADE, "up": "y", "unit": "m"}
-    report = export_run(session, run, FORMATS["c3d"], wish, tmp_path / "walk.c3d")
+    requested = {"track": MADE, "up": "y", "unit": "m"}
+    report = export_run(session, run, FORMATS["c3d"], requested, tmp_path / "walk.c3d")
     body = load_body("human25")
     _, _, unit, points, _ = read_c3d_by_hand(report.files[0])
     assert unit == "m"
@@ -102,8 +102,8 @@ def test_more_frames_than_c3d_counts(make_run, tmp_path: Path) -> None:
         export_run(session, run, FORMATS["c3d"], {"track": MADE}, tmp_path / "long.c3d")
     assert "split" in refused.value.hint
     assert not list(tmp_path.glob("long*"))
-    wish = {"track": MADE, "split": True}
-    report = export_run(session, run, FORMATS["c3d"], wish, tmp_path / "long.c3d")
+    requested = {"track": MADE, "split": True}
+    report = export_run(session, run, FORMATS["c3d"], requested, tmp_path / "long.c3d")
     assert [path.name for path in report.files] == ["long-1.c3d", "long-2.c3d"]
     body = load_body("planar_arm4")
     wanted = marker_points(body, moving_poses(body, count)[MOST_C3D_FRAMES:])
@@ -113,8 +113,8 @@ def test_more_frames_than_c3d_counts(make_run, tmp_path: Path) -> None:
 
 def test_names_of_halpe_and_what_is_missing(make_run, tmp_path: Path) -> None:
     session, run = make_run("human29", lambda body: track_of(moving_poses(body, 30)))
-    wish = {"track": MADE, "names": "halpe26"}
-    report = export_run(session, run, FORMATS["trc"], wish, tmp_path / "walk.trc")
+    requested = {"track": MADE, "names": "halpe26"}
+    report = export_run(session, run, FORMATS["trc"], requested, tmp_path / "walk.trc")
     names, _, _, points = read_trc_by_hand(report.files[0])
     assert {"RBigToe", "LHeel", "Neck", "RWrist"} <= set(names)
     note = next(note for note in report.notes if "left out" in note)

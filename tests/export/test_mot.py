@@ -19,10 +19,10 @@ STATES = tuple("lost" if frame in LOST else "tracked" for frame in range(FRAMES)
 def test_joint_angles_are_degrees_over_time(make_run, tmp_path: Path) -> None:
     session, run = make_run("human31", lambda body: track_of(moving_poses(body), states=STATES))
     place = tmp_path / "walk.mot"
-    told = export_run(session, run, FORMATS["mot"], {"track": MADE}, place)
-    assert told.track == MADE
-    assert told.checked.startswith("read back within")
-    assert any("20 frames have no pose of their own" in note for note in told.notes)
+    report = export_run(session, run, FORMATS["mot"], {"track": MADE}, place)
+    assert report.track == MADE
+    assert report.checked.startswith("read back within")
+    assert any("20 frames have no pose of their own" in note for note in report.notes)
 
     lines = place.read_text().splitlines()
     end = lines.index("endheader")

@@ -15,8 +15,10 @@ from studio.knobs import changed
 ARM = load_body("planar_arm4")
 
 
-def motion(poses: np.ndarray, frames: np.ndarray | None = None, states: tuple[str, ...] = (), **wish: object):
-    return even_motion(ARM, 60.0, track_of(poses, frames, states), changed(ExportOptions(), wish))
+def motion(
+    poses: np.ndarray, frames: np.ndarray | None = None, states: tuple[str, ...] = (), **requested: object
+):
+    return even_motion(ARM, 60.0, track_of(poses, frames, states), changed(ExportOptions(), requested))
 
 
 def test_a_track_without_gaps_stays_as_it_is() -> None:

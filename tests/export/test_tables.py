@@ -24,9 +24,9 @@ def exported(make_run, tmp_path: Path):
     """Exports a run of human29 with fifteen lost frames."""
     session, run = make_run("human29", lambda body: track_of(moving_poses(body), states=STATES))
 
-    def export(name: str, **wish: object) -> Path:
+    def export(name: str, **requested: object) -> Path:
         return export_run(
-            session, run, FORMATS[name], {"track": MADE, **wish}, tmp_path / f"walk.{name}"
+            session, run, FORMATS[name], {"track": MADE, **requested}, tmp_path / f"walk.{name}"
         ).files[0]
 
     return export
@@ -69,13 +69,13 @@ def test_duckdb_reads_the_parquet(exported) -> None:
             f"SELECT frame, time, x, y, z, conf FROM '{path}' WHERE name = 'LAnkle' ORDER BY frame"
         ).fetchall()
         (missing,) = base.execute(f"SELECT count(*) FROM '{path}' WHERE x IS NULL").fetchone()
-        told = dict(
+        metadata = dict(
             base.execute(f"SELECT decode(key), decode(value) FROM parquet_kv_metadata('{path}')").fetchall()
         )
     assert missing == len(LOST) * len(markers)
     assert [row[0] for row in rows] == list(range(FRAMES))
     assert isinstance(rows[0][0], int)
-    assert (told["unit"], told["up"], told["fps"], told["track"], told["body"]) == (
+    assert (metadata["unit"], metadata["up"], metadata["fps"], metadata["track"], metadata["body"]) == (
         "m",
         "y",
         "60",

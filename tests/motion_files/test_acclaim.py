@@ -117,10 +117,10 @@ def test_what_is_wrong_is_named_with_its_line(
     assert old in (SKELETON if file == "asf" else FRAMES)
     changed = {"asf": SKELETON, "amc": FRAMES}
     changed[file] = changed[file].replace(old, new, 1)
-    with pytest.raises(StudioError) as told:
+    with pytest.raises(StudioError) as caught:
         read_acclaim(files(tmp_path, changed["asf"], changed["amc"]))
-    assert words in told.value.message
-    assert told.value.hint
+    assert words in caught.value.message
+    assert caught.value.hint
 
 
 def test_a_missing_skeleton_is_asked_for(tmp_path: Path) -> None:

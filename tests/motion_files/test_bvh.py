@@ -74,11 +74,11 @@ def test_a_small_tree_stands_where_scipy_puts_it(tmp_path: Path) -> None:
 )
 def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, old: str, new: str, words: str) -> None:
     assert old in TEXT
-    with pytest.raises(StudioError) as told:
+    with pytest.raises(StudioError) as caught:
         read_bvh(written(tmp_path, TEXT.replace(old, new, 1)))
-    assert words in told.value.message
-    assert "'tiny.bvh'" in told.value.message
-    assert told.value.hint
+    assert words in caught.value.message
+    assert "'tiny.bvh'" in caught.value.message
+    assert caught.value.hint
 
 
 def test_a_file_says_which_joints_move_and_keeps_its_own_axes(tmp_path: Path) -> None:

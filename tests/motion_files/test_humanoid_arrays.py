@@ -73,10 +73,10 @@ def test_frames_held_twice_count_once(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_wrong_is_named(tmp_path: Path, change: dict[str, Any], words: str) -> None:
-    with pytest.raises(StudioError) as told:
+    with pytest.raises(StudioError) as caught:
         read_humanoid_arrays(written(tmp_path, arrays(**change)))
-    assert words in told.value.message
-    assert told.value.hint
+    assert words in caught.value.message
+    assert caught.value.hint
 
 
 def test_other_files_are_refused(tmp_path: Path) -> None:

@@ -58,7 +58,7 @@ def test_a_marker_with_three_blank_cells_is_missing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("rows", "said"),
+    ("rows", "message"),
     [
         (ROWS.replace("2.5", "nan"), "line 8, column 4 (Hip Y) is 'nan'"),
         (ROWS.replace("2.5", "inf"), "column 4 (Hip Y)"),
@@ -71,15 +71,15 @@ def test_a_marker_with_three_blank_cells_is_missing(tmp_path: Path) -> None:
         ("", "has 0 rows"),
     ],
 )
-def test_a_broken_row_is_named(tmp_path: Path, rows: str, said: str) -> None:
+def test_a_broken_row_is_named(tmp_path: Path, rows: str, message: str) -> None:
     with pytest.raises(TruthError) as caught:
         read_trc(written(tmp_path, rows))
-    assert said in caught.value.message
+    assert message in caught.value.message
     assert caught.value.hint
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         (("{unit}", "feet"), "unit 'feet'"),
         (("Neck", "Hip"), "1 markers and line 3 says 2"),
@@ -88,8 +88,8 @@ def test_a_broken_row_is_named(tmp_path: Path, rows: str, said: str) -> None:
         (("60\t60\t2", "x\t60\t2"), "no DataRate"),
     ],
 )
-def test_a_broken_header_is_named(tmp_path: Path, change: tuple[str, str], said: str) -> None:
-    with pytest.raises(TruthError, match=said):
+def test_a_broken_header_is_named(tmp_path: Path, change: tuple[str, str], message: str) -> None:
+    with pytest.raises(TruthError, match=message):
         read_trc(written(tmp_path, header=HEADER.replace(*change)))
 
 

@@ -18,7 +18,7 @@ def test_cameras_are_turned_told_and_turned_back() -> None:
     assert not looked.changed
     assert (session.path / CAMERAS_PATH).read_bytes() == before
     assert max(looked.before, key=lambda name: looked.before[name]) == NUDGED
-    assert set(steps) == {"looking at silhouettes"}
+    assert set(steps) == {"reading silhouettes"}
     turned = studio.align("nudged")
     assert turned.changed
     assert turned.after[NUDGED] < 0.4 * turned.before[NUDGED]

@@ -91,8 +91,8 @@ def test_the_only_model_that_fits_is_taken_and_said(session_on_disk: Session, mo
 def test_a_model_is_named_or_given_by_path(session_on_disk: Session, models: Path, tmp_path: Path) -> None:
     elsewhere = tmp_path / "mine.behaviour"
     write_model(arm_model().at_rate(30.0), elsewhere)
-    for asked, name in (("swings", "swings"), ("swings.behaviour", "swings"), (str(elsewhere), "mine")):
-        run = prepare_run(session_on_disk, RunRequest(behaviour=asked))
+    for requested, name in (("swings", "swings"), ("swings.behaviour", "swings"), (str(elsewhere), "mine")):
+        run = prepare_run(session_on_disk, RunRequest(behaviour=requested))
         assert run.record.behaviour == name
         assert not any("behaviour" in note.lower() for note in run.record.notes)
 

@@ -60,7 +60,7 @@ def test_the_true_poses_fit_and_others_do_not(session):
     assert "off the masks in" in wrong.in_words()
     assert not wrong.good
     assert check_step(session).state == "done"
-    assert "look at the marked frames" in check_step(session).why
+    assert "check the marked frames" in check_step(session).why
 
 
 def test_a_body_that_turns_round_at_once_is_named():

@@ -76,9 +76,11 @@ def test_backwards_replaces_what_was_before_and_keeps_the_rest(
 ) -> None:
     before = poses_of(wrong)
     run = prepare_correction(session_on_disk, wrong, K, true_poses()[K], backwards_to=2)
-    told: list[tuple[int, int]] = []
-    assert track_backwards(session_on_disk, run, lambda _step, done, total: told.append((done, total))) == 4
-    assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
+    reports: list[tuple[int, int]] = []
+    assert (
+        track_backwards(session_on_disk, run, lambda _step, done, total: reports.append((done, total))) == 4
+    )
+    assert reports == [(1, 4), (2, 4), (3, 4), (4, 4)]
     found = poses_of(run)
     assert np.array_equal(found[:2], before[:2])
     assert np.array_equal(found[K + 1 :], before[K + 1 :])
@@ -138,7 +140,7 @@ def test_frames_that_are_not_there_are_refused(
 def test_poses_and_names_are_checked(session_on_disk: Session, wrong: StoredRun) -> None:
     with pytest.raises(RunError, match="has 4 finite numbers"):
         prepare_correction(session_on_disk, wrong, 3, np.full(4, np.nan))
-    with pytest.raises(RunError, match="is not one that is tracked backwards"):
+    with pytest.raises(RunError, match="was not prepared for tracking backwards"):
         track_backwards(session_on_disk, wrong)
     with pytest.raises(NotFoundError):
         session_on_disk.run("right")

@@ -82,17 +82,17 @@ def test_people_in_random_moments_and_headings_are_found(people: Session) -> Non
 
 def test_a_run_without_start_pose_finds_one(people: Session) -> None:
     steps: list[tuple[str, int, int]] = []
-    run = prepare_run(people, RunRequest(first=1, last=2), lambda *told: steps.append(told))
+    run = prepare_run(people, RunRequest(first=1, last=2), lambda *step: steps.append(step))
     assert run.record.start_pose is not None
     assert run.record.start_source.startswith("found in frame 1, confidence ")
-    assert steps[-1][0] == "looking for each limb"
+    assert steps[-1][0] == "checking each limb"
     assert not (people.path / "start_pose.csv").exists()
 
 
 def test_a_cancelled_search_ends(people: Session) -> None:
-    asked = iter([False, False, True])
+    answers = iter([False, False, True])
     with pytest.raises(WorkCancelledError):
-        initialise(people, 0, cancelled=lambda: next(asked))
+        initialise(people, 0, cancelled=lambda: next(answers))
 
 
 def test_a_frame_that_is_not_there(people: Session) -> None:
@@ -124,16 +124,16 @@ def test_where_a_pose_came_from_is_said_with_its_confidence(session_on_disk: Ses
 
 def test_nothing_to_be_seen_is_refused(session_on_disk: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("studio.runs.initialising.anything_seen", lambda _: False)
-    with pytest.raises(RunError, match="Nothing is to be seen"):
+    with pytest.raises(RunError, match="shows no body"):
         initialise(session_on_disk, 0)
 
 
 def test_an_arm_that_is_fixed_to_the_world_is_found_with_one_camera(session_on_disk: Session) -> None:
-    told = initialise(session_on_disk, 0)
-    assert "One camera" in told.note
-    assert told.confidence > 0.9
-    assert told.margin == np.inf
-    assert told.overlap > 0.6
+    found = initialise(session_on_disk, 0)
+    assert "One camera" in found.note
+    assert found.confidence > 0.9
+    assert found.margin == np.inf
+    assert found.overlap > 0.6
 
 
 def test_a_drawn_body_without_feet_is_sought_with_feet() -> None:
@@ -150,8 +150,8 @@ def test_a_drawn_body_without_feet_is_sought_with_feet() -> None:
     middle = hull.weights() @ hull.centres
     assert np.linalg.norm(middle[:2] - [200.0, 0.0]) < 60.0
     problem = whole_problem(body, cameras, SETTINGS, evidence)
-    told = seek(problem, space, body, hull, box, cameras=4, seed=0, effort=QUICK)
-    assert facing(body, told.pose[None])[0] @ facing(with_feet, truth[None])[0] > 0.8
+    found = seek(problem, space, body, hull, box, cameras=4, seed=0, effort=QUICK)
+    assert facing(body, found.pose[None])[0] @ facing(with_feet, truth[None])[0] > 0.8
 
 
 def test_masks_without_a_volume_in_common_make_no_hull() -> None:

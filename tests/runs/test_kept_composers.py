@@ -15,15 +15,15 @@ from studio.sessions.session import Session
 def closed(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[ViewComposer]]:
     """Composers that were closed, in order."""
     forget_composers()
-    told: list[ViewComposer] = []
+    composers: list[ViewComposer] = []
     close = ViewComposer.close
 
     def noted(composer: ViewComposer) -> None:
-        told.append(composer)
+        composers.append(composer)
         close(composer)
 
     monkeypatch.setattr(ViewComposer, "close", noted)
-    yield told
+    yield composers
     monkeypatch.undo()
     forget_composers()
 

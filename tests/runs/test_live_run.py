@@ -148,13 +148,13 @@ def test_forth_and_back_goes_on_behind_the_end(session_on_disk: Session) -> None
 
 def test_a_live_run_recovers_quickly_unless_asked_otherwise(session_on_disk: Session) -> None:
     assert live_run(session_on_disk, "a").record.settings["recovery"] == SPREAD
-    asked = live_run(session_on_disk, "b", changes={"recovery": INITIALISE})
-    assert asked.record.settings["recovery"] == INITIALISE
+    requested = live_run(session_on_disk, "b", changes={"recovery": INITIALISE})
+    assert requested.record.settings["recovery"] == INITIALISE
     assert prepare_run(session_on_disk, RunRequest(name="c")).record.settings["recovery"] == INITIALISE
 
 
 def test_what_cannot_be_done_live_is_refused(session_on_disk: Session) -> None:
-    with pytest.raises(RunError, match="cannot teach"):
+    with pytest.raises(RunError, match="cannot train"):
         prepare_run(session_on_disk, live_request(changes={"online_learning": True}))
     with pytest.raises(RunError, match="Only a live run"):
         prepare_run(session_on_disk, RunRequest(to_and_fro=True))

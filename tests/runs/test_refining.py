@@ -32,11 +32,14 @@ def test_refining_comes_nearer_and_the_weighting_agrees(session_on_disk: Session
     raw = read_track(run)
     shaken = dataclasses.replace(raw, name="shaken", poses=true_poses() + 0.15 * rng.standard_normal((8, 4)))
     write_track(run, shaken)
-    told: list[tuple[int, int]] = []
+    reports: list[tuple[int, int]] = []
     made = refine_run(
-        session_on_disk, run, source="shaken", progress=lambda _step, done, total: told.append((done, total))
+        session_on_disk,
+        run,
+        source="shaken",
+        progress=lambda _step, done, total: reports.append((done, total)),
     )
-    assert told == [(done, 8) for done in range(9)]
+    assert reports == [(done, 8) for done in range(9)]
     before = np.abs(shaken.poses - true_poses()).mean()
     assert np.abs(made.track.poses - true_poses()).mean() < 0.6 * before
     with opened(session_on_disk, run) as tracking:
@@ -120,11 +123,11 @@ def test_refusals_keep_what_is_there(session_on_disk: Session, run: StoredRun) -
 
 
 def test_a_cancelled_refinement_keeps_nothing(session_on_disk: Session, run: StoredRun) -> None:
-    asked: list[int] = []
+    calls: list[int] = []
 
     def cancelled() -> bool:
-        asked.append(1)
-        return len(asked) > 3
+        calls.append(1)
+        return len(calls) > 3
 
     with pytest.raises(WorkCancelledError):
         refine_run(session_on_disk, run, cancelled=cancelled)

@@ -38,9 +38,9 @@ def black(walk: Session, tmp_path_factory: pytest.TempPathFactory) -> Session:
     return interrupted(walk, tmp_path_factory.mktemp("black") / "walk", frames, range(4, 9), BLACK, FPS)
 
 
-def made(session: Session, **wish: object) -> StoredRun:
-    changes = SMALL | dict(wish.pop("changes", {}))  # pyright: ignore[reportCallIssue, reportArgumentType]
-    return prepare_run(session, RunRequest(changes=changes, **wish))  # pyright: ignore[reportArgumentType]
+def made(session: Session, **options: object) -> StoredRun:
+    changes = SMALL | dict(options.pop("changes", {}))  # pyright: ignore[reportCallIssue, reportArgumentType]
+    return prepare_run(session, RunRequest(changes=changes, **options))  # pyright: ignore[reportArgumentType]
 
 
 def tracked(session: Session, run: StoredRun) -> list[FrameResult]:
@@ -205,11 +205,11 @@ def test_every_tracker_tracks_again_within_a_second(
     """A second of black pictures; the person leaves and comes back a second further on. 9 of 10 seeds."""
     blind = range(12, 12 + SECOND)
     session = interrupted(longer, tmp_path / "walk", list(range(LONGER)), blind, kind, float(SECOND))
-    model, told = str(habits) if tracker == "behaviour" else "", []
+    model, recovered = str(habits) if tracker == "behaviour" else "", []
     for seed in range(10):
         run = prepare_run(session, RunRequest(tracker=tracker, seed=seed, behaviour=model))
         results = tracked(session, run)
         states = [result.tracking for result in results]
         reported = all(states[frame] in (NO_EVIDENCE, LOST) for frame in blind)
-        told.append(reported and tracks_again(states, errors(session, longer, results, 1), blind.stop))
-    assert sum(told) >= 9, told
+        recovered.append(reported and tracks_again(states, errors(session, longer, results, 1), blind.stop))
+    assert sum(recovered) >= 9, recovered

@@ -85,21 +85,21 @@ def test_a_run_that_is_sound_has_no_such_track(
 
 def test_a_run_that_is_tracked_to_its_end_is_looked_at(session: Session, truth: np.ndarray) -> None:
     batch, job = planted(session, truth), planted(session, truth)
-    told: list[str] = []
-    track_to_end(session, batch, lambda step, _done, _total: told.append(step))
-    assert "comparing left and right" in told
+    steps: list[str] = []
+    track_to_end(session, batch, lambda step, _done, _total: steps.append(step))
+    assert "comparing left and right" in steps
     assert read_track(batch, "sides").made_by["exchanged"] == list(WORDS)
 
-    said: list[tuple[str, str]] = []
+    messages: list[tuple[str, str]] = []
 
-    def say(_run: OpenRun, level: str, text: str) -> None:
-        said.append((level, text))
+    def log(_run: OpenRun, level: str, text: str) -> None:
+        messages.append((level, text))
 
-    looking, open_run = SideLooking(say), opened(str(session.path), str(job.folder))
+    looking, open_run = SideLooking(log), opened(str(session.path), str(job.folder))
     looking.add(open_run)
     looking._thread.submit(lambda: None).result()
     looking.close()
     open_run.close()
-    assert [level for level, _ in said] == ["info"]
-    assert WORDS[0] in said[0][1]
-    assert notes_of(job)[-1] == said[0][1]
+    assert [level for level, _ in messages] == ["info"]
+    assert WORDS[0] in messages[0][1]
+    assert notes_of(job)[-1] == messages[0][1]

@@ -73,8 +73,8 @@ def test_a_mirrored_video_is_named(rig: tuple[Camera, ...], masks: dict) -> None
 
 def test_a_wrong_size_blocks_unless_it_is_only_the_told_height(rig: tuple[Camera, ...], masks: dict) -> None:
     larger = tuple(dataclasses.replace(camera, translation=1.3 * camera.translation) for camera in rig)
-    (told,) = silhouette_doubts(larger, masks, HEIGHT)
-    assert (told.code, told.severity) == ("square-size", "warns")
+    (finding,) = silhouette_doubts(larger, masks, HEIGHT)
+    assert (finding.code, finding.severity) == ("square-size", "warns")
     giant = tuple(dataclasses.replace(camera, translation=2.0 * camera.translation) for camera in rig)
     (unseen,) = silhouette_doubts(giant, masks, None)
     assert unseen.severity == "blocks"

@@ -17,9 +17,9 @@ PEOPLE = (104, 105, 106, 13, 14)
 def test_lengths_of_people_who_are_only_seen(tmp_path: Path) -> None:
     fitted, usual = [], []
     for seed in PEOPLE:
-        session, true, told = make_sized_session(tmp_path / f"person{seed}", seed)
-        found = fit_session_subject(session, FitRequest(height_mm=told))
-        assert found.poses_from == "searched for in each frame"
+        session, true, height = make_sized_session(tmp_path / f"person{seed}", seed)
+        found = fit_session_subject(session, FitRequest(height_mm=height))
+        assert found.poses_from == "a search in each frame"
         sizes = {size.name: size for size in found.sizes}
         after = [sizes[name].after - length for name, length in true.items()]
         before = [sizes[name].before - length for name, length in true.items()]

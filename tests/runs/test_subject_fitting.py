@@ -62,11 +62,11 @@ def test_a_written_subject_is_that_very_body(tmp_path: Path) -> None:
 
 
 def test_wishes_that_cannot_be_met_are_refused(session_on_disk: Session) -> None:
-    for wish, said in (
+    for request, message in (
         (FitRequest(lengths=False, radii=False), "Neither"),
         (FitRequest(frames=(100000,)), "does not lie"),
         (FitRequest(count=0), "1 to 24"),
         (FitRequest(run="nobody"), "nobody"),
     ):
-        with pytest.raises(StudioError, match=said):
-            fit_session_subject(session_on_disk, wish)
+        with pytest.raises(StudioError, match=message):
+            fit_session_subject(session_on_disk, request)

@@ -47,11 +47,11 @@ def test_the_way_recommends_turning_and_is_content_afterwards(
     assert calibration_step(session).why == ""
     assert apart(session) == pytest.approx(DEGREES, abs=0.01)
     remember_alignment(session, aligned)
-    told = calibration_step(session)
-    assert told.state == "done"
-    assert f"({NUDGED})" in told.why
-    assert told.why.startswith("The silhouettes miss by up to")
-    assert "step Background" in told.why
+    status = calibration_step(session)
+    assert status.state == "done"
+    assert f"({NUDGED})" in status.why
+    assert status.why.startswith("The silhouettes miss by up to")
+    assert "step Background" in status.why
     change = turn_cameras(session, aligned)
     assert apart(change.session) < 0.4 * DEGREES
     assert calibration_step(change.session).why == ""

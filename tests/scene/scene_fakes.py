@@ -31,7 +31,7 @@ class FakeControl:
         """A queue that `say` fills."""
         return self.watchers.subscribe()
 
-    def say(self, event: Event) -> None:
+    def emit(self, event: Event) -> None:
         """Tell all watchers an event."""
         if isinstance(event, StateChanged):
             self.state = event
@@ -40,7 +40,7 @@ class FakeControl:
     def answer(self, command: Command, message: str = "", hint: str = "") -> None:
         """Acknowledge a command; with a message it is refused."""
         name = type(command).__name__
-        self.say(
+        self.emit(
             Acknowledged(
                 self.state.session, self.state.run, command.identifier, name, not message, message, hint
             )

@@ -205,14 +205,14 @@ def test_pictures_are_drawn_anew_for_results_and_not_for_layers(shown: Model, hu
 
 def test_the_newest_request_is_shown_until_it_is_answered(shown: Model) -> None:
     default = knob(shown)
-    asked = scene.request(scene.request(shown, "one", {"survival": 0.7}), "two", {"survival": 0.4})
-    assert knob(asked) == 0.4
-    taken = scene.settle(asked, "one", True)
+    requested = scene.request(scene.request(shown, "one", {"survival": 0.7}), "two", {"survival": 0.4})
+    assert knob(requested) == 0.4
+    taken = scene.settle(requested, "one", True)
     applied = after(taken, SettingsApplied("s", "r", 2, 1, 0, {"survival": 0.7}))
     assert knob(applied) == 0.4, "an older answer does not pull the slider back"
     assert knob(scene.settle(applied, "two", True)) == 0.4
     assert knob(scene.settle(applied, "two", False)) == 0.7
-    assert knob(scene.settle(scene.settle(asked, "two", False), "one", False)) == default
+    assert knob(scene.settle(scene.settle(requested, "two", False), "one", False)) == default
     assert scene.settle(shown, "of another window", False) is shown
 
 

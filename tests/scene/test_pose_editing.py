@@ -150,11 +150,11 @@ def test_the_editing_ends_when_the_run_is_tracked_or_another_is_opened(
     stage.poses.edit("swaying", "run-1", 2)
     until(lambda: stage.shown.editing and stage.shown.frame == 2)
     paused = control.state
-    control.say(dataclasses.replace(paused, run="run-9", state="tracking"))
-    control.say(paused)
+    control.emit(dataclasses.replace(paused, run="run-9", state="tracking"))
+    control.emit(paused)
     by_hand(tab_of(stage).sliders[4].handle, 250.0)
     until(lambda: stage.poses.editing is not None and stage.poses.editing.moved)
-    control.say(dataclasses.replace(paused, state="tracking"))
+    control.emit(dataclasses.replace(paused, state="tracking"))
     until(lambda: not stage.shown.editing)
     assert stage.poses.editing is None
     handles = handles_of(stage)
@@ -162,7 +162,7 @@ def test_the_editing_ends_when_the_run_is_tracked_or_another_is_opened(
     # Whoever begins to edit while it goes on is left to it.
     stage.poses.edit("swaying", "run-1", 1)
     until(lambda: stage.shown.editing)
-    control.say(dataclasses.replace(paused, state="tracking", frame=3))
+    control.emit(dataclasses.replace(paused, state="tracking", frame=3))
     stage.show_layer(1)
     until(lambda: stage.shown.layer == 1)
     assert stage.shown.editing
@@ -175,17 +175,17 @@ def test_refining_tells_shows_and_can_fail(
 ) -> None:
     begin(stage)
     better = swaying_pose(human, 1)
-    asked: list[int] = []
+    requested: list[int] = []
 
     def found(session, frame, pose, *, run, progress, cancelled):
-        asked.append(frame)
+        requested.append(frame)
         progress("searching", 1, 2)
         return SimpleNamespace(pose=better, gain=1.0, overlap_before=0.5, overlap=0.9)
 
     monkeypatch.setattr(pose_refining, "better_pose", found)
     press(tab_of(stage).refine)
     until(lambda: pose_is(stage, better))
-    assert asked == [stage.shown.frame]
+    assert requested == [stage.shown.frame]
     until(lambda: not tab_of(stage).progress.visible)
 
     def refused(*_: object, **__: object) -> None:

@@ -118,10 +118,10 @@ def test_a_person_sees_the_run_and_moves_the_survival_rate(
     change = next(command for command in control.commands if isinstance(command, ChangeSettings))
     assert math.isclose(float(change.changes["survival"]), default + 0.01)
     control.answer(change)
-    control.say(SettingsApplied("swaying", "run-1", 2, 4, 0, {"survival": default + 0.01}, ("survival",)))
+    control.emit(SettingsApplied("swaying", "run-1", 2, 4, 0, {"survival": default + 0.01}, ("survival",)))
     page.get_by_text("In use since frame 4, layer 1.").wait_for(timeout=PATIENCE * 1000)
     page.get_by_text("• survival rate").wait_for(timeout=PATIENCE * 1000)
-    control.say(LayerFinished("swaying", "run-1", cloud_record(human, 4, 0), True))
+    control.emit(LayerFinished("swaying", "run-1", cloud_record(human, 4, 0), True))
     clouds = stage._controller.views.particles
     until(page, lambda: [handle.visible for handle in clouds.handles] == [True, False, False, False])
 

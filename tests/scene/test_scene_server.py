@@ -84,10 +84,10 @@ def test_layers_in_the_making_are_drawn_at_once(
     stage: SceneServer, control: FakeControl, human: BodyModel
 ) -> None:
     open_run(stage)
-    control.say(dataclasses.replace(control.state, state="tracking"))
+    control.emit(dataclasses.replace(control.state, state="tracking"))
     new = FRAMES - 1
     for layer in range(2):
-        control.say(LayerFinished("swaying", "run-1", cloud_record(human, new, layer)))
+        control.emit(LayerFinished("swaying", "run-1", cloud_record(human, new, layer)))
     until(lambda: stage.shown.frame == new)
     until(
         lambda: (
@@ -104,8 +104,8 @@ def test_a_reannealed_frame_stands_beside_the_stored_answer(
     open_run(stage)
     stage.show_frame(2)
     until(lambda: stage.shown.frame == 2)
-    control.say(LayerFinished("swaying", "run-1", cloud_record(human, 2, 0), True))
-    control.say(FrameFinished("swaying", "run-1", frame_result(human, 2, shift=120.0), True))
+    control.emit(LayerFinished("swaying", "run-1", cloud_record(human, 2, 0), True))
+    control.emit(FrameFinished("swaying", "run-1", frame_result(human, 2, shift=120.0), True))
     moved = swaying_pose(human, 2)
     moved[4] += 120.0
     until(lambda: body_stands_at(stage, human, moved))
@@ -132,14 +132,14 @@ def test_a_setting_selects_the_shown_frame_and_is_asked_for(stage: SceneServer, 
     assert change.changes == {"survival": 0.7}
     control.answer(change, "Setting 'survival' cannot be 0.7.", "Try 0.6.")
     until(lambda: survival.handle.value == default)
-    control.say(SettingsApplied("swaying", "run-1", 2, 2, 0, {"survival": 0.6}, ("survival",)))
+    control.emit(SettingsApplied("swaying", "run-1", 2, 2, 0, {"survival": 0.6}, ("survival",)))
     until(lambda: survival.handle.value == 0.6)
     assert len(control.commands) == 1, "showing what is in use asks for nothing"
 
 
 def test_knobs_are_about_the_run_that_is_shown(stage: SceneServer, control: FakeControl) -> None:
-    said: list[StudioError] = []
-    stage._controller.refused = said.append
+    refusals: list[StudioError] = []
+    stage._controller.refused = refusals.append
     stage._controller.post(stage._controller.request_knobs, {"survival": 0.7})
     control.state = dataclasses.replace(control.state, session="other", run="run-9")
     open_run(stage)
@@ -151,26 +151,26 @@ def test_knobs_are_about_the_run_that_is_shown(stage: SceneServer, control: Fake
     until(lambda: len(control.commands) == 2)
     assert [Path(command.run).name for command in control.commands] == ["run-1", "run-1"]
     control.answer(control.commands[1], "Run 'run-9' of session 'other' is being tracked.")
-    until(lambda: said)
-    assert "run-9" in said[0].message
+    until(lambda: refusals)
+    assert "run-9" in refusals[0].message
     until(lambda: survival.handle.value == 0.7)
     by_hand(survival.handle, 99.0)
-    until(lambda: len(said) == 2)
-    assert "99" in said[1].message
+    until(lambda: len(refusals) == 2)
+    assert "99" in refusals[1].message
     until(lambda: survival.handle.value == 0.7)
 
 
 def test_playback_shows_one_frame_after_another_and_tells_the_page(
     workspace: Workspace, control: FakeControl
 ) -> None:
-    told: list[Selection] = []
-    stage = SceneServer(workspace, control, told.append)
+    selections: list[Selection] = []
+    stage = SceneServer(workspace, control, selections.append)
     open_run(stage)
     stage.show_frame(0)
     until(lambda: stage.shown.frame == 0)
-    assert told == [], "who asked is not told"
+    assert selections == [], "who asked is not told"
     stage.play(True, speed=4.0)
-    until(lambda: {shown.frame for shown in told} >= set(range(1, FRAMES - 1)) and len(told) > 6)
+    until(lambda: {shown.frame for shown in selections} >= set(range(1, FRAMES - 1)) and len(selections) > 6)
     stage.stop()
 
 
@@ -247,7 +247,7 @@ def test_a_kept_answer_takes_the_place_of_the_stored_one_and_of_what_followed(
     with ResultsWriter(workspace.session("swaying").run("run-1").folder) as writer:
         writer.forget_from(2)
         writer.write_frame(kept, [cloud_record(human, 2, 0)])
-    control.say(FrameFinished("swaying", "run-1", kept))
+    control.emit(FrameFinished("swaying", "run-1", kept))
     until(lambda: stage._controller.model.frames == (0, 1, 2))
     until(lambda: body_stands_at(stage, human, kept.estimate.pose))
 
@@ -323,10 +323,10 @@ def test_a_strange_relay_header_is_no_way_in(stage: SceneServer, shown: bytes) -
 
 
 def test_posts_keep_their_order_and_what_goes_wrong_ends_nothing(stage: SceneServer) -> None:
-    said: list[StudioError] = []
+    refusals: list[StudioError] = []
     order: list[int] = []
     controller = stage._controller
-    controller.refused = said.append
+    controller.refused = refusals.append
 
     def note(model: Model, number: int) -> Model:
         order.append(number)
@@ -340,7 +340,7 @@ def test_posts_keep_their_order_and_what_goes_wrong_ends_nothing(stage: SceneSer
         controller.post(note, number)
     until(lambda: len(order) == 100)
     assert order == list(range(100))
-    until(lambda: len(said) == 10)
+    until(lambda: len(refusals) == 10)
     open_run(stage)
 
 
@@ -365,5 +365,5 @@ def test_frames_that_were_not_heard_of_are_known_with_the_next(
     with ResultsWriter(workspace.session("swaying").run("run-1").folder) as writer:
         layers = [cloud_record(human, FRAMES - 1, layer) for layer in range(LAYERS)]
         writer.write_frame(frame_result(human, FRAMES - 1), layers)
-    control.say(FrameFinished("swaying", "run-1", frame_result(human, FRAMES - 1)))
+    control.emit(FrameFinished("swaying", "run-1", frame_result(human, FRAMES - 1)))
     until(lambda: stage._controller.model.frames == tuple(range(FRAMES)))

@@ -40,14 +40,14 @@ def test_what_a_change_makes_stale_is_said(session: Session) -> None:
     old = prepare_run(session, RunRequest(name="old"))
     change = change_footage(session, {"cam_2": 1})
     assert change.stale_runs == ("old",)
-    said = " ".join(change.notes)
+    notes = " ".join(change.notes)
     for words in (
         "11 frames are in all cameras",
         "Run old was tracked",
         "start pose belongs",
         "truth counts its time",
     ):
-        assert words in said
+        assert words in notes
     assert not (session.path / "thumbnail.jpg").exists()
     assert old.record.last == FRAMES
     # A run made afterwards is not stale; the old one stays so when its record is written again or made earlier.

@@ -59,7 +59,7 @@ def test_offsets_and_turns_by_hand(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("offsets", "rotations", "said"),
+    ("offsets", "rotations", "message"),
     [
         ({"cam_9": 3}, {}, "There is no camera 'cam_9'"),
         ({"cam_1": 12}, {}, "no frame is left"),
@@ -68,9 +68,9 @@ def test_offsets_and_turns_by_hand(tmp_path: Path) -> None:
     ],
 )
 def test_what_cannot_be_asked(
-    tmp_path: Path, offsets: dict[str, int], rotations: dict[str, int], said: str
+    tmp_path: Path, offsets: dict[str, int], rotations: dict[str, int], message: str
 ) -> None:
     source = video_source(tmp_path / "source")
-    with pytest.raises(StudioError, match=said):
+    with pytest.raises(StudioError, match=message):
         import_source(source, tmp_path / "made", offsets=offsets, rotations=rotations)
     assert not (tmp_path / "made").exists()

@@ -105,7 +105,7 @@ def test_another_rate_and_missing_parts(lee: Path, tmp_path: Path) -> None:
 
 @pytest.mark.real_data
 @pytest.mark.parametrize(
-    ("name", "content", "said"),
+    ("name", "content", "message"),
     [
         ("InitialPose.txt", "0.1 0.2", "does not hold 31 finite numbers"),
         ("PoseParameters.txt", "nan " * 93, "does not hold 93 finite numbers"),
@@ -114,11 +114,11 @@ def test_another_rate_and_missing_parts(lee: Path, tmp_path: Path) -> None:
     ],
 )
 def test_parameter_files_that_do_not_fit(
-    lee: Path, tmp_path: Path, name: str, content: str, said: str
+    lee: Path, tmp_path: Path, name: str, content: str, message: str
 ) -> None:
     shutil.copytree(lee, tmp_path / "source")
     (tmp_path / "source" / name).write_text(content)
     before = everything_below(tmp_path)
-    with pytest.raises(BodyError, match=said):
+    with pytest.raises(BodyError, match=message):
         import_source(tmp_path / "source", tmp_path / "made")
     assert everything_below(tmp_path) == before

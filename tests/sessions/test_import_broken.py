@@ -106,7 +106,7 @@ def no_footage(source: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("spoil", "kind", "said"),
+    ("spoil", "kind", "message"),
     [
         (cut_video, FootageError, "cam02.mp4"),
         (rubbish_video, FootageError, "cam01.mp4"),
@@ -129,14 +129,14 @@ def no_footage(source: Path) -> None:
     ],
 )
 def test_a_cause_a_remedy_and_nothing_left(
-    tmp_path: Path, spoil: Callable[[Path], None], kind: type[StudioError], said: str
+    tmp_path: Path, spoil: Callable[[Path], None], kind: type[StudioError], message: str
 ) -> None:
     source = full_source(tmp_path / "source")
     spoil(source)
     before = everything_below(tmp_path)
     with pytest.raises(kind) as caught:
         import_source(source, tmp_path / "made")
-    assert said in caught.value.message
+    assert message in caught.value.message
     assert caught.value.hint.endswith(".")
     assert everything_below(tmp_path) == before
     assert sorted(path.name for path in tmp_path.iterdir()) == ["source"]

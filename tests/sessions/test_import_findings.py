@@ -27,7 +27,7 @@ Z_DOWN = np.diag([1.0, -1.0, -1.0])
 
 
 @pytest.mark.parametrize(
-    ("spoil", "said"),
+    ("spoil", "message"),
     [
         (lambda camera: in_world(camera, Y_UP), "Y axis points up in all pictures, not Z"),
         (lambda camera: in_world(camera, Z_DOWN), "(minus Z axis points up|under the floor)"),
@@ -38,14 +38,14 @@ Z_DOWN = np.diag([1.0, -1.0, -1.0])
     ],
 )
 def test_what_makes_results_wrong_blocks(
-    tmp_path: Path, spoil: Callable[[Camera], Camera], said: str
+    tmp_path: Path, spoil: Callable[[Camera], Camera], message: str
 ) -> None:
     source = video_source(tmp_path / "source")
     path = source / "calibration" / "Calib.toml"
     export_calibration(tuple(spoil(camera) for camera in CAMERAS), path, "aniposelib")
     # The unit is named, as FreeMoCap does, so that the distance between the cameras is not asked.
     path.write_text(path.read_text() + "\n[metadata.board]\nsquare_length_mm = 30.0\n")
-    with pytest.raises(CalibrationError, match=said) as caught:
+    with pytest.raises(CalibrationError, match=message) as caught:
         import_source(source, tmp_path / "made")
     assert "--despite-findings" in caught.value.hint
     assert not (tmp_path / "made").exists()
@@ -90,9 +90,9 @@ def test_the_remedies_work(tmp_path: Path, up: str, axes: np.ndarray) -> None:
         assert np.linalg.det(found.rotation) == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize(("words", "said"), [({"unit": "inch"}, "no unit"), ({"up": "w"}, "no axis")])
-def test_units_and_axes_that_are_none(tmp_path: Path, words: dict[str, str], said: str) -> None:
-    with pytest.raises(CalibrationError, match=said):
+@pytest.mark.parametrize(("words", "message"), [({"unit": "inch"}, "no unit"), ({"up": "w"}, "no axis")])
+def test_units_and_axes_that_are_none(tmp_path: Path, words: dict[str, str], message: str) -> None:
+    with pytest.raises(CalibrationError, match=message):
         import_source(video_source(tmp_path / "source"), tmp_path / "made", **words)
 
 

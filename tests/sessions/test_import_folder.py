@@ -18,8 +18,8 @@ from studio.sessions.importers.importing import import_source
 def test_videos_become_a_session(tmp_path: Path) -> None:
     source = video_source(tmp_path / "source")
     before = everything_below(source)
-    told: list[tuple[str, int, int]] = []
-    report = import_source(source, tmp_path / "made", progress=lambda *step: told.append(step))
+    reports: list[tuple[str, int, int]] = []
+    report = import_source(source, tmp_path / "made", progress=lambda *step: reports.append(step))
     session = report.session
     assert [(match.footage, match.camera) for match in report.matching] == [
         ("cam01", "cam_1"),
@@ -35,8 +35,8 @@ def test_videos_become_a_session(tmp_path: Path) -> None:
     kept = (session.path / "calibration" / "original.toml").read_bytes()
     assert kept == (source / "calibration" / "Calib.toml").read_bytes()
     assert everything_below(source) == before
-    assert {step for step, _, _ in told} >= {"reading cam01.mp4", "copying cam02.mp4 (kB)"}
-    assert all(done <= total for _, done, total in told if total)
+    assert {step for step, _, _ in reports} >= {"reading cam01.mp4", "copying cam02.mp4 (kB)"}
+    assert all(done <= total for _, done, total in reports if total)
 
 
 def test_every_optional_part_arrives(tmp_path: Path) -> None:

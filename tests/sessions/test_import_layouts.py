@@ -93,7 +93,7 @@ def recordings(folder: Path) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("write", "named", "wish", "first"),
+    ("write", "named", "wanted", "first"),
     [
         (batch, "Trial_1, Trial_2, Trial_10", "Trial_2", 20),
         (takes, "run, walk", "run", 20),
@@ -102,7 +102,7 @@ def recordings(folder: Path) -> Path:
     ],
 )
 def test_several_trials_are_named_and_one_is_chosen(
-    tmp_path: Path, write: Callable[[Path], Path], named: str, wish: str, first: int
+    tmp_path: Path, write: Callable[[Path], Path], named: str, wanted: str, first: int
 ) -> None:
     source = write(tmp_path / "source")
     with pytest.raises(FootageError, match=f"trials: .*{named}") as caught:
@@ -110,7 +110,7 @@ def test_several_trials_are_named_and_one_is_chosen(
     assert "--trial" in caught.value.hint
     with pytest.raises(FootageError, match="There is no trial 'dance'"):
         import_source(source, tmp_path / "made", trial="dance")
-    session = import_source(source, tmp_path / "made", trial=wish).session
+    session = import_source(source, tmp_path / "made", trial=wanted).session
     assert number_of(session.footage().picture("cam_1", 3)) == first + 3
     assert len(session.cameras()) == 2
 

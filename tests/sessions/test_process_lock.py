@@ -60,10 +60,10 @@ def test_another_process_holds_it_until_it_dies(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("code", "said"), [(sqlite3.SQLITE_FULL, "disk full"), (sqlite3.SQLITE_READONLY, "cannot be written")]
+    ("code", "message"), [(sqlite3.SQLITE_FULL, "disk full"), (sqlite3.SQLITE_READONLY, "cannot be written")]
 )
 def test_what_the_disk_refuses_is_not_held(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int, said: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int, message: str
 ) -> None:
     path = tmp_path / "a.lock"
     path.touch()
@@ -79,7 +79,7 @@ def test_what_the_disk_refuses_is_not_held(
         process_lock.sqlite3, "connect", lambda *given, **named: connect(*given, **named, factory=Refusing)
     )
     assert not ProcessLock.is_held(path)
-    with pytest.raises(SessionError, match=said):
+    with pytest.raises(SessionError, match=message):
         ProcessLock.take(path)
 
 

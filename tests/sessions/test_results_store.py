@@ -107,9 +107,9 @@ def test_how_a_frame_went_is_kept_and_stores_without_it_read_as_tracked(tmp_path
 def test_what_is_not_there_is_named(tmp_path: Path) -> None:
     with ResultsWriter(tmp_path) as writer, ResultsReader(tmp_path) as reader:
         write(writer, 0)
-        for ask in (lambda: reader.result(1), lambda: reader.layers(1), lambda: reader.layer(0, 3)):
+        for read in (lambda: reader.result(1), lambda: reader.layers(1), lambda: reader.layer(0, 3)):
             with pytest.raises(NotFoundError, match="has no"):
-                ask()
+                read()
 
 
 def test_fewer_particles_are_kept_the_heaviest_in_their_order_and_the_last_set_whole(tmp_path: Path) -> None:
@@ -266,9 +266,9 @@ def test_another_process_reads_while_it_is_written(tmp_path: Path) -> None:
         write(writer, 1)
         writer._connection.execute("BEGIN IMMEDIATE")
         writer._connection.execute("DELETE FROM frames")
-        told = subprocess.run(
+        finished = subprocess.run(
             [sys.executable, "-c", script, str(tmp_path)], capture_output=True, text=True, check=True
         )
         writer._connection.execute("ROLLBACK")
-    assert told.stdout.split("]")[0] == "[0, 1"
-    assert float(told.stdout.split()[-1]) == float(layer_of(1, 2).poses.sum())
+    assert finished.stdout.split("]")[0] == "[0, 1"
+    assert float(finished.stdout.split()[-1]) == float(layer_of(1, 2).poses.sum())

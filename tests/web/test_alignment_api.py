@@ -85,7 +85,7 @@ def test_measuring_is_cancelled_and_fails_in_words(
 ) -> None:
     def waits(_: Session, __: object, *, progress: Callable[[str, int, int], None]) -> None:
         while True:
-            progress("looking at silhouettes", 1, 16)
+            progress("reading silhouettes", 1, 16)
             time.sleep(0.01)
 
     monkeypatch.setattr(alignment_routes, "align_cameras", waits)

@@ -55,17 +55,17 @@ def test_progress_cancel_and_a_second_one_at_once(studio: Studio, monkeypatch: p
     def waits(
         _: Session, *__: object, progress: Callable[[str, int, int], None], **___: object
     ) -> BackgroundSetup:
-        progress("finding where nobody stands", 1, 4)
+        progress("finding empty regions", 1, 4)
         at_work.set()
         while True:
-            progress("finding where nobody stands", 2, 4)
+            progress("finding empty regions", 2, 4)
             time.sleep(0.01)
 
     monkeypatch.setattr(background_setup_routes, "set_up_background", waits)
     assert studio.client.post(f"{PLACE}/background", json={"source": "median"}).status_code == 202
     assert at_work.wait(20.0)
     job = studio.client.get(f"{PLACE}/background").json()["job"]
-    assert (job["step"], job["total"]) == ("finding where nobody stands", 4)
+    assert (job["step"], job["total"]) == ("finding empty regions", 4)
     again = studio.client.post(f"{PLACE}/background", json={"source": "median"})
     assert again.status_code == 409
     assert studio.client.delete(f"{PLACE}/background").status_code == 202

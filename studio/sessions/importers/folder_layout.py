@@ -233,7 +233,7 @@ def plan_folder(
         if not bare or calibration is not None:
             raise
         wanted, chosen = folder, False
-    said = f"calibration '{wanted.name}'" if chosen else "without a calibration"
+    calibration_note = f"calibration '{wanted.name}'" if chosen else "without a calibration"
     above = "" if folder == source else f" in '{source.name}'"
     return SourcePlan(
         source=folder,
@@ -249,7 +249,7 @@ def plan_folder(
         sigma_file=_file(folder / "sigma.csv"),
         tracker=session.tracker if session else "",
         weighting=session.weighting if session else "",
-        notes=(f"Taken for a {layout.title}: '{folder.name}'{above}, {said}.",),
+        notes=(f"Taken for a {layout.title}: '{folder.name}'{above}, {calibration_note}.",),
         layout=layout.title,
         timestamps=layout.timestamps,
         offsets={camera.name: camera.offset for camera in kept if camera.offset},

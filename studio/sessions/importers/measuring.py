@@ -228,7 +228,7 @@ def measure_source(
     used = [camera for camera in calibration.cameras if camera.name in by_camera]
     masks = _matched(plan.masks, used, "masks")
     backgrounds = _matched(plan.backgrounds, used, "backgrounds")
-    turns = turns_asked(plan, by_camera)
+    turns = requested_turns(plan, by_camera)
     check_before_decoding([by_camera[camera.name] for camera in used], fps or plan.fps)
     measured = tuple(
         _measure_camera(
@@ -385,7 +385,7 @@ def in_step(offsets: Mapping[str, int]) -> dict[str, int]:
     return {name: offset - least for name, offset in offsets.items()}
 
 
-def turns_asked(plan: SourcePlan, footage: Mapping[str, Path]) -> dict[str, Turn]:
+def requested_turns(plan: SourcePlan, footage: Mapping[str, Path]) -> dict[str, Turn]:
     """Turns by camera. footage : of every camera. Raises FootageError for names and angles that are none."""
     asked = _by_camera(plan.rotations, footage)
     return {camera: checked_turn(camera, degrees) for camera, degrees in asked.items()}
