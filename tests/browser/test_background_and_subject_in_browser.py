@@ -75,7 +75,7 @@ def test_the_background_is_set_up_and_the_views_agree(
 ) -> None:
     step(page, studio, "background")
     page.get_by_role("radio", name="Picture A picture of").check()
-    page.get_by_label("try what makes the views agree best").uncheck()
+    page.get_by_label("tune the knobs for the best agreement of the views").uncheck()
     page.get_by_role("button", name="Set up the background").click()
     page.get_by_role("button", name="Cancel").wait_for()
     expect(page.locator(".agree li")).to_have_count(4)
@@ -160,7 +160,7 @@ def test_a_height_becomes_a_body_and_the_body_is_fitted(
     page.wait_for_function("() => document.querySelector('.fitted img').naturalWidth > 0")
     shoot(page, artefacts / "way-subject-fitted.png")
     save.click()
-    expect(page.get_by_text("What was there before stays")).to_be_visible()
+    expect(page.get_by_text("The old subject is kept")).to_be_visible()
     told = studio.get("/api/sessions/person/subject")
     assert told["fitted"]
     rows = page.locator(".sizes tr").filter(has_text="thigh")

@@ -130,7 +130,7 @@ def test_calibration(way: Way, raw: Path) -> None:
     proposal = page.locator(".proposal")
     expect(proposal).to_contain_text("taken to be in m")
     expect(proposal).to_contain_text("The footage of camera cam01 is 1080x1920")
-    expect(page.locator("#step")).to_contain_text("Nothing speaks against this calibration")
+    expect(page.locator("#step")).to_contain_text("No fault found in this calibration")
     way.press("Use this calibration")
     way.stands("calibration", "done")
     way.shoot("calibration")
@@ -144,7 +144,7 @@ def test_background(way: Way, raw: Path) -> None:
     plates = sorted((raw / "calibration" / "extrinsics").glob("*.png"))
     page.get_by_label("Pictures or clips of the empty room").set_input_files(plates)
     expect(page.locator(".plates summary")).to_contain_text("4 of 4")
-    page.get_by_label("exclude what the person never comes near").check()
+    page.get_by_label("exclude regions that the person never comes near").check()
     way.press("Set up the background")
     shares = way.agreement()
     print("before the cameras are turned:", shares)
@@ -217,7 +217,7 @@ def test_track_a_first_part(way: Way) -> None:
     """The first second, with the body of the guessed height, refined."""
     tracked(way, FIRST_PART, 2000)
     way.to("check")
-    way.press("Look at the motion")
+    way.press("Check the motion")
     expect(way.page.locator(".share-strip button")).to_have_count(FIRST_PART // 10)
     made_better(way, "Refine on the silhouettes", "refined")
     way.shoot("check.first")
@@ -247,7 +247,7 @@ def test_track(way: Way) -> None:
 def test_check(way: Way) -> None:
     """Looked at, refined, smoothed: most of the model lies in the masks of every tenth frame, nobody turns round."""
     way.to("check")
-    way.press("Look at the motion")
+    way.press("Check the motion")
     expect(way.page.locator(".share-strip button")).to_have_count(FRAMES // 10)
     made_better(way, "Refine on the silhouettes", "refined")
     made_better(way, "Smooth in time", "smoothed")

@@ -149,9 +149,9 @@ def test_a_file_that_is_wrong_is_said_and_put_right(
 
 def test_what_was_used_before_comes_back_and_goes_out(window: StudioPage, tmp_path: Path) -> None:
     page = window.page
-    page.get_by_role("button", name="Look at it").click()
+    page.get_by_role("button", name="Preview").click()
     page.get_by_role("button", name="Use this calibration").wait_for()
-    page.get_by_role("button", name="Leave it").click()
+    page.get_by_role("button", name="Discard").click()
     with page.expect_download() as caught:
         page.get_by_role("button", name="Download", exact=True).click()
     caught.value.save_as(tmp_path / "got.toml")

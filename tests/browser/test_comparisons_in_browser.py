@@ -111,7 +111,7 @@ def test_it_is_watched_cancelled_and_goes_on(window: StudioPage, artefacts: Path
     told = window.studio.get("/api/comparisons/walk/long")["comparison"]
     assert told["status"] == "cancelled"
     assert 0 < told["done"] < told["total"] == 900
-    page.get_by_role("button", name="Go on", exact=True).click()
+    page.get_by_role("button", name="Resume", exact=True).click()
     page.locator(".card-box .badge", has_text="running").wait_for()
     page.get_by_role("button", name="Cancel", exact=True).click()
     page.locator(".card-box .badge", has_text="cancelled").wait_for()

@@ -59,7 +59,7 @@ def paused(window: StudioPage) -> StudioPage:
 def test_the_scene_is_seen_while_the_tracking_goes_on(window: StudioPage) -> None:
     window.until("get('work')?.state === 'paused' && get('summary')?.frames.length > 0")
     count = len(window.get("summary")["frames"])  # pyright: ignore[reportIndexIssue]
-    window.page.get_by_role("button", name="Track on", exact=True).click()
+    window.page.get_by_role("button", name="Continue", exact=True).click()
     window.until("get('work').state === 'tracking'")
     window.until(f"get('summary').frames.length > {count + 2} && get('frame') > {count}")
     window.until("get('detail')?.layers.length > 0 && get('follow')")
@@ -67,7 +67,7 @@ def test_the_scene_is_seen_while_the_tracking_goes_on(window: StudioPage) -> Non
     window.page.click("#track-toggle")
     window.until("get('work').state === 'paused'")
     window.page.locator("#state-text", has_text="paused").wait_for()
-    assert window.page.locator("#track-toggle").inner_text() == "Track on"
+    assert window.page.locator("#track-toggle").inner_text() == "Continue"
     # What is drawn of a stored frame is what the store has.
     window.key("Home")
     window.until("get('frame') === 0 && get('detail')?.frame === 0")

@@ -99,7 +99,7 @@ def test_leaps_are_called_out_and_an_old_export_is(page: Page, studio: StudioSer
     )
     write_track(run, leaping)
     step(page, studio, "check")
-    page.get_by_role("button", name="Look at the motion").click()
+    page.get_by_role("button", name="Check the motion").click()
     chip = page.get_by_role("button", name=re.compile("^5 left arm$"))
     chip.click()
     expect(chip).to_have_attribute("aria-current", "")

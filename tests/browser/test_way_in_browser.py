@@ -85,7 +85,7 @@ def test_from_raw_files_to_an_exported_motion(
     page.screenshot(path=artefacts / "way-track.png")
 
     page.keyboard.press("ArrowDown")
-    page.locator("#step button.primary", has_text="Look at the motion").click()
+    page.locator("#step button.primary", has_text="Check the motion").click()
     state_of(page, "check", "done")
     expect(page.locator(".share-strip button")).to_have_count(2)
     told = studio.get("/api/sessions/mine/runs/run-1/check")["check"]

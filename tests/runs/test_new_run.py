@@ -102,7 +102,7 @@ def test_a_run_begins_in_the_frame_of_the_start_pose(session_on_disk: Session) -
     assert given.record.first == 0
     keep_start_pose(session, body, true_poses()[0])
     assert session.start_pose_frame() == 3
-    with pytest.raises(RunError, match="is of frame 3, after the last frame wanted") as refusal:
+    with pytest.raises(RunError, match="is of frame 3, after the last requested frame") as refusal:
         prepare_run(session, RunRequest(last=2))
     assert "first frame" in refusal.value.hint
     with pytest.raises(RunError, match="has no frame 99"):

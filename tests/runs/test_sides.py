@@ -61,7 +61,7 @@ def test_legs_are_put_right_once_and_what_was_tracked_stays(
     kept = np.setdiff1d(np.arange(LAST), EXCHANGED)
     assert np.array_equal(track.poses[kept], raw.poses[kept])
     assert (track.confidence[list(EXCHANGED)] > 0.7).all()
-    assert notes_of(run)[-1].startswith("Sides were put right in track 'sides': frames 12 to 27: left")
+    assert notes_of(run)[-1].startswith("Sides were corrected in track 'sides': frames 12 to 27: left")
     looked = len(read)
     assert put_sides_right(run, problems, read.append) == words
     assert len(read) == looked

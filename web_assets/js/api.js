@@ -1,14 +1,14 @@
 // The JSON API. Errors carry the server's cause and remedy; every call names the window, whose scene it may concern.
-// What an address takes and answers is known from the API's own description (api_types.d.ts).
+// The types of requests and answers come from the API's own description (api_types.d.ts).
 
 import { windowName } from "./window.js";
 
 /** @import { Address, Answer, Body } from "./api_types" */
 
-/** An error that says what to do. */
+/** An error with a remedy. */
 export const fault = (message, hint = "", more = {}) => Object.assign(new Error(message), { hint, ...more });
 
-/** An answer, or the error that it says. */
+/** An answer, or the error that it carries. */
 export async function accepted(answer) {
   if (answer.ok) return answer;
   const { message = `The studio answered ${answer.status}.`, hint = "" } = await answer.json().catch(() => ({}));
@@ -38,7 +38,7 @@ export const put = (path, body) => call("PUT", path, body);
 export const patch = (path, body) => call("PATCH", path, body);
 /** @type {<const P extends string>(path: Address<P, "delete">) => Promise<Answer<P, "delete">>} */
 export const remove = (path) => call("DELETE", path);
-/** Send bytes as they are. */
+/** Send raw bytes. */
 export const putBytes = (path, bytes) => call("PUT", path, undefined, { body: bytes });
 
 /** @returns {`/api/sessions/${string}`} */

@@ -1,4 +1,4 @@
-// Learning a model: the form, and the card that says how far it is.
+// Learning a model: the form, and the card with its progress.
 
 import { post } from "./api.js";
 import { bar, button, card, element, failure, field, files, fill, hint, lead, NAME, number, optional, pageHead, select, sends, table } from "./elements.js";
@@ -19,7 +19,7 @@ function knobField(knob) {
 const knobGroups = (knobs) => [...Map.groupBy(knobs, (knob) => knob.group)].map(([group, members]) => element("details", { className: "card-box" },
   element("summary", {}, group), element("div", { className: "fields" }, members.map(knobField))));
 
-/** A row a run that holds something: whether it is learnt from, tested on, or left alone. */
+/** A row for each run with frames: whether it is used for learning, for the test, or not. */
 function runRows(sessions) {
   const rows = sessions.flatMap((session) => session.runs.filter((run) => run.done > 1).map((run) => {
     const source = `${session.name}/${run.name}`;
@@ -56,19 +56,19 @@ export function showLearningForm(content, { choices, sessions, started }) {
     started(await post("/api/learning", { ...request, ...upload }));
   });
   fill(content, element("div", { className: "column" },
-    pageHead("Learn a behaviour", "Recorded motion and earlier runs are put on one body, several copies with other smoothing are made, clustered into elementary movements, and their order is learnt."), form));
+    pageHead("Learn a behaviour", "Recorded motion and earlier runs are put on one body, copied with different smoothing and clustered into elementary movements, whose order is learnt."), form));
   name.focus();
 }
 
-/** How far it is, in one line. */
+/** The progress in one line. */
 export const progressWords = (job) => (isGoing(job) ? progressOf(job, "beginning").words : job.state);
 
 const shareOf = (job) => (job.total ? job.done / job.total : 0);
 
-/** The card of what is being learnt, or of why it was not. again: called for another form. */
+/** The card of the model being learnt, or of why it failed. again: called for another form. */
 export function showLearning(content, job, { cancel, again }) {
   const running = isGoing(job);
-  const ended = { cancelled: "It was cancelled; nothing of it was kept.", failed: job.message }[job.state] ?? "";
+  const ended = { cancelled: "It was cancelled; nothing was stored.", failed: job.message }[job.state] ?? "";
   const box = card("", running ? [element("p", { className: "lead words-of-progress" }, progressWords(job)), bar(shareOf(job), "long-progress")] : [failure({ message: ended }), job.hint && lead(job.hint)]);
   box.id = "learning";
   fill(content, element("div", { className: "column" }, pageHead(job.name, `body ${job.body}`, running ? button("Cancel", cancel) : button("Try again", again)), box));

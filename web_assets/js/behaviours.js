@@ -1,4 +1,4 @@
-// The page of behaviour models: a list at the left; clusters as poses, which follows which, entropies and a generated movement at the right.
+// The page of behaviour models: a list at the left; clusters as poses, transitions, entropies and a generated movement at the right.
 
 import * as echarts from "../vendor/echarts.esm.min.js";
 import { fault, fetchJson, patch, post, remove } from "./api.js";
@@ -73,16 +73,16 @@ async function show(name) {
     column(heading(detail.model), numbers(detail), card("", failure({ message: detail.problem })), entropyCard(entropies, detail));
     return drawEntropies(entropies, name);
   }
-  const automaton = element("div", { className: "drawing", role: "img", ariaLabel: "Which cluster follows which" });
+  const automaton = element("div", { className: "drawing", role: "img", ariaLabel: "Transitions between clusters" });
   const cards = clusterCards(detail);
   const walk = walkCard(pathOf(name), detail);
   column(heading(detail.model), numbers(detail),
     card("Elementary movements",
-      lead(`The frame that each cluster's Gaussian finds most likely, most frequent first, with its share of the time and how long it is stayed in. Arrows: where hands, feet and head go in ${detail.arrow_seconds} s at the cluster's mean change. Drag a body to turn all of them.`),
+      lead(`The frame that each cluster's Gaussian finds most likely, most frequent first, with its share of the time and its mean duration. Arrows: where hands, feet and head go in ${detail.arrow_seconds} s at the cluster's mean change. Drag a body to turn all of them.`),
       cards.grid, cards.more),
     walk.box,
     element("div", { className: "pair" },
-      card("What follows what", lead("One dot a cluster, as large as it is frequent; a line the stronger, the more probable the transition once the cluster is left. Choose a dot to see its pose."), automaton),
+      card("Transitions", lead("One dot for each cluster, its size by frequency; the stronger a line, the more probable the transition once the cluster is left. Choose a dot to see its pose."), automaton),
       entropyCard(entropies, detail)));
   releases.push(walk.close, drawAutomaton(automaton, detail, echarts, cards.choose), cards.close);
   await drawEntropies(entropies, name);
@@ -91,12 +91,12 @@ async function show(name) {
 function entropyCard(figure, { context_lengths: lengths }) {
   const words = lengths.map((count, length) => `${count} of ${length}`).filter((_, length) => lengths[length]);
   return card("Memory and entropy",
-    lead("The automaton learnt again from four fifths of the recordings, and how many bits a frame it needs for them and for the rest. A memory is long enough where the lines stop falling, too long where the test's rises."), figure,
+    lead("The automaton learnt again from four fifths of the recordings, and how many bits a frame it needs for them and for the rest. The memory is long enough where the lines stop falling, and too long where the test's rises."), figure,
     lead(`States by the length of their history, frames: ${words.join(", ")}.`));
 }
 
 function heading(model) {
-  const facts = model.problem ? "it cannot be read" : dotted(`body ${model.body}`, `${model.frames} frames at ${model.fps} a second`, sourcesOf(model));
+  const facts = model.problem ? "cannot be read" : dotted(`body ${model.body}`, `${model.frames} frames at ${model.fps} a second`, sourcesOf(model));
   return pageHead(model.name, facts, element("div", { className: "form-foot" }, button("Rename…", () => renameForm(model.name)), button("Delete…", () => removeForm(model.name))));
 }
 
@@ -181,7 +181,7 @@ async function refresh() {
   drawList();
 }
 
-/** The form, or how far what is being learnt is. */
+/** The form, or the progress of learning. */
 async function openNew() {
   turnTo("", "Learn a behaviour · Capture studio", "?new=");
   const choices = await fetchJson("/api/learning");
@@ -224,8 +224,8 @@ async function openFirst() {
   if (first) return show(first.name);
   turnTo("", "Behaviours · Capture studio", "");
   fill(content, nothing("No behaviour learnt yet",
-    element("p", {}, "A behaviour model says what a body tends to do: clusters of elementary movements, and an automaton that orders them. It is learnt from recorded motion (AMC, BVH, C3D) or from earlier runs, and guides every tracker."),
-    button("Learn one", () => openNew().catch(complain), "primary"), element("code", {}, "studio learn FILES... --body human25 --into dance"), element("p", {}, "What was learnt is shown here.")));
+    element("p", {}, "A behaviour model describes typical motion of a body: clusters of elementary movements, and an automaton for their order. It is learnt from recorded motion (AMC, BVH, C3D) or from earlier runs, and guides every tracker."),
+    button("Learn one", () => openNew().catch(complain), "primary"), element("code", {}, "studio learn FILES... --body human25 --into dance"), element("p", {}, "Learnt models are shown here.")));
 }
 
 async function start() {

@@ -1,4 +1,4 @@
-// What a calibration says, drawn: the cameras from above, findings, residuals.
+// A calibration drawn: the cameras from above, findings, residuals.
 
 import { element, shape } from "./elements.js";
 import { seriesColour, token } from "./theme.js";
@@ -51,9 +51,9 @@ export function rigFromAbove(rig) {
     `${rig.floor ? `Floor: ${rig.floor}. ` : ""}The shape at the origin is a person's shoulders and head.`));
 }
 
-/** What speaks against a calibration, what blocks first, each with its remedy. @param {{ findings?: any[] }} what */
+/** The findings on a calibration, blocking ones first, each with its remedy. @param {{ findings?: any[] }} what */
 export function findingList({ findings }) {
-  if (!findings.length) return element("p", { className: "all-well" }, "✓ Nothing speaks against this calibration.");
+  if (!findings.length) return element("p", { className: "all-well" }, "✓ No fault found in this calibration.");
   return element("ul", { className: "findings" }, findings.map((one) => element("li", { className: one.severity, dataset: { code: one.code } },
     element("b", {}, one.severity === "blocks" ? "Wrong" : "Doubtful"), element("p", {}, one.message), element("p", { className: "remedy" }, one.remedy))));
 }

@@ -11,7 +11,7 @@ const panel = byId("panel-cameras");
 const LAYERS = [["outline", "outlines"], ["truth", "truth"], ["mask", "mask"], ["edges", "edge map"], ["samples", "sample points"], ["particles", "particles"]];
 const shown = new Set(JSON.parse(localStorage.getItem("overlays") ?? '["outline"]'));
 let cameras = [];
-let age = 0;  // rises when a frame got another answer, so that its pictures are asked for again
+let age = 0;  // rises when a frame got another answer, so that its pictures are requested again
 
 /** A view's address: of the run's frame, or, before there is a run, the session's first picture. */
 function source(camera, height) {

@@ -1,4 +1,4 @@
-// The form of a new comparison: which trackers take part, with how many evaluations, on which frames.
+// The form of a new comparison: trackers, evaluations, frames.
 
 import { fault, post } from "./api.js";
 import { button, card, element, field, fill, nothing, number, optional, pageHead, select, sends, spring } from "./elements.js";
@@ -13,7 +13,7 @@ function readKnobs(text) {
   const knobs = {};
   for (const part of text.split(/[,\n]/).map((one) => one.trim()).filter(Boolean)) {
     const [name, ...rest] = part.split("=");
-    if (!name.trim() || !rest.join("=").trim()) throw fault(`“${part}” changes nothing.`, "Write knob=value, separate several with commas.");
+    if (!name.trim() || !rest.join("=").trim()) throw fault(`“${part}” is not a knob with a value.`, "Write knob=value, separate several with commas.");
     knobs[name.trim()] = rest.join("=").trim();
   }
   return knobs;
@@ -119,5 +119,5 @@ export function showForm(content, { sessions, choices, bodies, initial, started 
   rows.fill(initial.trackers ?? USUAL.filter((name) => known.has(name)).map((name) => ({ name })));
   takeSession();
   fill(content, element("div", { className: "column" },
-    pageHead("Compare trackers", "Same evidence, likelihood, start and seeds, and as many poses evaluated in every frame: what differs is the search. Errors are measured against the session's truth."), form));
+    pageHead("Compare trackers", "Same evidence, likelihood, start and seeds, and as many poses evaluated in every frame: only the search differs. Errors are measured against the session's truth."), form));
 }

@@ -1,4 +1,4 @@
-// One comparison: how far it is, or what came of it: table, error curves, sign tests in words, settings.
+// One comparison: its progress, or its result: table, error curves, sign tests, settings.
 
 import * as echarts from "../vendor/echarts.esm.min.js";
 import { bar, button, card, dotted, duration, element, fill, hint, lead, pageHead, spring, table } from "./elements.js";
@@ -26,7 +26,7 @@ const millimetres = (value) => value.toFixed(1);
 const seedWords = (count) => `${count} ${count === 1 ? "seed" : "seeds"}`;
 const swatch = (names, name) => element("i", { className: "swatch", style: `background: ${seriesColour(names.indexOf(name))}` });
 
-/** What a comparison is doing, as a mark. */
+/** The state of a comparison, as a badge. */
 export const badge = (status) => element("span", { className: `badge ${BADGES[status] ?? "calm"}` }, status);
 
 /** How many poses and seeds a comparison takes. */
@@ -58,7 +58,7 @@ function head({ comparison: line, fps }, actions) {
 }
 
 function progressWords(line) {
-  if (line.status === "cancelling") return "Cancelling; what is measured stays.";
+  if (line.status === "cancelling") return "Cancelling; finished trials stay.";
   const left = line.seconds_left === null ? (line.done ? "" : ", the first ones read the footage") : `, about ${duration(line.seconds_left)} left`;
   return dotted(`${line.done} of ${line.total} trials${left}`, line.step && `last: ${line.step}`);
 }
@@ -66,11 +66,11 @@ function progressWords(line) {
 function progressBox(line, actions) {
   const going = isGoing(line);
   const words = {
-    interrupted: "The studio ended before the comparison did. What is measured is kept.",
-    cancelled: "Cancelled. What is measured is kept, and it can go on.", failed: line.problem,
+    interrupted: "The studio ended before the comparison did. Finished trials are kept.",
+    cancelled: "Cancelled. Finished trials are kept, and it can be resumed.", failed: line.problem,
   };
   return card("", element("div", { className: "form-foot" }, badge(line.status), element("span", { className: "progress-words" }, going ? progressWords(line) : words[line.status] ?? ""),
-    spring(), going && line.status !== "cancelling" && button("Cancel", actions.cancel), !going && button("Go on", actions.resume, "primary")),
+    spring(), going && line.status !== "cancelling" && button("Cancel", actions.cancel), !going && button("Resume", actions.resume, "primary")),
   bar(shareOf(line), "long-progress"), !going && hint(`${line.done} of ${line.total} trials are done.`));
 }
 
@@ -106,10 +106,10 @@ function figures(result) {
 const probability = (p) => (p < 1e-4 ? "p < 0.0001" : `p = ${Number(p.toPrecision(2))}`);
 const together = (words) => element("span", { className: "together" }, words);
 
-/** The sign tests, a sentence a pair, and what they may not be taken for. */
+/** The sign tests, a sentence a pair, with their limits. */
 function signTests(result) {
   const names = result.trackers.map((one) => one.tracker);
-  if (!result.sign_tests.length) return lead("One tracker alone has nothing to be compared with.");
+  if (!result.sign_tests.length) return lead("A single tracker has nothing to compare with.");
   const lines = result.sign_tests.map(({ first, second, frames, seeds }) => {
     const ahead = frames.better >= frames.worse;
     const [winner, other] = ahead ? [first, second] : [second, first];
@@ -121,7 +121,7 @@ function signTests(result) {
   const least = 0.5 ** (result.seeds.length - 1);
   const few = least > SIGNIFICANT ? ` With ${seedWords(result.seeds.length)} the seeds' p cannot fall below ${Number(least.toPrecision(2))}; six or more can show a difference at 5 %.` : "";
   return element("ul", { className: "words" }, lines,
-    element("li", { className: "caution" }, `Sign tests, two-sided. Frames that follow each other are alike, so the frames' p is smaller than it should be: it describes, it does not prove. Seeds are independent.${few}`));
+    element("li", { className: "caution" }, `Sign tests, two-sided. Neighbouring frames are alike, so the frames' p is too small: it describes, it does not prove. Seeds are independent.${few}`));
 }
 
 function settingsBox({ comparison: line, settings, body }) {

@@ -54,7 +54,7 @@ async function track(back) {
     await remove(POSE_PATH);
     await refreshSessions();
     openSession(session, ended.made_run);
-    say(`Frame ${at} of ${run} is corrected in ${ended.made_run}${ended.state === "cancelled" ? ", as far as it came" : ""}; ${run} stays as it was.`);
+    say(`Frame ${at} of ${run} is corrected in ${ended.made_run}${ended.state === "cancelled" ? ", as far as it was tracked" : ""}; ${run} is unchanged.`);
     if (back === null) await post(`${runPath(session, ended.made_run)}/start`);
     else set({ frame: at });
   } catch (error) {

@@ -30,7 +30,7 @@ function banner(text) {
 /** A session without runs: the scene stays free, because its start pose is set there. */
 function invite(entry) {
   if (entry.next_step) fill(invitation, `${entry.name}: ${lacks(entry)}.`, button("Guided set-up", () => { location.href = setupPath(entry); }, "primary small"));
-  else fill(invitation, "No run yet. Set where the search begins under “Pose” if the session has no start pose, then", button("New run", () => newRunForm(entry), "primary small"));
+  else fill(invitation, "No run yet. Set a start pose under “Pose” if the session has none, then", button("New run", () => newRunForm(entry), "primary small"));
   invitation.hidden = false;
 }
 
@@ -49,15 +49,15 @@ function draw() {
   curtain.classList.remove("banner");
   invitation.hidden = true;
   document.body.classList.toggle("disconnected", get("connected") === false);
-  if (get("stranger")) return cover("The studio was started again", "This page belongs to the one before. Open the address that the new one printed in its terminal.");
-  if (get("connected") === false) return banner("Disconnected. What is shown is the last state; trying to reach the studio again …");
+  if (get("stranger")) return cover("The studio was started again", "This page belongs to the previous start. Open the address that the new one printed in its terminal.");
+  if (get("connected") === false) return banner("Disconnected. The last state is shown; trying to reach the studio again …");
   if (sessions?.length === 0) {
     return cover("Nothing here yet", "Import the footage of your cameras, or start with the bundled walk.",
       group(button("Open the sample", addSample, "primary"), button("From my own cameras", () => { location.href = "/way?new"; }), button("Import footage", importForm)));
   }
   if (work?.state === "lost" && work.session === get("session")) {
     const resume = () => post(`${runPath(work.session, work.run)}/start`).catch(complain);
-    return cover("The tracking process ended", `${work.message} What was tracked is kept. ${work.hint}`, group(button("Resume", resume, "primary")));
+    return cover("The tracking process ended", `${work.message} Tracked frames are kept. ${work.hint}`, group(button("Resume", resume, "primary")));
   }
   if (work?.state === "compiling" && work.session === get("session")) return cover("Compiling the kernels, once", "The first run on this machine takes about half a minute longer.", bar(0, "progress unknown"));
   curtain.hidden = true;
@@ -68,7 +68,7 @@ function keepForm(frame) {
   const path = runPath(get("session"), get("run"));
   openForm({
     heading: `Keep the new result of frame ${frame}?`, action: "Keep it", rows: [],
-    intro: "It replaces the stored one. The frames after it followed from the old result and are dropped; tracking on computes them again.",
+    intro: "It replaces the stored one. The frames after it followed from the old result and are dropped; continuing the run computes them again.",
     send: () => post(`${path}/reanneal`, { frame, keep: true }),
   });
 }

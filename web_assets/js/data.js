@@ -76,7 +76,7 @@ async function showInScene() {
   await post("/api/scene/show", shown).catch(complain);
 }
 
-/** The scene's own controls moved, or it plays: follow them, and do not send it back what it said. */
+/** The scene's own controls moved, or it plays: follow them, without sending the change back. */
 function takeScene(event) {
   if (!isShown(event.session, event.run)) return;
   if (event.follow && get("follow") && searching()) return;
@@ -125,7 +125,7 @@ function takeFrame(event) {
   set(changes);
 }
 
-/** The search came to rest: what it stands in is shown, the rest of the page asks again. */
+/** The search came to rest: show where it is, and let the rest of the page load again. */
 function takeRest(work) {
   const inside = work.state === "paused" && work.layer > 0 && layers.at(-1)?.frame === work.frame;
   if (inside && get("follow") && !get("whatIf")) showLive(work.frame, false);

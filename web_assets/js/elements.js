@@ -61,15 +61,15 @@ export function shape(tag, attributes, ...children) {
 
 /** A quiet line of explanation. */
 export const hint = (...children) => element("p", { className: "hint" }, ...children);
-/** A line that is to be noticed. */
+/** A notice. */
 export const notice = (...children) => element("p", { className: "notice" }, ...children);
-/** What a part of the page is about. */
+/** The introduction to a part of the page. */
 export const lead = (...children) => element("p", { className: "lead" }, ...children);
-/** What went wrong, and what to do; nothing where nothing did. @param {{ message: string, hint?: string } | null} error */
+/** An error with its remedy; nothing without an error. @param {{ message: string, hint?: string } | null} error */
 export const failure = (error) => error && element("p", { className: "wrong", role: "alert" }, error.message, error.hint && element("span", { className: "hint" }, ` ${error.hint}`));
-/** A place for what is there at times; it takes no room while it is empty. */
+/** A place that takes no room while it is empty. */
 export const optional = () => element("div", { className: "optional" });
-/** What stands where there is nothing yet. */
+/** The content of an empty page. */
 export const nothing = (heading, ...children) => element("div", { className: "nothing" }, element("h1", {}, heading), ...children);
 /** A part of a page in a frame, under its heading. */
 export const card = (heading, ...children) => element("section", { className: "card-box" }, heading && element("h2", {}, heading), ...children);
@@ -153,7 +153,7 @@ export function sends(form, submit, wrong, send) {
 
 // Progress.
 
-/** How far something is, as a bar. share: 0 to 1. */
+/** A progress bar. share: 0 to 1. */
 export const bar = (share, className = "progress") => element("div", { className }, element("i", { style: `width: ${Math.round(100 * (share ?? 0))}%` }));
 
 /**
@@ -195,7 +195,7 @@ export function showPicture(image, address) {
 
 // Words.
 
-/** Seconds as a person says them. */
+/** Seconds as text. */
 export function duration(seconds) {
   if (seconds === null || seconds === undefined) return "";
   if (seconds < 90) return `${Math.max(1, Math.round(seconds))} s`;

@@ -1,4 +1,4 @@
-// The run's export: which format, with which options; how far it is; the files that came of it, to be downloaded.
+// The run's export: format, options, progress, and the files to download.
 
 import { fetchJson, post, remove, runPath } from "./api.js";
 import { bar, button, byId, check, dotted, element, failure, field, fill, hint, number, select } from "./elements.js";
@@ -96,7 +96,7 @@ function fileLine(made) {
 }
 
 function fileList() {
-  if (!listing.exports.length) return element("div", { className: "export-files" }, element("p", { className: "empty" }, "No files yet. Each is read back and compared before it is offered here."));
+  if (!listing.exports.length) return element("div", { className: "export-files" }, element("p", { className: "empty" }, "No files yet. Each is read back and checked before it is listed here."));
   return element("ul", { className: "export-files" }, listing.exports.map(fileLine));
 }
 

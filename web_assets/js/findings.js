@@ -1,4 +1,4 @@
-// What experiments found: a summary with all verdicts, then each with the paper's claim beside what was seen.
+// Results of experiments: a summary with all verdicts, then each with the paper's claim beside ours.
 // Used by the report (reproduction/report_document.py) and by the studio's pages; looks are in report.css.
 
 import { duration, element, shape } from "./elements.js";
@@ -98,7 +98,7 @@ function section(experiment, echarts, charts) {
       badge(experiment.verdict, experiment.firm)),
     element("div", { className: "findings-words" },
       element("blockquote", {}, element("h3", {}, isQuestion(experiment) ? "The question" : "The paper's claim"), element("p", {}, experiment.claim)),
-      element("div", {}, element("h3", {}, "What we see"), element("p", {}, experiment.words), ...experiment.notes.map((note) => element("p", { className: "findings-note" }, note)))),
+      element("div", {}, element("h3", {}, "Our result"), element("p", {}, experiment.words), ...experiment.notes.map((note) => element("p", { className: "findings-note" }, note)))),
     failures(experiment), numbers(experiment));
   const grid = element("div", { className: "findings-charts" });
   for (const chart of experiment.charts) {

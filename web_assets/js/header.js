@@ -1,4 +1,4 @@
-// The header: which run, what the tracking process does, how far, how long still; and the buttons that command it.
+// The header: the run, the state of the tracking process, progress and time left; and its buttons.
 
 import { fetchJson, post, runPath } from "./api.js";
 import { byId, element, fill, offer } from "./elements.js";
@@ -57,7 +57,7 @@ function toggleWord(work, here, complete) {
   if (here && work.state === "tracking") return "Pause";
   if (here && work.state === "lost") return "Resume";
   if (!get("summary")?.frames.length) return "Track";
-  return complete ? "Tracked" : "Track on";
+  return complete ? "Tracked" : "Continue";
 }
 
 function drawButtons(work, here) {
@@ -82,7 +82,7 @@ export function reanneal() {
   if (!byId("reanneal").disabled) command("reanneal", { frame: get("frame") });
 }
 
-// How slowly the search goes for whoever watches it. The choices and their words are the server's, the speed in use is the
+// The speed at which the search is slowed down to be watched. The choices and their labels are the server's, the speed in use is the
 // tracking process's own.
 
 /** @type {HTMLSelectElement} */

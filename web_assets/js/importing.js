@@ -12,12 +12,12 @@ import { uploadFiles } from "./uploading.js";
 export function importForm() {
   openForm({
     heading: "Import footage", action: "Import",
-    intro: "A folder with videos/ and calibration/ (masks, background, truth, subject.toml, start_pose.csv if there are), or a bodytrack folder.",
+    intro: "A folder with videos/ and calibration/ (optional: masks, background, truth, subject.toml, start_pose.csv), or a bodytrack folder.",
     rows: [
       [{ name: "source", label: "Folder on this computer", placeholder: "full path of the folder" }],
       [{ name: "files", label: "or upload a folder", kind: "file", webkitdirectory: true, multiple: true }],
       [{ name: "name", label: "Session name", ...NAME }, { name: "fps", label: "Frames per second", kind: "number", min: 1, step: "any", hint: "needed for folders of pictures" }],
-      [{ name: "refer", kind: "check", label: "refer to the footage where it lies instead of copying it" }],
+      [{ name: "refer", kind: "check", label: "use the footage in place instead of copying it" }],
     ],
     send: async (values, report) => {
       const source = values.files.length ? { upload: await uploadFiles(values.files, report) } : { source: values.source };

@@ -1,4 +1,4 @@
-// Work in the background of the server: asked for its state until it has ended.
+// Background jobs of the server, polled until they have ended.
 
 import { fault, fetchJson } from "./api.js";
 import { dotted, duration } from "./elements.js";
@@ -6,13 +6,13 @@ import { dotted, duration } from "./elements.js";
 const POLL_MILLISECONDS = 350;
 const WORTH_SAYING = 2;
 
-/** The code of the error of what a person ended. */
+/** The error code of a cancelled job. */
 export const CANCELLED = "cancelled";
 
-/** The states of what is not over. */
+/** The states of a job that has not ended. */
 export const GOING = ["queued", "running", "cancelling"];
 
-/** Whether a job is not over. */
+/** Whether a job has not ended. */
 export const isGoing = (job) => GOING.includes(job?.state);
 
 /**

@@ -42,7 +42,7 @@ export async function newRunForm(entry, like = null) {
   const [doubt] = detail.doubts;
   openForm({
     heading: `New run of ${entry.name}`, action: "Track",
-    intro: [...(doubt ? [`The footage speaks against the calibration. ${doubt}`] : []), ...problems].join(" "),
+    intro: [...(doubt ? [`The footage contradicts the calibration. ${doubt}`] : []), ...problems].join(" "),
     rows: [
       [{ name: "tracker", label: "Tracker", choices: named(trackers), value: first.tracker }, { name: "weighting", label: "Likelihood", choices: named(weightings), value: first.weighting }],
       [{ name: "preset", label: "Preset", choices: presetChoices(presets, knobs) },

@@ -124,7 +124,7 @@ function sessionBlock(entry) {
   const title = [entry.title, entry.problem || `${entry.frame_count} frames at ${figure(entry.fps)} per second, ${entry.body}`, ...(entry.warnings ?? [])].join("\n");
   const head = line(entry.name, "head", { ariaExpanded: String(isOpen), title }, () => openSession(entry.name), (more) => sessionMenu(more, entry),
     picture, lineWords(entry.name, entry.problem || lacks(entry) || `${counted(entry.cameras, "camera")} · ${entry.frame_count} frames`));
-  const next = entry.next_step ? button("Go on in the guided set-up", () => go(setupPath(entry)), "new-run quiet small") : button("+ New run", () => newRunForm(entry), "new-run quiet small");
+  const next = entry.next_step ? button("Continue in the guided set-up", () => go(setupPath(entry)), "new-run quiet small") : button("+ New run", () => newRunForm(entry), "new-run quiet small");
   const compare = entry.has_truth && element("a", { className: "compare", href: comparisonsPath(entry) }, entry.comparisons ? counted(entry.comparisons, "comparison") : "Compare trackers");
   return element("div", { className: isOpen ? "session open" : "session" }, head,
     element("div", { className: "runs", role: "group" }, entry.runs.map((run) => runRow(entry, run)), element("div", { className: "last-line" }, next, compare)));

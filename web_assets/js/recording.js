@@ -63,7 +63,7 @@ async function show() {
 /** A card a camera: its picture, and how it stands. */
 function drawCards() {
   fill(grid, view.cameras.map((camera) => {
-    const image = element("img", { alt: `What ${camera.name} sees now`, className: "camera-picture", hidden: true });
+    const image = element("img", { alt: `Live picture of ${camera.name}`, className: "camera-picture", hidden: true });
     const made = element("figure", { className: "camera-card", dataset: { name: camera.name } }, element("div", { className: "camera-frame" }, image, element("p", { className: "camera-silence" })),
       element("figcaption", {}, element("b", {}, camera.name), element("span", { className: "badge" }), element("span", { className: "camera-facts" })));
     follow(made, image, camera.name);
@@ -98,7 +98,7 @@ function updateCard(made) {
 function spreadWords() {
   const { sets, median, most, worst, apart, lagging } = view.spread;
   if (view.cameras.length < 2 || !sets) return "";
-  const words = `Pictures of one moment come ${plain(median)} ms apart (95 %: ${plain(most)}, worst ${plain(worst)}).`;
+  const words = `Pictures of one moment arrive ${plain(median)} ms apart (95 %: ${plain(most)}, worst ${plain(worst)}).`;
   return apart ? `${words} ${apart} of the last ${sets} sets are more than half a frame apart${lagging ? `: ${lagging} lags` : ""}.` : words;
 }
 

@@ -10,8 +10,8 @@ import { startTheme } from "./theme.js";
 const FILES = { Report: "report.html", JSON: "results.json", Markdown: "summary.md" };
 
 const empty = () => nothing("Nothing reproduced yet",
-  element("p", {}, "The papers' figures and tables are run again by one command. A look at all of them takes about a quarter of an hour; without --quick the full runs take hours, and go on where they stopped."),
-  element("code", {}, "studio reproduce all --quick"), element("p", {}, "What it finds appears here, with the paper's claim beside every number."));
+  element("p", {}, "The papers' figures and tables are run again by one command. A quick pass over all of them takes about a quarter of an hour; without --quick the full runs take hours, and resume where they stopped."),
+  element("code", {}, "studio reproduce all --quick"), element("p", {}, "Results appear here, with the paper's claim beside every number."));
 
 async function start() {
   startTheme();

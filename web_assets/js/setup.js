@@ -29,13 +29,13 @@ import { startTheme } from "./theme.js";
 
 const STEPS = {
   footage: { name: "Footage", lead: "One video, or one folder of pictures, per camera, all of the same recording." },
-  calibration: { name: "Calibration", lead: "Where the cameras stand and how their lenses project, and whether that is right." },
-  background: { name: "Background", lead: "What of each picture is the person, and how far the views agree on it." },
-  subject: { name: "Subject", lead: "The body that is tracked, and its measures." },
-  "start-pose": { name: "Start pose", lead: "How the person stands in the frame where tracking begins." },
+  calibration: { name: "Calibration", lead: "Positions and lenses of the cameras, and whether they are right." },
+  background: { name: "Background", lead: "The person's mask in each picture, and how far the views agree." },
+  subject: { name: "Subject", lead: "The tracked body and its measures." },
+  "start-pose": { name: "Start pose", lead: "The person's pose in the frame where tracking begins." },
   track: { name: "Track", lead: "The motion, frame by frame." },
-  check: { name: "Check", lead: "Whether the motion fits the pictures, and what makes it better." },
-  export: { name: "Export", lead: "The motion as a file that other programs open." },
+  check: { name: "Check", lead: "Whether the motion fits the pictures, and how to improve it." },
+  export: { name: "Export", lead: "The motion as a file for other programs." },
 };
 const STATES = { done: "done", ready: "to be done", blocked: "not yet possible", stale: "to be done again", running: "running" };
 
@@ -154,7 +154,7 @@ async function drawSessions() {
 /** The form of a session that begins empty. */
 function beginForm() {
   openForm({
-    heading: "New session", action: "Begin", intro: "It begins empty; footage and calibration come next. A name has letters, digits, - and _.",
+    heading: "New session", action: "Create", intro: "It starts empty; footage and calibration come next. A name has letters, digits, - and _.",
     rows: [[{ name: "name", label: "Name", ...NAME, oninput: ({ target }) => { target.value = target.value.replace(/\s/g, "-"); } }]],
     send: async (values) => {
       const made = await post("/api/sessions", { name: values.name });
@@ -198,7 +198,7 @@ async function start() {
     const [first] = await drawSessions();
     const wanted = query.get("session") ?? first;
     if (wanted && !query.has("new")) return await open(wanted, query.get("step") ?? "");
-    fill(panel, nothing("From your own cameras", lead("From the raw footage of your cameras to a motion file, step by step. Begin with an empty session."), actions(button("New session", beginForm, "primary"))));
+    fill(panel, nothing("From your own cameras", lead("From the raw footage of your cameras to a motion file, step by step. Start with an empty session."), actions(button("New session", beginForm, "primary"))));
     if (query.has("new")) beginForm();
   } catch (error) { complain(error); }
 }

@@ -20,16 +20,16 @@ export function adder(place, setup, done) {
   const refer = check("refer to it where it lies instead of copying it", { name: "refer" });
   const fps = number("", { name: "fps", min: 1, placeholder: "as the files say" });
   const trial = text({ name: "trial", placeholder: "the only one" });
-  const replace = check("replace all cameras", { name: "replace" }, "Cameras that the new footage does not name are forgotten.");
+  const replace = check("replace all cameras", { name: "replace" }, "Cameras that are not in the new footage are removed.");
   const submit = button("Add footage", begin);
   const summary = element("summary", {});
-  const elsewhere = hint("Cameras that are connected now (USB, RTSP, MJPEG) are looked at and recorded under ", element("a", { href: "/recording" }, "Live cameras"), ".");
+  const elsewhere = hint("Connected cameras (USB, RTSP, MJPEG) can be viewed and recorded under ", element("a", { href: "/recording" }, "Live cameras"), ".");
   const folders = element("div", { className: "folder-list" });
   fill(place, summary, element("div", { className: "footage-form" },
     field("Videos, one per camera (or a zip or tar of all)", videos),
     field("or a folder: videos/, pictures, masks/, background/, calibration/; Pose2Sim, FreeMoCap, Caliscope, anipose and EasyMocap layouts too", folder),
     field("or a folder of the computer that the studio runs on", source), folders, refer,
-    element("div", { className: "step-row" }, field("Frames per second", fps), field("Trial", trial, { title: "Where a folder holds several trials." })),
+    element("div", { className: "step-row" }, field("Frames per second", fps), field("Trial", trial, { title: "For a folder with several trials." })),
     replace, actions(submit), going, wrong, elsewhere));
   source.onfocus = () => browse(source.value).catch(() => fill(folders));
 

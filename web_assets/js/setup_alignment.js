@@ -5,7 +5,7 @@ import { actions, button, dotted, drawProgress, element, failure, fill, hint, no
 import { isGoing, timeLeft } from "./jobs.js";
 import { complain } from "./messages.js";
 
-const WHY = "A tripod that was touched after the calibration turns a camera by a degree, which is twenty pixels. Silhouettes show it, without a board.";
+const WHY = "A tripod that was touched after the calibration turns a camera by a degree, or twenty pixels. Silhouettes show it, without a board.";
 const pixels = (value) => (value === null ? "–" : `${value.toFixed(1)} px`);
 
 /** The box in `place`; `changed()` is called when the session has other cameras. Returns {load, measure, stop}. @param {import("./setup.js").Setup} setup */
@@ -20,13 +20,13 @@ export function alignmentBox(setup, place, changed) {
 
   function verdict(job) {
     if (job.kept) return "The session uses the turned cameras.";
-    if (!job.needed) return "The cameras agree: nothing has to be turned.";
+    if (!job.needed) return "The cameras agree: no correction is needed.";
     return job.better ? `${job.words} Lenses and positions stay as they are.` : job.words;
   }
 
   function turning(job) {
-    const turn = job?.needed && job.better && !job.kept && button("Turn the cameras", () => change("keep"), "small", { disabled: busy, title: "The calibration before is kept; what was made with it is marked as stale." });
-    const back = alignment.turned && button("Turn them back", () => change("undo"), "small quiet", { disabled: busy, title: "Use the calibration again that the cameras were turned from." });
+    const turn = job?.needed && job.better && !job.kept && button("Turn the cameras", () => change("keep"), "small", { disabled: busy, title: "The previous calibration is kept; results made with it are marked as out of date." });
+    const back = alignment.turned && button("Turn them back", () => change("undo"), "small quiet", { disabled: busy, title: "Restore the calibration from before the cameras were turned." });
     return (turn || back) && actions(turn, back);
   }
 

@@ -16,10 +16,10 @@ const POLL_MILLISECONDS = 500;
 const PREVIEW_MILLISECONDS = 180;
 const HIGHEST_SLIDER = 5000;
 const SOURCES = {
-  combined: ["Combined", "Pictures of the empty room where there are any, the footage itself elsewhere; cleaned by what the other views see. The best where there are three cameras or more."],
-  plate: ["Picture", "A picture of the empty room from each camera, as it is."],
-  clip: ["Clip", "A short video of the empty room from each camera, as it is."],
-  median: ["Median", "What the footage itself shows most of the time. Good where the person moves about."],
+  combined: ["Combined", "Pictures of the empty room where there are any, the footage elsewhere; cleaned with the other views. The best choice with three cameras or more."],
+  plate: ["Picture", "A picture of the empty room from each camera, unchanged."],
+  clip: ["Clip", "A short video of the empty room from each camera, unchanged."],
+  median: ["Median", "The median of the footage. Good if the person moves about."],
 };
 const MISSING = { plate: "Give a picture for every camera below.", clip: "Give a clip for every camera below." };
 const FIRST = ["mask_threshold", "mask_gain_fit", "mask_shadow_test", "mask_shadow_darkest", "mask_shadow_colour", "mask_opening", "mask_closing", "mask_keep_components"];
@@ -71,7 +71,7 @@ export function mount(place, setup) {
         element("input", { type: "radio", name: "background-source", value: name, checked: name === source, disabled: !possible, onchange: () => { source = name; drawMake(); } }),
         element("span", {}, element("b", {}, label), used && element("span", { className: "badge good" }, "in use"), element("span", { className: "hint" }, possible ? words : MISSING[name])));
     });
-    return element("fieldset", { className: "choices" }, element("legend", {}, "Backgrounds are made of"), rows);
+    return element("fieldset", { className: "choices" }, element("legend", {}, "Source of the backgrounds"), rows);
   }
 
   function plates() {
@@ -93,7 +93,7 @@ export function mount(place, setup) {
     const words = make.querySelector(".upload-words");
     try {
       const upload = await uploadFiles(chosen, (text) => { words.textContent = text; });
-      words.textContent = "Looking at them…";
+      words.textContent = "Reading them…";
       background = await post(`${here}/backgrounds`, { upload, files: named });
       failed = null;
       pictures.preview(changed);
@@ -104,10 +104,10 @@ export function mount(place, setup) {
 
   function drawMake() {
     const running = isGoing(background.job);
-    fill(make, background.source === "masks" && notice("Masks came with the footage and are used as they are. Set a background up only if they are not good."),
+    fill(make, background.source === "masks" && notice("Masks came with the footage and are used unchanged. Set up a background only if they are not good."),
       sourceChoices(), plates(),
-      check("try what makes the views agree best", { checked: tune, onchange: ({ target }) => { tune = target.checked; } }, "Knobs under which the views agree best are chosen; those that you set below stay."),
-      source === "combined" && check("exclude what the person never comes near", { checked: unused, onchange: ({ target }) => { unused = target.checked; } }, "A bystander, a monitor, a window: what moves there is not the person."),
+      check("tune the knobs for the best agreement of the views", { checked: tune, onchange: ({ target }) => { tune = target.checked; } }, "Knobs that you set below stay fixed."),
+      source === "combined" && check("exclude regions that the person never comes near", { checked: unused, onchange: ({ target }) => { unused = target.checked; } }, "A bystander, a monitor, a window: motion there is not the person."),
       !running && actions(button("Set up the background", setUp, "primary", { disabled: !source })), going, failure(failed),
       (background.job?.notes ?? []).map((note) => hint(note)));
     if (running) drawGoing();
@@ -205,7 +205,7 @@ export function mount(place, setup) {
     const named = (name) => background.knobs.find((knob) => knob.name === name);
     const rest = background.knobs.filter((knob) => knob.name.startsWith("mask_") && !FIRST.includes(knob.name));
     offerKeeping();
-    fill(knobs, element("summary", {}, "Fine adjustment"), hint("The pictures follow; nothing is kept before you say so."), FIRST.map((name) => knobRow(named(name))),
+    fill(knobs, element("summary", {}, "Fine adjustment"), hint("The pictures follow; nothing is stored before you press Keep."), FIRST.map((name) => knobRow(named(name))),
       element("details", {}, element("summary", {}, "More"), rest.map(knobRow)), actions(keep, reset));
   }
 

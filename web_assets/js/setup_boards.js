@@ -19,7 +19,7 @@ function boardFields() {
   const markerField = field("Marker mm", marker, { title: "Side of a marker as measured on the print" });
   const dictionary = select(DICTIONARIES.map((name) => [name, name.replace("DICT_", "").replaceAll("_", " ").toLowerCase()]), kept.dictionary ?? "DICT_4X4_250");
   const legacy = check("old pattern", { checked: Boolean(kept.legacy) }, "Boards drawn by OpenCV before 4.6 with an even number of rows");
-  const markers = element("div", { className: "step-row" }, field("Markers", dictionary, { title: "The dictionary that the markers are of" }), legacy);
+  const markers = element("div", { className: "step-row" }, field("Markers", dictionary, { title: "The dictionary of the markers" }), legacy);
   const count = element("span", { className: "hint" });
   kind.onchange = () => {
     markerField.hidden = markers.hidden = kind.value === "chessboard";
@@ -57,7 +57,7 @@ function distanceRows(cameras, kept) {
       button("×", () => { kept.splice(index, 1); draw(); }, "quiet small", { ariaLabel: "Leave this distance out" }));
   };
   const draw = () => fill(box, kept.map(row), actions(button(kept.length ? "Another distance" : "Add a measured distance", () => { kept.push({ first: cameras[0], second: cameras[1], mm: "" }); draw(); }, "small",
-    { title: "Between two cameras' lenses, by tape. It checks the scale: a board that is not of the size that was entered is found by it." })));
+    { title: "Between two cameras' lenses, by tape. It checks the scale and so finds a wrong board size." })));
   draw();
   return box;
 }
@@ -69,13 +69,13 @@ function moreFields(cameras, inputs) {
     number(inputs.offsets[camera] ?? 0, { step: 1, min: "", oninput: ({ target }) => { inputs.offsets[camera] = Number(target.value); } }),
     { title: "Frame of this camera's common board footage that the others' frame 0 belongs to" })));
   return element("details", { className: "more-board", open: Boolean(inputs.open) }, element("summary", { onclick: () => { inputs.open = !inputs.open; } }, "More"), element("div", { className: "more-fields" },
-    field("Lenses from", place("intrinsics", "a folder, or a calibration file"), { title: "Board footage for the lenses, a video or folder of pictures a camera; or a calibration file that has them. Instead of intrinsics/" }),
+    field("Lenses from", place("intrinsics", "a folder, or a calibration file"), { title: "Board footage for the lenses, a video or folder of pictures for each camera; or a calibration file that has them. Instead of intrinsics/" }),
     field("Positions from", place("extrinsics", "a folder"), { title: "Synchronised board footage of all cameras at once. Instead of extrinsics/" }),
     field("Floor from pictures in", place("floorFolder", "a folder"), { title: "A picture a camera of the board that lies on the floor, face up; instead of a frame of the common footage" }),
     cameras.length > 1 && [distanceRows(cameras, inputs.distances),
       check("The board was recorded without stopping: use the session's offsets", { checked: Boolean(inputs.own), onchange: ({ target }) => { inputs.own = shifts.hidden = target.checked; } }, "Only where the board and the motion are one recording"), shifts],
     check("let the lenses move a little in the last adjustment", { checked: Boolean(inputs.refine), onchange: ({ target }) => { inputs.refine = target.checked; } },
-      "Lenses that were found alone may change a little where all cameras together say so; only with a board that was seen all over the pictures")));
+      "Let the final adjustment of all cameras change the lenses a little; only with a board that was seen all over the pictures")));
 }
 
 const sessionOffsets = async (session) => Object.fromEntries((await fetchJson(`${sessionPath(session)}/footage`)).cameras.map((camera) => [camera.name, camera.offset]));
@@ -108,7 +108,7 @@ export function boardForm(session, { cameras, inputs, hasFootage, isChief, uploa
   }
 
   return [
-    hint("A folder with intrinsics/ (the board close to each camera) and extrinsics/ (all cameras at once): one video or folder of pictures a camera. Either alone does, if it shows enough."),
+    hint("A folder with intrinsics/ (the board close to each camera) and extrinsics/ (all cameras at once): one video or folder of pictures for each camera. Either alone is enough if it shows the board well."),
     ...board.lines, field("Upload a folder", upload), field("or on this computer", path),
     element("div", { className: "step-row" }, field("Board on the floor in frame", floor, { title: "Frame of the common footage in which the board lies on the floor, face up; the floor can be clicked later instead" }),
       field("Plate thickness mm", thickness, { title: "Of the plate that carries the board; matters where it lies on the floor" })),

@@ -17,7 +17,7 @@ export async function brush(setup, lens, done) {
   const turns = ((lens.quarter_turns % 4) + 4) % 4;
   const stored = [lens.picture_width, lens.picture_height];
   const [width, height] = turns % 2 ? [stored[1], stored[0]] : stored;
-  const canvas = element("canvas", { width, height, tabIndex: 0, className: "brush-canvas", role: "application", ariaLabel: `What does not count of ${lens.name}. ${HELP}` });
+  const canvas = element("canvas", { width, height, tabIndex: 0, className: "brush-canvas", role: "application", ariaLabel: `Excluded regions of ${lens.name}. ${HELP}` });
   const context = canvas.getContext("2d", { willReadFrequently: true });
   /** @type {{ size: number, erasing: boolean, holding: boolean, at: number[], last: number[], undo: ImageData[] }} */
   const state = { holding: false, size: Math.round(width / 16), erasing: false, at: [width / 2, height / 2], last: null, undo: [] };
@@ -122,7 +122,7 @@ export async function brush(setup, lens, done) {
   /** Show what is excluded now. */
   async function load() {
     const answer = await fetch(place);
-    if (!answer.ok) throw fault(`What is excluded of ${lens.name} could not be read.`, "Open the brush again.");
+    if (!answer.ok) throw fault(`The excluded regions of ${lens.name} could not be read.`, "Open the brush again.");
     const picture = await createImageBitmap(await answer.blob());
     const [out] = turned(picture, turns, [width, height]);
     const read = out.getContext("2d").getImageData(0, 0, width, height);

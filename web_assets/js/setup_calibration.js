@@ -120,7 +120,7 @@ export function mount(place, setup) {
       element("p", {}, element("b", {}, present.source || "imported with the footage"), changed && element("span", { className: "quiet-text" }, ` · since ${new Date(changed).toLocaleString()}`)),
       ...notes.map((note) => notice(note)), !notes.length && stale.length > 0 && notice(`Tracked with another calibration: ${stale.join(", ")}.`),
       row("Export for other tools", format, button("Download", () => save(format.value).catch(complain))),
-      earlier.length > 0 && row("Earlier ones", back, button("Look at it", () => propose(() => post(`${here}/proposals`, { earlier: back.value })))),
+      earlier.length > 0 && row("Earlier ones", back, button("Preview", () => propose(() => post(`${here}/proposals`, { earlier: back.value })))),
     ];
   }
 
@@ -147,8 +147,8 @@ export function mount(place, setup) {
     const use = button("Use this calibration", () => apply(blocked), "primary", { disabled: blocked });
     return element("section", { className: "proposal" }, element("h2", {}, proposal.source), proposal.unit_note && hint(proposal.unit_note),
       proposal.notes.map((note) => hint(note)), proposal.points.length > 0 && hint(pointWords(proposal.points)),
-      blocked && proposal.cameras.length > 0 && check("Use it although results would be wrong", { onchange: ({ target }) => { use.disabled = !target.checked; } }),
-      actions(use, button("Leave it", () => { proposal = null; draw(); }, "quiet")));
+      blocked && proposal.cameras.length > 0 && check("Use it although results will be wrong", { onchange: ({ target }) => { use.disabled = !target.checked; } }),
+      actions(use, button("Discard", () => { proposal = null; draw(); }, "quiet")));
   }
 
   function startClicking() {
@@ -180,7 +180,7 @@ export function mount(place, setup) {
       element("div", { className: "aside-actions" }, rig.cameras.length > 1 && button("Set the floor by clicks", startClicking, "small"),
         proposal && lenses.length > 0 && setup.detail.cameras.length > 0 && button(showsBoard ? "Show the recording" : "Show the board", () => { showsBoard = !showsBoard; drawAside(); }, "small quiet")),
       rig.cameras.length > 0 && rigFromAbove(rig), element("div", { className: "pictures" }, figures),
-      coverage.length > 0 && element("h2", {}, "What the board shows"), element("div", { className: "pictures" }, coverage)));
+      coverage.length > 0 && element("h2", {}, "Coverage of the board"), element("div", { className: "pictures" }, coverage)));
   }
 
   function draw() {

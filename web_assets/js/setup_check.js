@@ -32,7 +32,7 @@ export function mount(place, setup) {
   let failed = null;
   let stopped = false;
 
-  const picker = element("input", { type: "range", min: 0, max: 0, value: 0, ariaLabel: "Looked-at frame" });
+  const picker = element("input", { type: "range", min: 0, max: 0, value: 0, ariaLabel: "Checked frame" });
   wall.tools.append(picker);
   picker.oninput = () => show(framesToSee()[Number(picker.value)]);
 
@@ -100,9 +100,9 @@ export function mount(place, setup) {
     const seen = check.covered.flat().filter((share) => share !== null);
     const covered = seen.reduce((sum, share) => sum + share, 0) / seen.length;
     const parts = [
-      check.good ? "The motion fits the pictures." : "Look at the marked frames.",
+      check.good ? "The motion fits the pictures." : "Check the marked frames.",
       `${percent(check.inside_mean)} of the model lies in the masks${seen.length ? `, ${percent(covered)} of the masks under the model: where it is little, an arm or a leg is elsewhere` : ""}.`,
-      check.turned.length ? `The body turns round suddenly ${check.turned.length} times: left and right may have changed places.` : "Left and right keep their places: no sudden turn.",
+      check.turned.length ? `The body turns round suddenly ${check.turned.length} times: left and right may be exchanged.` : "No sudden turn: left and right were not exchanged.",
       check.jumps.length ? `A limb jumps ${check.jumps.length === 1 ? "once" : `${check.jumps.length} times`}: it was lost or taken for another.` : "",
       check.jitter_mm !== null ? `The markers jitter by ${check.jitter_mm.toFixed(1)} mm.` : "",
     ];
@@ -111,7 +111,7 @@ export function mount(place, setup) {
 
   function drawFound() {
     const check = answer?.check;
-    const measure = actions(button(check ? "Measure again" : "Look at the motion", () => begin("check", { track }), check ? "quiet small" : "primary", { disabled: Boolean(job) }));
+    const measure = actions(button(check ? "Measure again" : "Check the motion", () => begin("check", { track }), check ? "quiet small" : "primary", { disabled: Boolean(job) }));
     if (!check) return fill(found, hint(`Track "${track}" of ${run.name}: every tenth frame is compared with the masks, in every view.`), measure);
     fill(found, verdict(check), strip(check), chips("Too little of the model in the masks", plain(check.poor)), chips("Lost", plain(check.lost)),
       Object.entries(check.lost_limbs).map(([limb, frames]) => chips(`The ${limb} is off the masks`, plain(frames))), chips("Doubtful", plain(check.doubtful)), chips("Sudden turns", plain(check.turned)), chips("Jumps", jumpsOf(check)), measure);
@@ -124,12 +124,12 @@ export function mount(place, setup) {
     const truth = setup.detail.has_truth;
     fill(better, element("h2", {}, "Improve the track"),
       table(["track", "jitter", ...(truth ? ["from truth"] : [])], tracks.map((line) => [
-        element("td", {}, element("label", { className: "check" }, element("input", { type: "radio", name: "setup-track", value: line.name, checked: line.name === track, ariaLabel: `Look at ${line.name}`, onchange: () => choose(line.name).catch(complain) }),
+        element("td", {}, element("label", { className: "check" }, element("input", { type: "radio", name: "setup-track", value: line.name, checked: line.name === track, ariaLabel: `Show ${line.name}`, onchange: () => choose(line.name).catch(complain) }),
           line.name === "raw" ? "raw (as searched)" : line.name), line.made_by.exchanged && hint(/** @type {any} */ (line.made_by.exchanged).join("; ")),
         line.name === answer?.usual && element("span", { className: "badge good", title: "Step Export takes this one, unless you choose another." }, "for export")),
         millimetres(line.jitter_mm), ...(truth ? [millimetres(line.mean_mm)] : [])])),
       actions(act("refine", has("refined") ? "Refine again" : "Refine on the silhouettes", "refined"), act("smooth", has("smoothed") ? "Smooth again" : "Smooth in time", "smoothed")),
-      hint("Each is kept beside what the search found. The smoothed one is exported where there is one, else the refined one, else that with its sides corrected."), failure(failed));
+      hint("Each is stored beside the tracked one. The smoothed one is exported if there is one, else the refined one, else the one with corrected sides."), failure(failed));
   }
 
   async function choose(name) {

@@ -17,10 +17,10 @@ function agreementBar(line) {
  * is known in words, `measured`, is said); `paint(camera)` opens the brush. */
 export function qualityList(quality, paint, measured = "") {
   if (!quality && measured) return [hint(`When it was last measured, ${measured}. Measure again to see every camera.`)];
-  if (!quality) return [hint("Not measured yet. No truth is needed: where one view's mask says “person”, the others must agree in space.")];
+  if (!quality) return [hint("Not measured yet. No ground truth is needed: the masks of all views must agree in the visual hull.")];
   const rows = quality.cameras.map((line) => element("li", {}, element("span", {}, line.camera), agreementBar(line), element("span", { className: "figure" }, percent(line.agreement)), line.note && hint(line.note)));
   const worst = quality.cameras.find((line) => line.camera === quality.worst);
-  const doubts = quality.doubts.length > 0 && element("div", {}, notice("The silhouettes speak against the calibration:"), findingList({ findings: quality.doubts }));
+  const doubts = quality.doubts.length > 0 && element("div", {}, notice("The silhouettes contradict the calibration:"), findingList({ findings: quality.doubts }));
   const verdict = worst
     ? element("div", { className: "notice" }, element("p", {}, remedy(worst)), button(`Exclude regions of ${worst.camera}…`, () => paint(worst.camera), "small"))
     : !doubts && hint(`Every view agrees with the others; ${quality.frames.length} frames were compared.`);
@@ -28,7 +28,7 @@ export function qualityList(quality, paint, measured = "") {
 }
 
 function remedy(line) {
-  const first = `Look at ${line.camera} first.`;
+  const first = `Check ${line.camera} first.`;
   if (line.agreement === null) return `${first} Its mask is empty: lower “mask threshold”, or give a picture of its empty room.`;
   if (line.denied > 0.05) return `${first} Its mask has holes that carve the person in all views: lower “mask threshold”, or switch “shadow test” off.`;
   if (line.covered !== null && line.covered < USABLE) return `${first} It holds something that no other view has: a bystander, a reflection, a shadow. Exclude the region, or raise “mask threshold”.`;

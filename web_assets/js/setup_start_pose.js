@@ -119,22 +119,22 @@ export function mount(place, setup) {
   function drawVerdicts() { fill(verdicts, pose?.stored && !editing && [verdict(), ...mending()]); }
 
   const editingBox = () => element("div", { className: "step-place" },
-    element("p", {}, "Drag the balls on the limbs: the body follows, its joints keep their limits. The rings turn it whole; the tab Pose has a slider for every angle, undo and a search from there."),
-    actions(button("Use this pose", () => leave(true), "primary"), button("Leave it as it was", () => leave(false), "quiet")));
+    element("p", {}, "Drag the balls on the limbs: the body follows, its joints keep their limits. The rings turn the whole body; the tab Pose has a slider for every angle, undo and a local search."),
+    actions(button("Use this pose", () => leave(true), "primary"), button("Discard", () => leave(false), "quiet")));
 
   /** How sure the pose is, in words. */
   function verdict() {
     const words = [found && `Found in frame ${found.frame}, confidence ${percent(found.confidence)}.`, better && (better.gain > 0 && better.overlap !== null
-      ? `Improved: overlap with the masks ${percent(better.overlap_before)} → ${percent(better.overlap)}.` : "The search found nothing better around it.")];
+      ? `Improved: overlap with the masks ${percent(better.overlap_before)} → ${percent(better.overlap)}.` : "The search found no better pose near it.")];
     const unsure = found && isUnsure(found);
     return element("div", { className: "start-pose-verdict" }, element("p", { className: unsure ? "notice" : "" }, words.filter(Boolean).join(" ") || `The session has a start pose, of frame ${pose.frame}.`),
-      unsure && notice("It may face the other way: look at left and right before you track."), found?.note && hint(found.note));
+      unsure && notice("It may face the other way: check left and right before you track."), found?.note && hint(found.note));
   }
 
   function mending() {
     if (frame !== pose.frame) {
       return [notice(`The start pose is of frame ${pose.frame}, where tracking begins. To begin in frame ${frame}, find or edit it here.`),
-        actions(button(`Look at frame ${pose.frame}`, () => { frame = pose.frame; draw(); }, "small"))];
+        actions(button(`Show frame ${pose.frame}`, () => { frame = pose.frame; draw(); }, "small"))];
     }
     const swatch = (side) => element("i", { className: `side-swatch ${side}` });
     const act = (label, work, className = "") => button(label, work, className, { disabled: going });

@@ -58,7 +58,7 @@ export function mount(place, setup) {
     slider.oninput = () => { take(Number(slider.value)); typed.value = String(height / 10); };
     fill(who, field("Body", select(bodies.map((one) => [one.name, one.label]), body, { onchange: ({ target }) => { body = target.value; look(); drawFit(); } })),
       field("Height (cm)", element("div", { className: "height-row" }, typed, slider)),
-      hint(`Every length follows from the height by published proportions. ${subject.fitted ? "A height that is set again replaces what was fitted." : "A guess within 3 cm will do; the fit finds the rest."}`),
+      hint(`Every length follows from the height by published proportions. ${subject.fitted ? "A new height replaces the fitted measures." : "A guess within 3 cm will do; the fit finds the rest."}`),
       actions(saveHeight), failure(failed));
   }
 
@@ -86,7 +86,7 @@ export function mount(place, setup) {
     }, PREVIEW_MILLISECONDS);
   }
 
-  const note = (shown) => (shown !== subject ? "As it would be." : shown.fitted ? "As it was fitted to the footage." : shown.saved ? "By published proportions." : "Of usual size: nothing is known of the person yet.");
+  const note = (shown) => (shown !== subject ? "Preview." : shown.fitted ? "Fitted to the footage." : shown.saved ? "By published proportions." : "Average size: no measures of the person yet.");
 
   // The fit.
 
@@ -150,8 +150,8 @@ export function mount(place, setup) {
     const frames = fit.frames.length > 1 ? `frames ${fit.frames.slice(0, -1).join(", ")} and ${fit.frames.at(-1)}` : `frame ${fit.frames[0]}`;
     return element("div", { className: "background-quality" },
       element("p", {}, `Body and silhouettes overlap by ${percent(mean(fit.overlap))} (${percent(mean(fit.overlap_before))} before), in ${frames}; first poses ${fit.poses_from.startsWith("run") ? `of ${fit.poses_from}` : fit.poses_from}.`),
-      fit.file ? hint("Saved. What was there before stays beside it as subject-before.") : actions(button("Save as the subject", keep, "primary")),
-      sizeTable("length"), sizeTable("radius"), hint("± is one standard deviation: two limbs in three, about, lie within it. Wrists and shoulders show least."));
+      fit.file ? hint("Saved. The old subject is kept beside it as subject-before.") : actions(button("Save as the subject", keep, "primary")),
+      sizeTable("length"), sizeTable("radius"), hint("± is one standard deviation: two limbs in three, about, lie within it. Wrists and shoulders are the least certain."));
   }
 
   /** The pictures of the fit: the new body over each frame, a camera each in turn. */
@@ -168,7 +168,7 @@ export function mount(place, setup) {
     drawWho();
     drawFit();
     if (fit?.state !== "done") return look();
-    drawStature(setup.aside, fit.limbs, subject.limbs, fit.file ? "Fitted and saved. Dashed: by height alone." : "As fitted. Dashed: as it was before.");
+    drawStature(setup.aside, fit.limbs, subject.limbs, fit.file ? "Fitted and saved. Dashed: by height alone." : "As fitted. Dashed: before the fit.");
     setup.aside.append(fitPictures());
   }
 

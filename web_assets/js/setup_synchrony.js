@@ -28,8 +28,8 @@ export function synchroniser(place, setup, use) {
   function found() {
     if (estimate?.state !== "done") return null;
     const same = footage.cameras.every((camera) => (estimate.offsets[camera.name] ?? 0) === camera.offset);
-    const verdict = from ? `From ${from}.` : estimate.sure ? "The estimate is sure: all pairs of cameras agree." : "The estimate is not sure: look at the pictures before you use it.";
-    return [(estimate.sure ? hint : notice)(verdict, same && " It is what is in use."), (estimate.notes ?? []).map((note) => hint(note)),
+    const verdict = from ? `From ${from}.` : estimate.sure ? "The estimate is reliable: all pairs of cameras agree." : "The estimate is not reliable: check the pictures before you use it.";
+    return [(estimate.sure ? hint : notice)(verdict, same && " These offsets are in use."), (estimate.notes ?? []).map((note) => hint(note)),
       !same && actions(button("Use these offsets", () => use(estimate.offsets), "use-estimate"))].flat();
   }
 
@@ -40,10 +40,10 @@ export function synchroniser(place, setup, use) {
     const apply = button("Apply", () => use(entered()), "apply-offsets", { hidden: true });
     const times = files({ accept: ".csv", hidden: true });
     times.onchange = () => readTimes(times.files[0]).catch(complain);
-    fill(place, element("h2", {}, "In step"), hint("The frame of each camera's file that was recorded with frame 0 of the others."),
+    fill(place, element("h2", {}, "Synchronisation"), hint("The frame of each camera's file that was recorded with frame 0 of the others."),
       table(["camera", "offset", "found"], rows(apply), "figures offsets"),
       actions(apply, button("Estimate from motion", begin, "small"), button("From timestamps.csv…", () => times.click(), "quiet small"), times),
-      bar, failure(failed), found(), footage.stale_runs.length > 0 && notice(`Tracked on the footage as it was before: ${footage.stale_runs.join(", ")}.`));
+      bar, failure(failed), found(), footage.stale_runs.length > 0 && notice(`Tracked with earlier offsets or rotations: ${footage.stale_runs.join(", ")}.`));
     if (isGoing(estimate)) drawProgress(bar, progressOf(estimate, "beginning", () => remove(`${here}/synchrony`).catch(complain)));
   }
 

@@ -107,12 +107,12 @@ export function mount(place, setup) {
     fill(form,
       field("Tracker", select(named(trackers.filter((one) => !one.needs_behaviour)), setup.detail.tracker, { name: "tracker" })),
       field("Likelihood", select(named(weightings), setup.detail.weighting, { name: "weighting" })),
-      hint("Edges and silhouette suit a room that is full of things: edges inside the masks are often the room's."),
+      hint("Edges and silhouette suit a cluttered room, where edges inside the masks are often the room's."),
       field("Effort", select(EFFORTS, "2000", { name: "evaluations" })),
       element("div", { className: "step-row" }, field("First frame", number(first, { name: "first", max: count - 1, step: 1 })), field("Last frame", number(count - 1, { name: "last", max: count - 1, step: 1 }))),
       first > 0 && hint(`The start pose is of frame ${first}: tracking begins there. The frames before it can be tracked backwards afterwards.`),
-      !known && hint("There is no start pose yet: it is looked for in the first frame, which takes a while."),
-      doubts.length > 0 && [notice(`The footage speaks against the calibration. ${doubts[0]}`), check("track all the same", { name: "despite", className: "despite" })],
+      !known && hint("There is no start pose yet: the first frame is searched for one, which takes a while."),
+      doubts.length > 0 && [notice(`The footage contradicts the calibration. ${doubts[0]}`), check("track all the same", { name: "despite", className: "despite" })],
       actions(submit), wrong);
     sends(form, submit, wrong, begin);
   }

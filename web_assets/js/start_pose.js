@@ -24,7 +24,7 @@ export function sayFound(found) {
   const unsure = isUnsure(found);
   say(`Start pose found in frame ${found.frame} (confidence ${percent(found.confidence)}), kept in ${found.file}.`, {
     kind: unsure ? "warning" : "info",
-    remedy: [unsure ? "Look at it in the scene before you track: it may face the other way." : "", found.note].filter(Boolean).join(" "),
+    remedy: [unsure ? "Check it in the scene before you track: it may face the other way." : "", found.note].filter(Boolean).join(" "),
   });
 }
 
