@@ -1,4 +1,4 @@
-"""Where a camera's picture stands in the scene, and how a viewer looks through it.
+"""The placement of a camera's picture in the scene, and the view through the camera.
 
 The picture hangs on a plane in front of its camera so that every pixel lies on its own ray: the principal
 point may be off-centre, the lens distortion is taken out of the picture (cameras in the scene are plain
@@ -56,7 +56,7 @@ class PicturePlane:
 
     @property
     def up(self) -> Array:
-        """(3,) what is up in the upright picture, as a direction in the world."""
+        """(3,) the up direction of the upright picture in the world."""
         return -Rotation.from_quat(self.wxyz, scalar_first=True).as_matrix()[:, 1]
 
     @property
@@ -119,9 +119,7 @@ class StraightPicture:
 
 
 def straight_picture(camera: Camera, source_width: int, longest_side: int) -> StraightPicture:
-    """The small straight picture of a camera whose pictures arrive `source_width` pixels wide (already
-    reduced, say).
-    """
+    """The small undistorted picture of a camera whose pictures arrive `source_width` pixels wide (perhaps reduced)."""
     longest = max(camera.width, camera.height)
     shrink = min(1.0, longest_side / longest)
     size = (max(1, round(camera.width * shrink)), max(1, round(camera.height * shrink)))

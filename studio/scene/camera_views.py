@@ -84,8 +84,8 @@ class CameraView:
     def show(
         self, tokens: ColourTokens, visible: bool = True, picture: bool = False, through: str | None = None
     ) -> None:
-        """Show or hide the camera and its picture. through : the camera that is looked through: its picture becomes
-        the backdrop, and the others are out of the way.
+        """Show or hide the camera and its picture. through : the camera that the viewers look through: its picture
+        becomes the backdrop, and the others are hidden.
         """
         is_backdrop = through == self.camera.name
         self.bars.visible = self._label.visible = visible and through is None
@@ -114,7 +114,7 @@ class CameraViews:
         }
 
     def hang(self, pictures: Mapping[str, Bytes]) -> None:
-        """Hang new pictures, by camera name; they are seen from the next `show` on."""
+        """Hang new pictures, by camera name; they appear with the next `show`."""
         for name, picture in pictures.items():
             self.views[name].hang(picture)
 
@@ -129,7 +129,7 @@ class CameraViews:
             self.place(client)
 
     def place(self, client: viser.ClientHandle) -> None:
-        """Put a viewer into the place of the camera that is looked through, or back where it was."""
+        """Put a viewer into the place of the chosen camera, or back where it was."""
         camera = client.camera
         before = (camera.position, camera.look_at, camera.up_direction, np.array(camera.fov))
         if self._through is None:
@@ -144,7 +144,7 @@ class CameraViews:
             look_at = position + plane.forward * _LOOK_DISTANCE
             fov = plane.field_of_view(camera.aspect)
         with client.atomic():
-            # A slow browser tells where it was after it was moved away; viser believes it and would leave out the
+            # A slow browser reports its old place after it was moved away; viser believes it and would skip the
             # way back to a place that it takes to be the viewer's already.
             camera.position = position + _ASIDE
             camera.position = position
@@ -155,7 +155,7 @@ class CameraViews:
 
 def frustum_mesh(plane: PicturePlane, depth: float = DEPTH, bar: float = _BAR) -> trimesh.Trimesh:
     """The camera's frame in its own upright frame, metres: four bars to the picture's corners, its four
-    edges, and a small triangle over its upper edge that says what is up.
+    edges, and a small triangle over its upper edge that shows the up direction.
     """
     corners = plane.corners * depth
     origin = np.zeros(3)

@@ -1,9 +1,8 @@
 """The one thread that owns a scene's model and its views.
 
-Whatever happens is posted as a change of the model, `change(model, *values) -> Model`, from any thread, and happens
-here, one after another; then what is new is drawn. Changes that need more than the model (files to be opened, commands
-for the tracking process) are methods of the controller of the same form. Redraws are held to 30 a second and pictures
-to 10; whatever comes in between, the newest wins.
+Changes of the model, `change(model, *values) -> Model`, are posted from any thread and applied here one after another;
+then the difference is drawn. Changes that need more than the model (files, commands for the tracking process) are
+methods of the controller of the same form. Redraws are limited to 30 a second and pictures to 10; the newest wins.
 """
 
 import logging
@@ -60,15 +59,15 @@ Array = NDArray[float64]
 
 REDRAW_SECONDS = 1.0 / 30.0
 PICTURE_SECONDS, LIVE_PICTURE_SECONDS = 1.0 / 10.0, 1.0 / 2.0
-"""Composing pictures costs a third of a core at ten times a second: a live run needs that itself."""
+"""Composing pictures ten times a second costs a third of a core, which a live run needs."""
 IDLE_SECONDS = 0.5
 _LOG = logging.getLogger(__name__)
 _WAKE = Event("", "")
 
 
 class SceneController:
-    """moved : called in the scene's thread with the selection whenever the scene's own controls, playback or the
-    tracking changed it; it returns at once.
+    """Owns a scene's model and views. moved : called in the scene's thread with the selection whenever the scene's
+    controls, playback or the tracking changed it; it must return at once.
     """
 
     def __init__(
@@ -94,7 +93,7 @@ class SceneController:
         server.on_client_connect(self._greet)
 
     def start(self) -> None:
-        """Begin to draw."""
+        """Start drawing."""
         self.post(lambda model: hear(model, self._process.state))
         self._thread.start()
 
@@ -107,12 +106,12 @@ class SceneController:
         self._close()
 
     def post(self, change: Change, *values: Any, announce: bool = True) -> None:  # noqa: ANN401 - what the change takes
-        """Let a change happen soon. told : whether `moved` hears of it; who asks from outside knows already."""
+        """Queue a change. announce : whether `moved` is called for it; callers from outside know already."""
         self._inbox.append((change, values, announce))
         self._events.put(_WAKE)
 
     def refused(self, problem: StudioError) -> None:
-        """Tell every viewer about a refusal."""
+        """Show a refusal to every viewer."""
         notify(self._server, problem.message, problem.hint, bad=True)
 
     # Changes that need more than the model.
@@ -124,9 +123,9 @@ class SceneController:
         return select(show_frame(self._open(model, session, run), frame), layer=layer)
 
     def propose_pose(self, model: Model, session: str, pose: Array, text: str, frame: int | None) -> Model:
-        """Show a start pose (D,) that was found, with its session alone, if it is one of the session's body.
+        """Show a found start pose (D,) without a run, if it fits the session's body.
 
-        It stays until a person saves it or ends the editing, opens a run or another session, or tracks.
+        It stays until the user saves it, ends the editing, opens a run or another session, or tracks.
         """
         notify(self._server, "Start pose found", text)
         model = self.show_run(model, session, "")
@@ -137,7 +136,7 @@ class SceneController:
     def begin_edit(
         self, model: Model, session: str, run: str, frame: int | None, pose: Array | None
     ) -> Model:
-        """Let the start pose of a session, or the right pose of a run's frame, be edited. pose : (D,) to begin with."""
+        """Start editing a session's start pose, or the corrected pose of a run's frame. pose : (D,) initial."""
         model = select(set_playback(self._open(model, session, run), False), follow=False)
         model = show_frame(model, frame)
         if pose is None and run and self.opened is not None:
@@ -149,7 +148,7 @@ class SceneController:
         return edit_pose(model, ended)
 
     def request_knobs(self, model: Model, changes: Mapping[str, Value]) -> Model:
-        """Ask the tracking process for knobs of the shown run; all are changed or, if one is refused, none. While
+        """Request knobs of the shown run from the tracking process; all are changed or, if one is refused, none. While
         nothing is tracked the shown frame is annealed again.
         """
         if model.knobs is None:
@@ -165,7 +164,7 @@ class SceneController:
             return refuse(model, changes)
 
     def _send_knobs(self, model: Model, wanted: Mapping[str, Value]) -> Model:
-        """Ask for knobs of the shown run and, while nothing is tracked, for its frame, in one command.
+        """Request knobs of the shown run and, while nothing is tracked, its frame, in one command.
 
         Raises StudioError without a run.
         """
@@ -189,7 +188,7 @@ class SceneController:
         notify(
             self._server,
             "Start pose saved",
-            f"Runs that are started from now on begin with it, in frame {frame}.",
+            f"New runs begin with it, in frame {frame}.",
         )
         return edit_pose(model, saved)
 
@@ -226,7 +225,7 @@ class SceneController:
         return edit_pose(model, lambda edit: moved(edit, found.pose))
 
     def _open(self, model: Model, session: str, run: str) -> Model:
-        """Open a session or run, unless it is shown already. Where that fails nothing is open."""
+        """Open a session or run, unless it is shown already. If that fails nothing is open."""
         if (session, run) == (model.selection.session, model.selection.run):
             return model
         same_place = model.subject is not None and model.selection.session == session
@@ -239,7 +238,7 @@ class SceneController:
             return nothing
         place = self._workspace.session(session)
         if not (place.has_footage and place.is_calibrated):
-            # Nothing to be placed in the room yet: the guided set-up says what is next.
+            # Nothing to place in the room yet: the guided set-up shows the next step.
             return opened(model, session, "", None)
         found = self.opened = OpenedRun(place, place.run(run) if run else None)
         self.views = SceneViews(
@@ -297,7 +296,7 @@ class SceneController:
                     self._guarded(draw)
 
     def _patience(self) -> float:
-        """How long to wait for events: until the next redraw that is due, or until something happens."""
+        """Seconds to wait for events: until the next redraw is due."""
         now = time.monotonic()
         rest = REDRAW_SECONDS if self.model.playback.playing else IDLE_SECONDS
         return min((drawing.waits(now) for drawing in self._drawings if drawing.is_wanted), default=rest)
@@ -314,7 +313,7 @@ class SceneController:
                 self._stopping.wait(REDRAW_SECONDS)
 
     def _take_posts(self) -> None:
-        """Let happen what was posted; of a drag only the newest place, so that solving never lags behind the hand."""
+        """Apply the posted changes; of a drag only the newest, so that solving never lags behind the hand."""
         while self._inbox:
             change, values, announce = self._inbox.popleft()
             if change is drag and self._inbox and not values[-1]:
@@ -334,8 +333,8 @@ class SceneController:
             return model
         frame = event.result.frame
         self.opened.forget_from(frame)
-        # The newest event wins, so some frames may not have been heard of; and one that takes the place of an older
-        # answer drops what had followed from that.
+        # The newest event wins, so some frames may have had no event; and a frame that replaces an older result
+        # drops the frames that followed from it.
         newest = model.frames[-1] if model.frames else self.opened.span[0] - 1
         frames = (*model.frames, frame) if frame == newest + 1 else tuple(self.opened.frames())
         return hear(model, event, frames)
@@ -357,7 +356,7 @@ class SceneController:
             self._moved(self.model.selection)
 
     def _guarded(self, action: Callable[[], Any]) -> Any:  # noqa: ANN401 - what the action gives
-        """Do something without letting it end the thread: the scene must outlive a file that cannot be read."""
+        """Call an action and handle its errors, so that an unreadable file does not end the thread."""
         try:
             return action()
         except StudioError as problem:
@@ -396,13 +395,13 @@ class SceneController:
 
 
 class Due:
-    """A drawing that is wanted or not, at most once in `pause` seconds."""
+    """A redraw, pending or not, at most once in `pause` seconds."""
 
     def __init__(self, pause: float) -> None:
         self.pause, self.is_wanted, self._last = pause, False, float("-inf")
 
     def is_due(self, now: float) -> bool:
-        """Whether it is wanted and its pause is over."""
+        """Whether it is pending and its pause is over."""
         return self.is_wanted and now - self._last >= self.pause
 
     def waits(self, now: float) -> float:
@@ -410,17 +409,17 @@ class Due:
         return max(0.0, self._last + self.pause - now)
 
     def done(self, now: float) -> None:
-        """It was drawn."""
+        """Note that it was drawn."""
         self._last, self.is_wanted = now, False
 
 
 def picture_pause(state: StateChanged) -> float:
-    """How long pictures are left as they are."""
+    """Seconds between two updates of the pictures."""
     return LIVE_PICTURE_SECONDS if state.live is not None and state.state == "tracking" else PICTURE_SECONDS
 
 
 def subject_of(found: OpenedRun) -> Subject:
-    """What a model needs to know of what was opened."""
+    """The model's subject for an opened session or run."""
     try:
         mirror = Mirror(found.body)
     except BodyError:

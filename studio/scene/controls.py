@@ -1,4 +1,4 @@
-"""What stands between viser's inputs and the model: a person's hand is reported, the model's value is shown."""
+"""Connects viser's inputs with the model: user input is reported, the model's value is shown."""
 
 from collections.abc import Callable
 from typing import Any
@@ -8,11 +8,11 @@ import viser
 from studio.scene.model import Model
 
 Change = Callable[..., Model]
-"""(model, *values) to the model after it."""
+"""(model, *values) to the changed model."""
 
 
 Post = Callable[..., None]
-"""post(change, *values): lets a change happen in the scene's thread, soon; from any thread, returns at once."""
+"""post(change, *values): queues a change for the scene's thread; from any thread, returns at once."""
 
 
 class Control:
@@ -55,7 +55,7 @@ class Control:
 
 
 def on_press(handle: Any, post: Post, change: Change) -> None:  # noqa: ANN401 - a button or a group of them
-    """Let a press of a button change the model; of a group with the pressed one's word."""
+    """Change the model when a button is pressed; for a group with the label of the pressed one."""
     is_group = isinstance(handle, viser.GuiButtonGroupHandle)
 
     async def report(event: viser.GuiEvent) -> None:

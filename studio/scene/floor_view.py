@@ -1,4 +1,4 @@
-"""The floor: a slab that takes shadows, with half-metre lines, under everything that the cameras see."""
+"""The floor: a slab that takes shadows, with half-metre lines, under the cameras' field of view."""
 
 from collections.abc import Sequence
 

@@ -1,8 +1,8 @@
-"""What a frame's hull and blobs are made of, in a thread of its own: looking at them never holds up scene or search.
+"""A frame's visual hull and blobs, computed in a separate thread, so that they never delay scene or search.
 
-The hull is carved from the evidence of the run's own settings. In a run that is weighed by blobs it is the run's very
-hull, with the blobs fitted from the shown answer and the memory that came into the frame; in every other run the blob
-weighting's default knobs carve it.
+The hull is carved from the evidence of the run's own settings. In a run with the likelihood `blobs` it is the run's own
+hull, with the blobs fitted from the shown result and the memory that came into the frame; in other runs it is carved
+with the default knobs of that likelihood.
 """
 
 import contextlib
@@ -35,16 +35,16 @@ BLOBS = "blobs"
 FEWEST_VIEWS = 2
 KEPT = 6
 REST_SECONDS = 20.0
-"""After so long without a request, the footage and background models are given back."""
+"""Footage and background models are released after so many seconds without a request."""
 LEAST_PAUSE_SECONDS, LONGEST_PAUSE_SECONDS = 0.05, 0.5
-"""Between two frames: as long as the last one took, so that at most half a core goes into it."""
+"""Pause between two frames in times of the last one's duration, so that at most half a core is used."""
 NICENESS = 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameVolume:
-    """hull : of the frame. model : the blobs that the run knew then, fitted : to the voxels; None without blobs, the
-    latter also where nothing is seen.
+    """The hull of a frame with its blobs. model : the blobs that the run had then; fitted : to the voxels; None without
+    blobs, the latter also in an empty hull.
     """
 
     frame: int
@@ -86,7 +86,7 @@ class FrameVolumes:
         self._thread: threading.Thread | None = None
 
     def of(self, moment: Moment, settings: RunSettings, *, blobs: bool) -> FrameVolume | None:
-        """The volume of a moment; until it is made, the one that was shown before. blobs : wanted with the hull."""
+        """The volume of a moment; until it is made, the one shown before. blobs : requested with the hull."""
         frame = self._opened.span[0] if moment.frame is None else moment.frame
         request = self._request_for(frame, moment.pose, settings, blobs=blobs and has_blobs(settings))
         with self._lock:
@@ -142,8 +142,8 @@ class FrameVolumes:
         try:
             if len(opened.cameras) < FEWEST_VIEWS and len(root_parameters(opened.body)):
                 raise StudioError(
-                    "One camera makes no visual hull of a body that moves about.",
-                    "Hulls are shown of sessions with two cameras or more.",
+                    "One camera makes no visual hull.",
+                    "Visual hulls need two cameras or more.",
                 )
             problems = problems or ProblemSource(opened.session, opened.body, opened.cameras)
             made = _volume(problems, request)
@@ -175,14 +175,14 @@ def _volume(problems: ProblemSource, request: _Request) -> FrameVolume:
 
 
 def _carving(settings: RunSettings) -> RunSettings:
-    """The settings that carve the hull of a run that is weighed otherwise: its own evidence, default knobs."""
+    """The settings for the hull of a run with another likelihood: its own evidence, default knobs."""
     return dataclasses.replace(
         default_settings(settings.tracker_name, BLOBS), evidence=settings.evidence, recovery=settings.recovery
     )
 
 
 def _step_back() -> None:
-    """Let this thread use one core, and only what others leave."""
+    """Limit this thread to one core at low priority."""
     numba.set_num_threads(1)
     if hasattr(os, "setpriority"):
         with contextlib.suppress(OSError):

@@ -1,6 +1,6 @@
 """A viser server that only our own relay can talk to.
 
-viser has no authentication and no check of origins, listens on every address unless told otherwise and lets
+viser has no authentication and no check of origins, listens on every address by default and lets
 any client open a public tunnel. Here it listens on the loopback address at a free port, refuses sockets
 that do not carry a secret header (which only the web application's relay knows), and never opens a tunnel.
 """
@@ -31,21 +31,20 @@ class GuardedServer(viser.ViserServer):
             super().__init__(host="127.0.0.1", port=0, label="Capture studio", verbose=False)
         # Appended after viser's own callbacks, all of which run before the first message is sent or read.
         self._websock_server.on_client_connect(self._refuse_strangers)
-        # A client that slipped in before the guard stood would be dropped here, and refused when it comes
-        # back.
+        # A client that connected before the guard was set is dropped here, and refused when it reconnects.
         self._websock_server.disconnect_all_clients()
 
     def relay_headers(self) -> dict[str, str]:
-        """What the relay must send when it opens the socket; never written to a log or a page."""
+        """The headers that the relay must send when it opens the socket; never written to a log or a page."""
         return {RELAY_HEADER: self._relay_secret}
 
     @property
     def is_viewed(self) -> bool:
-        """Whether a browser is connected, be it only just."""
+        """Whether a browser is connected."""
         return bool(self._websock_server._live_connections)
 
     def request_share_url(self, verbose: bool = True) -> str | None:
-        """None: the scene is never published, whoever asks."""
+        """None: the scene is never published."""
         return None
 
     def stop(self) -> None:
@@ -68,8 +67,8 @@ class GuardedServer(viser.ViserServer):
 
 @contextlib.contextmanager
 def _quietly() -> Iterator[None]:
-    """viser prints its own address and its end, told to be quiet or not: a second address would mislead people."""
-    # One at a time: two that overlap would leave the console quiet for good.
+    """Silences viser, which prints its own address and its end even when not verbose: a second address would mislead."""
+    # One at a time: two that overlap would leave the console silent for good.
     with _CONSOLE:
         console = rich.get_console()
         before, console.quiet = console.quiet, True

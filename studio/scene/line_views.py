@@ -49,7 +49,7 @@ class TruthView(LinesView):
         self.links = np.array(marker_links(body, names), dtype=np.int64).reshape(-1, 2)
 
     def show(self, positions_mm: Array | None, tokens: ColourTokens) -> None:
-        """Join the markers (M, 3) mm; None hides them; a marker that is NaN takes its lines along."""
+        """Join the markers (M, 3) mm; None hides them; a marker that is NaN hides its lines."""
         points = np.zeros((0, 3)) if positions_mm is None else positions_mm * METRES_PER_MM
         segments = points[self.links] if len(points) else np.zeros((0, 2, 3))
         seen = segments[np.isfinite(segments).all(axis=(1, 2))]

@@ -1,8 +1,8 @@
-"""What a window's scene shows, as one immutable value, and every way in which it changes, as plain functions.
+"""The model of a window's scene, one immutable value, and all its changes, plain functions.
 
-Whatever happens (a person moves a control, the page asks, the tracking process reports, time goes by) is a function
-of the model and of what happened: `change(model, *values) -> Model`. Nothing here reads files, talks to viser or
-looks at a clock: the controller does, in one thread, and the views draw what the model says.
+Every event (a moved control, a request of the page, a report of the tracking process, passing time) is a function
+`change(model, *values) -> Model`. Nothing here reads files, uses viser or a clock: the controller does, in one thread,
+and the views draw the model.
 """
 
 import bisect
@@ -27,13 +27,13 @@ Array = NDArray[float64]
 
 SEARCHING = ("tracking", "compiling")
 NEAR_THE_END = 3
-"""Whoever goes to one of the last frames while more are tracked goes on following."""
+"""A viewer who goes to one of the last frames while more are tracked keeps following."""
 REMEMBERED = 256
 
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """What a window is about. session, run : names, "" while none is open. frame : None while there is none.
+    """The selection of a window. session, run : names, "" while none is open. frame : None while there is none.
 
     layer : one layer's cloud, None for all together. limb, parameter, camera : names. particle : a row of the layer's
     cloud. look_through : the camera whose place the viewers take, None for the free view. follow : the frame moves on
@@ -57,7 +57,7 @@ class Selection:
 class ViewOptions:
     """The choices of the Show tab and of the page.
 
-    body, body_opacity : the answer's cones. stored : the stored answer as a grey cage beside a re-annealed one.
+    body, body_opacity : the answer's cones. stored : the stored result as a grey cage beside a re-annealed one.
     truth : the reference's stick figure. particles : the clouds, at the far ends of `limbs` (names; None: the
     extremities'), coloured by "layer" or "weight". point_size : metres. trails : paths of `trail_markers` (None: the
     extremities') over `trail_frames` frames before and after the shown one (0: all). cameras, pictures : frusta and
@@ -100,7 +100,7 @@ class Playback:
 class LiveSearch:
     """The layers so far of the frame in progress, or of one that is annealed again.
 
-    frame : None while nothing is known. reannealed : a what-if beside the stored answer. result : None until the
+    frame : None while there is none. reannealed : a what-if beside the stored result. result : None until the
     frame is finished.
     """
 
@@ -111,7 +111,7 @@ class LiveSearch:
 
     @property
     def pose(self) -> Array | None:
-        """(D,) the answer so far: the result's pose, else the mean of the newest layer."""
+        """(D,) the pose so far: the result's, else the mean of the newest layer."""
         if self.result is not None:
             return self.result.estimate.pose
         return self.records[-1].mean if self.records else None
@@ -124,7 +124,7 @@ class LiveSearch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Subject:
-    """What is open: a session, or a run of it. span : its frames, half open. mirror : None for a body without sides."""
+    """An open session, or a run of it. span : its frames, half open. mirror : None for a body without sides."""
 
     body: BodyModel
     cameras: tuple[str, ...]
@@ -153,8 +153,8 @@ class Subject:
 class Knobs:
     """settings : in use. since : the frame and layer since which, None as the run began.
 
-    requested : changes that wait for the tracking process's answer, by its identifier, oldest first. drafts : text
-    that was refused and stays, so that it can be finished.
+    requested : changes waiting for the tracking process's answer, by identifier, oldest first. drafts : refused text
+    that stays in its field, so that it can be completed.
     """
 
     settings: RunSettings
@@ -173,8 +173,8 @@ class Knobs:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Model:
-    """All that a scene shows. search : how the tracking process stands. subject, knobs, edit : None while nothing is
-    open. frames : the stored ones, ascending.
+    """Everything that a scene shows. search : state of the tracking process. subject, knobs, edit : None while nothing
+    is open. frames : the stored ones, ascending.
     """
 
     search: StateChanged
@@ -228,7 +228,7 @@ def opened(
     edit: PoseEdit | None = None,
 ) -> Model:
     """Another session or run is open: its newest frame is shown. subject : None where there is nothing to draw."""
-    # Refusals of what was requested before are still told; its values are of another run.
+    # Refusals of earlier requests are still reported; their values are of another run.
     requested = {} if model.knobs is None else {key: {} for key in model.knobs.requested}
     return replace(
         model,
@@ -279,12 +279,12 @@ def look_through(model: Model, camera: str | None) -> Model:
 
 
 def camera_clicked(model: Model, camera: str) -> Model:
-    """Look through a camera, or no longer if that is done already."""
+    """Look through a camera, or stop looking through it."""
     return look_through(model, None if camera == model.selection.look_through else camera)
 
 
 def change_options(model: Model, changes: Mapping[str, object]) -> Model:
-    """Show other things, by the names of `ViewOptions`."""
+    """Change what is shown, by the names of `ViewOptions`."""
     options = replace(model.options, **changes)  # pyright: ignore[reportArgumentType]
     return model if options == model.options else replace(model, options=options)
 
@@ -319,7 +319,7 @@ def set_playback(
 
 
 def advance(model: Model, seconds: float) -> Model:
-    """Let time go by: what is played moves on."""
+    """Advance the playback by `seconds`."""
     if model.subject is None or not model.playback.playing:
         return model
     after, frame = played(model.playback, seconds * model.subject.fps, model.selection.frame, model.frames)
@@ -352,7 +352,7 @@ def played(
 
 
 def hear(model: Model, event: Event, frames: tuple[int, ...] = ()) -> Model:
-    """Take an event. frames : what is stored now, where a frame was finished."""
+    """Apply an event of the tracking process. frames : stored now, if a frame was finished."""
     if isinstance(event, StateChanged):
         return _hear_state(model, event)
     if model.knobs is None or (event.session, event.run) != (model.selection.session, model.selection.run):
@@ -377,14 +377,14 @@ def _hear_state(model: Model, state: StateChanged) -> Model:
     if state.state == "lost" and model.knobs is not None:
         model = replace(model, knobs=replace(model.knobs, requested={}))
     if model.is_searched and model.is_searching and not before:
-        model = edit_pose(model, ended)  # what is searched is to be seen now
+        model = edit_pose(model, ended)  # show the search
     return model
 
 
 def searched_on(live: LiveSearch, event: LayerFinished | FrameFinished) -> LiveSearch:
     """The search after another layer or its result.
 
-    A layer of another frame, of the other kind, or with a number that was there already begins anew.
+    A layer of another frame, of the other kind, or with a known number starts again.
     """
     if isinstance(event, FrameFinished):
         same = (live.frame, live.reannealed) == (event.result.frame, event.reannealed)
@@ -403,7 +403,7 @@ def searched_on(live: LiveSearch, event: LayerFinished | FrameFinished) -> LiveS
 
 
 def request(model: Model, identifier: str, changes: Mapping[str, Value]) -> Model:
-    """The tracking process was asked for knobs."""
+    """Note requested knobs."""
     assert model.knobs is not None
     waiting = dict([*model.knobs.requested.items(), (identifier, changes)][-REMEMBERED:])
     drafts = {name: value for name, value in model.knobs.drafts.items() if name not in changes}
@@ -411,7 +411,7 @@ def request(model: Model, identifier: str, changes: Mapping[str, Value]) -> Mode
 
 
 def settle(model: Model, identifier: str, taken: bool) -> Model:
-    """The tracking process answered: the values are in use, or those before are shown again."""
+    """Apply the tracking process's answer: the values are in use, or the earlier ones are shown again."""
     if model.knobs is None or identifier not in model.knobs.requested:
         return model
     waiting = dict(model.knobs.requested)
@@ -423,7 +423,7 @@ def settle(model: Model, identifier: str, taken: bool) -> Model:
 
 
 def refuse(model: Model, changes: Mapping[str, Value]) -> Model:
-    """Knobs cannot be changed: they show what is in use, but half-written text (a list of numbers, say) stays."""
+    """Reject a change of knobs: they show the values in use, but incomplete text (such as a list of numbers) stays."""
     if model.knobs is None:
         return model
     texts = {knob.name for knob in all_knobs(model.knobs.settings) if knob.kind is str and not knob.choices}

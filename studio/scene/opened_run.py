@@ -1,4 +1,4 @@
-"""A session and one of its runs, opened for looking: everything the scene draws comes from here."""
+"""A session and one of its runs, opened for display: the source of everything that the scene draws."""
 
 from collections import OrderedDict
 from collections.abc import Sequence
@@ -26,11 +26,11 @@ _KEPT_FRAMES = 8
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moment:
-    """What there is to draw at a frame (None while there is none). pose : (D,) drawn as the body.
+    """The content of the scene at a frame (None while there is none). pose : (D,) drawn as the body.
 
-    beside : (D,) the stored answer while a re-annealed one, or another track's, is shown. records : the layers whose
-    clouds are drawn. layer_count : how many layers the frame takes. truth : (M, 3) mm. tracking : how a stored frame
-    went, "" unknown. edited : whether the pose is edited, and no answer.
+    beside : (D,) the stored result while a re-annealed one, or another track's, is shown. records : the layers whose
+    clouds are drawn. layer_count : how many layers the frame takes. truth : (M, 3) mm. tracking : the tracking
+    state of a stored frame, "" unknown. edited : whether the pose is being edited and is no result.
     """
 
     frame: int | None
@@ -60,7 +60,7 @@ class OpenedRun:
 
     @property
     def span(self) -> tuple[int, int]:
-        """The frames to be looked at, half open: the run's, else the footage's."""
+        """The frames to show, half open: the run's, else the footage's."""
         if self.run is not None:
             return self.run.record.first, self.run.record.last
         return 0, self.session.manifest.footage.frame_count
@@ -81,7 +81,7 @@ class OpenedRun:
         return self._results[frame]
 
     def layers(self, frame: int) -> list[LayerRecord]:
-        """The stored layers of a frame; those of an unfinished frame are read anew each time."""
+        """The stored layers of a frame; those of an unfinished frame are read again each time."""
         if frame in self._layers:
             return self._layers[frame]
         if self.results is None:
@@ -95,7 +95,7 @@ class OpenedRun:
         return found
 
     def forget_from(self, frame: int) -> None:
-        """Read a frame and all later ones anew when they are asked for again."""
+        """Forget a frame and all later ones, so that they are read again."""
         for kept in (self._results, self._layers):
             for known in [one for one in kept if one >= frame]:
                 del kept[known]
@@ -112,7 +112,7 @@ class OpenedRun:
         return (RAW,) if self.run is None else track_names(self.run)
 
     def track_key(self, track: str) -> tuple[str, int]:
-        """The track that is shown where `track` is asked for, and a number that changes when it is made anew."""
+        """The track shown when `track` is requested, and a number that changes when it is made again."""
         if self.run is None or track == RAW or track not in self.tracks():
             return RAW, 0
         return track, track_stamp(self.run, track)
@@ -126,7 +126,7 @@ class OpenedRun:
         return found.poses[row] if row < len(found.frames) and found.frames[row] == frame else None
 
     def _read_track(self, track: str) -> Track | None:
-        """A derived track, read again when it was made anew; None where there is none or it cannot be read."""
+        """A derived track, read again when it was made again; None where there is none or it cannot be read."""
         key = self.track_key(track)
         if self.run is None or key[0] == RAW:
             return None
@@ -175,8 +175,8 @@ class OpenedRun:
     ) -> Moment:
         """The moment at `frame`: stored, in progress, annealed again, or a pose being edited.
 
-        live : used where it is about this frame. edited : (D,) shown instead of an answer. layers : how many a frame
-        takes with the settings in use. track : whose poses are shown of stored frames, where it has one.
+        live : used if it is of this frame. edited : (D,) shown instead of a result. layers : number of a frame with
+        the settings in use. track : whose poses are shown of stored frames, where it has one.
         """
         truth = None if frame is None else self.truth_at(frame)
         if edited is not None:

@@ -1,4 +1,4 @@
-"""viser's panel: which run is shown and how it stands, and under it the tabs. The page carries the transport."""
+"""viser's panel: the shown run and its state, and below them the tabs. The page has the transport controls."""
 
 from html import escape
 
@@ -18,15 +18,15 @@ from studio.worker.events import StateChanged
 PANEL_WIDTH = 310
 MARKS = {
     LOST: ("bad", "the tracker is off the body and searches for it"),
-    LIMB_LOST: ("warn", "a limb is off, the silhouettes deny it"),
-    NO_EVIDENCE: ("text-quiet", "nothing is to be seen, the pose is held"),
+    LIMB_LOST: ("warn", "a limb is contradicted by the silhouettes"),
+    NO_EVIDENCE: ("text-quiet", "no evidence, the pose is held"),
     RECOVERED: ("good", "the body was found again"),
 }
 STATE_WORDS = {"reannealing": "annealing again", "lost": "worker lost", "compiling": "compiling, once"}
 
 
 class Panel:
-    """All controls. request, refine, save : what needs more than the model, see the parts."""
+    """All controls. request, refine, save : changes that need more than the model, see the parts."""
 
     def __init__(
         self, server: viser.ViserServer, post: Post, request: Request, refine: Change, save: Change
@@ -38,14 +38,14 @@ class Panel:
         self.mark = gui.add_html("", visible=False)
         tabs = gui.add_tab_group()
         search, show, weighting, masks, pose = (
-            tabs.add_tab(name) for name in ("Search", "Show", "Weighting", "Masks", "Pose")
+            tabs.add_tab(name) for name in ("Search", "Show", "Likelihood", "Masks", "Pose")
         )
         self.settings = SettingsPanel(gui, search, weighting, masks, post, request)
         self.options = ShowPanel(gui, show, post)
         self.pose = PosePanel(gui, pose, post, refine, save)
 
     def show(self, model: Model, moment: Moment | None, tokens: ColourTokens) -> None:
-        """Bring every control to a model."""
+        """Show a model in every control."""
         self.status.content = status_html(model)
         self.mark.content = mark_html(model, moment, tokens)
         self.mark.visible = bool(self.mark.content)
@@ -70,7 +70,7 @@ def dress(server: viser.ViserServer, tokens: ColourTokens) -> None:
 
 
 def notify(server: viser.ViserServer, title: str, body: str, *, bad: bool = False) -> None:
-    """Show every viewer a notification that goes away by itself."""
+    """Show every viewer a notification that disappears after a while."""
     for client in server.get_clients().values():
         client.add_notification(
             title, body, auto_close_seconds=8.0 if bad else 4.0, color="red" if bad else "green"
@@ -78,7 +78,7 @@ def notify(server: viser.ViserServer, title: str, body: str, *, bad: bool = Fals
 
 
 def status_html(model: Model) -> str:
-    """Which run is shown and how it stands: two quiet lines."""
+    """The shown run and its state: two lines."""
     selection, state, subject = model.selection, model.search, model.subject
     if subject is None or model.is_searched or state.state == "lost":
         return search_html(state)
@@ -90,7 +90,7 @@ def status_html(model: Model) -> str:
 
 
 def search_html(state: StateChanged) -> str:
-    """How the run stands that the tracking process has open, how fast it goes, how long it takes still."""
+    """The state, rate and time left of the run that the tracking process has open."""
     if not state.run:
         return _two_lines("No run is open", "Open one in the list on the left.")
     name = f"{state.session} / {state.run} — {STATE_WORDS.get(state.state, state.state)}"
@@ -106,8 +106,8 @@ def search_html(state: StateChanged) -> str:
 
 
 def mark_html(model: Model, moment: Moment | None, tokens: ColourTokens) -> str:
-    """How the shown frame went, where it did not simply go on, in the colour of its mark on the timeline; of a start
-    pose that was found, how sure it is.
+    """The tracking state of the shown frame, unless it was simply tracked, in the colour of its mark on the timeline;
+    for a found start pose its confidence.
     """
     if model.edit is not None and model.edit.found:
         title, words, colour = "start pose", model.edit.found, tokens["good"]

@@ -21,13 +21,13 @@ Array = NDArray[np.float64]
 
 FAR_END = 1
 MOST_DRAWN = 4000
-"""Particles drawn of a layer; of larger sets every second, third, … (the store keeps 2000 unless told otherwise)."""
+"""Particles drawn of a layer; of larger sets every second, third, … (the store keeps 2000 by default)."""
 
 
 @dataclass(frozen=True, slots=True)
 class CloudStyle:
     """limbs : indices into the body's drawn limbs whose far ends are shown. colour_by : "layer" or "weight".
-    layer : the only layer to show, None for all. layer_count : how many layers a frame takes (colours). point_size :
+    layer : the only layer to show, None for all. layer_count : layers of a frame (colours). point_size :
     metres.
     """
 

@@ -1,4 +1,4 @@
-"""A pose that a person edits: a start pose, or the right pose of a run's frame. A value and plain functions."""
+"""A pose being edited: a start pose, or the corrected pose of a run's frame. A value and plain functions."""
 
 from dataclasses import dataclass, replace
 
@@ -18,13 +18,13 @@ MIRROR, ROUND = "mirror left / right", "turn round"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseEdit:
-    """start, original, pose : (D,) the start pose, what `RESET` goes back to, and the pose as it is now.
+    """start, original, pose : (D,) the start pose, the one that `RESET` restores, and the current one.
 
-    active : whether it is edited now; otherwise it waits to be gone on with. frame : of the run that is corrected,
-    None: the start pose. past : earlier poses, newest last. source : what moved the pose last; all that one source
-    does in a row is undone at once. grip : the limb that carries the gizmo, "" none. held : the limb being dragged,
-    "" the root. refining : how far the search around the pose is, 0 to 1. found : of a pose that was found
-    automatically, how sure it is.
+    active : whether it is edited now; otherwise editing can be resumed. frame : of the run being corrected, None: the
+    start pose. past : earlier poses, newest last. source : of the last change; consecutive changes from one source are
+    undone together. grip : the limb that carries the gizmo, "" none. held : the limb being dragged, "" the root.
+    refining : progress of the search around the pose, 0 to 1. found : confidence of an automatically found pose, as
+    text.
     """
 
     start: Array
@@ -46,12 +46,12 @@ class PoseEdit:
 
 
 def edit_of(pose: Array) -> PoseEdit:
-    """A start pose (D,) that nobody edits yet."""
+    """A start pose (D,) that is not edited yet."""
     return PoseEdit(pose, pose, pose)
 
 
 def begun(edit: PoseEdit, pose: Array | None = None, frame: int | None = None, found: str = "") -> PoseEdit:
-    """Edit the start pose, or the right pose of a frame. pose : (D,) to begin with or to go on to; None: as it is."""
+    """Edit the start pose, or the corrected pose of a frame. pose : (D,) to start from; None: the current one."""
     if not edit.active or frame != edit.frame:
         first = pose if frame is not None else edit.start if edit.frame is not None else None
         if first is not None:
@@ -66,7 +66,7 @@ def ended(edit: PoseEdit) -> PoseEdit:
 
 
 def moved(edit: PoseEdit, pose: Array, source: str = "") -> PoseEdit:
-    """Take a pose (D,). source : see `PoseEdit`; "": this change is undone by itself."""
+    """Take a pose (D,). source : see `PoseEdit`; "": this change is undone separately."""
     edit = replace(edit, active=True)
     if np.array_equal(pose, edit.pose):
         return edit
@@ -109,5 +109,5 @@ def changed_whole(edit: PoseEdit, change: str, mirror: Mirror | None) -> PoseEdi
 
 
 def saved(edit: PoseEdit) -> PoseEdit:
-    """The pose was stored as the start pose: it is the original now."""
+    """The edit after its pose was stored as the start pose, which is the original now."""
     return replace(edit, start=edit.pose, original=edit.pose)

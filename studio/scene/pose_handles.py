@@ -1,4 +1,4 @@
-"""What a person takes hold of in the scene: a ball on every limb's end, a gizmo on the chosen one and on the root."""
+"""The handles of a pose in the scene: a ball on every limb's end, a gizmo on the chosen one and on the root."""
 
 from dataclasses import replace
 
@@ -53,7 +53,7 @@ class PoseHandles:
         self.root.on_update(root_dragged)
 
     def show(self, edit: PoseEdit, tokens: ColourTokens) -> None:
-        """Put everything where the body is, or out of sight while it is not edited."""
+        """Move the handles to the body, or hide them while it is not edited."""
         self._grip = edit.grip
         points = self._dragger.points(edit.pose) * METRES_PER_MM
         root = self._dragger.root_frame(edit.pose)
@@ -61,7 +61,7 @@ class PoseHandles:
             ball.visible = edit.active and grip.name != edit.grip
             ball.position, ball.color = point, tokens[f"limb-{grip.side}"]
         self.gizmo.visible = edit.active and edit.grip in self._names
-        # What is being dragged is where the hand is; to move it would pull it out of the hand.
+        # A handle being dragged is not moved, because that would pull it away from the cursor.
         if edit.grip in self._names and edit.held != edit.grip:
             self.gizmo.position = points[self._names.index(edit.grip)]
         self.root.visible = edit.active and root is not None

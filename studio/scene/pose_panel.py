@@ -1,4 +1,4 @@
-"""The Pose tab: what is edited, buttons for the whole pose, and a slider for every entry of it, in degrees and mm."""
+"""The Pose tab: buttons for the whole pose, and a slider for every parameter, in degrees and mm."""
 
 import math
 
@@ -44,8 +44,8 @@ class PosePanel:
             self.grip = Control(
                 grips, post, lambda model, name: take_hold(model, "" if name == NO_GRIP else name)
             )
-            self.back = gui.add_button_group("step", (UNDO, RESET), hint="One change back, or all of them.")
-            hint = "Left and right exchanged where it stands, or facing the other way as well."
+            self.back = gui.add_button_group("step", (UNDO, RESET), hint="Undo one change, or all of them.")
+            hint = "Exchange left and right in place, or turn the body to face the other way."
             self.whole = gui.add_button_group("whole body", (MIRROR, ROUND), hint=hint)
             hint = "A short search around the pose in this frame's pictures."
             self.refine = gui.add_button("Refine from here", hint=hint)
@@ -57,7 +57,7 @@ class PosePanel:
         on_press(self.save, post, save)
 
     def show(self, model: Model) -> None:
-        """Show the pose and what can be done with it."""
+        """Show the pose and enable the possible actions."""
         edit, subject = model.edit, model.subject
         if edit is None or subject is None:
             return
@@ -118,7 +118,7 @@ def stored_value(parameter: Parameter, shown: float) -> float:
 
 
 def slider_limits(parameter: Parameter, shown: float) -> tuple[float, float]:
-    """The slider's ends in degrees or mm: the body's limits, or a usual reach where there are none; a value outside
+    """The slider's ends in degrees or mm: the body's limits, or a default range without limits; a value outside
     (a start pose need not keep limits) widens them.
     """
     reach = _FREE_ANGLE_DEG if parameter.kind == "angle" else _REACH_MM

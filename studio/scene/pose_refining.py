@@ -1,4 +1,4 @@
-"""The short search around an edited pose, in a thread of its own, so that the scene goes on meanwhile."""
+"""The short search around an edited pose, in a separate thread."""
 
 import logging
 import math
@@ -17,8 +17,8 @@ _LOG = logging.getLogger(__name__)
 
 
 class PoseRefining:
-    """One search, under way. progress : called with the share that is done. done : called with this object and what
-    came of it, a `BetterPose` or the reason why there is none. Both are called in the search's thread.
+    """A search in progress. progress : called with the share done. done : called with this object and the result, a
+    `BetterPose` or an error. Both are called in the search's thread.
     """
 
     def __init__(
@@ -54,14 +54,14 @@ class PoseRefining:
         threading.Thread(target=search, name="pose-refining", daemon=True).start()
 
     def stop(self) -> None:
-        """End it soon; nothing is reported any more."""
+        """Stop the search; nothing more is reported."""
         self._stopping.set()
 
 
 def outcome(found: BetterPose) -> str:
-    """What came of a search, in words."""
+    """The result of a search as text."""
     if found.gain <= 0.0:
-        return "The pose was the best one around already."
+        return "No better pose was found nearby."
     if math.isfinite(found.overlap_before) and math.isfinite(found.overlap):
         return f"Overlap with the masks {100.0 * found.overlap_before:.0f} % → {100.0 * found.overlap:.0f} %."
     return "A better pose was found nearby."

@@ -34,7 +34,7 @@ STEP_ROWS = 10
 
 
 class Recording(NamedTuple):
-    """What a recording holds. seconds : its length. messages : (time, message) in order, as viser decodes them."""
+    """The content of a recording. seconds : its length. messages : (time, message) in order, as viser decodes them."""
 
     seconds: float
     messages: list[tuple[float, dict]]
@@ -43,7 +43,7 @@ class Recording(NamedTuple):
 def record_scene(task: ExportTask) -> Written:
     """Write the scene's recording, as a page if the file ends so, and read it back.
 
-    Raises ExportError where it does not hold the limbs where they were.
+    Raises ExportError if the limbs in the file are not where they were.
     """
     server = GuardedServer()
     try:
@@ -111,7 +111,7 @@ def _checked(task: ExportTask, recording: Recording) -> str:
     """Compare where the limbs are in each frame of the file with where they were."""
     motion = task.motion
     places = {f"{BODY}/{limb.name}": index for index, limb in enumerate(motion.body.drawn)}
-    # A limb stands at the origin until it is moved; what does not change is not said again.
+    # A limb stands at the origin until it is moved; unchanged values are not repeated.
     moved: dict[int, list[tuple[float, Array]]] = {index: [(-1.0, np.zeros(3))] for index in places.values()}
     for at, message in recording.messages:
         if message.get("type") == "SetPositionMessage" and message.get("name") in places:
@@ -120,7 +120,7 @@ def _checked(task: ExportTask, recording: Recording) -> str:
     worst = 0.0
     for index, steps in moved.items():
         times = np.array([at for at, _ in steps])
-        # What stands in a frame is the last that was said by its time; half a frame absorbs rounding.
+        # A frame shows the last value up to its time; half a frame absorbs rounding.
         rows = np.searchsorted(times, motion.times + 0.5 / motion.fps) - 1
         shown = np.array([place for _, place in steps])[rows]
         worst = max(worst, float(np.linalg.norm(shown - wanted[:, index], axis=1)[motion.known].max()))

@@ -1,7 +1,7 @@
 """The viser scene of one window, behind the web application's relay.
 
-Building viser blocks for some milliseconds: in a thread. All methods may be called from any thread; they post what is
-requested to the scene's own thread and return.
+Building viser blocks for some milliseconds, so do it in a thread. All methods may be called from any thread; they post
+the request to the scene's own thread and return.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 
 class SceneServer:
-    """The scene as one window sees it. process : the tracking process, shared by all windows.
+    """The scene of one window. process : the tracking process, shared by all windows.
 
     moved : called with every move that the scene's own controls, its playback or the tracking make, in the scene's
     thread; it returns at once. Moves made through `show_run` and its like are not reported.
@@ -58,12 +58,12 @@ class SceneServer:
         return self._server.is_viewed
 
     def relay_headers(self) -> Mapping[str, str]:
-        """The secret that the inner server asks of whoever connects."""
+        """The secret that the inner server requires of every connection."""
         return self._server.relay_headers()
 
     @property
     def shown(self) -> Selection:
-        """What is shown now."""
+        """The current selection."""
         return self._controller.model.selection
 
     def show_run(
@@ -109,8 +109,8 @@ class SceneServer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Editing:
-    """What is being edited. frame : of the run that is corrected, None: the session's start pose. pose : (D,). moved :
-    whether it is another pose than it was.
+    """A pose being edited. frame : of the run being corrected, None: the session's start pose. pose : (D,). moved :
+    whether it differs from the original.
     """
 
     session: str
@@ -121,14 +121,14 @@ class Editing:
 
 
 class ScenePoses:
-    """Poses that are shown to the scene's viewers to be judged and edited; they may be used from any thread."""
+    """Poses shown in the scene for review and editing; thread-safe."""
 
     def __init__(self, controller: SceneController) -> None:
         self._controller = controller
 
     @property
     def editing(self) -> Editing | None:
-        """What is being edited now, None while nothing is."""
+        """The pose being edited, or None."""
         model = self._controller.model
         edit, selection = model.edit, model.selection
         if edit is None or not edit.active:
@@ -136,17 +136,15 @@ class ScenePoses:
         return Editing(selection.session, selection.run, edit.frame, edit.pose.copy(), edit.is_moved)
 
     def propose(self, session: str, pose: Sequence[float], text: str, frame: int | None = None) -> None:
-        """Show a start pose (D,) that was found for a session. said : how sure it is, for the viewers. frame : that it
-        was found in.
-        """
+        """Show a start pose (D,) found for a session. text : its confidence, for the viewers. frame : of the pose."""
         given = np.array(pose, dtype=np.float64)
         self._controller.post(self._controller.propose_pose, session, given, text, frame)
 
     def edit(
         self, session: str, run: str = "", frame: int | None = None, pose: Sequence[float] | None = None
     ) -> None:
-        """Let the viewers edit a session's start pose, or the right pose of a run's frame. pose : (D,) to begin
-        with, or to go on with where that is being edited already; None: the one that is shown there.
+        """Start editing a session's start pose, or the corrected pose of a run's frame. pose : (D,) to start from, or
+        to continue with; None: the shown one.
         """
         given = None if pose is None else np.array(pose, dtype=np.float64)
         self._controller.post(self._controller.begin_edit, session, run, frame, given)

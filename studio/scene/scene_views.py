@@ -1,4 +1,4 @@
-"""All that stands in the scene of one opened session or run: made when it is opened, moved from then on."""
+"""All objects in the scene of an opened session or run: made when it is opened, then only moved."""
 
 import time
 from collections.abc import Callable
@@ -26,8 +26,8 @@ from studio.tracking.tracker import LOST, NO_EVIDENCE
 Array = NDArray[np.float64]
 
 DOUBTFUL, EDITED, STORED = 0.35, 0.6, 0.35
-"""Opacity of a body that is held where it was last seen or known to be elsewhere, of one that is edited (so that what
-is behind a limb can be taken hold of), and of the stored answer beside another."""
+"""Opacity of a body that is held or known to be lost, of one being edited (so that handles behind a limb can be
+grasped), and of the stored result beside another."""
 TRAIL_SECONDS = 1.0
 _VIEW_ELEVATION = 0.34
 _LEAST_DISTANCE, _MOST_DISTANCE = 2.6, 9.0
@@ -74,7 +74,7 @@ class SceneViews:
             self._composer.close()
 
     def show(self, model: Model, moment: Moment, tokens: ColourTokens) -> None:
-        """Draw everything but the pictures, in one step for the viewers."""
+        """Draw everything but the pictures, as one update for the viewers."""
         subject, knobs, options = model.subject, model.knobs, model.options
         if subject is None or knobs is None:
             return
@@ -105,7 +105,7 @@ class SceneViews:
             self.floor.show(tokens, through is None)
 
     def hang_pictures(self, model: Model, moment: Moment, tokens: ColourTokens) -> None:
-        """Compose the pictures of a moment and hang them on the cameras; one that cannot be made stays as it was."""
+        """Compose the pictures of a moment and hang them on the cameras; one that cannot be made stays unchanged."""
         subject, knobs, options, selection = model.subject, model.knobs, model.options, model.selection
         if subject is None or knobs is None or not (options.pictures or selection.look_through):
             return
@@ -134,7 +134,7 @@ class SceneViews:
             self.cameras.show(tokens, options.cameras, options.pictures, selection.look_through)
 
     def look_at_person(self, *, move_viewers: bool) -> None:
-        """Where a viewer begins: in front of the person, between two cameras, a little above the eyes' height."""
+        """Set the first view: in front of the person, between two cameras, a little above eye height."""
         position, middle = first_view(
             self._person * METRES_PER_MM,
             [camera.centre * METRES_PER_MM for camera in self._opened.cameras],

@@ -18,11 +18,11 @@ from studio.tracking.catalogue import presets
 FOREMOST = 6
 NO_PRESET = "choose …"
 FIRST_SPAN = 5
-"""A slider over a range far wider than usual moves in leaps: it first spans so many times the default, and grows when
-it is drawn to its end."""
+"""A slider over a very wide range would be too coarse: it first spans this multiple of the default, and grows when it
+reaches its end."""
 
 Request = Callable[[Model, Mapping[str, Value]], Model]
-"""Asks the tracking process for knobs; those that are shown already are left out."""
+"""Requests knobs from the tracking process; unchanged ones are left out."""
 
 
 class SettingsPanel:
@@ -46,7 +46,7 @@ class SettingsPanel:
         self.preset: Control | None = None
 
     def show(self, knobs: Knobs) -> None:
-        """Show the values in use and requested; the controls are made anew only where other knobs are needed."""
+        """Show the values in use and requested; the controls are rebuilt only for other knobs."""
         made_for = (knobs.settings.tracker_name, *values(knobs.settings))
         if made_for != self._made_for:
             self._build(knobs.settings)
@@ -125,7 +125,7 @@ class KnobInput:
         self._control = Control(
             self.handle, post, lambda model, moved: request(model, {knob.name: knob_value(knob, moved)})
         )
-        # A group of one button: as slight as what it resets, and in line with it.
+        # A group of one button is small and stands in line with its input.
         self.reset = gui.add_button_group(" ", (f"reset to {in_words(knob, knob.default)}",), visible=False)
         on_press(self.reset, post, lambda model, _: request(model, {knob.name: knob.default}))
 
@@ -143,9 +143,9 @@ class KnobInput:
 
 
 def since_in_words(knobs: Knobs) -> str:
-    """Since when the settings are in use."""
+    """Since when the settings are in use, as text."""
     if knobs.since is None:
-        return "_Settings as the run began._"
+        return "_Settings from the start of the run._"
     return f"_In use since frame {knobs.since[0]}, layer {knobs.since[1] + 1}._"
 
 

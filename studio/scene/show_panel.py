@@ -1,4 +1,4 @@
-"""The Show tab: what is drawn in the scene, and what its colours mean."""
+"""The Show tab: the content of the scene, and a legend of its colours."""
 
 from collections.abc import Callable
 from html import escape
@@ -15,22 +15,22 @@ from studio.scene.opened_run import Moment
 
 OVERLAY_WORDS = {"edges": "edge map", "samples": "sample points", "outline": "outlines"}
 SWITCHES = (
-    ("body", "body", "The answer's cones: left limbs cyan, right limbs yellow, torso and head magenta."),
+    ("body", "body", "The body's cones: left limbs cyan, right limbs yellow, torso and head magenta."),
     ("truth", "truth", "The reference as a stick figure, where the session has one."),
-    ("stored", "stored answer", "The stored answer as a grey cage while a re-annealed one is shown."),
+    ("stored", "stored result", "The stored result as a grey cage while a re-annealed one is shown."),
     ("particles", "particles", "Every layer's own particles at the chosen limb ends."),
-    ("trails", "trails", "Where the chosen joints went."),
+    ("trails", "trails", "Paths of the chosen joints."),
     ("cameras", "cameras", "The cameras; click one to look through it."),
     ("pictures", "pictures", "The pictures on the cameras."),
     (
         "hull",
         "visual hull",
-        "What the silhouettes leave of space in this frame, as voxels in their mean colours; with the body over it.",
+        "The visual hull of this frame as voxels in their mean colours, with the body over it.",
     ),
     (
         "blobs",
         "coloured blobs",
-        "Blobs fitted to the voxels, in the colours learnt; as cages those that the shown pose has of itself.",
+        "Blobs fitted to the voxels, in their learnt colours; as cages those of the shown pose.",
     ),
 )
 POINT_SIZE = "point_size"
@@ -100,7 +100,7 @@ class ShowPanel:
         handle: viser.GuiInputHandle,
         meant: Callable[[float], object] = lambda value: value,
     ) -> None:
-        """meant : what an input's value is as the option."""
+        """meant : converts an input's value to the option's."""
         self.inputs[name] = Control(
             handle, self._post, lambda model, value: change_options(model, {name: meant(value)})
         )
@@ -136,5 +136,5 @@ def legend_html(tokens: ColourTokens, colour_by: str, layers: int, truth: bool) 
 
 
 def css(colour: tuple[int, int, int]) -> str:
-    """An RGB colour as a style sheet writes it."""
+    """An RGB colour in CSS notation."""
     return "#{:02x}{:02x}{:02x}".format(*colour)

@@ -2,8 +2,8 @@
 
 Voxels are instances of one box, in their own sizes and mean colours. Blobs are instances of one ball, drawn out to
 `BLOB_REACH` standard deviations: a solid cylinder's reaches its surface at two. The blobs fitted to the frame's voxels
-are solid and wear the colours that were learnt, those that the shown pose makes of the body stand beside them as cages
-in the colours of their limbs' sides.
+are solid and wear the colours that were learnt, those of the shown pose are cages in the colours of
+their limbs' sides.
 """
 
 import numpy as np
@@ -31,7 +31,7 @@ UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 class VolumeView:
-    """Hull and blobs of one moment; what is drawn already is not sent again."""
+    """Hull and blobs of one moment; unchanged parts are not sent again."""
 
     def __init__(self, server: viser.ViserServer, body: BodyModel) -> None:
         self._server, self._body = server, body
@@ -47,7 +47,7 @@ class VolumeView:
     def show(
         self, volume: FrameVolume | None, pose: Array | None, tokens: ColourTokens, *, hull: bool, blobs: bool
     ) -> None:
-        """Draw what there is of a volume. pose : (D,) whose own blobs are drawn. hull, blobs : what is wanted."""
+        """Draw a volume. pose : (D,) whose blobs are drawn. hull, blobs : whether each is shown."""
         voxels = volume.hull if volume is not None and hull else None
         model = volume.model if volume is not None and blobs else None
         fitted = volume.fitted if volume is not None and blobs else None

@@ -17,12 +17,12 @@ from studio.worker.control import StudioControl
 MOST_SCENES = 32
 """A scene takes two threads, six file descriptors and about 25 MB with four cameras of 640 × 480."""
 GRACE_SECONDS = 60.0
-"""How long a scene outlives its window: a page that is loaded again finds it as it was."""
+"""Seconds that a scene outlives its window, so that a reloaded page finds it unchanged."""
 _LOG = logging.getLogger(__name__)
 
 
 class TooManyScenesError(StudioError):
-    """As many windows as the studio serves show a scene already."""
+    """Raised when too many windows show a scene."""
 
     status, code = 503, "windows"
 
@@ -76,11 +76,11 @@ class WindowScenes:
             return entry.scene
 
     def open_scenes(self) -> dict[str, SceneServer]:
-        """The scenes that there are, by window."""
+        """The open scenes by window."""
         return {window: entry.scene for window, entry in list(self._entries.items())}
 
     def close_unused(self, windows: Collection[str]) -> None:
-        """Close the scenes that had no viewer and no window for a while. windows : those that are there."""
+        """Close the scenes that had no viewer and no window for a while. windows : open ones."""
         now = time.monotonic()
         with self._lock:
             for window, entry in self._entries.items():

@@ -1,1 +1,1 @@
-"""What is kept on disk: manifests, importers, runs and their results."""
+"""Sessions on disk: manifests, importers, runs and their results."""

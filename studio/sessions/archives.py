@@ -1,4 +1,4 @@
-"""Footage out of an archive and its wrapping. An archive is not believed: counted, limited, and nothing leads out.
+"""Unpacks footage from an archive. Archives are untrusted: sizes are limited, and no path leads outside.
 
 Sizes in an archive's index are claims, so the bytes are counted as they are written. Links, devices, encrypted entries,
 names that lead out and names that appear twice are refused before anything is written.
@@ -72,8 +72,8 @@ def only_archive(folder: Path) -> Path | None:
 
 
 def unwrapped(folder: Path, parts: Collection[str]) -> Path:
-    """The folder itself, without folders that hold nothing but it. parts : patterns of names (small letters) that are
-    no wrapping, even of a folder that stands alone.
+    """The folder without wrapping folders that contain only one folder. parts : name patterns (lower case) that are no
+    wrapping, even alone.
     """
     while len(inside := [path for path in folder.iterdir() if not is_litter(path.name)]) == 1:
         if not inside[0].is_dir() or any(fnmatch(inside[0].name.lower(), part) for part in parts):
@@ -90,7 +90,7 @@ def is_litter(name: str) -> bool:
 def unpack(archive: Path, folder: Path, limits: ArchiveLimits | None = None) -> int:
     """Unpack a zip or tar into `folder`, which must be empty, and return the bytes written.
 
-    Raises ArchiveError, PathRefused; what was written until then is the caller's to remove.
+    Raises ArchiveError, PathRefused; the caller then removes what was written.
     """
     allowed = limits or ArchiveLimits()
     words = ("an archive that can be unpacked", "Pack the folder again.")
@@ -110,7 +110,7 @@ def unpack(archive: Path, folder: Path, limits: ArchiveLimits | None = None) -> 
 
 
 def unpacked(folder: Path) -> Path:
-    """A folder, or what its only archive holds, which is removed then. Raises ArchiveError, PathRefused."""
+    """A folder, or the content of its only archive, which is removed then. Raises ArchiveError, PathRefused."""
     archive = only_archive(folder)
     if archive is None:
         return folder
@@ -127,7 +127,7 @@ def unpacked(folder: Path) -> Path:
 
 @contextlib.contextmanager
 def folder_of(source: Path, parts: Collection[str], beside: Path) -> Iterator[Path]:
-    """A source's folder: itself, or what an archive holds, unpacked beside `beside` for as long as it is in use.
+    """A source's folder: itself, or the content of an archive, unpacked beside `beside` while it is in use.
 
     parts : as of `unwrapped`. Raises ArchiveError, PathRefused.
     """
@@ -179,7 +179,7 @@ def _tar_entry(tar: tarfile.TarFile, member: tarfile.TarInfo) -> _Entry:
 
 
 def _checked(found: Iterator[_Entry], limits: ArchiveLimits) -> list[_Entry]:
-    """All entries. A tar's index is what lies before each file, so it is refused as soon as it claims too much."""
+    """All entries. A tar's index is spread over the file, so it is refused as soon as it claims too much."""
     entries: list[_Entry] = []
     seen: set[str] = set()
     claimed = 0

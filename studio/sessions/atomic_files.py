@@ -1,4 +1,4 @@
-"""Files that are either the old version or the new one, whatever happens in between.
+"""Atomic file replacement: a file is either the old version or the new one.
 
 The new content goes to a temporary file in the same folder, is flushed to the disk, and then takes the old
 one's place in one step (`os.replace`); syncing the folder makes the step itself last through a power cut.
@@ -21,8 +21,7 @@ PARTIAL_PREFIX = ".partial-"
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Put `content` at `path`, replacing what was there in one step. Raises OSError; then the old file
-    stands."""
+    """Write `content` to `path`, atomically. Raises OSError; then the old file is unchanged."""
     handle, temporary = tempfile.mkstemp(prefix=PARTIAL_PREFIX, dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as stream:
@@ -93,7 +92,7 @@ def taken(place: Path) -> SessionError:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make renames inside `folder` last; a system without folder handles is left alone."""
+    """Make renames inside `folder` durable; does nothing on systems without folder handles."""
     try:
         handle = os.open(folder, os.O_RDONLY)
     except OSError:
@@ -115,7 +114,7 @@ def unwritable(what: str, path: Path, error: OSError | sqlite3.Error) -> Session
     if is_full(path, error):
         return SessionError(
             f"{what} '{path}' cannot be written: disk full ({_reason(error)}).",
-            "Make room on the disk and go on from there; what was finished before is kept.",
+            "Make room on the disk and resume; finished work is kept.",
         )
     return SessionError(
         f"{what} '{path}' cannot be written ({_reason(error)}).",

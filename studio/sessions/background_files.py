@@ -1,9 +1,9 @@
-"""What a session knows of its empty room: backgrounds a camera, excluded regions, and how masks are made.
+"""A session's files for masks: backgrounds by camera, excluded regions, and knobs.
 
 background/…                 plates and clips; the manifest names the one in use
 exclusions/<camera>.png      white where nothing counts: a bystander, a monitor
 evidence.json                knobs of `evidence.settings` that new runs of the session start with, and the
-                             backgrounds as they were given, where cleaned ones are in use
+                             given backgrounds, where cleaned ones are in use
 """
 
 import dataclasses
@@ -31,7 +31,7 @@ Knob = bool | int | float | str
 
 
 class SessionEvidence(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """knobs : by flat name. given : camera to the background as it was given, where a cleaned one is in use."""
+    """knobs : by flat name. given : camera to the given background, where a cleaned one is in use."""
 
     schema: int = SCHEMA_VERSION
     knobs: dict[str, Knob] = {}
@@ -62,8 +62,8 @@ def given_backgrounds(session: Session) -> Session:
 
 
 def use_cleaned(session: Session, contents: Mapping[str, Bytes]) -> Session:
-    """Keep cleaned backgrounds (H, W, 3) by camera as `background/<camera>-clean.png` and use them from now on; what
-    was in use before is remembered as given.
+    """Store cleaned backgrounds (H, W, 3) by camera as `background/<camera>-clean.png` and use them; the earlier ones
+    are remembered as given.
     """
     folder = session.path / BACKGROUND_NAME
     folder.mkdir(exist_ok=True)
@@ -78,7 +78,7 @@ def use_cleaned(session: Session, contents: Mapping[str, Bytes]) -> Session:
 
 
 def write_evidence(session: Session, evidence: SessionEvidence) -> None:
-    """Keep how masks of a session are made."""
+    """Store a session's knobs for masks."""
     _RECORD.write(session.path / EVIDENCE_NAME, evidence)
 
 
@@ -127,9 +127,9 @@ def use_backgrounds(session: Session, names: Mapping[str, str]) -> Session:
 
 
 def set_exclusion(session: Session, camera: str, content: bytes) -> int:
-    """Keep a painted picture (PNG or other) of what does not count; nothing painted removes it. Returns the pixels.
+    """Store a painted picture (PNG or other) of excluded regions; an empty one removes them. Returns the pixels.
 
-    Raises FootageError for what is no picture, or one of another size than the footage.
+    Raises FootageError for an unreadable picture, or one of another size than the footage.
     """
     source = _source(session, camera)
     path = session.path / EXCLUSIONS / f"{camera}.png"
@@ -153,7 +153,7 @@ def set_exclusion(session: Session, camera: str, content: bytes) -> int:
 
 
 def polygon_exclusion(session: Session, camera: str, corners: Array) -> int:
-    """Add a polygon (K, 2) of pixels to what does not count. Returns the pixels of all. Raises NotFoundError."""
+    """Add a polygon (K, 2) of pixels to the excluded regions. Returns the pixels of all. Raises NotFoundError."""
     source = _source(session, camera)
     path = session.path / EXCLUSIONS / f"{camera}.png"
     painted = np.zeros((source.height, source.width), np.uint8)

@@ -1,4 +1,4 @@
-"""Cameras solved from board footage: of a session, whose calibration they become, or of a folder that is none yet."""
+"""Calibrates cameras from board footage: a session's, or those of a folder that is no session yet."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,7 +20,9 @@ REFUSED_NAME = "refused.toml"
 
 @dataclass(frozen=True, slots=True)
 class BoardPlace:
-    """Whose cameras are solved. folder : the session's, or that of the board footage. session : None for a folder."""
+    """A session or folder to calibrate. folder : the session's, or that of the board footage. session : None for a
+    folder.
+    """
 
     folder: Path
     session: Session | None = None
@@ -32,14 +34,14 @@ class BoardPlace:
         """
         place = wanted or self.folder / CAMERAS_PATH
         if place.exists() and not replace:
-            raise CalibrationError(f"'{place}' is there already.", "Name another file, or ask to replace it.")
+            raise CalibrationError(f"'{place}' exists already.", "Name another file, or replace it.")
         return place
 
 
 @dataclass(frozen=True, slots=True)
 class KeptBoards:
-    """What was written. files : the calibration where nothing blocks, its report, coverage pictures. notes : what it
-    means for the session. stops : the findings for which the calibration itself was not written.
+    """The result of a calibration. files : the calibration unless a finding blocks it, its report, coverage pictures.
+    notes : consequences for the session. stops : the findings that blocked writing the calibration.
     """
 
     files: tuple[Path, ...]
@@ -102,7 +104,7 @@ def solve_boards(
 ) -> Calibrated:
     """`calibration.verbs.calibrate` with cameras named, sized and turned as the session's footage is.
 
-    intrinsics, extrinsics : default what the place holds. offsets : of the common footage, frames by camera. Nothing is
+    intrinsics, extrinsics : default those of the place. offsets : of the common footage, frames by camera. Nothing is
     written. Raises CalibrationError, FootageError.
     """
     taken = how_taken(place.session, offsets or {})
@@ -123,7 +125,7 @@ def solve_boards(
 
 
 def keep_boards(place: BoardPlace, found: Calibrated, target: Path, *, anyway: bool = False) -> KeptBoards:
-    """Write what was found to a `target` of the place: into a session's own file as its calibration, one before kept.
+    """Write a calibration to a `target` of the place; a session's earlier calibration is kept.
 
     anyway : even if a finding blocks; without it only the report is written then.
     """
@@ -142,7 +144,7 @@ def keep_boards(place: BoardPlace, found: Calibrated, target: Path, *, anyway: b
         files = tuple(sorted(path for path in target.parent.iterdir() if path.name.startswith("cameras.")))
         return KeptBoards(files, (*fitted.warnings, *change.notes))
     if own is not None and target.exists():
-        # Only the report of what cannot be used: it must not pass for that of the calibration in use.
+        # A blocked calibration writes only its report, which must not replace that of the calibration in use.
         target = target.with_name(REFUSED_NAME)
     if target.exists() and found.rig is not None and not stops:
         target.replace(target.with_name(f"{target.stem}.before.toml"))

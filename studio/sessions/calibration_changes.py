@@ -1,9 +1,9 @@
-"""A session's calibration, made or given after the import: put in its place in one step, the one before kept.
+"""Changes a session's calibration after the import, atomically; the earlier one is kept.
 
 calibration/cameras.toml              the one in use
 calibration/original…                 the files it was read from, byte for byte
-calibration/cameras.report.json, …    what a board told of it
-calibration/earlier/<time>/           each one before, whole, named by when it was replaced (UTC)
+calibration/cameras.report.json, …    the report of the board calibration
+calibration/earlier/<time>/           each earlier one, complete, named by its time of replacement (UTC)
 
 Runs keep their own copy; which of them were tracked with another one is computed from that.
 """
@@ -40,9 +40,10 @@ MOVED_MM = 1.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NewCalibration:
-    """What a session is to use. cameras : named and sized as its footage (`calibration_fit`). source : where from, in
-    words. originals : name → content of the files it was read from. crops, matching, notes : of the fit. calibrated :
-    what boards told, None for a file. floor : how the floor of the cameras in use was set anew, "" for other cameras.
+    """A session's new calibration. cameras : named and sized as its footage (`calibration_fit`). source : its origin,
+    as text. originals : name → content of the files it was read from. crops, matching, notes : of the fit. calibrated
+    : the board calibration, None for a file. floor : how the floor of the cameras in use was set again, "" for other
+    cameras.
     """
 
     cameras: tuple[Camera, ...]
@@ -57,8 +58,8 @@ class NewCalibration:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationChange:
-    """A change that was made. session : as it is now. notes : what it means. stale_runs : runs with another
-    calibration. kept : where the one before lies, None if there was none.
+    """A change of calibration. session : after it. notes : its consequences. stale_runs : runs with another
+    calibration. kept : path of the earlier one, None if there was none.
     """
 
     session: Session
@@ -68,7 +69,7 @@ class CalibrationChange:
 
 
 def replace_calibration(session: Session, new: NewCalibration) -> CalibrationChange:
-    """Let a session use another calibration from now on.
+    """Make another calibration a session's own.
 
     Raises SessionError while a run is being tracked, CalibrationError where a camera of the footage is missing.
     """
@@ -93,9 +94,9 @@ def replace_calibration(session: Session, new: NewCalibration) -> CalibrationCha
 
 
 def restore_calibration(session: Session, name: str, source: str) -> CalibrationChange:
-    """Let a session use an earlier calibration again, byte for byte with all that lay beside it; the one before stays.
+    """Restore an earlier calibration, byte for byte with its other files; the current one is kept.
 
-    name : one of `earlier_calibrations`. source : where it came from, in words. Raises NotFoundError, SessionError
+    name : one of `earlier_calibrations`. source : its origin, as text. Raises NotFoundError, SessionError
     while a run is being tracked, CalibrationError where it lacks a camera of the footage.
     """
     folder = earlier_calibration(session, name)
@@ -136,7 +137,8 @@ def earlier_calibration(session: Session, name: str) -> Path:
     folder = inside(session.path / CAMERAS_PATH.parent / EARLIER, name, "calibration")
     if not (folder / CAMERAS_PATH.name).is_file():
         raise NotFoundError(
-            f"Session '{session.name}' kept no calibration '{name}'.", "Choose one of its earlier ones."
+            f"Session '{session.name}' kept no calibration '{name}'.",
+            "Choose one of its earlier calibrations.",
         )
     return folder
 
@@ -155,7 +157,7 @@ def _keep(folder: Path) -> Path:
 
 
 def _write(place: Path, new: NewCalibration) -> None:
-    """The canonical file takes the old one's place in one step; then what lies beside it."""
+    """Replace the canonical file atomically, then the files beside it."""
     made = atomic_files.new_folder_beside(place)
     try:
         if new.calibrated is not None and new.calibrated.rig is not None:
@@ -187,7 +189,7 @@ def _write(place: Path, new: NewCalibration) -> None:
 
 
 def _correct_report(path: Path, new: NewCalibration) -> None:
-    """What boards told of the same cameras, with their places in the new world."""
+    """The board calibration of the same cameras, with their places in the new world."""
     try:
         report = msgspec.json.decode(path.read_bytes(), type=dict[str, object])
     except (OSError, msgspec.DecodeError):
@@ -229,11 +231,11 @@ def _consequences(
     far = [float(np.linalg.norm(camera.centre - old[camera.name])) for camera in after if camera.name in old]
     if not far or max(far) < MOVED_MM:
         return notes
-    moved = f"The cameras stand up to {max(far):.0f} mm from where they were"
+    moved = f"The cameras are up to {max(far):.0f} mm from their earlier places"
     if (session.path / made_from.FILES["start-pose"]).exists():
-        notes.append(f"{moved}: look whether the start pose still fits, or find it again.")
+        notes.append(f"{moved}: check whether the start pose still fits, or find it again.")
     if session.truth_path is not None:
-        notes.append(f"{moved}: the truth stays in the world as it was.")
+        notes.append(f"{moved}: the truth stays in the old world.")
     return notes
 
 
@@ -252,7 +254,7 @@ def _content(path: Path) -> bytes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FittedCameras:
-    """cameras : in the footage's order, or all where there is no footage yet. crops : what was assumed to make sizes
+    """cameras : in the footage's order, or all where there is no footage yet. crops : assumptions that make sizes
     agree. matching : footage to the calibration's own names. warnings : sentences.
     """
 

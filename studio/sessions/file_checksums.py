@@ -1,7 +1,7 @@
-"""Checksums of the files of a folder (`.checksums.json` in it), to tell what is no longer as it was written.
+"""Checksums of the files of a folder (`.checksums.json` in it), to detect damage.
 
-A file whose content changed though its time did not is damaged; one whose time changed, too, was written again. What
-the studio never writes again (footage, what a run was made from) is damaged in either case. Results stores have
+A file whose content changed but not its time is damaged; one whose time changed, too, was written again. Files that the
+studio never rewrites (footage, a run's inputs) are damaged in either case. Results stores have
 checksums of their own.
 """
 
@@ -48,7 +48,7 @@ class NotedFiles(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 _RECORD = RecordFile(
     NotedFiles,
     "checksums of files",
-    "Remove it; the files are then noted anew.",
+    "Remove it; new checksums are then made.",
     (f"There is no '{NAME}'.", "Note the files."),
     version=2,
     migrations={1: lambda entries: {"files": entries}},
@@ -58,7 +58,7 @@ _RECORD = RecordFile(
 @dataclass(frozen=True, slots=True)
 class CheckedFiles:
     """count : files read. damaged : path in the folder and what is wrong with it. written_again : paths. new : paths of
-    files that were not noted before.
+    files without a checksum so far.
     """
 
     count: int
@@ -68,12 +68,12 @@ class CheckedFiles:
 
 
 def note_files(folder: Path) -> None:
-    """Note the checksums of all files as they are. Raises OSError."""
+    """Store the checksums of all files. Raises OSError."""
     _write(folder, {name: _noted(path) for name, path in _files(folder)})
 
 
 def check_files(folder: Path, *, note: bool = True) -> CheckedFiles:
-    """Compare the files with what was noted of them. note : note those that are new or were written again."""
+    """Compare the files with their checksums. note : store checksums of files that are new or were written again."""
     known, readable = _read(folder)
     now: dict[str, Noted] = {}
     damaged: dict[str, str] = {} if readable else {NAME: "the checksums cannot be read"}
@@ -121,7 +121,7 @@ def _noted(path: Path) -> Noted:
 
 
 def _read(folder: Path) -> tuple[dict[str, Noted], bool]:
-    """What was noted, and whether that can be read; nothing where nothing was noted."""
+    """The stored checksums, and whether they can be read; empty without any."""
     try:
         return _RECORD.read(folder / NAME, NotedFiles()).files, True
     except SessionError:

@@ -1,8 +1,7 @@
 """Offsets and turns of a session's cameras, changed after the import.
 
-The footage's files stay as they are; only the manifest says otherwise from which frame and how turned they are read.
-Runs keep their own numbers, which then count frames as they were: `stale_runs` names them, computed from when they were
-made.
+The footage's files are unchanged; only the manifest changes. Runs keep their own frame numbers, which count frames
+before the change: `stale_runs` names these runs by their creation time.
 """
 
 import dataclasses
@@ -31,7 +30,9 @@ from studio.sessions.stored_run import StoredRun
 
 @dataclass(frozen=True, slots=True)
 class FootageChange:
-    """A change that was made. session : as it is now. notes : what it means, sentences. stale_runs : names of runs."""
+    """A change of offsets or turns. session : after it. notes : its consequences, sentences. stale_runs : names of
+    runs.
+    """
 
     session: Session
     notes: tuple[str, ...]
@@ -41,7 +42,7 @@ class FootageChange:
 def change_footage(
     session: Session, offsets: Mapping[str, int] | None = None, rotations: Mapping[str, int] | None = None
 ) -> FootageChange:
-    """Give cameras other offsets (the file's frame that was taken with the others' frame 0) and turns (degrees
+    """Set cameras' offsets (the file's frame that was taken with the others' frame 0) and turns (degrees
     clockwise); cameras that are not named keep theirs. Frame 0 becomes the first one that all cameras have.
 
     Raises FootageError where no common frame is left, masks are too few, or a turned picture is not of the calibrated
@@ -75,7 +76,7 @@ def stale_runs(session: Session) -> tuple[str, ...]:
 def synchrony_of(
     session: Session, progress: Progress | None = None, most_seconds: float = MOST_SECONDS
 ) -> Synchrony:
-    """Offsets of a session's cameras estimated from what moves in them; changes nothing. Raises FootageError."""
+    """Offsets of a session's cameras estimated from motion; changes nothing. Raises FootageError."""
     source = session.manifest.footage
     if not source.cameras:
         raise SessionError(f"Session '{session.name}' has no footage yet.", "Add it first.")
@@ -145,7 +146,7 @@ def _made_before(run: StoredRun, changed: datetime.datetime) -> bool:
 
 
 def _masks_of(session: Session, camera: CameraSource) -> int:
-    """How many masks came with a camera, 0 where there are none or it is not known."""
+    """The number of masks of a camera, 0 if there are none or it is unknown."""
     place = session.path / camera.masks
     if not camera.masks:
         return 0
@@ -174,11 +175,11 @@ def _consequences(
     moved = any(a.offset != b.offset for a, b in zip(before.cameras, after.cameras, strict=True))
     if stale:
         notes.append(
-            f"Run {listed(stale)} was tracked on the footage as it was: its poses stay, but pictures and overlays now"
-            " show other ones. Track again."
+            f"Run {listed(stale)} was tracked before this change: its poses stay, but pictures and overlays now"
+            " show other frames. Track again."
         )
     if moved and (session.path / START_POSE_NAME).exists():
-        notes.append("The start pose belongs to frame 0 as it was: find it again with 'studio initialise'.")
+        notes.append("The start pose belongs to the old frame 0: find it again with 'studio initialise'.")
     if moved and session.truth_path is not None:
-        notes.append("The truth counts its time from frame 0 as it was: check it before you evaluate.")
+        notes.append("The truth counts its time from the old frame 0: check it before you evaluate.")
     return notes

@@ -1,8 +1,8 @@
-"""What a session's parts were made from: digests, so that a change of one says which others are stale.
+"""Provenance of a session's parts: digests of their inputs, which show what a change makes stale.
 
-`made_from.json` holds, for a part that was made here (the start pose, the fitted subject, the measured masks, how
-far the silhouettes miss), its own digest and those of what it was made from. A part that was given (imported, typed in)
-has no entry and is never stale; neither is one whose file was replaced by hand since.
+`made_from.json` holds, for a part made here (the start pose, the fitted subject, the measured masks, the silhouettes'
+misses), its own digest and those of its inputs. A given part (imported, typed in) has no entry and is never stale;
+neither is one whose file was replaced by hand since.
 """
 
 import hashlib
@@ -27,16 +27,16 @@ INPUTS = {
     "start-pose": ("footage", "calibration", "subject"),
     "alignment": ("footage", "calibration", "masks"),
 }
-"""Part to what it is made from."""
+"""The inputs of each part."""
 ALL_INPUTS = ("footage", "calibration", "subject", "masks")
 
 FILES = {"subject": SUBJECT_NAME, "start-pose": START_POSE_NAME}
 
 
 class Origin(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Of one part. content : digest of its file, "" where it has none. inputs : digests of what it was made from.
-    words : what was found, in words; good : whether it is fit for what comes next. stops : what was found that makes
-    all results wrong, sentences.
+    """The provenance of one part. content : digest of its file, "" without one. inputs : digests of its inputs. words :
+    the result as text; good : whether it is good enough for the next steps. stops : findings that make all results
+    wrong, sentences.
     """
 
     content: str
@@ -47,14 +47,14 @@ class Origin(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class MadeFrom(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The file. parts : by the name of the step that makes them."""
+    """The file's content. parts : by the name of the step that makes them."""
 
     schema: int = SCHEMA_VERSION
     parts: dict[str, Origin] = {}
 
 
 def digests(session: Session, names: Iterable[str] = ALL_INPUTS) -> dict[str, str]:
-    """Digests of what is named, as it is now; "" for what is not there."""
+    """Current digests of the named inputs; "" for missing ones."""
     of: dict[str, Callable[[Session], str]] = {
         "footage": _footage_digest,
         "calibration": lambda session: _file_digest(session.path / CAMERAS_PATH),
@@ -67,19 +67,19 @@ def digests(session: Session, names: Iterable[str] = ALL_INPUTS) -> dict[str, st
 def note(
     session: Session, part: str, words: str = "", good: bool = True, stops: tuple[str, ...] = ()
 ) -> None:
-    """Remember that a part was made just now, of what is there now. part : a key of INPUTS; the rest as in `Origin`."""
+    """Record that a part was made now from the current inputs. part : a key of INPUTS; the rest as in `Origin`."""
     origin = Origin(_own(session, part), digests(session, INPUTS[part]), words, good, stops)
     _write(session, {**_read(session).parts, part: origin})
 
 
 def origin_of(session: Session, part: str) -> Origin | None:
-    """What is known of a part; None where it was given, or its file is another one since."""
+    """The provenance of a part; None if it was given, or its file has changed since."""
     found = _read(session).parts.get(part)
     return found if found is not None and found.content == _own(session, part) else None
 
 
 def changed_inputs(session: Session, part: str, among: Iterable[str] = ALL_INPUTS) -> tuple[str, ...]:
-    """What a part was made from that is another one now: some of INPUTS[part], in order. among : what is asked."""
+    """The inputs of a part that have changed since: some of INPUTS[part], in order. among : the inputs to compare."""
     found = origin_of(session, part)
     if found is None:
         return ()
@@ -88,7 +88,7 @@ def changed_inputs(session: Session, part: str, among: Iterable[str] = ALL_INPUT
 
 
 def adopt(session: Session) -> None:
-    """Before something changes: parts that were given count as made from what is there now."""
+    """Call before a change: given parts then count as made from the current inputs."""
     known = _read(session).parts
     given = {
         part: Origin(_own(session, part), digests(session, INPUTS[part]))
@@ -151,7 +151,7 @@ def _file_digest(path: Path) -> str:
 
 _RECORD = RecordFile(
     MadeFrom,
-    "what a session's parts were made from",
+    "the provenance of a session's parts",
     "Remove it; the parts then count as given.",
     (f"There is no '{FILE_NAME}'.", "Make the parts again."),
     SCHEMA_VERSION,

@@ -1,8 +1,8 @@
-"""`session.json`: what a session is, as measured and decided at import.
+"""`session.json`: the description of a session, as measured and decided at import.
 
-Nothing here changes while runs are made, and nothing that can be computed (how far runs got, how many there
-are) is kept beside its source. Unknown entries are refused and the schema's version is checked, so that a
-newer studio's session is named as such instead of being half understood.
+Nothing here changes while runs are made, and nothing that can be computed (such as the progress of runs) is stored
+twice. Unknown entries are refused and the schema's version is checked, so that a newer studio's session is reported as
+such.
 """
 
 import datetime
@@ -22,11 +22,11 @@ class SessionManifest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
     """A session's description.
 
     name : the folder's name when it was made; title : free text shown to people. created : UTC, ISO 8601.
-    body : the body its subject is fitted to. tracker, weighting : what runs of this session use unless told
-    otherwise, "" for the studio's own default. footage : see `FootageSource`; paths relative to the session
-    folder. calibration_source : name of the imported file or files. assumptions : what was taken for granted
-    to make footage and calibration fit (a crop, a unit, a frame rate). matching : footage to cameras. layout :
-    whose folder layout the source was taken for. footage_changed : when offsets or turns were last changed (UTC, ISO
+    body : the body its subject is fitted to. tracker, weighting : defaults for runs of this session,
+    "" for the studio's own default. footage : see `FootageSource`; paths relative to the session
+    folder. calibration_source : name of the imported file or files. assumptions : made so that
+    footage and calibration fit (a crop, a unit, a frame rate). matching : footage to cameras. layout : the recognised
+    folder layout of the source. footage_changed : when offsets or turns were last changed (UTC, ISO
     8601, to the microsecond), "" if never; runs made before count the frames as they were then.
     calibration_changed : likewise of the calibration.
     """
@@ -75,7 +75,7 @@ _RECORD = RecordFile(
 
 
 def read_manifest(session_folder: Path) -> SessionManifest:
-    """The manifest of a session. Raises NotFoundError where there is none, SessionError for what is no manifest."""
+    """The manifest of a session. Raises NotFoundError if there is none, SessionError for an invalid one."""
     return _RECORD.read(session_folder / FILE_NAME)
 
 

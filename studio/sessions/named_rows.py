@@ -1,5 +1,4 @@
-"""Small CSV files whose header names the pose vector's parameters: `start_pose.csv`, `sigma.csv` and poses to
-keep.
+"""Small CSV files whose header names the pose vector's parameters: `start_pose.csv`, `sigma.csv` and stored poses.
 
 Numbers are in radians and mm. `sigma.csv` has a leading column `fps`: the frame rate at which its standard
 deviations from one frame to the next were measured. Files of poses have a leading column `frame`, and a start pose that
@@ -34,7 +33,7 @@ def read_pose(path: Path, names: tuple[str, ...], frame: int | None = None) -> A
         if FRAME not in header:
             raise BodyError(
                 f"'{path.name}' has {len(rows)} rows and no column 'frame'.",
-                "Keep the one row that is the start pose.",
+                "Keep one row, the start pose.",
             )
         column = header.index(FRAME)
         row = next((found for found in rows if frame is not None and found[column] == frame), rows[0])
@@ -42,7 +41,7 @@ def read_pose(path: Path, names: tuple[str, ...], frame: int | None = None) -> A
 
 
 def pose_frame(path: Path) -> int | None:
-    """The frame that the (first) pose in a CSV file is of; None where the file does not say. Raises BodyError."""
+    """The frame of the (first) pose in a CSV file; None if the file has no such column. Raises BodyError."""
     header, rows = _read(path)
     return int(rows[0][header.index(FRAME)]) if FRAME in header else None
 

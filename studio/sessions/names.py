@@ -1,4 +1,4 @@
-"""Names of sessions and runs, which are names of folders and travel in addresses.
+"""Names of sessions and runs, which are folder names and parts of URLs.
 
 A name is `[A-Za-z0-9_-]{1,64}` and none of the device names that Windows reserves; a path made from one is
 resolved and must still lie inside its root, so that neither `..` nor a link leads out.
@@ -29,7 +29,7 @@ class NameRefused(SessionError):
 
 
 def checked_name(name: str, kind: str = "session") -> str:
-    """The name itself. Raises NameRefused naming it and what is allowed."""
+    """Returns a valid name unchanged. Raises NameRefused."""
     if not PATTERN.fullmatch(name) or name.lower() in RESERVED:
         shown = name if len(name) <= LONGEST else name[:LONGEST] + "…"
         raise NameRefused(
@@ -45,7 +45,7 @@ def is_name(text: str) -> bool:
 
 
 def name_from(text: str, fallback: str = "session") -> str:
-    """A lawful name that looks like `text` (a title, the name of a folder)."""
+    """A valid name that resembles `text` (a title, the name of a folder)."""
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode("ascii")
     made = re.sub(r"[^A-Za-z0-9_-]+", "-", plain).strip("-")[:LONGEST].rstrip("-")
     if not made:
@@ -91,7 +91,7 @@ class PathRefused(StudioError):
 
 
 def relative_path(text: str) -> PurePosixPath:
-    """A name inside an upload or archive, with forward slashes. Raises PathRefused naming what is wrong."""
+    """A name inside an upload or archive, with forward slashes. Raises PathRefused."""
     shown = repr(text if len(text) <= 80 else text[:80] + "…")
     parts = text.split("/")
     wrong = ""

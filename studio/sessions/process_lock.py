@@ -17,7 +17,7 @@ class ProcessLock:
 
     @staticmethod
     def take(path: Path) -> "ProcessLock | None":
-        """The lock that the file `path` stands for (made where missing), None while another holds it.
+        """Acquire the lock of the file `path` (created if missing); None while another holds it.
 
         It needs no room on the disk but for the file's name. Raises SessionError where the file cannot be made or
         written.
@@ -55,7 +55,7 @@ class ProcessLock:
         return False
 
     def free(self) -> None:
-        """Let others take it."""
+        """Release the lock."""
         self.connection.close()
 
 

@@ -26,8 +26,8 @@ class _Head(msgspec.Struct):
 class RecordFile(Generic[Record]):
     """One kind of record.
 
-    type : with the entry `schema`, the version. what, remedy : what the file should be, and what to do where it is not.
-    missing : cause and remedy where there is no file; {folder} and {name} stand for its folder. version : the newest,
+    type : with the entry `schema`, the version. what, remedy : the name of the content, and the remedy for an invalid
+    file. missing : cause and remedy without a file; {folder} and {name} stand for its folder. version : the newest,
     which is written; files without one are of version 1. migrations : version to what makes a file's entries those of
     the next version.
     """

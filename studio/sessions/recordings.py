@@ -1,4 +1,4 @@
-"""What was recorded from live cameras, made a session like any other: offsets by the times at which pictures came."""
+"""Makes a session from a recording of live cameras: offsets follow from the times of the pictures."""
 
 import shutil
 from collections.abc import Sequence
@@ -64,9 +64,9 @@ def import_recording(
     notes: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> tuple[ImportReport, SpreadFigures]:
-    """Make a session at `into` of a recording, which is then removed; a recording that was cut off is mended first.
+    """Make a session at `into` from a recording, which is then removed; an interrupted recording is repaired first.
 
-    Also how far apart the pictures of one frame were taken. Raises StudioError; then the recording stays.
+    Also returns the time spread of a frame's pictures. Raises StudioError; then the recording stays.
     """
     for path in sorted((folder / "videos").glob("*.mp4")):
         mend_recording(path)
@@ -101,7 +101,7 @@ def import_recording(
 
 
 def spreads_of(path: Path, session: Session) -> SpreadFigures:
-    """How far apart pictures of one frame were taken, by a recorder's times and the session's offsets."""
+    """The time spread of the pictures of a frame, from a recorder's times and the session's offsets."""
     source = session.manifest.footage
     times = read_timestamps(path)
     cut = {
@@ -114,7 +114,7 @@ def spreads_of(path: Path, session: Session) -> SpreadFigures:
 
 
 def figures_of(times: dict[str, Array], fps: float) -> SpreadFigures:
-    """Figures of frames whose pictures came at these times (K,) by camera, seconds."""
+    """The time spread of frames whose pictures came at these times (K,) by camera, seconds."""
     rows = np.stack(list(times.values()), axis=1) if times else np.zeros((0, 1))
     spreads = rows.max(axis=1) - rows.min(axis=1) if len(rows) else np.zeros(0)
     late = [

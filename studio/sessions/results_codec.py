@@ -5,7 +5,7 @@ blobs is packed in a tenth of the time that as many npz archives take. The numbe
 share one array and those that are per parameter another. Stores of the first version hold npz archives
 (`allow_pickle=False`); nothing in either can run.
 
-Checksums of what a results store holds, and what of it this process has found to be as it was written.
+Checksums of a results store's content, and which parts this process has already found intact.
 
 A frame's checksums lie in one row: of its numbers and pose ("row"), of its result's blob ("result") and of each layer's
 ("layers"). Rows of stores that were written before there were checksums have none: they count as unchecked.
@@ -155,7 +155,7 @@ def unpack_result(blob: bytes) -> FrameResult:
 
 
 def carried_arrays(carried: Carried) -> dict[str, Array]:
-    """What goes from one frame to the next, as named arrays; what is None has no entry."""
+    """The state carried to the next frame, as named arrays; None has no entry."""
     arrays: dict[str, Array] = {}
     if carried.estimate is not None:
         arrays["estimate"] = carried.estimate
@@ -197,9 +197,9 @@ def _with_prefix(arrays: dict[str, Array], prefix: str) -> dict[str, Array]:
 
 
 FRAME, PARTIAL, SETTINGS = "frame", "partial", "settings"
-"""What a row of checksums is of."""
+"""Kinds of checksum rows."""
 GIVEN_UP = "damaged"
-"""Stands in place of the checksums of a frame without any whose content cannot be read: it is to be tracked again."""
+"""Marks a frame without checksums whose content cannot be read, so that it is tracked again."""
 STORES_REMEMBERED = 64
 
 
@@ -213,14 +213,14 @@ def checksum(values: Iterable[object]) -> int:
 
 
 def sums_text(row: Iterable[object], blobs: Mapping[str, bytes], layers: Mapping[int, bytes]) -> str:
-    """The checksums of one row and of the blobs that belong to it, as they are stored."""
+    """The stored checksums of one row and its blobs."""
     sums: dict[str, object] = {"row": checksum(row)}
     sums |= {name: checksum([blob]) for name, blob in blobs.items()}
     return json.dumps(sums | {"layers": {str(layer): checksum([blob]) for layer, blob in layers.items()}})
 
 
 class Sums:
-    """Stored checksums, read back. A text that is damaged itself fits nothing."""
+    """Stored checksums, read back. A damaged text matches nothing."""
 
     def __init__(self, text: str) -> None:
         try:
@@ -230,15 +230,15 @@ class Sums:
             self._sums = {}
 
     def row_fits(self, row: Iterable[object]) -> bool:
-        """Whether a row is as it was written."""
+        """Whether a row is intact."""
         return self._sums.get("row") == checksum(row)
 
     def fits(self, name: str, blob: bytes) -> bool:
-        """Whether a blob is as it was written."""
+        """Whether a blob is intact."""
         return self._sums.get(name) == checksum([blob])
 
     def wrong_layers(self, blobs: Mapping[int, bytes]) -> list[int]:
-        """The layers that are missing, too many, or not as they were written."""
+        """The layers that are missing, surplus or damaged."""
         sums = self._sums.get("layers")
         known = sums if isinstance(sums, dict) else {}
         found = {str(layer): checksum([blob]) for layer, blob in blobs.items()}

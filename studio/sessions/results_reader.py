@@ -30,8 +30,8 @@ from studio.tracking.tracker import TRACKED, FrameResult, LayerRecord
 
 FILE_NAME = "results.sqlite"
 SCHEMA_VERSION = 2
-"""Stores of version 1 hold npz archives, which `results_codec.unpack` reads too, and may lack tables that came later;
-one that is written to becomes one of this version.
+"""Stores of version 1 hold npz archives, which `results_codec.unpack` reads too, and may lack later tables; writing to
+one converts it to this version.
 """
 Unpacked = TypeVar("Unpacked")
 LATER_TABLES = (("tracking", ("state", "overlap", "doubts")), ("arrivals", ("arrived", "ready")))
@@ -39,7 +39,7 @@ UNWATCHED = (TRACKED, None, 0)
 """State, overlap and doubts of a frame that was stored before a loss could be noticed."""
 ROWS = "SELECT frames.frame, log_weight, milliseconds, evaluations, layers, settings_version, pose"
 NUMBERS, RESULT, LOST = "its numbers", "its result", "all of it"
-"""What of a frame is damaged, in words; of layers: "layer 3"."""
+"""The damaged parts of a frame as text; of layers: "layer 3"."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,8 +53,8 @@ class PartialFrame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Timeline:
-    """What a timeline shows of K finished frames: all (K,). layers, evaluations, settings_version : int. tracking : how
-    each frame went, of `tracking.tracker.TRACKING_STATES`. overlaps : NaN where unknown. doubts : int.
+    """Columns of K finished frames for a timeline, all (K,). layers, evaluations, settings_version : int. tracking :
+    states of `tracking.tracker.TRACKING_STATES`. overlaps : NaN where unknown. doubts : int.
     """
 
     frames: Indices
@@ -69,8 +69,7 @@ class Timeline:
 
 
 class ResultsReader:
-    """What a run's store holds now. Every call sees the newest finished transaction; a missing store reads as
-    empty.
+    """Reads a run's store. Every call sees the newest finished transaction; a missing store reads as empty.
 
     All methods may be called from any thread. Damaged stores raise SessionError, missing entries
     NotFoundError.
@@ -91,7 +90,7 @@ class ResultsReader:
         self.close()
 
     def close(self) -> None:
-        """Let go of the file; the next call opens it again."""
+        """Close the file; the next call opens it again."""
         with self._lock:
             if self._connection is not None:
                 self._connection.close()
@@ -103,10 +102,10 @@ class ResultsReader:
         return [row[0] for row in self._state(blobs)[0]]
 
     def damaged(self, *, blobs: bool = True) -> dict[int, str]:
-        """The finished frames that are no longer what was written, and what of each is damaged, in words.
+        """The damaged finished frames, and the damaged parts of each as text.
 
-        blobs : also look at results and layers that this process has not yet found whole; else only at the numbers.
-        Frames without checksums (of older stores) count as whole.
+        blobs : also check results and layers that this process has not yet found intact; else only the numbers.
+        Frames without checksums (of older stores) count as intact.
         """
         return self._state(blobs)[1]
 
@@ -116,13 +115,13 @@ class ResultsReader:
         return [row[0] for row in self._rows() if row[0] not in sums]
 
     def check_all_again(self) -> None:
-        """Let everything be read anew, also what was found whole before."""
+        """Forget what was read, also what was found intact."""
         VERIFIED.forget(self._folder)
         self._known = None
         self._fitting.clear()
 
     def check_again(self, frame: int) -> str:
-        """What of a frame without checksums cannot be unpacked, in words; "" where all can."""
+        """The parts of a frame without checksums that cannot be unpacked, as text; "" if all can."""
         try:
             self.result(frame)
             self.layers(frame)
@@ -133,7 +132,7 @@ class ResultsReader:
         return ""
 
     def stored_poses(self) -> dict[int, Array]:
-        """The pose (D,) of every finished frame whose numbers are whole, whatever else of it is damaged."""
+        """The pose (D,) of every finished frame whose numbers are intact, even if other parts are damaged."""
         sums = self._sums(FRAME)
         return {
             row[0]: np.frombuffer(row[6], dtype="<f8")
@@ -142,11 +141,11 @@ class ResultsReader:
         }
 
     def partial_is_damaged(self) -> bool:
-        """Whether a frame is half searched, and what is stored of it is not what was written."""
+        """Whether the stored state of an unfinished frame is damaged."""
         return bool(self._query("SELECT 1 FROM partial")) and self.partial() is None
 
     def result(self, frame: int) -> FrameResult:
-        """The result of a finished frame. Raises DamagedError where it is not what was written."""
+        """The result of a finished frame. Raises DamagedError if it is damaged."""
         with self._snapshot():
             text = self._sums(FRAME, frame).get(frame)
             rows = self._query("SELECT blob FROM frames WHERE frame = ?", (frame,))
@@ -157,8 +156,8 @@ class ResultsReader:
         return self._unpacked(frame, RESULT, unpack_result, rows[0][0])
 
     def layers(self, frame: int) -> list[LayerRecord]:
-        """The layers of a frame in the order they ran; of the unfinished frame those that are done. Raises DamagedError
-        where one is not what was written.
+        """The layers of a frame in the order they ran; of the unfinished frame those done. Raises DamagedError if one
+        is damaged.
         """
         blobs = self._layer_blobs(frame)
         if not blobs:
@@ -194,13 +193,13 @@ class ResultsReader:
             doubts=np.array([entry[2] for entry in went], dtype=np.int64),
         )
 
-    # ------------------------------------------------------------------ what is still as it was written
+    # ------------------------------------------------------------------ integrity
 
     def _whole_rows(self) -> list[tuple]:
         return self._state(True)[0]
 
     def _state(self, blobs: bool) -> tuple[list[tuple], dict[int, str]]:
-        """The rows of the frames that are whole, and what of the others is damaged; kept until the store changes."""
+        """The rows of the intact frames, and the damage of the others; cached until the store changes."""
         version, known = self._query("PRAGMA data_version"), self._known
         if known is not None and known[0] == (version, blobs):
             return known[1], known[2]
@@ -213,7 +212,7 @@ class ResultsReader:
         return whole, damaged
 
     def _damage(self, frame: int, text: str, row: tuple | None, blobs: bool) -> str:
-        """What of a frame does not fit its checksums, in words; "" where all does, or was found to before."""
+        """The parts of a frame that do not match their checksums, as text; "" if all match or did before."""
         if row is None:
             return LOST
         if self._fitting.get(frame) != (text, row):
@@ -228,7 +227,7 @@ class ResultsReader:
         return ""
 
     def _rows(self) -> list[tuple]:
-        """Every finished frame's numbers and pose, without its blobs; what older stores have no table for is NULL."""
+        """Every finished frame's numbers and pose, without blobs; columns missing in older stores are NULL."""
         columns, joined = ROWS, ""
         for table, names in LATER_TABLES:
             known = self._has_table(table)
@@ -244,7 +243,7 @@ class ResultsReader:
         return dict(self._query(f"SELECT number, sums FROM checksums WHERE what = '{what}'{one}"))
 
     def _damaged_blobs(self, frame: int, text: str) -> str:
-        """What of a frame's blobs does not fit its checksums, in words; "" where all do."""
+        """The blobs of a frame that do not match their checksums, as text; "" if all do."""
         sums = Sums(text)
         try:
             blob = self._query("SELECT blob FROM frames WHERE frame = ?", (frame,))
@@ -256,7 +255,7 @@ class ResultsReader:
         return _named(sums.wrong_layers(layers))
 
     def _layer_blobs(self, frame: int) -> dict[int, bytes]:
-        """The layers of a frame, each as it was written. Raises DamagedError."""
+        """The intact layers of a frame. Raises DamagedError."""
         with self._snapshot():
             rows = self._query("SELECT layer, blob FROM layers WHERE frame = ? ORDER BY layer", (frame,))
             text = self._sums(FRAME, frame).get(frame)
@@ -295,9 +294,7 @@ class ResultsReader:
         return bool(self._query(f"SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = '{name}'"))
 
     def settings_history(self) -> list[SettingsEntry]:
-        """Every version of the settings that was in use, oldest first. Raises SessionError where one is not what was
-        written.
-        """
+        """Every version of the settings that was in use, oldest first. Raises SessionError if one is damaged."""
         rows = self._query('SELECT version, frame, layer, "values" FROM settings ORDER BY version')
         wrong = self.damaged_settings()
         if wrong:
@@ -310,7 +307,7 @@ class ResultsReader:
         ]
 
     def damaged_settings(self) -> list[int]:
-        """The versions of the settings that are lost, or not what was written."""
+        """The versions of the settings that are lost or damaged."""
         with self._snapshot():
             found = self._query('SELECT version, frame, layer, "values" FROM settings')
             sums = self._sums(SETTINGS)
@@ -322,7 +319,7 @@ class ResultsReader:
         )
 
     def partial(self) -> PartialFrame | None:
-        """Where the search stopped inside a frame, if it did; what is damaged of it does not count."""
+        """The state of an unfinished frame, if there is one and it is intact."""
         with self._snapshot():
             rows = self._query("SELECT frame, next_layer, blob FROM partial")
             layers = dict(self._query("SELECT layer, blob FROM partial_layers"))
@@ -349,8 +346,8 @@ class ResultsReader:
         return rows[0][0] if rows else None
 
     def arrivals(self) -> tuple[Indices, Array]:
-        """Of a live run the finished frames (K,) that came on a clock, and when (K, 2) their pictures had come and
-        their poses were ready, seconds; nothing of other runs.
+        """The finished frames (K,) of a live run, and the times (K, 2) of their pictures and of their poses, seconds;
+        empty for other runs.
         """
         if not self._has_table("arrivals"):
             return np.zeros(0, dtype=np.int64), np.zeros((0, 2))
@@ -406,7 +403,7 @@ def _named(layers: Iterable[int]) -> str:
 
 
 def _open_to_read(path: Path) -> sqlite3.Connection:
-    """A connection that changes nothing; a store in a folder that cannot be written is read as it stands."""
+    """A read-only connection; also to a store in a read-only folder."""
     address = path.resolve().as_uri()
     try:
         connection = sqlite3.connect(
@@ -425,7 +422,7 @@ def _open_to_read(path: Path) -> sqlite3.Connection:
 
 
 def check_version(connection: sqlite3.Connection, path: Path) -> None:
-    """Raises SessionError for a store that a newer studio wrote; one that cannot be read is told of elsewhere."""
+    """Raises SessionError for a store of a newer studio; an unreadable one is reported elsewhere."""
     with suppress(sqlite3.DatabaseError):
         row = connection.execute("SELECT value FROM meta WHERE key = 'schema'").fetchone()
         if row is not None and str(row[0]).isdigit() and int(row[0]) > SCHEMA_VERSION:

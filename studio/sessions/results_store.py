@@ -1,9 +1,9 @@
 """A run's results on disk, written frame by frame and readable at any moment by any process.
 
-One SQLite file in WAL mode per run (`results.sqlite`): readers never wait for the writer nor hold it up, and
+One SQLite file in WAL mode per run (`results.sqlite`): readers and the writer never wait for each other, and
 a frame with all its layers arrives in one transaction or not at all, also when the writer is killed. Layers
-and frames are compressed blobs (see `results_codec`); what lists and timelines need stands beside them in
-columns. Neither side holds more than the frame at hand.
+and frames are compressed blobs (see `results_codec`); data for lists and timelines is in separate
+columns. Neither side holds more than one frame in memory.
 """
 
 import contextlib
@@ -145,7 +145,7 @@ class ResultsWriter:
                 connection.execute("PRAGMA journal_mode = WAL")
                 connection.execute("PRAGMA synchronous = NORMAL")
                 connection.executescript(SCHEMA)
-                # Whoever reads it from now on has to understand this version.
+                # From now on a reader must support this version.
                 connection.execute(_NOTE_VERSION)
             except BaseException:
                 connection.close()
@@ -175,7 +175,7 @@ class ResultsWriter:
     ) -> None:
         """Store a finished frame with all its layers in one transaction; the unfinished frame's state goes.
 
-        particles : how many of each layer's set are recorded (None: all); the set at the end of the frame is
+        particles : number recorded of each layer's set (None: all); the set at the end of the frame is
         in `result.carried` and always whole. came : of a live run's frame, when its pictures had come and when its
         pose was ready, seconds of one clock.
         """
@@ -224,7 +224,7 @@ class ResultsWriter:
         self._transaction(statements)
 
     def give_up(self, frame: int) -> None:
-        """Let a frame count as damaged, so that it is tracked again; for frames without checksums, or lost ones."""
+        """Mark a frame as damaged, so that it is tracked again; for frames without checksums, or lost ones."""
         self._transaction([(_SUMS, (FRAME, frame, GIVEN_UP))])
 
     def forget_partial(self) -> None:
@@ -234,7 +234,7 @@ class ResultsWriter:
     def forget_from(self, frame: int) -> None:
         """Drop the results of `frame` and all later ones, and the settings that were first used in them.
 
-        What is kept: at least one entry of the settings' history.
+        At least one entry of the settings' history is kept.
         """
         self._transaction(
             [
@@ -267,8 +267,8 @@ class ResultsWriter:
         )
 
     def mark_ended(self, how: str) -> None:
-        """Note that a person ended the run (`how`: "cancelled"), that a live one is over ("finished"), or with "" that
-        it goes on.
+        """Note that the user cancelled the run (`how`: "cancelled"), that a live one is over ("finished"), or with ""
+        that it is resumed.
         """
         if how:
             self._transaction([("INSERT OR REPLACE INTO meta VALUES ('ended', ?)", (how,))])
@@ -293,7 +293,7 @@ class ResultsWriter:
 
     @contextlib.contextmanager
     def _begun(self) -> Iterator[None]:
-        """A transaction. Raises what went wrong first, and leaves none open."""
+        """A transaction. Raises the first error, and leaves none open."""
         if self._connection.in_transaction:
             # An earlier one could not even be rolled back: closing does that.
             self._connection.close()
@@ -303,7 +303,7 @@ class ResultsWriter:
             yield
             self._connection.execute("COMMIT")
         except BaseException:
-            # Where the disk is full or broken SQLite has rolled back by itself.
+            # On a full or broken disk SQLite has rolled back already.
             if self._connection.in_transaction:
                 with contextlib.suppress(sqlite3.Error):
                     self._connection.execute("ROLLBACK")

@@ -1,9 +1,8 @@
-"""`run.json`: what a run was asked to do, written once when it is made.
+"""`run.json`: the request of a run, written once when it is made.
 
-Everything that a run's poses depend on is here or beside it in the run's folder: the body with its dimensions
-(`body/`), the cameras as they were (`cameras.toml`), the behaviour model if it has one (`behaviour.model`), the start
-pose, σ0, the seed and the settings that it began with. Settings changed on the way, and how far it got, are facts of
-the results store.
+Everything that a run's poses depend on is here or in the run's folder: the body with its dimensions (`body/`), the
+cameras (`cameras.toml`), the behaviour model if any (`behaviour.model`), the start pose, σ0, the seed and the initial
+settings. Later settings and the progress are in the results store.
 """
 
 from pathlib import Path
@@ -23,19 +22,18 @@ BEHAVIOUR_NAME = "behaviour.model"
 class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A run's description.
 
-    name : the run's folder. session : the session's name when the run was made. created : UTC, ISO 8601.
-    first, last : frames, half open. fps : frames per second. settings : every knob by its flat name at the
-    start. body : name or file of the body; dimensions : its lengths and radii, mm, as they were fitted to the
-    subject. parameters : names of the pose vector. start_pose : radians and mm, None where the search starts
-    uniformly. start_source : where it came from, in words. sigma : σ0 of every parameter from frame to frame,
-    rad and mm. software : the studio's version. notes : what a reader of the results should know. behaviour : name of
-    the behaviour model whose copy the run keeps, "" without one. live : frames came on a clock and those that came too
-    fast were dropped; which were tracked, the results store says. to_and_fro : the footage goes forth and back without
-    an end (`capture.footage`), so that `last` may lie behind its end. made_from : the run that was corrected, "" if
-    none: other frames are that run's. corrected : the frame that begins anew at corrected_pose. backwards_to : None
-    where the frames after it follow from it; else these are the old ones, and from it down to this frame each was
-    tracked from the one after it. subject_dimensions : the subject's, where the first frames gave the body another
-    shape; empty where they did not.
+    name : the run's folder. session : the session's name when the run was made. created : UTC, ISO 8601. first, last :
+    frames, half open. fps : frames per second. settings : every knob by its flat name at the start. body : name or
+    file of the body; dimensions : its lengths and radii, mm, as they were fitted to the subject. parameters : names of
+    the pose vector. start_pose : radians and mm, None where the search starts uniformly. start_source : its origin, as
+    text. sigma : σ0 of every parameter from frame to frame, rad and mm. software : the studio's version. notes : for
+    readers of the results. behaviour : name of the behaviour model whose copy the run keeps, "" without one. live :
+    frames came on a clock and those that came too fast were dropped; the results store lists the tracked ones.
+    to_and_fro : the footage is played forwards and backwards without end (`capture.footage`), so that `last` may lie
+    behind its end. made_from : the run that was corrected, "" if none: other frames are that run's. corrected : the
+    frame that restarts at corrected_pose. backwards_to : None where the frames after it follow from it; else these are
+    the old ones, and from it down to this frame each was tracked from the one after it. subject_dimensions : the
+    subject's, where the first frames gave the body another shape; empty where they did not.
     """
 
     schema: int = SCHEMA_VERSION
@@ -89,7 +87,7 @@ _RECORD = RecordFile(
 
 
 def read_run_record(run_folder: Path) -> RunRecord:
-    """The record of a run. Raises NotFoundError where there is none, SessionError for what is no record."""
+    """The record of a run. Raises NotFoundError if there is none, SessionError for an invalid one."""
     return _RECORD.read(run_folder / FILE_NAME)
 
 

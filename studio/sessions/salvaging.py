@@ -1,4 +1,4 @@
-"""A results store whose database is broken, made anew of every frame that can still be read."""
+"""Rebuilds a broken results store from all frames that can still be read."""
 
 import contextlib
 import os
@@ -18,7 +18,7 @@ BROKEN = ".broken"
 
 
 def faults_of_database(run_folder: Path) -> list[str]:
-    """What SQLite finds wrong with a store's file, in its words; nothing where it is sound."""
+    """SQLite's report on a damaged store file; empty if it is intact."""
     path = run_folder / FILE_NAME
     if not path.exists():
         return []
@@ -62,7 +62,7 @@ def salvage(run_folder: Path, first: int, last: int) -> list[int]:
         raise unwritable("The results in", path, error) from None
     except OSError as error:
         raise SessionError(
-            f"'{path}' cannot be made anew ({error.strerror}).", "Check the folder's permissions."
+            f"'{path}' cannot be rebuilt ({error.strerror}).", "Check the folder's permissions."
         ) from None
     finally:
         lock.free()

@@ -1,4 +1,4 @@
-"""A session on disk: footage, cameras, subject, truth and runs, each read when it is asked for.
+"""A session on disk: footage, cameras, subject, truth and runs, each read on demand.
 
 Folder: `session.json`, `videos/` or `pictures/<camera>/`, `masks/<camera>/`, `background/`,
 `calibration/original.*` and `calibration/cameras.toml`, `truth/*.trc`, `subject.toml`, `start_pose.csv`,
@@ -129,7 +129,7 @@ class Session:
         return tuple(read_calibration(self.path / CAMERAS_PATH).cameras)
 
     def footage(self) -> Footage:
-        """The session's footage, opened anew; close it when done. Raises FootageError; SessionError without any."""
+        """The session's footage, newly opened; close it when done. Raises FootageError; SessionError without any."""
         self._check_footage()
         return open_footage(self.manifest.footage, self.path)
 
@@ -154,7 +154,7 @@ class Session:
 
     @property
     def body_folders(self) -> tuple[Path, ...]:
-        """Where bodies of a user's own are looked for: in the session, then in the workspace around it."""
+        """The folders searched for user-defined bodies: the session's, then its workspace's."""
         folders = (self.path / BODIES_NAME, self.path.parent / BODIES_NAME)
         return tuple(folder for folder in folders if folder.is_dir())
 
@@ -171,8 +171,8 @@ class Session:
         return within_limits(model, read_pose(path, _parameter_names(model)))
 
     def start_pose_frame(self) -> int:
-        """The frame that the start pose is of, in which tracking begins unless told otherwise; 0 where nothing says so,
-        or the footage has no such frame any more. Raises BodyError.
+        """The frame of the start pose, in which tracking begins by default; 0 if it is not given or outside the
+        footage. Raises BodyError.
         """
         path = self.path / START_POSE_NAME
         frame = pose_frame(path) if path.exists() else None
@@ -196,7 +196,7 @@ class Session:
         return found[0] if found else None
 
     def thumbnail(self) -> Path | None:
-        """A small picture of the session (JPEG), made when first asked for; None if the footage cannot be
+        """A small picture of the session (JPEG), made on first use; None if the footage cannot be
         read."""
         path = self.path / THUMBNAIL_NAME
         if not path.exists():
@@ -234,8 +234,8 @@ class Session:
         """Make the folder of a run: its record, the calibration's and the body file's snapshot, an empty
         store.
 
-        It appears whole or not at all. `runs.new_run.prepare_run` fills in the record. body_text : content of
-        the body's file, "" where it is not to be kept. behaviour : the file of its behaviour model, to be copied.
+        It is made atomically. `runs.new_run.prepare_run` fills in the record. body_text : content of
+        the body's file, "" to keep none. behaviour : the file of its behaviour model, to be copied.
         Raises SessionError if the name is taken, or the disk is full.
         """
         place = self.path / RUNS_NAME / checked_name(record.name, "run")
@@ -263,7 +263,7 @@ def free_run_name(session: Session) -> str:
 
 
 def described_anew(session: Session, manifest: SessionManifest) -> Session:
-    """Write a changed manifest and return the session as it is then."""
+    """Write a changed manifest and return the new session."""
     write_manifest(session.path, manifest)
     return Session(session.path)
 

@@ -1,4 +1,4 @@
-"""A run on disk: its record, its results, and how it stands, computed from them."""
+"""A run on disk: its record, its results, and its status, computed from them."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -23,11 +23,11 @@ NAMED = 10
 
 @dataclass(frozen=True, slots=True)
 class RunSummary:
-    """A run as a line of a list.
+    """The status of a run, for lists.
 
     status : "new", "tracking" (some process has it open), "interrupted", "cancelled" or "finished".
-    done : finished frames of first … last that are whole. tracked_to : the frame after the last of them. damaged : the
-    frames that were stored but are no longer what was written; resuming the run tracks them again.
+    done : intact finished frames of first … last. tracked_to : the frame after the last of them. damaged : damaged
+    stored frames; resuming the run tracks them again.
     """
 
     session: str
@@ -46,7 +46,7 @@ class RunSummary:
 
 
 def damage_in_words(frames: Sequence[int]) -> str:
-    """Which frames are damaged and what to do, as a sentence; "" where none is."""
+    """The damaged frames and the remedy, as a sentence; "" if there are none."""
     if not frames:
         return ""
     named = ", ".join(str(frame) for frame in list(frames)[:NAMED])
@@ -56,7 +56,7 @@ def damage_in_words(frames: Sequence[int]) -> str:
 
 
 class StoredRun:
-    """A run's folder. Opening it reads nothing; each part is read when it is asked for."""
+    """A run's folder. Opening it reads nothing; each part is read on demand."""
 
     def __init__(self, folder: Path, record: RunRecord | None = None) -> None:
         self.folder = folder
@@ -74,7 +74,7 @@ class StoredRun:
 
     @property
     def record(self) -> RunRecord:
-        """What the run was asked to do. Raises SessionError."""
+        """The run's request. Raises SessionError."""
         if self._record is None:
             self._record = read_run_record(self.folder)
         return self._record
@@ -84,19 +84,19 @@ class StoredRun:
         return ResultsReader(self.folder)
 
     def body(self) -> BodyModel:
-        """The body as it was when the run was made, dimensions and all. Raises BodyError."""
+        """The run's own copy of the body, with its dimensions. Raises BodyError."""
         snapshots = sorted((self.folder / BODY_FOLDER).glob("*.toml"))
         tree = load_body(str(snapshots[0]) if snapshots else self.record.body)
         body = with_dimensions(tree, self.record.dimensions)
         if tuple(entry.name for entry in body.parameters) != self.record.parameters:
             raise BodyError(
                 f"The body '{self.record.body}' has changed since run '{self.name}' was made.",
-                "Start a new run with the body as it is now.",
+                "Start a new run with the current body.",
             )
         return body
 
     def cameras(self) -> tuple[Camera, ...]:
-        """The cameras as they were when the run was made. Raises CalibrationError."""
+        """The run's own copy of the cameras. Raises CalibrationError."""
         return tuple(read_calibration(self.folder / CAMERAS_NAME).cameras)
 
     def behaviour(self) -> BehaviourModel | None:
@@ -110,7 +110,7 @@ class StoredRun:
         return is_being_written(self.folder)
 
     def damage(self) -> str:
-        """Which frames are damaged on the disk and what to do, as a sentence; "" where none is. Raises SessionError."""
+        """The damaged frames and the remedy, as a sentence; "" if there are none. Raises SessionError."""
         with self.results() as results:
             return damage_in_words(list(results.damaged()))
 

@@ -1,12 +1,12 @@
-"""A take: a session whose footage live cameras are giving while it is tracked.
+"""A take: a session recorded from live cameras while it is tracked.
 
-It has the calibration, the person and the empty room of the session that it was begun from, and pictures of its own.
-What is tracked is what lies on disk, so a take is tracked again bit for bit.
+It has the calibration, the subject and the empty room of its base session, and its own pictures. The tracked pictures
+are those on disk, so a take can be tracked again bit for bit.
 
-pictures/<camera>/000041.jpg   a camera's picture of set 41; none where the camera gave none
-live/sets.csv                  a line a set: number, moment, spread, who lags, who is left out, arrival of each picture
-live/go                        there once the sets may begin: the first one comes before, to get ready with
-live/lock                      held by whoever records
+pictures/<camera>/000041.jpg   a camera's picture of set 41; none where the camera gave none live/sets.csv
+a line a set: number, moment, spread, lagging camera, missing cameras, arrival of each picture live/go
+exists once the sets may begin: the first one comes before, for warming up live/lock                      held by the
+recorder
 """
 
 import contextlib
@@ -64,19 +64,19 @@ class TakenSet:
 
 @dataclass(frozen=True, slots=True)
 class TakenSets:
-    """What there is of a take. ended : why it ended, "" while it goes on or where it was killed."""
+    """The sets of a take. ended : why it ended, "" while it is recorded or if it was killed."""
 
     sets: tuple[TakenSet, ...]
     ended: str
 
     @property
     def spreads(self) -> SpreadFigures:
-        """How far apart the pictures were taken."""
+        """The time spread of the pictures."""
         return spread_figures(np.array([one.spread for one in self.sets]), [one.lagging for one in self.sets])
 
 
 class TakeWriter:
-    """The one who records a take; one at a time, by a lock that dies with its process. Raises SessionError."""
+    """Records a take; one at a time, by a lock that is released when its process ends. Raises SessionError."""
 
     def __init__(self, session: Session) -> None:
         self.folder = session.path
@@ -96,7 +96,7 @@ class TakeWriter:
         return (self.folder / LIVE / GO_NAME).exists()
 
     def put(self, frame: int, found: PictureSet) -> None:
-        """Keep a set. Raises FootageError for a picture of another size, OSError where the disk refuses."""
+        """Store a set. Raises FootageError for a picture of another size, OSError if it cannot be written."""
         for name, shot in found.shots.items():
             source = self._cameras[name]
             check_size(source, shot.pixels.shape[1], shot.pixels.shape[0])
@@ -106,13 +106,13 @@ class TakeWriter:
         self._line((frame, f"{found.moment:.6f}", spread, found.lagging, ";".join(found.left_out), arrivals))
 
     def end(self, why: str) -> None:
-        """No further set will come. Never raises: the disk may be the reason."""
+        """End the recording. Never raises: the disk may be the reason."""
         with contextlib.suppress(OSError):
             self._line((END, "", "", "", "", why))
         self.close()
 
     def close(self) -> None:
-        """Let go of file and lock."""
+        """Close the file and release the lock."""
         with contextlib.suppress(OSError):
             self._file.close()
         self._lock.free()
@@ -134,7 +134,7 @@ def begin_take(
 ) -> Session:
     """A new session at `into` whose pictures are still to come.
 
-    cameras : of the base session, which the take is seen by. fps : sets a second. frame_count : sets at most.
+    cameras : of the base session, those recorded. fps : sets a second. frame_count : sets at most.
     keep_start : the person begins in the base's start pose; else that is searched. Raises SessionError, FootageError.
     """
     checked_name(into.name, "session")
@@ -199,14 +199,14 @@ def is_being_recorded(folder: Path) -> bool:
 
 
 def let_go_on(folder: Path) -> None:
-    """Let the sets come that follow the first."""
+    """Start the sets after the first."""
     (folder / LIVE / GO_NAME).touch()
 
 
 def finish_take(session: Session, notes: tuple[str, ...] = ()) -> Session:
-    """The session with as many frames as came, also after its recorder was killed; notes : more to be known of it.
+    """The session with the recorded number of frames, also after its recorder was killed; notes : added to its own.
 
-    Raises SessionError if no set came.
+    Raises SessionError without any set.
     """
     taken = read_sets(session.path)
     if not taken.sets:
@@ -216,7 +216,7 @@ def finish_take(session: Session, notes: tuple[str, ...] = ()) -> Session:
         return session
     cameras = tuple(dataclasses.replace(source, frame_count=count) for source in footage.cameras)
     for source in cameras:
-        # A picture that no line tells of may be cut.
+        # A picture without a line may be truncated.
         for path in (session.path / source.path).glob("*.jpg"):
             if path.stem.isdigit() and int(path.stem) >= count:
                 path.unlink()

@@ -58,7 +58,7 @@ class SessionSummary:
 
 
 def workspace_root() -> Path:
-    """Where sessions are kept: the environment variable STUDIO_WORKSPACE, or the user's data folder."""
+    """The folder of sessions: the environment variable STUDIO_WORKSPACE, or the user's data folder."""
     chosen = os.environ.get(VARIABLE, "").strip()
     if chosen:
         return Path(chosen).expanduser()
@@ -111,8 +111,7 @@ class Workspace:
         )
 
     def place_for(self, name_or_path: str | Path) -> Path:
-        """Where a new session goes: a name means the workspace, a path itself. Raises SessionError if it is
-        taken."""
+        """The place of a new session: a name means the workspace, a path itself. Raises SessionError if it is taken."""
         text = str(name_or_path)
         if is_name(text):
             self.root.mkdir(parents=True, exist_ok=True)
@@ -146,8 +145,7 @@ class Workspace:
         return described_anew(session, msgspec.structs.replace(session.manifest, title=words))
 
     def duplicate(self, name: str, new_name: str | None = None) -> Session:
-        """A copy of a session with its runs, whole or not at all; results being written are copied as they
-        stand."""
+        """Copy a session with its runs, atomically; results being written are copied in their current state."""
         session = self.session(name)
         wanted = new_name or free_name(name, {path.name for path in self.root.iterdir()})
         place = self._free(wanted)
@@ -195,7 +193,7 @@ class Workspace:
         return place
 
     def trashed(self) -> tuple[str, ...]:
-        """What lies in the trash, oldest first; sessions among it can be given to `restore`."""
+        """The content of the trash, oldest first; sessions in it can be given to `restore`."""
         folder = self.root / TRASH_NAME
         found = [path for path in folder.iterdir() if path.is_dir()] if folder.is_dir() else []
         return tuple(path.name for path in sorted(found, key=lambda path: path.stat().st_ctime_ns))
@@ -205,7 +203,7 @@ class Workspace:
         path = inside(self.root / TRASH_NAME, trashed_name)
         if not (path / FILE_NAME).is_file():
             raise NotFoundError(
-                f"There is no session '{trashed_name}' in the trash.", "List what lies there first."
+                f"There is no session '{trashed_name}' in the trash.", "List its content first."
             )
         name = free_name(Session(path).manifest.name, {entry.name for entry in self.root.iterdir()})
         os.rename(path, inside(self.root, name))
@@ -224,7 +222,7 @@ class Workspace:
                 write_run_record(path, msgspec.structs.replace(record, name=name))
                 os.rename(path, inside(session.path / RUNS_NAME, name, "run"))
                 return session.run(name)
-        raise NotFoundError(f"Session '{owners[0]}' of this run is gone.", "Restore the session first.")
+        raise NotFoundError(f"Session '{owners[0]}' of this run is missing.", "Restore the session first.")
 
     def _free(self, name: str) -> Path:
         """The place for a session of this name. Raises SessionError if there is something."""
@@ -265,7 +263,7 @@ def _summary(folder: Path) -> SessionSummary:
 
 
 def _run_summaries(folder: Path) -> tuple[RunSummary, ...]:
-    """By time of making; a run whose results are damaged says so as its status, one without a record is left out."""
+    """Runs by creation time; damaged results show in the status, runs without a record are left out."""
     found: list[RunSummary] = []
     for path in _named_folders(folder, RECORD_NAME):
         with contextlib.suppress(StudioError):
@@ -318,8 +316,7 @@ LONGEST_TITLE = 200
 def begin_session(place: Path, title: str = "", body: str = "") -> Session:
     """Make an empty session at `place` (as `Workspace.place_for` gives it). title : its name unless given.
 
-    Raises BodyError for a body that is not there, SessionError for a title that cannot be shown or a place that is
-    taken.
+    Raises BodyError for an unknown body, SessionError for an invalid title or a place that is taken.
     """
     words = " ".join(title.split()) or place.name
     if len(words) > LONGEST_TITLE:
@@ -334,7 +331,7 @@ def begin_session(place: Path, title: str = "", body: str = "") -> Session:
 
 
 def next_step(cameras: int, calibrated: bool) -> str:
-    """What a session lacks before it can be tracked: "footage", "calibration", or "" if nothing."""
+    """What a session lacks for tracking: "footage", "calibration", or "" if nothing."""
     if not cameras:
         return "footage"
     return "" if calibrated else "calibration"

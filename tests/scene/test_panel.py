@@ -52,7 +52,7 @@ class Settings:
 
     def __init__(self, server: GuardedServer, posted: Posted) -> None:
         self.server, self.posted, self.requests = server, posted, []
-        tabs = [server.gui.add_tab_group().add_tab(name) for name in ("Search", "Weighting", "Masks")]
+        tabs = [server.gui.add_tab_group().add_tab(name) for name in ("Search", "Likelihood", "Masks")]
         self.panel = SettingsPanel(server.gui, *tabs, posted.post, self.request)
         self.show(Knobs(default_settings()))
 

@@ -83,7 +83,7 @@ def test_folders_of_pictures_need_a_frame_rate(tmp_path: Path, parent: str) -> N
     write_pose2sim(source / "calibration" / "c.toml", rig(2, "cam_"))
     for index in (1, 2):
         write_pictures(source / parent / f"CAM{index}", [numbered_frame(number) for number in range(5)])
-    with pytest.raises(FootageError, match="how many frames a second") as caught:
+    with pytest.raises(FootageError, match="The frame rate of the footage is unknown") as caught:
         import_source(source, tmp_path / "made")
     assert "--fps" in caught.value.hint
     session = import_source(source, tmp_path / "made", fps=25.0).session

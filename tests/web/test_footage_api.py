@@ -49,7 +49,7 @@ def test_a_change_is_written_and_says_what_it_makes_stale(studio: Studio, tracke
     assert [(camera["offset"], camera["turned"]) for camera in told["cameras"]] == [(0, 180), (1, 0)]
     assert told["frame_count"] == 3
     assert told["stale_runs"] == ["first"]
-    assert any("Run first was tracked on the footage as it was" in note for note in told["notes"])
+    assert any("Run first was tracked before this change" in note for note in told["notes"])
     assert any("start pose" in note for note in told["notes"])
     # The run keeps its numbers.
     assert studio.client.get("/api/sessions/take1/runs/first").status_code == 200

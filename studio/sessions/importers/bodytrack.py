@@ -2,8 +2,8 @@
 
 `BodyShapeParameters.txt` gives the subject's 58 dimensions, `InitialPose.txt` the 31 parameters of the
 start pose and the first 31 numbers of `PoseParameters.txt` the standard deviations from frame to frame at
-60 Hz (its limits belong to another branch of the angles and are not used). The start pose is kept as it is
-written; `Session.start_pose` spells it within the body's limits. Every file but pictures and calibration may
+60 Hz (its limits belong to another branch of the angles and are not used). The start pose is kept
+unchanged; `Session.start_pose` rewrites it within the body's limits. Every file but pictures and calibration may
 be missing.
 """
 
@@ -33,7 +33,7 @@ def is_bodytrack(source: Path) -> bool:
 
 
 def plan_bodytrack(source: Path, calibration: Path | str | None) -> SourcePlan:
-    """What such a folder holds. Raises BodyError for parameter files that do not fit the body."""
+    """The parts of such a folder. Raises BodyError for parameter files that do not fit the body."""
     body = load_body(BODY)
     count = len(body.parameters)
     shape = read_numbers(source / SHAPE)
@@ -49,9 +49,7 @@ def plan_bodytrack(source: Path, calibration: Path | str | None) -> SourcePlan:
         sigma=None if sigma is None else sigma[:count],
         sigma_fps=RATE,
         layout="folder of PARSEC's bodytrack benchmark",
-        notes=(
-            "A bodytrack folder: 60 frames per second are taken for granted unless --fps says otherwise.",
-        ),
+        notes=("A bodytrack folder: 60 frames per second are assumed; --fps overrides it.",),
     )
 
 

@@ -8,12 +8,12 @@
 
 Everything but footage and calibration may be missing. A session's own folder has this layout as well.
 
-Whose folder layout a source has, and where in it footage, calibration, masks and times lie.
+Layouts of other tools, and the places of footage, calibration, masks and times in them.
 
     FreeMoCap   videos/synchronized/ (formerly synchronized_videos/) and *calibration*.toml beside it
     Caliscope   recordings/<take>/ with calibration/extrinsic/capture_volume/ or camera_array.toml above; or a take with
                 a tracker's folder, which holds its own copy
-    anipose     videos-raw/, several takes told apart by their names, and calibration/
+    anipose     videos-raw/, several takes distinguished by their names, and calibration/
     EasyMocap   intri.yml with extri.yml, videos/ or images/
     Pose2Sim    Config.toml in a trial or above trials; <trial>/videos/, calibration*/ in the trial or above it
 
@@ -48,9 +48,9 @@ MOST_FOLDERS = 2000
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Where the parts of a source lie.
+    """The places of the parts of a source.
 
-    title : whose layout, in words. folder : what everything but the calibration is taken from. calibrations : folders
+    title : of the layout. folder : of everything but the calibration. calibrations : folders
     to look for it, the first one that has any. footage : videos and picture folders, natural order. timestamps : a
     recorder's times, None without.
     """
@@ -94,7 +94,7 @@ def recognise(source: Path) -> Layout:
 
 
 def trials_of(source: Path) -> dict[str, Layout]:
-    """The trials below a folder that holds none itself, by the names to choose them with; empty if there are none."""
+    """The trials below a folder that holds none itself, by name; empty if there are none."""
     if is_caliscope(source):
         return {take.folder.name: take for take in _caliscope_takes(source)}
     found: dict[str, Layout] = {}
@@ -124,7 +124,7 @@ def is_caliscope(source: Path) -> bool:
 
 
 def takes_by_name(footage: tuple[Path, ...]) -> dict[str, tuple[Path, ...]]:
-    """Videos of several takes in one folder, by what is left of their names without the camera's."""
+    """Videos of several takes in one folder, by their names without the camera's."""
     takes: dict[str, list[Path]] = {}
     for path in footage:
         name = path.name if path.is_dir() else path.stem
@@ -218,8 +218,8 @@ def _up_to(folder: Path, source: Path) -> list[Path]:
 def plan_folder(
     source: Path, calibration: Path | str | None, trial: str | None = None, *, bare: bool = False
 ) -> SourcePlan:
-    """What a folder holds. trial : which one of several below it, or of several takes in one folder of videos. bare :
-    footage alone will do; the plan's calibration is None where none can be chosen.
+    """The parts of a folder. trial : one of several below it, or of several takes in one folder of videos. bare :
+    footage alone is enough; the plan's calibration is None if none can be chosen.
 
     Raises FootageError, CalibrationError naming what is missing, or the trials there are.
     """
@@ -258,7 +258,7 @@ def plan_folder(
 
 
 def choose_calibration(source: Path, wish: Path | str | None) -> Path:
-    """The calibration to take from a source: the one that is asked for, or the only one that can be read.
+    """The calibration to take from a source: the requested one, or the only readable one.
 
     wish : a path, or a file's name in the source's calibration folder. Raises CalibrationError.
     """
@@ -289,7 +289,7 @@ def _chosen(source: Path, trial: str | None) -> tuple[Layout, tuple[Path, ...]]:
 
 
 def _one_of(source: Path, names: tuple[str, ...], trial: str | None) -> str:
-    """The trial that is asked for, or the only one. Raises FootageError naming all."""
+    """The requested trial, or the only one. Raises FootageError naming all."""
     if trial in names:
         return str(trial)
     if trial is None and len(names) == 1:
@@ -301,7 +301,7 @@ def _one_of(source: Path, names: tuple[str, ...], trial: str | None) -> str:
 
 
 def _calibration(source: Path, places: tuple[Path, ...], wish: Path | str | None) -> Path:
-    """The one that is asked for, or the only one of the first place that has any. Raises CalibrationError."""
+    """The requested calibration, or the only one in the first place that has any. Raises CalibrationError."""
     if wish is not None:
         for path in (Path(wish), *(place / wish for place in places)):
             if path.exists():

@@ -53,14 +53,14 @@ PERSON_PARTS = ("calibration", "subject.toml", "start_pose.csv", "sigma.csv", "t
 
 @dataclass(frozen=True, slots=True)
 class ImportOptions:
-    """How a source is read.
+    """Options of an import.
 
-    calibration : which one to take where there are several. fps : frame rate, before any other. copy : False refers to
+    calibration : the one to take, of several. fps : frame rate, before any other. copy : False refers to
     the footage where it lies. trial : which one of several. offsets : by camera (or its footage's name), the file's
     frame that was taken with the others' frame 0; rotations : degrees clockwise by which its pictures are turned; both
-    go before what the source says. unit, up : of the calibration, as in `read_calibration`. despite_findings : import
+    override the source's own. unit, up : of the calibration, as in `read_calibration`. despite_findings : import
     a calibration that would make results wrong (z not up, a wrong unit, …), with a warning. replaced : where footage is
-    added, forget all cameras that the source does not name.
+    added, remove all cameras that the source does not name.
     """
 
     calibration: Path | str | None = None
@@ -77,8 +77,8 @@ class ImportOptions:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImportReport:
-    """What became of a source. session : as it is now. matching : footage to cameras, shown to the user. warnings :
-    what to check. layout : whose layout it was taken for. calibrated : whether its calibration was taken over.
+    """The result of an import. session : after it. matching : footage to cameras, shown to the user. warnings : what to
+    check. layout : the recognised layout. calibrated : whether the source's calibration was used.
     """
 
     session: Session
@@ -105,11 +105,11 @@ def import_source(
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> ImportReport:
-    """Make a session at `into` from a source folder, or an archive of one; `known_layouts`, `folder_layout` and
-    `bodytrack` say what is understood, `ImportOptions` what may be asked for.
+    """Make a session at `into` from a source folder, or an archive of one; see `known_layouts`,
+    `folder_layout` and `bodytrack` for the layouts, `ImportOptions` for the options.
 
-    cancelled : asked often; True stops the import with WorkCancelledError. All is checked before anything is written;
-    whatever fails, nothing is left and nothing that was stored is touched. Raises StudioError.
+    cancelled : checked often; True stops the import with WorkCancelledError. All is checked before anything is written;
+    on failure nothing is left behind and stored data is unchanged. Raises StudioError.
     """
     options = ImportOptions(
         calibration, fps, copy, trial, offsets or {}, rotations or {}, unit, up, despite_findings
@@ -151,9 +151,8 @@ def add_footage(
     """Add the footage (with masks and backgrounds) of a folder, or of an archive of one, to a session.
 
     A session that is calibrated keeps its calibration, which has to name every camera; else the source's is taken
-    over where it has one (and subject, start pose and truth, where the session has none). A camera that is there
-    already gets the new footage. All is read before anything changes; whatever fails, the session stays as it was.
-    Raises StudioError.
+    over where it has one (and subject, start pose and truth, where the session has none). An existing camera
+    gets the new footage. All is read before anything changes; on failure the session is unchanged. Raises StudioError.
     """
     asked, report = options or ImportOptions(), watched(progress, cancelled, "The import")
     _check_request(source, asked)
@@ -199,7 +198,7 @@ def _added(session: Session, source: Path, options: ImportOptions, report: Progr
 
 
 def _check_request(source: Path, options: ImportOptions) -> None:
-    """What can be refused before looking into the source. Raises FootageError."""
+    """Check the options before the source is opened. Raises FootageError."""
     packed = source.is_file() and is_archive(source)
     if not source.is_dir() and not packed:
         raise FootageError(
@@ -208,7 +207,7 @@ def _check_request(source: Path, options: ImportOptions) -> None:
         )
     if packed and not options.copy:
         raise FootageError(
-            f"Footage in '{source.name}' cannot stay where it is.", "Unpack it, or let it be copied."
+            f"Footage in '{source.name}' cannot be used in place.", "Unpack it, or let it be copied."
         )
     if options.fps is not None and not (math.isfinite(options.fps) and 0.0 < options.fps <= FASTEST):
         raise FootageError(f"{options.fps:g} is no frame rate.", "Give frames per second, such as --fps 60.")
@@ -227,15 +226,15 @@ def _plan(source: Path, options: ImportOptions, *, bare: bool = False) -> Source
 
 
 def _checked_rig(measured: MeasuredSource, options: ImportOptions) -> MeasuredSource:
-    """With the doubts about its cameras as warnings: what a reprojection error cannot see of a calibration.
+    """The plan with findings on its cameras as warnings: faults that a reprojection error cannot show.
 
-    Raises CalibrationError with the first finding that would make results wrong, unless it is to be imported so.
+    Raises CalibrationError with the first finding that would make results wrong, unless `despite_findings`.
     """
     findings = check_calibration(tuple(entry.camera for entry in measured.cameras))
     wrong = blocking(findings)
     if wrong and not options.despite_findings:
         raise CalibrationError(
-            wrong[0].message, f"{wrong[0].remedy} To import it as it is: --despite-findings."
+            wrong[0].message, f"{wrong[0].remedy} To import it unchanged: --despite-findings."
         )
     return replace(measured, warnings=(*measured.warnings, *map(str, findings)))
 
@@ -272,7 +271,7 @@ def _stand_in(name: str, footage: Path) -> Camera:
 def _cameras_that_stay(
     session: Session, added: FootageSource, plan: SourcePlan, replaced: bool
 ) -> tuple[CameraSource, ...]:
-    """Cameras that stay as they are beside the added ones. Raises FootageError where the two do not fit together."""
+    """The unchanged cameras beside the added ones. Raises FootageError if the two do not fit together."""
     names = {camera.name for camera in added.cameras}
     before = session.manifest.footage
     stay = () if replaced else tuple(camera for camera in before.cameras if camera.name not in names)
@@ -287,7 +286,7 @@ def _cameras_that_stay(
 def _moved_in(
     session: Session, staged: Path, added: FootageSource, stay: tuple[CameraSource, ...]
 ) -> FootageSource:
-    """Move what was written beside the session into it; returns the footage as it is then."""
+    """Move the new files into the session; returns the footage after that."""
     prefix = ""
     if any((session.path / part).exists() for part in OWN_PARTS):
         prefix = free_name("take-2", {path.name for path in session.path.iterdir()})
@@ -338,7 +337,7 @@ def _described(
     footage: FootageSource,
     body: str,
 ) -> SessionManifest:
-    """The manifest with the new footage. body : that of the person who was taken over, "" for none."""
+    """The manifest with the new footage. body : of the imported subject, "" for none."""
     before = session.manifest
     names = {camera.name for camera in footage.cameras}
     known = session.is_calibrated or plan.calibration is not None

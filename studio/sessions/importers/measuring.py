@@ -35,8 +35,8 @@ TRIMMED_SHARE = 0.1
 class MeasuredCamera:
     """One camera's parts, measured.
 
-    camera : as fitted to the footage. footage, masks, background : source paths. found : what decoding the
-    footage found, before turning. crop : what had to be assumed to make it fit, if anything. turned : degrees
+    camera : as fitted to the footage. footage, masks, background : source paths. found : measured by decoding
+    the footage, before turning. crop : assumed to make it fit, if any. turned : degrees
     clockwise. offset : the file's frame that is frame 0 of all cameras.
     """
 
@@ -103,7 +103,7 @@ def gap_warnings(measured: tuple[MeasuredCamera, ...]) -> list[str]:
 
 
 def check_before_decoding(footage: Sequence[Path], fps: float | None) -> None:
-    """Refuse at once what decoding would only find after minutes. fps : None where the videos' own rates count.
+    """Check early what decoding would find only after minutes. fps : None to use the videos' own rates.
 
     Raises FootageError for videos that are not to be decoded, or whose announced frame rates differ much.
     """
@@ -164,7 +164,7 @@ def common_rate(
         other = [f"{name}: {rate:g}" for name, rate in rates.items() if abs(rate / asked - 1.0) > SAME_RATE]
         if other or uneven:
             warnings.append(
-                f"Taken as {asked:g} frames per second as asked, whatever the videos say"
+                f"Taken as {asked:g} frames per second as requested; the videos' own differ"
                 f" ({', '.join(other) or 'uneven times in ' + listed(uneven)})."
             )
         return asked
@@ -178,9 +178,7 @@ def common_rate(
         return known
     found = sorted(rates.values())
     if not found or found[0] <= 0.0:
-        raise FootageError(
-            "The footage does not say how many frames a second it has.", "Give the frame rate with --fps."
-        )
+        raise FootageError("The frame rate of the footage is unknown.", "Give the frame rate with --fps.")
     if found[-1] / found[0] - 1.0 > SAME_RATE:
         raise different_rates(rates)
     return found[0]
@@ -216,7 +214,7 @@ class MeasuredSource:
 def measure_source(
     plan: SourcePlan, calibration: Calibration, fps: float | None, progress: Progress
 ) -> MeasuredSource:
-    """Match, decode and compare all footage. fps : the user's, which goes before all others.
+    """Match, decode and compare all footage. fps : the user's, which overrides all others.
 
     Raises FootageError, CalibrationError.
     """
@@ -394,9 +392,9 @@ def requested_turns(plan: SourcePlan, footage: Mapping[str, Path]) -> dict[str, 
 def with_offsets(
     plan: SourcePlan, measured: tuple[MeasuredCamera, ...], known: Sequence[str], warnings: list[str]
 ) -> tuple[tuple[MeasuredCamera, ...], tuple[str, ...], bool]:
-    """Cameras with their offsets, sentences that say them, and whether any were told.
+    """Cameras with their offsets, these as sentences, and whether any were given.
 
-    Those given by hand go before recorded times; the camera that began last gets 0 … as its smallest offset. known :
+    Those given by hand override recorded times; the camera that began last gets 0 … as its smallest offset. known :
     names of all calibrated cameras. Raises FootageError.
     """
     offsets = dict.fromkeys((entry.camera.name for entry in measured), 0)
@@ -443,7 +441,7 @@ def _recorded(
 
 
 def _by_camera(asked: Mapping[str, int], footage: Mapping[str, Path]) -> dict[str, int]:
-    """What was asked by the name of a camera or of its footage, by camera. Raises FootageError for other names."""
+    """Requested values by camera, from names of cameras or of their footage. Raises FootageError for other names."""
     found: dict[str, int] = {}
     for name, value in asked.items():
         fitting = [camera for camera, path in footage.items() if name in (camera, path.name, path.stem)]

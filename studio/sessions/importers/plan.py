@@ -1,4 +1,4 @@
-"""What was found in a source, before anything of it is opened or copied."""
+"""The parts found in a source, before any of it is opened or copied."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -15,10 +15,10 @@ class SourcePlan:
     calibration : a file, or the folder of several .cal files; None where footage is added without. footage, masks :
     videos and folders of pictures. backgrounds : pictures and clips. fps : known frame rate or None. subject,
     start_pose, sigma :
-    values where the layout gives them in a form of its own; the files of the same names otherwise.
-    sigma_fps : the rate at which sigma was measured. tracker, weighting : what runs of the session use unless
-    told otherwise, "" for the default. layout : whose folder layout it was taken for, in words. timestamps : a
-    recorder's times of the frames. offsets, rotations : asked for by hand, by the name of a camera or its footage.
+    values where the layout has its own form for them; the files of the same names otherwise.
+    sigma_fps : the rate at which sigma was measured. tracker, weighting : defaults for runs of the session, "" for
+    the studio's. layout : name of the recognised folder layout. timestamps : a recorder's times of the frames.
+    offsets, rotations : given by hand, by the name of a camera or its footage.
     """
 
     source: Path

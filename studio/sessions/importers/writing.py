@@ -25,7 +25,7 @@ SPARE_BYTES = 50_000_000
 
 @dataclass(frozen=True, slots=True)
 class CheckedPerson:
-    """What is known of the person, read once and found good. notes : of the subject's fit."""
+    """The subject's data, read once and checked. notes : of the subject's fit."""
 
     body: str
     parameters: tuple[str, ...]
@@ -165,7 +165,7 @@ def write_calibrations(folder: Path, calibration: Calibration, measured: Measure
     place.mkdir()
     sources = calibration.sources
     if len(sources) == 1 and is_canonical(sources[0]):
-        # A session imported again: what its own import kept is the original.
+        # A session imported again: the original is the one that its own import kept.
         kept = [path for path in sources[0].parent.glob("original*") if path.is_file()]
         sources = tuple(kept) or sources
         if (sources[0].parent / "original").is_dir():
