@@ -1,8 +1,8 @@
 """Capture studio: recover articulated motion from calibrated cameras by stochastic search, and watch the search.
 
 For scripts and notebooks, the verbs of the command line as functions: `import studio`, then `studio.open_session`,
-`studio.track` and so on (`dir(studio)` lists them, the guide has a page of examples). Each is imported when it is asked
-for, so that `import studio` costs nothing.
+`studio.track` and so on (`dir(studio)` lists them, the guide has a page of examples). Each is imported on first
+use, so that `import studio` costs nothing.
 """
 
 import importlib
@@ -59,7 +59,7 @@ _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
 
 
 def __getattr__(name: str) -> object:
-    """A verb, imported when it is asked for."""
+    """A verb, imported on first use."""
     if name not in _PLACE_OF:
         raise AttributeError(f"module 'studio' has no attribute '{name}'")
     found = getattr(importlib.import_module(f"studio.{_PLACE_OF[name]}"), name)

@@ -1,8 +1,8 @@
-"""Arrays as all rooms call them, and named arrays out of npz archives, one archive at a time.
+"""Array types, and named arrays from npz archives, one archive at a time.
 
 NumPy reads the head of each array with Python's own parser (`ast`), which counts its depth for the whole process: two
 threads that parse at the same moment may both end in "AST constructor recursion depth mismatch" (seen with Python 3.11,
-where four views of a frame are asked for at once). Hence one lock.
+where four views of a frame are requested at once). Hence one lock.
 """
 
 import threading

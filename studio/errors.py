@@ -1,4 +1,4 @@
-"""What can go wrong, in words a person can act on.
+"""Errors with a cause and a remedy.
 
 Every error that a user can cause is a `StudioError`: `message` says what is wrong and where (naming the thing
 and the value), `hint` says what to do. Commands print both and exit with 2; the server answers with `status`.
@@ -60,7 +60,7 @@ class NotFoundError(SessionError):
 
 
 class DamagedError(NotFoundError):
-    """A frame that was stored, but is no longer what was written: a gap, until it is tracked again."""
+    """A damaged stored frame: a gap, until it is tracked again."""
 
     code = "damaged"
 
@@ -96,12 +96,12 @@ class UnforeseenError(StudioError):
 
 
 class WorkCancelledError(StudioError):
-    """Long work that whoever asked for it ended; nothing of it is kept."""
+    """Long work that the caller cancelled; nothing of it is kept."""
 
     status, code = 409, "cancelled"
 
 
 class ExportError(StudioError):
-    """An export that cannot be made, or that did not read back as what was written."""
+    """An export that cannot be made, or that differs when it is read back."""
 
     status, code = 422, "export"

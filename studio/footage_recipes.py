@@ -1,7 +1,7 @@
-"""Recipes of footage by name: the three things that the studio asks of the room `synthesis`.
+"""Recipes of footage by name: the three functions that the studio uses of the room `synthesis`.
 
-Making footage is a leaf: no room of the product imports it. Whoever wants a recipe asks here, and the room is loaded
-then, as a command's module is.
+Making footage is a leaf: no room of the product imports it. These functions load the room on first use, like a
+command's module.
 """
 
 import importlib
@@ -35,7 +35,7 @@ def person_of_recipe(
 def synthesize(
     recipe: str | Path, into: Path, progress: Progress | None = None, frames: int | None = None
 ) -> Path:
-    """Render a recipe's footage and make a session of it in the folder `into`, which is not there yet; returns it.
+    """Render a recipe's footage and make a session of it in the new folder `into`; returns it.
 
     frames : only the first so many. Raises StudioError.
     """

@@ -1,4 +1,4 @@
-"""Files that others made: whatever goes wrong while one is read is said with its name, and none is waited for.
+"""Files from outside: any error while one is read is reported with its name, and none may block.
 
 Parsers raise what they like (RecursionError for deep TOML, OverflowError for 400 digits, zlib.error for a flipped bit,
 an OSError for a corrupt archive's offsets), so readers do not list what may come: they read inside `foreign_file`.
@@ -27,7 +27,7 @@ def foreign_file(path: Path, wrong: type[StudioError], what: str, remedy: str) -
     """Read a file (or a folder of files) inside. what : what it should be, "a video". remedy : what to do if it is not.
 
     Raises `wrong` naming the file for whatever is raised inside, and for a pipe, socket or device, before anything of
-    it is read. StudioErrors pass as they are, and so does that a disk is full, which is no fault of the file.
+    it is read. StudioErrors pass unchanged, and so does a full disk, which is no fault of the file.
     """
     check_regular(path, wrong)
     try:
@@ -45,7 +45,7 @@ def foreign_file(path: Path, wrong: type[StudioError], what: str, remedy: str) -
 
 
 def check_regular(path: Path, wrong: type[StudioError]) -> None:
-    """Raises `wrong` for a pipe, a socket or a device: reading one may wait without end. What is not there passes."""
+    """Raises `wrong` for a pipe, a socket or a device: reading one may wait without end. A missing file passes."""
     try:
         mode = path.stat().st_mode
     except (OSError, ValueError):

@@ -1,7 +1,7 @@
-"""Native parsers run on unchecked files in a process of their own, which may crash, hang or ask for any memory.
+"""Runs native parsers on unchecked files in a separate process, which may crash, hang or request any memory.
 
-Only what that process has read to its end is read again by the server or the tracking process. One process serves one
-file after another (a second one starts where two threads ask at once), and ends when nobody asked for a while.
+Only files that this process has read completely are read again by the server or the tracking process. One process
+serves one file after another (a second one starts if two threads need it at once), and ends when it is unused.
 """
 
 import contextlib
@@ -75,12 +75,12 @@ def isolated(
 
 
 def silent(done: int, total: int) -> None:
-    """Progress that none asked for; it still tells that the reader lives."""
+    """Progress without a callback; it still shows that the reader is alive."""
     return
 
 
 class _Ended(Exception):
-    """The process is gone, or says nothing any more; in words."""
+    """How the process ended, or that it does not answer, as text."""
 
 
 class _Child:
@@ -183,15 +183,15 @@ _CHILDREN = _Children()
 
 
 def serve() -> None:
-    """The process from inside: reads files until nobody is there to ask."""
+    """The main function of the process: reads files until the pipe is closed."""
     with contextlib.suppress(ImportError, ValueError, OSError):
         import resource  # noqa: PLC0415 - not on every system
 
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    # Ctrl-C in the terminal reaches both processes; who asked decides what becomes of this one.
+    # Ctrl-C in the terminal reaches both processes; the parent decides about this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # Libraries that print must not speak in between.
+    # Libraries that print must not write into the pipe.
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     while True:

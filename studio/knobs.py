@@ -1,4 +1,4 @@
-"""How one tunable number is declared.
+"""The declaration of tunable numbers.
 
 A settings class is a frozen dataclass whose fields are made by `knob(...)`. The slider, the command-line option,
 the JSON schema, the range check and the guide's table are all made from that one line.
@@ -58,7 +58,7 @@ def knob(
 
 
 next_frame_knob = functools.partial(knob, takes_effect="next frame")
-"""A knob of what is made once a frame: it takes effect with the next."""
+"""A knob that takes effect with the next frame."""
 
 
 @functools.cache

@@ -1,4 +1,4 @@
-"""Builds workspace, worker, scene and web, opens them in order, and closes them all when told to."""
+"""Builds workspace, worker, scene and web, opens them in order, and closes them all at the end."""
 
 import logging
 import logging.handlers
@@ -63,7 +63,7 @@ def serve(
     """Serve the studio on a workspace until Ctrl-C.
 
     port : 0 takes a free one. open_session, open_run : what the printed address shows first; with `track`
-    the run is tracked at once. announce : is told the address, once. Raises StudioError for a host that
+    the run is tracked at once. announce : called once with the address. Raises StudioError for a host that
     needs `allow_remote`, a port that is taken, or a workspace that cannot be written.
     """
     hosts = binding_rule(host, allow_remote)
@@ -115,7 +115,7 @@ def address(host: str, port: int, token: str, session: str | None = None, run: s
 
 
 def _named(host: str) -> str:
-    """The host as it stands in an address: this machine's name where it listens on all."""
+    """The host for a URL: this machine's name if it listens on all addresses."""
     name = socket.gethostname() if host in ("0.0.0.0", "::", "") else host
     return f"[{name}]" if ":" in name else name
 
@@ -133,7 +133,7 @@ def served_at(root: Path) -> str:
 
 @contextmanager
 def _alone_on(root: Path) -> Iterator[Callable[[str], None]]:
-    """Serve a workspace as the only one; yields who is to be told the address. Raises WorkspaceServedError."""
+    """Hold the lock of a served workspace; yields the function that stores the address. Raises WorkspaceServedError."""
     folder = root / STATE_NAME
     lock = ProcessLock.take(folder / SERVER_LOCK)
     if lock is None:

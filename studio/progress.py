@@ -1,4 +1,4 @@
-"""How long work tells how far it is, hears that it is not wanted any more, and how much longer it will take."""
+"""Progress, cancellation and time left of long work."""
 
 import math
 import time
@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 from studio.errors import WorkCancelledError
 
 Progress = Callable[[str, int, int], None]
-"""Called with a step in words, how many parts of it are done and how many there are (0: unknown)."""
+"""Called with the name of a step, the number of parts done and of all (0: unknown)."""
 Cancelled = Callable[[], bool]
-"""Called often; True once the work is no longer wanted."""
+"""Called often; True once the work is cancelled."""
 
 LEAST_TAKEN = 5
-"""Measured stretches of work before anything is said."""
+"""Measured stretches of work before an estimate is given."""
 LEAST_SHARE, ENOUGH_PARTS = 0.05, 30
 """Parts that must be measured: a share of what is left, or so many."""
 UNLIKE_THE_REST = 2.0
@@ -25,9 +25,9 @@ KEPT = 64
 
 
 def watched(progress: Progress | None, cancelled: Cancelled | None, work: str) -> Progress:
-    """What the work calls: passes on to `progress`, raises WorkCancelledError once it is cancelled.
+    """The callback of the work: passes on to `progress`, raises WorkCancelledError once it is cancelled.
 
-    work : what is going on, as a sentence begins with it: "The export".
+    work : the subject of the message: "The export".
     """
 
     def report(step: str, done: int, total: int) -> None:

@@ -1,4 +1,4 @@
-"""What board footage says of a calibration that was made elsewhere, and of itself: faults by name."""
+"""Faults that board footage shows in a calibration made elsewhere, and in itself."""
 
 from collections.abc import Mapping, Sequence
 from itertools import combinations
@@ -27,7 +27,7 @@ CONTRADICTED, AGREED, FEWEST_SHARED = 0.5, 0.8, 3
 def board_findings(
     cameras: Sequence[Camera], board: Board, sightings: Sequence[Sighting]
 ) -> tuple[Finding, ...]:
-    """Whether cameras fit what they saw of a board: identity, mirroring, resolution, rotation, size of squares."""
+    """Checks cameras against their sightings of a board: identity, mirroring, resolution, rotation, size of squares."""
     backwards = mirrored_sightings(sightings)
     if backwards:
         return backwards

@@ -97,8 +97,8 @@ def by_camera(footage: Sequence[BoardFootage], names: Sequence[str]) -> dict[str
 
 
 def plain_names(names: Sequence[str]) -> tuple[str, ...]:
-    """Cameras' names from those of their board footage: without words that tell what it is for ("ext_cam1_img" is
-    "cam1"), where names stay apart.
+    """Cameras' names from those of their board footage, without words for its purpose ("ext_cam1_img" is "cam1") where
+    names stay distinct.
     """
     plain = tuple(AFFIXES.sub("", name) or name for name in names)
     return plain if len(set(plain)) == len(plain) else tuple(names)
@@ -127,7 +127,7 @@ def look_together(
     taken: HowTaken = AS_IT_IS,
 ) -> list[Seen]:
     """The board in up to 120 moments of all cameras; frames (or pictures in their order) of equal number, counted from
-    the offsets on, belong together, as far as the shortest recording goes. also : moments to look at in any case.
+    the offsets on, belong together, as far as the shortest recording goes. also : moments to include in any case.
 
     Raises CalibrationError if the offsets leave none.
     """
@@ -138,7 +138,7 @@ def look_together(
     if least <= first:
         raise CalibrationError(
             "With these offsets no moment of the board footage is left that all cameras have.",
-            "Correct them, or leave them out where the board was recorded by itself.",
+            "Correct them, or leave them out where the board was recorded separately.",
         )
     frames = first + frames_in_step([least - first], RIG_FRAMES)
     frames = np.union1d(frames, [frame for frame in also if first <= frame < least]).astype(np.int64)
@@ -149,7 +149,7 @@ def look_together(
 
 
 def frame_count(footage: BoardFootage) -> int:
-    """Frames or pictures; a video is decoded whole for it, so that damage is told. Raises FootageError."""
+    """The number of frames or pictures; a video is decoded completely, so that damage is found. Raises FootageError."""
     return len(footage.pictures) if footage.video is None else measure_video(footage.video).frame_count
 
 
@@ -161,7 +161,9 @@ def frames_in_step(counts: Sequence[int], most: int) -> Indices:
 
 
 def chosen_for_lens(seen: Sequence[Seen], most: int = LENS_PICTURES) -> tuple[list[Sighting], int]:
-    """Sharp ones that together cover the picture, most telling first, in order of frames; and how many were blurred."""
+    """Sharp ones that together cover the picture, most informative first, in order of frames; and how many were
+    blurred.
+    """
     if len(seen) <= most // 2:
         return [entry.sighting for entry in seen], 0
     usual = float(np.median([entry.sharpness for entry in seen]))
@@ -182,7 +184,7 @@ def chosen_for_lens(seen: Sequence[Seen], most: int = LENS_PICTURES) -> tuple[li
 
 
 def _cells(sighting: Sighting) -> set[int]:
-    """Cells of an 8 by 8 grid that a sighting's corners lie in, told apart by how the board is tilted."""
+    """Cells of an 8 by 8 grid that a sighting's corners lie in, distinguished by the tilt of the board."""
     places = np.clip(8 * sighting.pixels / np.array(sighting.size), 0, 7).astype(int)
     first, last = sighting.pixels[0], sighting.pixels[-1]
     lean = int(np.degrees(np.arctan2(last[1] - first[1], last[0] - first[0])) // 20) % 18

@@ -1,4 +1,4 @@
-"""The black rectangles of a board: what is printed, and what made-up footage shows."""
+"""The black rectangles of a board, for printing and for synthetic footage."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from studio.calibration.boards import Board
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pattern:
-    """What is black on white paper.
+    """The black parts of a board.
 
     width, height : of the squares, mm, without a margin. black : (N, 4) left, top, width, height of rectangles, mm from
     the top left corner of the squares, y down.

@@ -1,4 +1,4 @@
-"""How boards lie before single cameras, and what pairs of cameras that saw the same boards say of each other."""
+"""Poses of boards relative to single cameras, and relative poses of cameras that saw the same boards."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class BoardView:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairPose:
-    """What frames that both cameras saw say. second_from_first : (3, 4), mm. agreeing, shared : frames."""
+    """The relative pose of two cameras. second_from_first : (3, 4), mm. agreeing, shared : number of frames."""
 
     first: str
     second: str

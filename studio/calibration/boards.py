@@ -1,7 +1,7 @@
-"""Calibration boards: what is printed on them, and where their corners lie.
+"""Calibration boards: their pattern and the places of their corners.
 
 A board's own frame: origin at its first inner corner, x along a row of corners, y along a column (down on the
-printed page), z = x × y into the board, away from who looks at it; mm. Corners count row by row.
+printed page), z = x × y into the board, away from the viewer; mm. Corners count row by row.
 """
 
 import re
@@ -97,7 +97,7 @@ class Board:
 
     @property
     def turn_symmetric(self) -> bool:
-        """Whether the board looks the same after half a turn, so that pictures do not tell its first corner."""
+        """Whether the board looks the same after half a turn, so that pictures do not show its first corner."""
         across, down = self.corners
         return self.kind == "chessboard" and (across + down) % 2 == 0
 

@@ -37,9 +37,9 @@ class Observations:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bundle:
-    """What is solved for, as rotation vectors and translations (mm).
+    """The unknowns, as rotation vectors and translations (mm).
 
-    cameras : (C, 6) camera_from_world; the first stays put. boards : (M, 6) world_from_board. lenses : (C, 9) fx, fy,
+    cameras : (C, 6) camera_from_world; the first is fixed. boards : (M, 6) world_from_board. lenses : (C, 9) fx, fy,
     cx, cy, k1, k2, p1, p2, k3.
     """
 

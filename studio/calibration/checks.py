@@ -24,11 +24,11 @@ def check_calibration(
     height_mm: float | None = None,
     distances_mm: Mapping[tuple[str, str], float] | None = None,
 ) -> tuple[Finding, ...]:
-    """Everything that is wrong or doubtful, what blocks first; none for a good calibration.
+    """All findings on a calibration, blocking ones first; none for a good one.
 
     footage_sizes : (width, height) of each camera's footage. board, sightings : board footage taken with these
     cameras. masks : silhouettes of one person, frame → camera → (H, W), nonzero = person. height_mm : the person's.
-    distances_mm : measured distances between two cameras' lenses. Give what there is; each adds checks.
+    distances_mm : measured distances between two cameras' lenses. Each argument adds checks.
     """
     sizes = {sighting.camera: sighting.size for sighting in sightings} | dict(footage_sizes or {})
     found = [*size_findings(cameras, sizes), *rig_findings(cameras)]

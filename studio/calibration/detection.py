@@ -1,9 +1,9 @@
-"""Boards found in pictures: ChArUco and chessboard corners, sub-pixel, with the first corner told apart.
+"""Boards found in pictures: ChArUco and chessboard corners, sub-pixel, with the first corner identified.
 
 Only calls that OpenCV 4.10 and 5 both have. Chessboard corners come in any of several orders; here they are put into
-the board's own: never mirrored, and beginning at the corner whose outer square is black where the board
-tells. Boards that look the same after half a turn (`Board.turn_symmetric`) keep the order that begins
-furthest to the top left; who compares views settles the rest.
+the board's own: never mirrored, and beginning at the corner whose outer square is black, if the board has only one.
+Boards that look the same after half a turn (`Board.turn_symmetric`) keep the order that begins furthest to the top
+left; the comparison of views resolves the rest.
 """
 
 from collections.abc import Callable
@@ -20,7 +20,7 @@ from studio.calibration.boards import Board, Sighting
 FEWEST_CORNERS = 6
 SUBPIXEL_REACH = (2, 5)
 FIRST_LOOK = 960
-"""Chessboards are looked for in pictures shrunk to this long side first; full-size searches take seconds."""
+"""Chessboards are searched for in pictures reduced to this long side first; full-size searches take seconds."""
 OFF_PLANE = 0.15
 """Corners may lie this share of their spacing off a plane's picture (root mean square); a wrong row gives 0.4."""
 

@@ -1,4 +1,4 @@
-"""Where the cameras stand, from boards that several of them saw at once.
+"""The poses of the cameras, from boards that several of them saw at once.
 
 Pairs of cameras vote on their relative pose; the most trusted pairs make a tree; every frame's board gets the pose on
 which its cameras agree best; then bundle adjustment, once more without the views that do not fit.
@@ -33,7 +33,7 @@ class Rig:
 
     boards : frame → (3, 4) world_from_board, mm. turned : (camera, frame) of boards counted from their other end.
     rms : camera → pixels over the views used. views : camera → how many. dropped : views left out as not fitting.
-    pairs : what the pairs said.
+    pairs : relative poses of pairs.
     """
 
     cameras: tuple[Camera, ...]
@@ -47,7 +47,7 @@ class Rig:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Seen:
-    """What a rig is solved from. views : camera → frame → what it saw of the board."""
+    """The input of the solver. views : camera → frame → its sighting of the board."""
 
     board: Board
     names: tuple[str, ...]
@@ -63,7 +63,7 @@ def solve_rig(
     refine_lenses: bool = False,
     progress: Progress | None = None,
 ) -> Rig:
-    """The cameras named by `lenses` from what they saw at the same frame numbers.
+    """The cameras named by `lenses`, from their sightings at the same frame numbers.
 
     Raises CalibrationError naming the cameras that share no board view with the others.
     """

@@ -1,7 +1,7 @@
 """The usual faults, each as the cameras that would be right if it had happened.
 
 A mirrored picture is a camera with a negative focal length across, a smaller recording one with a scaled matrix, so
-every fault is a change of cameras; evidence (a board, silhouettes) then tells which change makes views agree.
+every fault is a change of cameras; evidence (a board, silhouettes) then shows which change makes views agree.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,9 +20,9 @@ not there left 0.72 or more with three to five cameras (280 trials), 0.38 with t
 0.4.
 """
 CERTAIN = 2.5
-"""A disagreement that no fault explains is said from so many times the usual on."""
+"""A disagreement that no fault explains is reported from this multiple of the usual one."""
 RUNNER_UP = 1.3
-"""Another explanation that is nearly as good (by this factor) is said too."""
+"""Another explanation that is nearly as good (by this factor) is reported too."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,10 +134,10 @@ def explained(
     evidence: str,
     least: float | None = None,
 ) -> tuple[Finding, ...]:
-    """Nothing if the views agree; else the fault whose undoing makes them agree, or that none is known.
+    """No finding if the views agree; else the fault whose correction makes them agree, or an unexplained disagreement.
 
-    disagreement : of cameras with the evidence, NaN where it cannot tell. good : what a sound calibration may have.
-    evidence : what was looked at, for the message. least : from which disagreement on a fault is looked for, default
+    disagreement : of cameras with the evidence, NaN if undetermined. good : that of a sound calibration.
+    evidence : its name, for the message. least : disagreement from which a fault is searched for, default
     `good`: a fault that hardly shows, such as a mirrored view of someone in its middle, explains a small one as well.
     """
     now = disagreement(cameras)

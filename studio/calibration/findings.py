@@ -1,4 +1,4 @@
-"""What is wrong with a calibration, in words with a remedy."""
+"""Faults of a calibration, each with a remedy."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

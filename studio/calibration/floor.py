@@ -227,7 +227,7 @@ def _world_of(clicks: Clicks, points: Array, cameras: Sequence[Camera]) -> Array
     new_from_old, ratio = world_from_points(points, np.array(known, dtype=np.float64))
     if abs(ratio - 1.0) > LENGTHS_AGREE:
         raise CalibrationError(
-            f"The clicked points lie {ratio:.3f} times as far apart as their places in the world say.",
-            "Measure the board's squares (the size told may be wrong) and the points' places.",
+            f"The clicked points lie {ratio:.3f} times as far apart as the given places in the world.",
+            "Measure the board's squares (the given size may be wrong) and the points' places.",
         )
     return new_from_old

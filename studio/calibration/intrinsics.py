@@ -41,11 +41,11 @@ class PictureResidual:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lens:
-    """What is known of a camera's lens.
+    """A calibrated lens.
 
     size : width, height. matrix (3, 3), distortion (5,) k1 k2 p1 p2 k3. rms : over the pictures used, pixels.
     focal_deviation, centre_deviation : one standard deviation, pixels (0 for a centre that was held fixed).
-    model : what was left free, in words. residuals : one a picture, dropped ones with their reason.
+    model : the free parameters, as text. residuals : one a picture, dropped ones with their reason.
     """
 
     camera: str
@@ -67,7 +67,7 @@ class Lens:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Solution:
-    """What one call of the solver gave. rms_of : (N,) pixels a picture; turns : (N, 3) rotation vectors."""
+    """The result of one call of the solver. rms_of : (N,) pixels a picture; turns : (N, 3) rotation vectors."""
 
     matrix: Array
     distortion: Array

@@ -1,4 +1,4 @@
-"""Whether the pictures are enough for a lens, in words: what is missing and what to photograph."""
+"""Whether the pictures determine a lens; else what is missing and what to photograph."""
 
 from collections.abc import Iterator
 
@@ -10,10 +10,10 @@ from studio.calibration.intrinsics import Lens
 FEW, TOO_FEW = 10, 4
 GOOD_COVERAGE, POOR_COVERAGE = 0.5, 0.2
 ENOUGH_TILT = 25.0
-"""Degrees; boards that all face the camera cannot tell focal length from distance."""
+"""Degrees; boards that all face the camera cannot separate focal length from distance."""
 TILTED_BOARDS = 3
 SURE, UNSURE = 0.01, 0.03
-"""Two standard deviations of the focal length, as a share of it: above the first it is said, above the second it
+"""Two standard deviations of the focal length, as a share of it: above the first it is reported, above the second it
 blocks."""
 SHARP = 1.0
 """Pixels of residual per 1000 of width, above which the pictures or the board are doubtful."""
@@ -21,13 +21,13 @@ UNLIKE_FOCAL = (0.35, 6.0)
 
 
 def lens_findings(lens: Lens) -> tuple[Finding, ...]:
-    """What speaks against a lens; none for one that can be trusted, or that was read from a file."""
+    """Findings on a lens; none for a reliable one, or one read from a file."""
     found = _doubts(lens) if lens.residuals else ()
     return tuple(sorted(found, key=lambda finding: finding.severity != "blocks"))
 
 
 def verdict(lens: Lens) -> str:
-    """One sentence: the focal length, how sure, from what."""
+    """One sentence: the focal length, its deviation, its source."""
     focal = float(np.mean(np.diag(lens.matrix)[:2]))
     if not lens.residuals:
         return f"Camera {lens.camera}: focal length {focal:.1f} px, {lens.model}."
@@ -68,7 +68,7 @@ def _doubts(lens: Lens) -> Iterator[Finding]:
             False,
             f"Only {tilted} of {len(tilts)} boards before {camera} were tilted by {ENOUGH_TILT:.0f}° or more (the most:"
             f" {tilts.max():.0f}°).",
-            "Tilt the board by 30° to 45° to either side: a board that faces the camera does not tell focal length"
+            "Tilt the board by 30° to 45° to either side: a board that faces the camera does not separate focal length"
             " from distance.",
         )
     focal = float(np.mean(np.diag(lens.matrix)[:2]))

@@ -1,4 +1,4 @@
-"""What a calibration found, beside its file: a JSON report and a coverage picture a camera."""
+"""The report of a calibration beside its file: JSON, and a coverage picture a camera."""
 
 import math
 from collections.abc import Mapping
@@ -48,7 +48,7 @@ def report_of(calibrated: Calibrated) -> dict[str, object]:
 
 
 def calibration_source(calibrated: Calibrated) -> str:
-    """Where a calibration comes from, in a few words: the board, and the pixels that its corners are off."""
+    """The origin of a calibration as text: the board, and its residual in pixels."""
     rig = calibrated.rig
     off = (
         math.sqrt(sum(value**2 for value in rig.rms.values()) / len(rig.rms)) if rig is not None else math.nan

@@ -1,4 +1,4 @@
-"""What the cameras' own numbers tell: up axis, floor, unit, place, resolution."""
+"""Checks of the cameras' own numbers: up axis, floor, unit, place, resolution."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -55,7 +55,7 @@ def _sizes(cameras: Sequence[Camera], footage_sizes: Mapping[str, tuple[int, int
             remedy = "Scale the calibration to the recording, or record at the calibrated resolution."
         elif (size[0] - size[1]) * (camera.width - camera.height) < 0:
             message = f"{mismatch}: one is upright, the other lies on its side."
-            remedy = "Turn the footage as it was when it was calibrated."
+            remedy = "Rotate the footage as it was rotated for the calibration."
         else:
             message = f"{mismatch}: the shape of the picture differs, so part of it was cut off."
             remedy = "Record with the same mode of the camera as for the calibration, or calibrate again."
@@ -169,7 +169,7 @@ def _unit(cameras: Sequence[Camera]) -> Iterator[Finding]:
         message = f"{message}: millimetres were taken for metres, it seems."
         remedy = "Divide the translations by 1000, or name the unit when importing."
     else:
-        message, remedy = f"{message}: they are all in one place.", "Calibrate where the cameras stand."
+        message, remedy = f"{message}: they are all in one place.", "Calibrate the cameras' positions, too."
     yield Finding("scale", "blocks", message, remedy)
 
 
@@ -229,25 +229,25 @@ def unit_finding(ratio: float, known: str, tolerance: float = UNIT_TOLERANCE) ->
 
 
 def scale_finding(ratio: float, known: str, board: Board | None = None) -> Finding:
-    """What a length says that was measured and comes out wrong; parameters as of `unit_finding`."""
+    """The finding for a measured length that does not match; parameters as of `unit_finding`."""
     return unit_finding(ratio, known) or Finding(
         "square-size",
         "blocks",
-        f"By the calibration {known} is {ratio:.3f} times what it is: its board's squares were not of the size told.",
+        f"By the calibration {known} is {ratio:.3f} times what it is: its board's squares were not of the given size.",
         f"Measure the printed squares and calibrate again with their true size{_true_size(ratio, board)}; or divide"
         f" lengths by {ratio:.3f}.",
     )
 
 
 def height_finding(seen_mm: float, known_mm: float, known: str, board: Board | None = None) -> Finding:
-    """What the height of a person who stands says: that it, or the calibration's size, is wrong. known : the height, in
-    words.
+    """The finding for a standing person's height that does not match: it, or the calibration's size, is wrong. known :
+    the height as text.
     """
     ratio = seen_mm / known_mm
     return unit_finding(ratio, known) or Finding(
         "square-size",
         "blocks",
-        f"By the calibration the person, who stands, is {seen_mm:.0f} mm tall, {ratio:.3f} times {known}.",
+        f"By the calibration the standing person is {seen_mm:.0f} mm tall, {ratio:.3f} times {known}.",
         f"Check the height. If it is right, the calibration board's squares were not of the size given: measure them"
         f" and calibrate again{_true_size(ratio, board)}, or divide lengths by {ratio:.3f}.",
     )

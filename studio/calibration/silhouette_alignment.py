@@ -3,10 +3,10 @@
 Footage is seldom taken with the cameras exactly as they were calibrated: a tripod is touched, a mount sags. A degree is
 twenty pixels, more than a forearm's half width, and no reprojection error of the calibration shows it. Silhouettes do,
 without a board: planes through the line between two cameras that touch the person touch both silhouettes
-(`silhouette_checks`), so the angles at which they do must be equal. Here each camera's attitude is what may change, by
+(`silhouette_checks`), so the angles at which they do must be equal. Here each camera's attitude is adjusted by
 least squares of these angles' differences (as pixels) over many frames, with a robust loss (masks have holes and
 shadows) and a pull towards the attitude that was given, which also settles what turning all cameras together leaves
-open. Places and lenses stay: silhouettes of one person in the middle hardly tell them from attitudes.
+open. Places and lenses stay: silhouettes of one person in the middle hardly separate them from attitudes.
 """
 
 import dataclasses
@@ -37,7 +37,7 @@ FEWEST_TANGENTS = 24
 @dataclass(frozen=True, slots=True, eq=False)
 class AlignedCameras:
     """cameras : turned, in order. turns : (V,) degrees that each was turned by. before, after : (V,) pixels by which
-    tangents of pairs with this camera miss, median; NaN for a camera that no pair tells of. frames : looked at.
+    tangents of pairs with this camera miss, median; NaN for a camera without such a pair. frames : used.
     """
 
     cameras: tuple[Camera, ...]
@@ -101,7 +101,7 @@ def _rays_in_cameras(cameras: Sequence[Camera], outlines: Outlines) -> list[dict
 def _misses(
     cameras: Sequence[Camera], rays: Sequence[Mapping[str, Array]], turns: Array
 ) -> tuple[Array, Indices]:
-    """(T,) signed misses in pixels, NaN where a pair cannot tell, and (T, 2) the cameras of each."""
+    """(T,) signed misses in pixels, NaN where undetermined, and (T, 2) the cameras of each."""
     now = turned(cameras, turns)
     missed: list[float] = []
     pairs: list[tuple[int, int]] = []

@@ -1,8 +1,8 @@
-"""What silhouettes of one person say of a calibration, without a board.
+"""Checks of a calibration by silhouettes of one person, without a board.
 
 Planes through the line between two cameras that touch the person touch both silhouettes (epipolar tangency): the range
 of their angles about the baseline must be the same from both cameras. Views in which the person is cut by the
-picture's edge, or that look along the baseline, say nothing.
+picture's edge, or that look along the baseline, do not count.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,7 @@ Masks = Mapping[int, Mapping[str, Bytes]]
 GOOD = 0.1
 """Share of the person's extent by which tangent planes may miss, mean over pairs of the median over frames."""
 LEAST = 0.02
-"""The same, from which on a fault is looked for that would explain it."""
+"""The same, from which a fault that would explain it is searched for."""
 CLIPPED = 1.5
 LEAST_PIXELS = 40
 WIDEST = np.radians(150.0)
@@ -52,8 +52,8 @@ def silhouette_findings(
 def stature_findings(
     found: Sequence[Posture], height_mm: float | None = None, board: Board | None = None
 ) -> tuple[Finding, ...]:
-    """What the sizes of a person say against a calibration. A wrong unit shows in any posture; all else only in the
-    height of somebody who stands: who bends or leaps is of another height than they are tall.
+    """Findings from the size of a person. A wrong unit shows in any posture; other faults only in the height of a
+    standing person.
     """
     known, words = (
         (USUAL_HEIGHT, "a usual height (about 1.6 m)")
@@ -68,7 +68,7 @@ def stature_findings(
     least, most = HUMAN if height_mm is None else (1.0 - HEIGHT_TOLERANCE, 1.0 + HEIGHT_TOLERANCE)
     if seen is None or least <= seen / known <= most:
         return ()
-    # Nobody is taller in one frame than they are: what is tall enough anywhere is not too small.
+    # The seen height is never above the true one: a person tall enough in any frame is not too small.
     if seen < known and max(posture.height_mm for posture in found) >= least * known:
         return ()
     return (height_finding(seen, known, words, board),)
@@ -93,7 +93,7 @@ def outlines_of(cameras: Sequence[Camera], masks: Masks) -> dict[int, dict[str, 
 
 
 def silhouette_disagreement(cameras: Sequence[Camera], outlines: Mapping[int, Mapping[str, Array]]) -> float:
-    """How far tangent planes miss, as a share of the person's extent; NaN if no pair of views can tell."""
+    """How far tangent planes miss, as a share of the person's extent; NaN if no pair of views determines it."""
     values = []
     for one, two in combinations(cameras, 2):
         misses = [
@@ -108,7 +108,7 @@ def silhouette_disagreement(cameras: Sequence[Camera], outlines: Mapping[int, Ma
 
 
 def _miss(one: Camera, two: Camera, first: Array, second: Array) -> float:
-    """By how much of the person's extent the tangent planes of two outlines miss; NaN where they cannot tell."""
+    """By how much of the person's extent the tangent planes of two outlines miss; NaN if undetermined."""
     baseline = two.centre - one.centre
     length = float(np.linalg.norm(baseline))
     if length < 1e-9:

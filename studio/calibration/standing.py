@@ -1,7 +1,7 @@
-"""The height of a person who is seen to stand, from silhouettes alone.
+"""The height of a standing person, from silhouettes alone.
 
-A calibration of the wrong size makes a person smaller or larger and leaves their shape as it is. So a height tells of
-the size only where the shape proves that nothing but the size made it: a straight column with a head at its top and
+A calibration of the wrong size makes a person smaller or larger with the same shape. So a height shows the size
+only where the shape proves that the person stands: a straight column with a head at its top and
 its feet on the floor. All measures of shape are shares of the seen height, which no wrong size changes. They are taken
 of the visual hull, which holds the person: where it is narrow, so is the person.
 """
@@ -24,10 +24,11 @@ LOWER, TOP = 0.42, 0.93
 FEET, LEGS, LEAN, HEAD, CENTRE, UNSEEN = 0.06, 0.42, 0.09, 0.18, 0.505, 0.04
 VOLUME = (0.02, 0.036)
 LEAST_FRAMES, AGREEMENT = 2, 0.06
-"""Who stands, by the fields of `Posture`. On masks rendered of 18 motions (walks, dances, jumps, a cartwheel, a
-handstand, random poses; 520 poses of two people, each by three rigs) and drawn of 24 postures (bowing, squatting,
-kneeling, sitting, kicking, leaping, arms up), whoever passed was 0.90 to 1.06 times as tall as they are, and no take of
-five frames with its own calibration raised anything (0 of 108; of takes of 0.7 to 1.4 times the size, 24).
+"""Limits of a standing person, by the fields of `Posture`. On masks rendered of 18 motions (walks, dances, jumps, a
+cartwheel, a handstand, random poses; 520 poses of two people, each by three rigs) and drawn of 24 postures (bowing,
+squatting, kneeling, sitting, kicking, leaping, arms up), those that passed were measured at 0.90 to 1.06 of their true
+height, and no take of five frames with its own calibration raised a finding (0 of 108; of takes of 0.7 to 1.4 times
+the size, 24).
 """
 
 
@@ -71,8 +72,8 @@ def postures(cameras: Sequence[Camera], masks: Mapping[int, Mapping[str, Bytes]]
 
 
 def standing_height(found: Sequence[Posture]) -> float | None:
-    """The height of a person who stands in several of the frames and is as tall in each, mm; None where that is not
-    sure.
+    """The height of a person who stands in several of the frames and is as tall in each, mm; None if that is not
+    certain.
     """
     heights = [one.height_mm for one in found if one.stands]
     if len(heights) < LEAST_FRAMES:

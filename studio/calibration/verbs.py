@@ -35,10 +35,10 @@ from studio.progress import Progress
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibrated:
-    """What came of it.
+    """The result of a calibration.
 
     lenses : camera → lens. rig : the placed cameras, None if only lenses were asked for. sightings : camera → those
-    that its lens came from. findings : what blocks first. floor : how it was set, in words; "" if it was not.
+    that its lens came from. findings : blocking ones first. floor : how it was set, as text; "" if it was not.
     """
 
     board: Board
@@ -68,7 +68,7 @@ def calibrate(
     intrinsics may also be a calibration file, of which the lenses are taken. Without it (and `lenses`) the lenses come
     from the extrinsic footage too. floor : "frame:N" of the extrinsic footage in which the board lies on the floor, a
     folder with pictures of it lying there, or a .json of clicked points.
-    names : the cameras' names (default: the footage's). footage_sizes : of what is to be tracked, to compare.
+    names : the cameras' names (default: the footage's). footage_sizes : of the footage to be tracked, to compare.
     taken : turns of all board footage, and offsets of the common one.
     progress(step, done, total) may raise to stop; nothing is written here. Raises CalibrationError, FootageError.
     """
@@ -110,7 +110,7 @@ def _names(folder: Path | None) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Solving:
-    """What all steps are given; as of `calibrate`."""
+    """The inputs of all steps, as of `calibrate`."""
 
     board: Board
     names: Sequence[str]
@@ -139,7 +139,7 @@ class _Solving:
     def lens_sightings(
         self, folder: Path | None, together: Sequence[Sighting]
     ) -> dict[str, tuple[Sighting, ...]]:
-        """Camera → what its lens is solved from; cameras without any are left out only if their footage is missing."""
+        """Camera → the sightings for its lens; cameras without any are left out only if their footage is missing."""
         if folder is None:
             return {name: of_camera(together, name) for name in self.names}
         found: dict[str, tuple[Sighting, ...]] = {}
@@ -169,13 +169,15 @@ class _Solving:
     def placed(
         self, together: Sequence[Sighting], lenses: Mapping[str, Lens], refine: bool
     ) -> tuple[Rig, str, list[Finding]]:
-        """The rig on its floor, how that was set, and what the pairs say. Raises CalibrationError for mirrored ones."""
+        """The rig on its floor, how that was set, and the findings of pairs. Raises CalibrationError for mirrored
+        ones.
+        """
         names = sorted({sighting.camera for sighting in together}, key=natural_key)
         silent = [name for name in lenses if name not in names]
         if silent:
             raise CalibrationError(
                 f"The board is found in no picture of camera {listed(silent)} in the common footage.",
-                "Carry the board through what this camera sees.",
+                "Carry the board through this camera's view.",
             )
         for sighting in together:
             if sighting.size != lenses[sighting.camera].size:
@@ -194,7 +196,9 @@ class _Solving:
         rig = moved(rig, new_from_old)
         upright = tuple(replace(camera, quarter_turns=quarter_turns(camera)) for camera in rig.cameras)
         if not words:
-            message = "The floor was not set: up is what the cameras' pictures call up, and z = 0 is a guess."
+            message = (
+                "The floor was not set: the up axis is that of the cameras' pictures, and z = 0 is a guess."
+            )
             remedy = "Lay the board on the floor in one frame and name it (--floor frame:N), or click floor points."
             findings.append(Finding("no-floor", "warns", message, remedy))
         return replace(rig, cameras=upright), words, findings
@@ -228,7 +232,7 @@ class _Solving:
 
 
 def _guessed_floor(rig: Rig) -> Array:
-    """Up as the pictures have it, the floor 1 m under what the cameras look at."""
+    """A world with the pictures' up axis, and the floor 1 m below the point that the cameras face."""
     up = -np.mean([camera.rotation[1] for camera in rig.cameras], axis=0)
     up = up / np.linalg.norm(up)
     target = common_target(rig.cameras)

@@ -49,7 +49,7 @@ def _read_file(path: Path) -> Camera:
     repeated = rotation_from_vector(values[22:25])
     if not math.isclose(float(np.abs(rotation - repeated).max()), 0.0, abs_tol=ROTATIONS_AGREE):
         raise CalibrationError(
-            f"{where}: rotation matrix and rotation vector say different things.", "Export the file again."
+            f"{where}: rotation matrix and rotation vector disagree.", "Export the file again."
         )
     matrix = np.array([[fx, skew * fx, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
     return Camera(path.stem, *BOUGUET_SIZE, matrix, values[5:10], rotation, values[19:22])

@@ -71,7 +71,7 @@ def _lens(inner: Storage, name: str, sized: bool) -> Intrinsics:
 
 
 def _camera(outer: Storage, lens: Intrinsics) -> Camera:
-    """A lens at its place; Rot_x and R_x must say the same."""
+    """A lens at its place; Rot_x and R_x must agree."""
     where = f"{outer.where}, camera {lens.name}"
     found: list[Array] = []
     if outer.first(f"Rot_{lens.name}"):
@@ -80,7 +80,7 @@ def _camera(outer: Storage, lens: Intrinsics) -> Camera:
         found.append(rotation_from_vector(outer.shaped(f"R_{lens.name}", 3)))
     if float(np.abs(found[0] - found[-1]).max()) > ROTATIONS_AGREE:
         raise CalibrationError(
-            f"{where}: rotation matrix and rotation vector say different things.", "Export the files again."
+            f"{where}: rotation matrix and rotation vector disagree.", "Export the files again."
         )
     # Six decimals in the file: the vector is a rotation exactly, the matrix nearly.
     return lens.placed(found[-1], outer.shaped(f"T_{lens.name}", 3))

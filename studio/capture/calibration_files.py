@@ -1,7 +1,7 @@
 """Calibrations as files: which ones a folder holds, reading any of them, writing the canonical one.
 
 Everything is converted to mm. Where a format does not name its unit, the distance between cameras
-tells: rigs are metres wide, so a number above 50 means mm. Names, rotations, lenses and shapes are checked; see
+determines it: rigs are metres wide, so a number above 50 means mm. Names, rotations, lenses and shapes are checked; see
 `sanity.py` and `calibration_parts.py`. Formats to write for other tools: `CALIBRATION_FORMATS`.
 """
 
@@ -60,7 +60,7 @@ WORLDS = {
 }
 """By the axis that points up: the new world's axes in the old one, rows."""
 CALIBRATION = ("a calibration", "Export it again, or calibrate again.")
-"""What is read here, and what to do where it is not that."""
+"""The name of the content, and the remedy for an unreadable file."""
 PICKLES = frozenset((".pickle", ".pkl"))
 
 
@@ -108,10 +108,10 @@ def find_calibrations(folder: Path) -> tuple[Path, ...]:
 def read_calibration(path: Path, unit: str = "", up: str = "z") -> Calibration:
     """The cameras of a file of any format that is known, or of a folder of files that belong together.
 
-    unit : "mm" or "m" goes before what the file or the distances say. up : the axis of the file's world that points up
+    unit : "mm" or "m" overrides the file and the distances. up : the axis of the file's world that points up
     (x, y, z, -x, -y, -z); the cameras' world has z up.
     Raises CalibrationError naming file, camera and entry: wrong shapes, numbers that are not finite or no camera's,
-    a rotation that is none, a fisheye camera, a name given twice, a damaged file, one that is a pipe.
+    an invalid rotation, a fisheye camera, a name given twice, a damaged file, one that is a pipe.
     """
     with foreign_file(path, CalibrationError, *CALIBRATION):
         return _calibration(path, unit, up)
@@ -145,7 +145,7 @@ def with_up(calibration: Calibration, up: str) -> Calibration:
     cameras = tuple(
         dataclasses.replace(camera, rotation=camera.rotation @ world.T) for camera in calibration.cameras
     )
-    note = f"The calibration's {up} axis was taken to point up, as asked."
+    note = f"The calibration's {up} axis was taken to point up, as requested."
     return dataclasses.replace(calibration, cameras=cameras, notes=(*calibration.notes, note))
 
 
@@ -236,7 +236,7 @@ def _finished(read: Calibration, unit: str, asked: str, turned: bool = False) ->
     if asked:
         scale, note = (
             (1.0 if asked == "mm" else 1000.0),
-            f"The calibration is taken to be in {asked}, as asked.",
+            f"The calibration is taken to be in {asked}, as requested.",
         )
     cameras = sorted(read.cameras, key=lambda camera: natural_key(camera.name))
     scaled = [dataclasses.replace(camera, translation=camera.translation * scale) for camera in cameras]
@@ -246,7 +246,7 @@ def _finished(read: Calibration, unit: str, asked: str, turned: bool = False) ->
 
 
 def _unit(cameras: tuple[Camera, ...], named: str) -> tuple[float, str]:
-    """Factor to mm, and the sentence that says why."""
+    """The factor to mm, and its reason as a sentence."""
     if named:
         return (1.0 if named == "mm" else 1000.0), f"The calibration is in {named}, as the file says."
     centres = np.array([camera.centre for camera in cameras])

@@ -1,4 +1,4 @@
-"""What every calibration format is read into, and what its numbers must fulfil to be a camera at all.
+"""The common form of all calibration formats, and the conditions for a valid camera.
 
 A lens is checked apart from the camera's place, because some files hold lenses only.
 """
@@ -86,7 +86,7 @@ class Intrinsics:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundCameras:
-    """What a reader finds in a file or folder: cameras with translations in the file's own unit.
+    """The content of a file or folder: cameras with translations in the file's own unit.
 
     unit : "mm" or "m" where the format or the file says so, else "". sources : the files that were read.
     unposed : cameras that the file gives no place in the world. sizes_known : False where picture sizes are

@@ -3,7 +3,7 @@
 `transform` holds the camera in the world: its place x y z and its axes, r11 r12 r13 being the first one (the matrix
 from camera to world, column after column). These are the axes of a camera that looks along -z; half a turn about x
 makes them OpenCV's. Distortion coefficients are OpenCV's as they stand; they are *not* in 64ths (the TOML that Pose2Sim
-makes of such a file divides them). `viewrotation` says how the picture is turned for people; pixels are the sensor's.
+makes of such a file divides them). `viewrotation` says how the picture is rotated for display; pixels are the sensor's.
 """
 
 from pathlib import Path

@@ -109,7 +109,7 @@ class Storage:
         shape = (*sides, int(kind[1])) if kind[1] not in ("", "1") else tuple(sides)
         if values.size != int(np.prod(shape)):
             raise CalibrationError(
-                f"{self.where}: the matrix '{name}' says {'x'.join(map(str, shape))} and has {values.size} numbers.",
+                f"{self.where}: the matrix '{name}' is declared {'x'.join(map(str, shape))} and has {values.size} numbers.",
                 "Export the file again.",
             )
         return values.reshape(shape)
@@ -205,7 +205,7 @@ def _children(element: Element, depth: int) -> dict[str, Entry]:
     entries: dict[str, Entry] = {}
     for child in element:
         if child.tag in entries:
-            raise ValueError(f"'{child.tag[:40]}' stands there twice")
+            raise ValueError(f"'{child.tag[:40]}' appears twice")
         if not len(child):
             entries[child.tag] = _xml_words(child.text or "")
         elif all(entry.tag == "_" and not len(entry) for entry in child):

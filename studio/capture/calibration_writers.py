@@ -1,6 +1,7 @@
 """Calibrations for other tools: Pose2Sim's and aniposelib's TOML, OpenCV's YAML.
 
-Each writer follows the rules of the format's own reader; what a format cannot hold is said, in pixels.
+Each writer follows the rules of the format's own reader; the loss where a format cannot hold a lens is reported, in
+pixels.
 """
 
 from collections.abc import Callable

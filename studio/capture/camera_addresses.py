@@ -1,9 +1,10 @@
-"""Where a live camera is: `cam1=http://…`, `cam2=rtsp://…`, `cam3=/dev/video0`, or a video replayed as if it were one.
+"""Addresses of live cameras: `cam1=http://…`, `cam2=rtsp://…`, `cam3=/dev/video0`, or a video replayed as if it were
+one.
 
-Addresses come from people and pages, so only what a camera can be is let through: MJPEG over HTTP, RTSP, a video
-device of this machine, and (where whoever asks may read files) a file. Cameras lie in local networks, so those are
-allowed; the studio's own ports are not. A name is resolved once for each connection, and what was checked is what is
-connected to (`machine_of`). What is shown or logged of an address never holds its name and password.
+Addresses come from users and pages, so only possible cameras are allowed: MJPEG over HTTP, RTSP, a video device of this
+machine, and (if the caller may read files) a file. Local networks are allowed, because cameras are there; the studio's
+own ports are not. A name is resolved once for each connection, and the checked machine is the one connected to
+(`machine_of`). Shown or logged addresses never hold user name and password.
 """
 
 import dataclasses
@@ -52,7 +53,7 @@ def address_from_text(text: str, *, replays: bool = False) -> CameraAddress:
 
 
 def camera_address(name: str, place: str, *, replays: bool = False) -> CameraAddress:
-    """The address of a camera, checked. Raises FootageError for what no camera can have."""
+    """The checked address of a camera. Raises FootageError for an impossible one."""
     if not NAME.fullmatch(name):
         raise FootageError(f"'{name[:60]}' is no name of a camera.", "Use letters, digits, '-' and '_'.")
     if not place or len(place) > LONGEST or any(ord(sign) < 33 for sign in place.replace(" ", "")):

@@ -45,7 +45,7 @@ class Shot:
     came: float
 
 
-# Waits so many seconds, or until whoever waits is told to stop: then it says True.
+# Waits for seconds, or until it is stopped: then it returns True.
 Wait = Callable[[float], bool]
 
 
@@ -102,8 +102,8 @@ def replayed_video(
     clock: Callable[[], float] = time.monotonic,
     released: Callable[[], bool] = lambda: True,
 ) -> Iterator[Shot]:
-    """A video as if it were a camera: each picture when its time has come, the first one again and again until it is
-    released. Raises FootageError.
+    """A video replayed as a camera: each picture at its time, the first one repeatedly until it is released. Raises
+    FootageError.
     """
     try:
         with open_video(path) as container:
@@ -169,9 +169,9 @@ def _pixels(frame: av.VideoFrame) -> Bytes:
 
 
 def _why(problem: Exception) -> str:
-    """What a library says went wrong, without the address."""
+    """A library's error as text, without the address."""
     if isinstance(problem, IndexError):
         return "no video in it"
     if isinstance(problem, av.error.ExitError):
-        return f"nothing came for {SECONDS_TO_READ:g} s"
+        return f"no data for {SECONDS_TO_READ:g} s"
     return str(getattr(problem, "strerror", "") or type(problem).__name__)

@@ -1,14 +1,14 @@
 """A session's footage: the pictures and masks of any frame, at random or onwards.
 
 Each camera has its own decoder behind a lock, so cameras can be read from several threads and the same
-session can be opened twice. The last pictures are kept, so that re-annealing a frame or looking at it
+session can be opened twice. The last pictures are kept, so that re-annealing or showing a frame
 again decodes nothing.
 
-Footage gone through forth and back without an end, so that a short clip can be replayed for long.
+Footage can be played forwards and backwards without end (ping-pong), so that a short clip can be replayed for long.
 
-A body that jumped from a clip's end to its beginning could not be followed; at a turning point it only goes back the
-way it came. Videos can only be decoded onwards, so on the way back stretches of frames are decoded at once and kept; a
-stretch costs some ten frames' time, every now and then.
+A jump from a clip's end to its beginning could not be tracked; at a turning point the body only moves backwards.
+Videos can only be decoded onwards, so on the way back stretches of frames are decoded at once and kept; a stretch
+costs some ten frames' time, every now and then.
 """
 
 import itertools
@@ -51,7 +51,7 @@ class Reader(Protocol):
         ...
 
     def close(self) -> None:
-        """Let go of files."""
+        """Close the files."""
         ...
 
 
@@ -114,8 +114,8 @@ class Footage:
         return self.folder / entry if entry else None
 
     def absent(self, frame: int) -> frozenset[str]:
-        """Cameras without a picture of a frame that others have: live ones that had stopped. Nothing may be concluded
-        from what `picture` shows in its place.
+        """Cameras without a picture of a frame that others have: live ones that had stopped. What `picture` shows in
+        its place means nothing.
         """
         numbered = [camera for camera in self.source.cameras if camera.kind == "numbered"]
         if not numbered:
@@ -142,7 +142,7 @@ class Footage:
             raise FootageError(
                 f"The exclusion of camera {camera} is {picture.shape[1]}x{picture.shape[0]} pixels, the footage"
                 f" {source.width}x{source.height}.",
-                f"Paint it anew, or remove '{EXCLUSIONS}/{path.name}'.",
+                f"Paint it again, or remove '{EXCLUSIONS}/{path.name}'.",
             )
         return thresholded_mask(picture)
 
@@ -154,7 +154,7 @@ class Footage:
         return turned_picture(picture, turn)
 
     def release(self, camera: str) -> None:
-        """Close a camera's files and forget its last pictures; whoever reads on opens them again."""
+        """Close a camera's files and forget its last pictures; the next read opens them again."""
         for kept in filter(None, (self._pictures[camera], self._masks.get(camera))):
             kept.release()
         give_back_freed_memory(of_late=True)
@@ -304,7 +304,7 @@ class _KeptPictures:
                     self._drop(key)
 
     def forget(self, reader: int) -> None:
-        """Keep nothing of a reader."""
+        """Drop all pictures of a reader."""
         with self._lock:
             self._drop_all(reader)
 

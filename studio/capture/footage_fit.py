@@ -1,9 +1,9 @@
 """Whether footage is what a camera was calibrated for, and what to assume where it nearly is.
 
 Sizes must agree within 2 % and in orientation. Where they differ by less, one of two things happened,
-and black bars tell which: a picture that was shrunk as a whole to fit one side has bars along the
+and black bars show which: a picture that was shrunk as a whole to fit one side has bars along the
 other; without bars, the difference was cut off evenly on both sides (encoders drop rows and columns
-that do not fill a block). Either moves the principal point; the assumption is said and stored.
+that do not fill a block). Either moves the principal point; the assumption is reported and stored.
 """
 
 import dataclasses
@@ -94,7 +94,7 @@ def _check_sizes(camera: Camera, width: int, height: int) -> None:
         raise CalibrationError(
             f"The footage of camera {camera.name} is {width}x{height} pixels and its calibration is for"
             f" {calibrated}: one is upright, the other lies on its side.",
-            "Turn the footage as it was when it was calibrated, or calibrate again.",
+            "Rotate the footage as for the calibration, or calibrate again.",
         )
     difference = max(abs(width / camera.width - 1.0), abs(height / camera.height - 1.0))
     if difference > LARGEST_DIFFERENCE:

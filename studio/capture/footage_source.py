@@ -1,4 +1,4 @@
-"""Where a session's footage lies and how much of it there is: the frozen description kept in the manifest.
+"""The description of a session's footage, stored in the manifest.
 
 It holds only what was *measured* at import (sizes and frame counts come from decoding every frame once), so
 that opening a session needs no probing and a file that changed afterwards is noticed.
@@ -22,7 +22,7 @@ class CameraSource:
     none.
     width, height : pixels, as they are after turning. frame_count : frames that decode, whatever the file's header
     claims. offset : the file's frame that was taken at the session's frame 0. turned : degrees clockwise by which the
-    pictures (masks and background too) are turned, beyond what the file itself asks for: 0, 90, 180 or 270.
+    pictures (masks and background too) are turned, in addition to the file's own rotation: 0, 90, 180 or 270.
     """
 
     name: str

@@ -1,8 +1,8 @@
-"""When pictures come: the sets that a live run tracks, and the clock that replays footage as if it were live.
+"""Sources of sets for a live run, and a clock that replays footage as if it were live.
 
-A *set* is one picture of every camera, all of one moment. What a live run asks of its pictures' source is small
-(`LiveSource`): the newest set that is complete, and to be woken by the next. Cameras answer it from what they have
-sent; `ReplayClock` answers it for footage on disk, a frame falling due when its time has come.
+A *set* is one picture of every camera, all of one moment. A live run needs little of its source
+(`LiveSource`): the newest complete set, and to be woken by the next. Cameras give it from their pictures; `ReplayClock`
+gives it for footage on disk, each frame at its time.
 """
 
 import time
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 PATIENCE_SECONDS = 0.05
-"""How long a wait lasts at most, so that whoever waits can be told to stop."""
+"""Longest single wait in seconds, so that a waiting thread can be stopped."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,10 +30,10 @@ class Arrival:
 
 
 class LiveSource(Protocol):
-    """Where a live run learns which pictures there are; the pictures themselves come from a `Footage`."""
+    """The source of sets of a live run; the pictures come from a `Footage`."""
 
     def begin(self, frame: int) -> None:
-        """From now on sets come, the first of them numbered `frame`."""
+        """Start the sets, the first of them numbered `frame`."""
         ...
 
     def newest(self, after: int) -> Arrival | None:
@@ -53,7 +53,7 @@ class ReplayClock:
     """Footage as if it were live: frame k comes (k - first) / fps seconds after the first.
 
     cameras : how many, which all take their pictures at the same time. last : the frame after the last one. clock :
-    seconds, rising; sleep : lets so many seconds pass.
+    seconds, rising; sleep : waits for seconds.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class ReplayClock:
         self._began: float | None = None
 
     def begin(self, frame: int) -> None:
-        """Let `frame` come now and the others after it."""
+        """Start the clock with `frame`."""
         self._first, self._began = frame, self._clock()
 
     def newest(self, after: int) -> Arrival | None:

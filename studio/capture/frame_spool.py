@@ -1,4 +1,4 @@
-"""Pictures laid aside in a temporary file, to be looked at together, a band of rows at a time.
+"""Pictures spooled to a temporary file, to be read together, a band of rows at a time.
 
 Twenty full-HD pictures are 125 MB. What needs all of them at once, pixel by pixel, as a median does, needs them only
 for the pixel it is at.

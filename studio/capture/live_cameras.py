@@ -1,14 +1,14 @@
-"""Cameras that run now: a reader each, their newest pictures, what state they are in, and the sets that they make.
+"""Live cameras: a reader each, their newest pictures and states, and the sets they form.
 
-A reader's thread is made by whoever starts it (`LiveCamera.run`). A stream that breaks is opened again after a while
+The caller of `LiveCamera.run` provides the reader's thread. A stream that breaks is opened again after a while
 that grows; a stream that gives nothing for long enough counts as stopped whether or not its reader has noticed, and the
 others go on without it.
 
-Which pictures of several cameras belong together, and how far apart they were taken.
+Pairing of pictures, and their time spread.
 
 Cameras that run on their own take their pictures at any time; of the newest ones those are paired that lie nearest to
 the newest picture of the camera that is behind. So pictures of one set are at most half a frame apart unless a camera
-lags or loses pictures, and then that is said with its name.
+lags or loses pictures, and then that is reported with its name.
 """
 
 import threading
@@ -26,7 +26,7 @@ from studio.capture.camera_streams import Shot, Wait, open_stream
 from studio.errors import FootageError
 
 APART = 0.5
-"""Pictures further apart than this share of a frame's duration are said to be."""
+"""Pictures further apart than this share of a frame's duration are reported."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,7 +66,7 @@ class SpreadFigures:
     def in_words(self) -> str:
         """As a person reads it."""
         if not self.sets:
-            return "no complete set of pictures came"
+            return "no complete set of pictures arrived"
         words = f"pictures {self.median:.1f} ms apart (95 %: {self.most:.1f}, worst {self.worst:.1f})"
         if self.apart:
             late = f"; camera {self.lagging} lags" if self.lagging else ""
@@ -134,8 +134,8 @@ Open = Callable[[CameraAddress, Wait], Iterator[Shot]]
 class CameraStanding:
     """A camera at this moment. state : "connecting" (no picture yet), "running", "stopped" (it ran, now nothing comes),
     "ended" (a replayed video is over). seconds : for how long. age : of its last picture, seconds, NaN before the
-    first. fps : as measured. pictures : that came. width, height : pixels, 0 before the first. message : what is
-    wrong, in words. attempts : how often it was opened in vain since it last ran.
+    first. fps : as measured. pictures : that came. width, height : pixels, 0 before the first. message : the
+    error. attempts : failed ones since it last ran.
     """
 
     name: str
@@ -152,7 +152,7 @@ class CameraStanding:
 
     @property
     def in_words(self) -> str:
-        """As a status line says it."""
+        """The text of a status line."""
         if self.state == "running":
             return f"{self.name}: {self.fps:.1f} fps"
         words = f"{self.name}: {self.state} for {self.seconds:.1f} s"
@@ -190,7 +190,7 @@ class LiveCamera:
         return self.address.name
 
     def run(self) -> None:
-        """Read until told to stop, opening the stream again when it breaks. Never raises."""
+        """Read until stopped, reopening the stream when it breaks. Never raises."""
         delay = FIRST_WAIT
         while not self._stopping.is_set():
             before = self._count
@@ -203,9 +203,7 @@ class LiveCamera:
                 problem_text = f"Camera {self.name} ({self.address.shown}): {ended}."
             except FootageError as problem:
                 problem_text = problem.message
-            except (
-                Exception
-            ) as problem:  # a reader must not die of what a stranger's stream does to a library
+            except Exception as problem:  # a foreign stream must not end the reader through a library's error
                 problem_text = f"Camera {self.name} cannot be read ({type(problem).__name__})."
             delay = FIRST_WAIT if self._count > before else min(2.0 * delay, LONGEST_WAIT)
             with self._lock:
@@ -219,7 +217,7 @@ class LiveCamera:
         self._stopping.set()
 
     def release(self) -> None:
-        """Let a replayed video go on from its first picture; cameras do not mind."""
+        """Let a replayed video continue from its first picture; has no effect on cameras."""
         self._released.set()
 
     def listen(self, listener: Listener) -> None:
@@ -246,7 +244,7 @@ class LiveCamera:
 
     @property
     def standing(self) -> CameraStanding:
-        """How it stands."""
+        """The camera's state."""
         with self._lock:
             now, last = self._clock(), self._recent[-1] if self._recent else None
             age = now - last.came if last else float("nan")
@@ -301,12 +299,12 @@ class LiveCameras:
             camera.listen(self._heard)
 
     def start(self, start: Callable[[Callable[[], None], str], None]) -> None:
-        """Let every camera's reader run. start : makes a thread of a function and a name."""
+        """Start every camera's reader. start : makes a thread of a function and a name."""
         for camera in self.cameras:
             start(camera.run, f"camera-{camera.name}")
 
     def stop(self) -> None:
-        """Let all readers end."""
+        """Stop all readers."""
         for camera in self.cameras:
             camera.stop()
         with self._changed:
@@ -314,7 +312,7 @@ class LiveCameras:
 
     @property
     def standings(self) -> tuple[CameraStanding, ...]:
-        """How each camera stands, in their order."""
+        """The state of each camera, in their order."""
         return tuple(camera.standing for camera in self.cameras)
 
     @property

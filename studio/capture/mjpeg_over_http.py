@@ -23,7 +23,7 @@ REMEDY = "Check that it is switched on, its address, and its name and password."
 def mjpeg_parts(
     address: CameraAddress, wait: Callable[[float], bool], patience: tuple[float, float]
 ) -> Iterator[bytes]:
-    """The parts of a stream, until it ends or `wait` says that nobody listens. patience : seconds to connect, to read.
+    """The parts of a stream, until it ends or `wait` returns True. patience : seconds to connect, to read.
 
     Raises FootageError, also in the middle; its words never hold the password.
     """
@@ -55,14 +55,14 @@ def mjpeg_parts(
                 raise _wrong(address, str(problem)) from None
     except httpx.TimeoutException as problem:
         seconds = opening if isinstance(problem, httpx.ConnectTimeout) else reading
-        raise _wrong(address, f"nothing came for {seconds:g} s") from None
+        raise _wrong(address, f"no data for {seconds:g} s") from None
     except (httpx.HTTPError, httpx.InvalidURL) as problem:
         # A library's own words may hold the address with its password.
         raise _wrong(address, type(problem).__name__) from None
 
 
 class _Password(httpx.Auth):
-    """Name and password, given when the camera asks for them: digested where it knows how, else plain."""
+    """Name and password, sent when the camera requires them: as digest if it supports that, else plain."""
 
     def __init__(self, name: str, password: str | None) -> None:
         self._given = unquote(name), unquote(password or "")

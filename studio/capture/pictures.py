@@ -30,7 +30,7 @@ STRICTLY_DECODED = frozenset((".png", ".jpg", ".jpeg", ".bmp"))
 
 @dataclass(frozen=True, slots=True)
 class PicturesMeasure:
-    """What reading every picture of a folder found. missing : numbers that the file names skip."""
+    """The result of reading every picture of a folder. missing : numbers that the file names skip."""
 
     width: int
     height: int
@@ -143,7 +143,7 @@ class PictureReader:
         return read_picture(self._paths[index])
 
     def close(self) -> None:
-        """Nothing is kept open."""
+        """Nothing to close."""
 
 
 def _missing_numbers(paths: tuple[Path, ...]) -> tuple[int, ...]:
@@ -169,7 +169,7 @@ def _damaged(path: Path) -> FootageError:
 SUFFIX = ".jpg"
 DIGITS = 6
 FURTHEST = 600
-"""Numbers that are looked back for a picture."""
+"""Largest number of steps back to an earlier picture."""
 
 
 def picture_path(folder: Path, number: int) -> Path:
@@ -203,7 +203,7 @@ class NumberedReader:
         )
 
     def close(self) -> None:
-        """Nothing is kept open."""
+        """Nothing to close."""
 
 
 MOST_BYTES = 40_000_000

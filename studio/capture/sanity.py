@@ -1,6 +1,6 @@
-"""What a calibration's numbers must fulfil, which way its pictures stand, and where its cameras look.
+"""Checks of a calibration's numbers, and the orientation of its pictures.
 
-A rotation that is none, or a mirrored one, is refused. Doubts that need more are `studio.calibration.checks`'.
+An invalid or mirrored rotation is refused. Further checks are in `studio.calibration.checks`.
 """
 
 import numpy as np

@@ -1,8 +1,8 @@
 """A live camera's pictures on disk as they come: fragmented MP4, of which a kill loses less than a second.
 
 Pictures are kept as JPEG: a stream's own bytes where it sent JPEG, so that nothing is decoded or lost, else pictures
-are compressed lightly. A recording has an even frame rate: a picture that was lost is stood in for by the one before it
-and one too many is left out, so that a picture's number tells its time; both are counted. When each picture really came
+are compressed lightly. A recording has an even frame rate: a lost picture is replaced by the one before it and a
+surplus one is left out, so that a picture's number gives its time; both are counted. When each picture really came
 stands in `timestamps.csv` (`capture.timestamps`).
 """
 
@@ -31,7 +31,7 @@ from studio.foreign_files import check_regular
 QUALITY, PREVIEW_QUALITY = 95, 80
 FRAGMENT_MICROSECONDS = 500_000
 TOLERANCE = 0.6
-"""A picture may come so many frames late or early before one is put in or left out."""
+"""Frames that a picture may be late or early before one is repeated or left out."""
 LONGEST_GAP = 600
 """Pictures put in at most at once; after a longer silence the recording goes on where it is."""
 TIME_COLUMNS = ("cam_id", "frame_index", "frame_time")
@@ -165,7 +165,7 @@ class TimesFile:
 
 @contextmanager
 def _disk_errors() -> Iterator[None]:
-    """What the library says of a disk, as the system would."""
+    """A library's disk error as an OSError."""
     try:
         yield
     except av.error.FFmpegError as problem:

@@ -1,8 +1,8 @@
-"""By how many frames cameras began apart, estimated from how much moves in their pictures.
+"""Offsets between cameras in frames, estimated from motion in their pictures.
 
 A movement begins and ends in all views at once, so the motion energy (mean absolute difference of successive pictures,
 reduced and grey) rises and falls together. For each two cameras the correlation of both courses is taken at every lag;
-the peak against the next best one says how far to trust it, its breadth how exact it is: a slow movement looks fastest
+the peak against the next best one shows its reliability, its breadth its accuracy: a slow movement looks fastest
 at different moments from different sides. Cameras are then put in order along the most trusted pairs, and other trusted
 pairs must agree. An estimate is shown to a person; nothing here applies it.
 """
@@ -77,7 +77,7 @@ def motion_energy(
 ) -> Array:
     """(count - 1,) mean absolute difference of each picture to the one before it, grey levels.
 
-    read(k) : (H, W, 3) uint8 BGR of frame k; tell : called with the frames done.
+    read(k) : (H, W, 3) uint8 BGR of frame k; report : called with the frames done.
     """
     energy = np.zeros(max(0, count - 1))
     before: NDArray[np.float32] | None = None
@@ -119,9 +119,9 @@ def estimate_offsets(
     ]  # fmt: skip
     weak = [f"{link.first} and {link.second}" for link in links if not link.sure]
     notes = (
-        *((f"The motion of {'; '.join(weak)} does not tell their offset reliably.",) if weak else ()),
+        *((f"The motion of {'; '.join(weak)} does not determine their offset reliably.",) if weak else ()),
         *(
-            f"{pair.first} and {pair.second} by themselves are {pair.lag:+d} frames apart, unlike the others say."
+            f"{pair.first} and {pair.second} alone are {pair.lag:+d} frames apart, which contradicts the others."
             for pair in against
         ),
     )
@@ -181,7 +181,7 @@ def estimate_synchrony(
 def _course(name: str, energy: Array) -> Array:
     """The energy's logarithm above its own quiet level, without the single spikes that a codec's key frames make.
 
-    Raises FootageError if nothing can be told from it.
+    Raises FootageError if it is too even.
     """
     if len(energy) < FEWEST_FRAMES - 1:
         raise FootageError(
@@ -193,8 +193,8 @@ def _course(name: str, energy: Array) -> Array:
     low, high = np.percentile(calm, [5.0, 95.0])
     if high - low < FLAT_GREY_LEVELS:
         raise FootageError(
-            f"What moves in camera {name} stays the same all the time (from {low:.2f} to {high:.2f} grey levels), so"
-            " its pictures do not tell when they were taken.",
+            f"The motion in camera {name} is the same all the time (from {low:.2f} to {high:.2f} grey levels), so"
+            " its pictures do not show when they were taken.",
             "Give the offsets by hand, or footage in which movements begin and end.",
         )
     return np.log(np.maximum(calm, 0.5 * low) + 0.1 * (high - low))
@@ -237,7 +237,7 @@ def _along_best_pairs(
 
 
 def in_words(found: Synchrony) -> str:
-    """One line a camera: its offset and how far to trust it; then the doubts."""
+    """One line a camera: its offset and reliability; then the notes."""
     lines = [
         f"{name}: {offset:+d} frames, give or take {found.within[name]}"
         f" (peak {found.confidence[name]:.2f} times the next best)"

@@ -1,8 +1,8 @@
-"""When each frame was taken, as recorders write it beside their videos: Caliscope's `timestamps.csv` and its like.
+"""Frame times as recorders write them beside their videos: Caliscope's `timestamps.csv` and similar files.
 
 A line a frame: the camera (`cam_id`, formerly `port`), its time in seconds (`frame_time`) and perhaps the frame's
 number in the video (`frame_index`); without it, lines of a camera are counted in the order of their times. From them
-follow each camera's offset and how far apart pictures of one frame really are.
+follow each camera's offset and the time spread of a frame's pictures.
 """
 
 import csv
@@ -26,15 +26,15 @@ CAMERA_COLUMNS, TIME_COLUMNS, INDEX_COLUMNS = (
 )
 LARGEST_FILE = 200_000_000
 APART = 0.5
-"""Pictures more than this share of a frame's duration apart are said."""
+"""Pictures more than this share of a frame's duration apart are reported."""
 
 
 @dataclass(frozen=True, slots=True)
 class TimedOffsets:
-    """What times say. offsets : each camera's frame that belongs to frame 0, the smallest being 0.
+    """Offsets and rate from times. offsets : each camera's frame that belongs to frame 0, the smallest being 0.
 
-    fps : frames per second. apart : largest distance of pictures with one number, in frames. notes : what a person
-    should know, sentences.
+    fps : frames per second. apart : largest distance of pictures with one number, in frames. notes : for the user,
+    sentences.
     """
 
     offsets: dict[str, int]
@@ -83,7 +83,7 @@ def offsets_from_times(times: dict[str, Array]) -> TimedOffsets:
     if different:
         words = ", ".join(f"{name}: {rate:.2f}" for name, rate in rates.items())
         raise FootageError(
-            f"The times say that cameras have different frame rates ({words}).",
+            f"By their times the cameras have different frame rates ({words}).",
             "Resample the footage to one rate, so that frames belong together.",
         )
     start = max(float(moments[0]) for moments in times.values())

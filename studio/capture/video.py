@@ -1,16 +1,16 @@
 """Video files, frame by frame and exactly: damage is reported, never skipped over.
 
 Headers are not believed: a video is measured by decoding every frame once (`measure_video`). The
-decoder is told to stop at damage (`err_detect=explode`), frames that it marks as corrupt count as
+decoder stops at damage (`err_detect=explode`), frames that it marks as corrupt count as
 damage, and fewer frames than the container announces mean that the file was cut. Damage that leaves a
 lawful bit stream cannot be seen by any decoder.
 
-What a video file says of itself before it is decoded, and what of that is refused.
+Headers of video files, and what is refused by them before decoding.
 
-Small files can ask for very much memory or time, so size, length and codec are checked first and the decoder is told
+Small files can ask for very much memory or time, so size, length and codec are checked first and the decoder gets
 the same limit. Headers are believed no further: `video.measure_video` counts by decoding.
 
-Memory that a video's decoder has let go of, given back to the system.
+Memory released by a video's decoder, returned to the system.
 
 A frame that was asked for its side data is part of a cycle, so it stays, 3 MB of full HD, until Python collects cycles,
 which it does seldom where few objects are made (`video` asks one frame of each file that it opens); and glibc keeps
@@ -51,7 +51,7 @@ CODECS = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class VideoProbe:
-    """What a file announces. width, height : pixels as shown, its rotation applied; turned : that rotation, degrees
+    """The header of a video. width, height : pixels as shown, its rotation applied; turned : that rotation, degrees
     clockwise. frame_count, seconds, fps : 0 where it does not say. steady : whether its frames seem evenly spaced.
     """
 
@@ -66,8 +66,8 @@ class VideoProbe:
 
 
 def probe_video(path: Path) -> VideoProbe:
-    """What a video announces; only its first frame is decoded, in a process of its own. Raises FootageError for what is
-    refused or no video.
+    """The header of a video; only its first frame is decoded, in a separate process. Raises FootageError for refused
+    files and non-videos.
     """
     check_regular(path, FootageError)
     return isolated(FootageError, _probed, path)
@@ -143,12 +143,12 @@ def check_turn(path: Path, frame: av.VideoFrame) -> int:
         a, b, _, c, d = np.frombuffer(memoryview(matrix), "<i4").astype(np.float64)[:5]
         if a * d - b * c < 0.0:
             raise FootageError(
-                f"'{path.name}' asks to be shown mirrored, which no calibration can follow.",
+                f"'{path.name}' is to be shown mirrored, which no calibration can represent.",
                 "Switch mirroring off in the camera, and re-encode the video without it.",
             )
     if round(frame.rotation) % 90:
         raise FootageError(
-            f"'{path.name}' asks to be shown turned by {frame.rotation} degrees.",
+            f"'{path.name}' is to be shown rotated by {frame.rotation} degrees.",
             "Re-encode it without a rotation.",
         )
     return round(-frame.rotation / 90.0) % 4 * 90
@@ -198,7 +198,7 @@ FORWARD = 24
 
 @dataclass(frozen=True, slots=True)
 class VideoMeasure:
-    """What decoding a whole video found. width, height : pixels as shown (the file's rotation applied).
+    """A video measured by decoding all of it. width, height : pixels as shown (the file's rotation applied).
 
     uneven_frame : the first frame that is not where a constant frame rate puts it, or -1.
     """
@@ -278,7 +278,7 @@ class VideoReader:
                     return upright_array(frame)
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         with self._lock:
             if self._container is not None:
                 self._container.close()
@@ -383,7 +383,7 @@ def _packet_times(path: Path) -> tuple[list[int] | None, list[int]]:
 
 
 def _again(first: av.VideoFrame, rest: Iterator[av.VideoFrame]) -> Iterator[av.VideoFrame]:
-    """The frame that was looked at, then the others."""
+    """The frame already read, then the others."""
     yield first
     yield from rest
 
@@ -404,8 +404,8 @@ OF_LATE = 1
 
 
 def give_back_freed_memory(*, of_late: bool = False) -> None:
-    """Collect what is in no use any more, and have the allocator let go of it (under glibc); 0.2 s in a server, whose
-    many objects are all looked at, milliseconds where only those made of late are.
+    """Collect garbage and return freed memory to the system (under glibc); takes 0.2 s in a server with many objects,
+    milliseconds where only recent ones are collected.
     """
     gc.collect(OF_LATE if of_late else 2)
     trim = getattr(_LIBC, "malloc_trim", None)

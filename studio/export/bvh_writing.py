@@ -1,7 +1,7 @@
 """Biovision's BVH: the skeleton in its rest pose with offsets, then a row of channels a frame.
 
 The root has three positions and three rotations, every other joint three rotations (a joint that also moves has
-positions too). BVH names no unit: the file is in metres unless another one is asked for, which Blender takes as they
+positions too). BVH names no unit: the file is in metres unless another one is requested, which Blender takes as they
 are. What a frame has no pose for is interpolated: BVH cannot say "missing".
 """
 
@@ -53,11 +53,11 @@ def write_bvh(task: ExportTask) -> Written:
 def smooth_angles(turns: Array, order: str) -> Array:
     """(K, J, 3) degrees of rotations (K, J, 3, 3) in an order of axes, without needless jumps from row to row.
 
-    Of the two spellings of a rotation, and their whole turns, the one nearest the row before is taken.
+    Of the two Euler triples of a rotation, plus whole turns, the one nearest the row before is taken.
     """
     shape = turns.shape[:2]
     with warnings.catch_warnings():
-        # At gimbal lock one of the angles is free; scipy says so and sets it to zero, which is a right spelling.
+        # At gimbal lock one of the angles is free; scipy says so and sets it to zero, which is a valid triple.
         warnings.simplefilter("ignore", UserWarning)
         first = Rotation.from_matrix(turns.reshape(-1, 3, 3)).as_euler(order).reshape(*shape, 3)
     other = np.stack([first[..., 0] + np.pi, np.pi - first[..., 1], first[..., 2] + np.pi], axis=-1)

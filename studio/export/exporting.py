@@ -22,7 +22,7 @@ from studio.sessions.stored_run import StoredRun
 
 @dataclass(frozen=True, slots=True)
 class ExportReport:
-    """What came of an export.
+    """The result of an export.
 
     files : written, and nothing else. track : that they hold, "" for none. checked : what reading back showed. notes :
     sentences on gaps, names and axes, and on a better track that was passed over.
@@ -43,10 +43,10 @@ class ExportReport:
 
 
 def settled(form: ExportFormat, requested: Mapping[str, object]) -> ExportOptions:
-    """Options from what was asked, "auto" settled for the format.
+    """Options from the request, with "auto" resolved for the format.
 
-    Raises SettingsError for unknown names and values, ExportError for an option that the format does not take, or a
-    range of frames that is none.
+    Raises SettingsError for unknown names and values, ExportError for an option that the format does not take, or an
+    empty range of frames.
     """
     options = changed(ExportOptions(), requested)
     for name in requested:
@@ -85,11 +85,11 @@ def export_run(
     record_scene: Writer | None = None,
     pack: bool = False,
 ) -> ExportReport:
-    """Export a run to `place`, which is written over only when the new file has read back as it should.
+    """Export a run to `place`, which is replaced only after the new file has been read back and checked.
 
-    asked : options by name. record_scene : the writer of scene recordings. pack : several files become one zip.
-    cancelled : asked often; True ends it with WorkCancelledError. Raises ExportError and whatever a run raises that
-    cannot be read.
+    requested : options by name. record_scene : the writer of scene recordings. pack : several files become one zip.
+    cancelled : checked often; True ends it with WorkCancelledError. Raises ExportError, and the errors of reading
+    the run.
     """
     options = settled(form, requested)
     writer = form.write or record_scene

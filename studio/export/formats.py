@@ -130,7 +130,7 @@ _OWN = (
     ExportFormat(
         "viser",
         "Scene recording",
-        "Plays in viser's own browser client: the 3-D scene with body and cameras, to be looked at from any side.",
+        "Plays in viser's own browser client: the 3-D scene with body and cameras, to be viewed from any side.",
         ("track", "first", "last", "lost"),
         None,
         what="scene",

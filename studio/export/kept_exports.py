@@ -1,4 +1,4 @@
-"""The exports that lie in a run's folder: `exports/<file>`, each with what was said of it when it was written."""
+"""The exports in a run's folder: `exports/<file>`, each with its report."""
 
 import datetime
 from collections.abc import Callable, Mapping
@@ -24,8 +24,8 @@ SAID = ".said.json"
 
 class KeptExport(msgspec.Struct, frozen=True):
     """One export. file : its name in the folder. made : UTC, ISO 8601. checked, notes : as in `ExportReport`. track,
-    content : the track that it was made from and a digest of its poses then; "" for a file that holds none, or of which
-    nobody knows.
+    content : the track that it was made from and a digest of its poses then; "" for a file that holds none, or an
+    unknown one.
     """
 
     file: str
@@ -43,7 +43,7 @@ class KeptExport(msgspec.Struct, frozen=True):
 
 
 _RECORD = RecordFile(
-    KeptExport, "what is known of an export", "Export it again.", ("There is no such export.", "Export it.")
+    KeptExport, "the report of an export", "Export it again.", ("There is no such export.", "Export it.")
 )
 
 
@@ -57,7 +57,7 @@ def export_into_run(
     cancelled: Callable[[], bool] | None = None,
     record_scene: Writer | None = None,
 ) -> KeptExport:
-    """Export a run into its own folder; several files become one zip. The same wish writes over its file.
+    """Export a run into its own folder; several files become one zip. The same request replaces its file.
 
     Raises what `exporting.export_run` raises.
     """
@@ -94,7 +94,7 @@ def kept_exports(run: StoredRun) -> tuple[KeptExport, ...]:
 
 
 def stale_export(run: StoredRun, kept: KeptExport) -> str:
-    """Why a file does not hold its track as it is now, a clause; "" where it does, or nobody can tell."""
+    """Why a file is out of date with its track, a clause; "" if it is not, or if that is unknown."""
     if not kept.content:
         return ""
     if kept.track not in track_names(run):

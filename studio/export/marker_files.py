@@ -13,7 +13,7 @@ from studio.motion_files.trc import TRC_FROM_WORLD, MarkerMotion, read_trc, writ
 
 
 def marked_points(task: ExportTask) -> tuple[Points, Array]:
-    """The points under the names that were asked for, and their places (K, M, 3) mm in the world, NaN in gaps."""
+    """The points under the requested names, and their places (K, M, 3) mm in the world, NaN in gaps."""
     points = points_of(task.motion.body, task.options.names)
     places = points.positions(task.motion.body, task.motion.poses)
     places[~task.motion.known] = np.nan
@@ -47,7 +47,7 @@ def write_c3d_file(task: ExportTask) -> Written:
     if count > MOST_C3D_FRAMES and not task.options.split:
         raise ExportError(
             f"C3D counts at most {MOST_C3D_FRAMES} frames and this motion has {count}.",
-            "Export fewer frames (first, last), a lower frame rate, or let it be split into several files (split).",
+            "Export fewer frames (first, last), a lower frame rate, or split it into several files (split).",
         )
     files, worst = [], 0.0
     for part, first in enumerate(range(0, count, MOST_C3D_FRAMES)):
@@ -75,7 +75,7 @@ def _notes(points: Points, task: ExportTask, how: str) -> tuple[str, ...]:
 
 
 def point_notes(task: ExportTask, points: Points, how: str) -> tuple[str, ...]:
-    """What whoever reads a file of points should know. how : gaps look in it, "as {how}"."""
+    """Notes for readers of a file of points. how : gaps look in it, "as {how}"."""
     gaps = task.gaps_in_words(f"{{count}} frames are missing in it, as {how}.")
     return (*gaps, *filter(None, [points.note]))
 

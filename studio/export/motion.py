@@ -29,7 +29,7 @@ class Motion:
 
     fps : of the grid. frames : (K,) numbers in the footage, fractions between. times : (K,) seconds from the first.
     poses : (K, D) radians and mm, filled. known : (K,) False where the pose was made up. confidence : (K,), NaN
-    unknown. states : K words, "" where the pose was made up. notes : sentences for whoever gets the file.
+    unknown. states : K words, "" where the pose was made up. notes : sentences for readers of the file.
     """
 
     body: BodyModel
@@ -100,7 +100,7 @@ def _filled(body: BodyModel, fps: float, track: Track, rows: Indices, lost: str)
     if not known.any():
         raise ExportError(
             f"The body is lost in every frame of track '{track.name}' that was chosen.",
-            "Choose other frames, or keep the poses that were held (lost = keep).",
+            "Choose other frames, or keep the held poses (lost = keep).",
         )
     places = np.arange(count, dtype=np.float64)
     made, far = _between(body, places[known], poses[known], places[~known])

@@ -1,6 +1,6 @@
 """Names that other programs know: which point of the body each is, and what its joints are called there.
 
-The maps are data (`name_maps/*.toml`). A body that lacks a point is exported without it, and that is said.
+The maps are data (`name_maps/*.toml`). A body that lacks a point is exported without it, and that is reported.
 """
 
 from dataclasses import dataclass
@@ -99,7 +99,7 @@ def joint_names(own: tuple[str, ...], names: str) -> tuple[tuple[str, ...], str]
             renamed = name
         renames.append(renamed)
     note = (
-        f"{name_map(names).title} has no name for {_listed(kept)}: these joints keep their own."
+        f"{name_map(names).title} has no name for {_listed(kept)}: these joints keep their own names."
         if kept
         else ""
     )

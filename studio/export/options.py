@@ -1,4 +1,4 @@
-"""What an export may be asked for: one declaration an option, from which command, API and page make theirs."""
+"""The options of an export: one declaration each, from which command, API and page derive theirs."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -25,8 +25,8 @@ class ExportOptions:
 
     track: str = knob(
         BEST,
-        help="Which track: best is the smoothed one, else the refined, else raw, what the search found; a track that is"
-        " older than the run's frames is passed over.",
+        help="Which track: best is the smoothed one, else the refined, else raw, the search's own; a track that is"
+        " older than the run's frames is skipped.",
     )
     first: int = knob(0, 0, 100_000_000, label="from frame", help="The first frame.")
     last: int = knob(0, 0, 100_000_000, label="to frame", help="The frame after the last; 0: to the end.")
@@ -37,7 +37,7 @@ class ExportOptions:
         "gap",
         label="lost frames",
         choices=("gap", "keep"),
-        help="Frames in which the body was lost become gaps, or keep the pose that was held.",
+        help="Frames in which the body was lost become gaps, or keep the held pose.",
     )
     unit: str = knob(
         AUTO, choices=(AUTO, "m", "cm", "mm"), help="Of lengths; auto: what the format's readers expect."

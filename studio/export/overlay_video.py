@@ -1,4 +1,4 @@
-"""Videos of what the cameras saw with the body drawn over it: H.264 in mp4, upright, one a camera."""
+"""Videos of the cameras' footage with the body drawn over it: H.264 in mp4, upright, one a camera."""
 
 from fractions import Fraction
 from pathlib import Path

@@ -53,7 +53,7 @@ def write_csv(task: ExportTask) -> Written:
 
 
 def write_parquet(task: ExportTask) -> Written:
-    """A row a frame and point: frame, time, name, x, y, z, conf; what else is known is the schema's metadata."""
+    """A row a frame and point: frame, time, name, x, y, z, conf; everything else is in the schema's metadata."""
     points, places = marked_points(task)
     motion, count = task.motion, len(points.names)
     converted = task.axes.points(places).reshape(-1, 3)

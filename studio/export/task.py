@@ -1,4 +1,4 @@
-"""What a writer of a format is given, what it hands back, and how closely a file that was read back must agree."""
+"""Input and output of a format's writer, and the tolerance when a file is read back."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class ExportTask:
 
     @property
     def source(self) -> dict[str, str]:
-        """Where the motion comes from, for files that have a place for it."""
+        """The source of the motion, for files that can name it."""
         return {
             "session": self.run.session_name,
             "run": self.run.name,
@@ -49,15 +49,15 @@ class ExportTask:
         }
 
     def gaps_in_words(self, words: str) -> tuple[str, ...]:
-        """What became of frames without a pose, if there are any. words : a sentence with {count} of {all} in it."""
+        """A note on frames without a pose, if there are any. words : a sentence with {count} of {all} in it."""
         count = int((~self.motion.known).sum())
         return (words.format(count=count, all=len(self.motion.known)),) if count else ()
 
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """files : what was written, the first the one that was asked for. checked : what reading it back showed, in words.
-    notes : what whoever uses the file should know.
+    """files : written, the requested one first. checked : the result of reading back, as text. notes : for users of the
+    file.
     """
 
     files: tuple[Path, ...]
@@ -69,14 +69,14 @@ Writer = Callable[[ExportTask], Written]
 
 
 def agreed(file: Path, points_mm: float, turns_degrees: float | None = None) -> str:
-    """What reading a file back showed, in words. Raises ExportError where it is not what was written.
+    """The result of reading a file back, as text. Raises ExportError if it differs.
 
     points_mm, turns_degrees : the largest differences between what was written and what was read.
     """
     turned = 0.0 if turns_degrees is None else turns_degrees
     if not (points_mm <= LEAST_MM and turned <= LEAST_DEGREES):
         raise ExportError(
-            f"'{file.name}' does not read back as what was written: {points_mm:.3g} mm and {turned:.3g} degrees apart.",
+            f"'{file.name}' differs when it is read back: {points_mm:.3g} mm and {turned:.3g} degrees apart.",
             "Export it again; if it stays so, report the run to the studio's makers.",
         )
     words = f"read back within {max(points_mm, 1e-4):.4f} mm"

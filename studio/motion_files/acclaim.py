@@ -26,7 +26,7 @@ INCH = 25.4
 CMU_RATE = 120.0
 ROOT = "root"
 ROOT_ORDER = ["tx", "ty", "tz", "rx", "ry", "rz"]
-REMEDY = "Correct the line, or fetch the file anew."
+REMEDY = "Correct the line, or fetch the file again."
 
 
 @dataclass(slots=True)
@@ -204,7 +204,7 @@ def _entry(path: Path, line: int, words: list[str], bone: _Bone) -> None:
         unknown = [word for word in rest if word.lower() not in ("rx", "ry", "rz")]
         if unknown:
             what = f"degree of freedom '{unknown[0]}' of bone '{bone.name}' is not rx, ry or rz"
-            raise at_line(path, line, what, "Take a skeleton whose bones only turn.")
+            raise at_line(path, line, what, "Use a skeleton whose bones only rotate.")
         bone.angles = ["xyz".index(word[1].lower()) for word in rest]
 
 

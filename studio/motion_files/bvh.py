@@ -1,7 +1,7 @@
 """Motion files in Biovision's BVH: a hierarchy of joints with offsets and channels, then a row of numbers a frame.
 
-Read strictly: whatever is not understood is refused with its line. `read_bvh_file` gives what the file says, in its own
-unit and axes. As a recording (`read_bvh`) the rest pose is that of all angles zero, y up and facing z, as in the CMU
+Read strictly: unknown input is refused with its line. `read_bvh_file` gives the file's content in its own unit and
+axes. As a recording (`read_bvh`) the rest pose is that of all angles zero, y up and facing z, as in the CMU
 clips, and only the root may move. BVH names no unit; the CMU clips' is 25.4 / 0.45 mm.
 """
 
@@ -31,7 +31,7 @@ REMEDY = "Correct the line, or export the file again."
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BvhFile:
-    """What a file says, in its unit and axes.
+    """A file's content, in its unit and axes.
 
     names, parents : joints in the file's order, end sites named after their parent with `_end`; is_end : (J,) which
     those are. offsets : (J, 3). moves : (F, J, 3) position channels, 0 where there is none; moved : (J, 3) where there
@@ -58,7 +58,7 @@ class BvhFile:
 
 @dataclass(slots=True)
 class _Hierarchy:
-    """What the upper half of the file says. channels : of each joint the words after their number."""
+    """The hierarchy of a file. channels : of each joint the words after their number."""
 
     names: list[str] = field(default_factory=list)
     parents: list[int] = field(default_factory=list)
@@ -188,7 +188,7 @@ def _read_rows(path: Path, lines: list[str], at: int, width: int) -> tuple[float
             rows.append(numbers(path, index + 1, words))
     if len(rows) != int(counted[1]) or not rows:
         raise at_line(
-            path, at + 2, f"{counted[1]} frames are announced, {len(rows)} follow", "Fetch the file anew."
+            path, at + 2, f"{counted[1]} frames are announced, {len(rows)} follow", "Fetch the file again."
         )
     return _rate(1.0 / step), np.array(rows)
 

@@ -15,7 +15,7 @@ from studio.motion_files.trc import MM_PER_UNIT, MarkerMotion, check_reach
 MOST_FRAMES = 65_535
 """C3D counts them with sixteen bits."""
 RESIDUAL_SEEN, RESIDUAL_MISSING = 0.0, -1.0
-REMEDY = "Export it again from the program that it comes from."
+REMEDY = "Export it again from its original program."
 
 
 def read_c3d(path: Path) -> MarkerMotion:

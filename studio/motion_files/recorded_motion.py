@@ -102,7 +102,7 @@ def followed(parents: Sequence[int], moves: Array, turns: Array) -> tuple[Array,
 
 
 def at_line(path: Path, line: int, what: str, remedy: str) -> StudioError:
-    """What is wrong in a line of a text file (counted from 1)."""
+    """An error in a line of a text file (counted from 1)."""
     return StudioError(f"'{path.name}', line {line}: {what}.", remedy)
 
 
@@ -122,7 +122,7 @@ def numbers(path: Path, line: int, words: list[str]) -> list[float]:
             value = float("nan")
         if not math.isfinite(value):
             raise at_line(
-                path, line, f"'{word}' is not a number", "Correct the line, or fetch the file anew."
+                path, line, f"'{word}' is not a number", "Correct the line, or fetch the file again."
             )
         values.append(value)
     return values

@@ -140,7 +140,7 @@ def _set_up(
 
 
 def _tuned(session: Session, own: dict[str, Knob], report: Progress) -> tuple[dict[str, Knob], MaskQuality]:
-    """The knobs among TRIALS, then TRIED_CLEANING (`own` stay fixed) whose worst camera agrees best, and the quality."""
+    """The knobs of TRIALS, then TRIED_CLEANING (`own` stay fixed) whose worst camera agrees best, and its quality."""
     cameras, footage = session.cameras(), session.footage()
     small = tuple(camera.reduced(JUDGED_SIDE) for camera in cameras)
     try:

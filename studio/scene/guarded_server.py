@@ -67,7 +67,7 @@ class GuardedServer(viser.ViserServer):
 
 @contextlib.contextmanager
 def _quietly() -> Iterator[None]:
-    """Silences viser, which prints its own address and its end even when not verbose: a second address would mislead."""
+    """Silences viser, which prints its own address and its end even when not verbose: a second address misleads."""
     # One at a time: two that overlap would leave the console silent for good.
     with _CONSOLE:
         console = rich.get_console()

@@ -33,7 +33,7 @@ BROKEN: dict[str, tuple[Callable[[Path], Path], str]] = {
     "strange camera": (
         lambda folder: spoiled(easymocap(folder).with_name("extri.yml"), "T_02", "T_99"), "does not have|T_02"),
     "mirrored": (lambda folder: mirrored(easymocap(folder)), "mirrors the world"),
-    "contradiction": (lambda folder: contradicting(easymocap(folder)), "say different things"),
+    "contradiction": (lambda folder: contradicting(easymocap(folder)), "disagree"),
     "sheared": (lambda folder: qualisys(folder / "c.qca.txt", r11="1.7"), "is no rotation"),
     "focal length": (lambda folder: qualisys(folder / "c.qca.txt", focalLengthU="118.0"), "focal lengths of 1.84"),
     "torn": (lambda folder: qualisys(folder / "c.qca.txt", radialDistortion1="-46"), "tear the picture apart"),

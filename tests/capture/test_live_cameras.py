@@ -203,4 +203,4 @@ def test_figures_of_spreads() -> None:
         "cam2",
     )
     assert "camera cam2 lags" in found.in_words
-    assert spread_figures(np.zeros(0), []).in_words == "no complete set of pictures came"
+    assert spread_figures(np.zeros(0), []).in_words == "no complete set of pictures arrived"

@@ -81,7 +81,7 @@ def test_a_file_that_does_not_read_back_is_not_offered(arm, tmp_path: Path) -> N
 
     place = tmp_path / "arm.bvh"
     place.write_text("the old one")
-    with pytest.raises(ExportError, match=r"does not read back as what was written: 12\.5 mm"):
+    with pytest.raises(ExportError, match=r"differs when it is read back: 12\.5 mm"):
         export_run(*arm, dataclasses.replace(FORMATS["bvh"], write=broken), {"track": MADE}, place)
     assert place.read_text() == "the old one"
     assert left_behind(tmp_path) == {"arm.bvh"}
