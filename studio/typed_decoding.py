@@ -1,7 +1,7 @@
 """TOML and JSON into frozen types, one at a time.
 
 msgspec works out how to decode a type when it first meets it; two threads that meet one type at the same moment can
-end the process (seen with msgspec 0.22: a page asks for a session and its thumbnail at once). Hence one lock.
+end the process (seen with msgspec 0.22: a page requests a session and its thumbnail at once). Hence one lock.
 
 Why not pydantic, which the server has anyway: on this studio's records it takes 1.6 times as long to decode, 1.8 to
 encode, 3 to encode an event and 1.4 to list two hundred runs, and its errors name an entry in three lines.

@@ -37,7 +37,7 @@ from studio.progress import Progress
 class Calibrated:
     """The result of a calibration.
 
-    lenses : camera → lens. rig : the placed cameras, None if only lenses were asked for. sightings : camera → those
+    lenses : camera → lens. rig : the placed cameras, None if only lenses were requested. sightings : camera → those
     that its lens came from. findings : blocking ones first. floor : how it was set, as text; "" if it was not.
     """
 

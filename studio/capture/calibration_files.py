@@ -225,7 +225,7 @@ def _read_folder(folder: Path) -> FoundCameras:
     )
 
 
-def _finished(read: Calibration, unit: str, asked: str, turned: bool = False) -> Calibration:
+def _finished(read: Calibration, unit: str, requested: str, turned: bool = False) -> Calibration:
     """In mm, sorted, upright (unless the file says how far to turn); names checked."""
     names = [camera.name for camera in read.cameras]
     if len(set(names)) != len(names):
@@ -233,10 +233,10 @@ def _finished(read: Calibration, unit: str, asked: str, turned: bool = False) ->
             f"'{read.label}' names a camera twice ({listed(names)}).", "Give each camera its own name."
         )
     scale, note = _unit(read.cameras, unit)
-    if asked:
+    if requested:
         scale, note = (
-            (1.0 if asked == "mm" else 1000.0),
-            f"The calibration is taken to be in {asked}, as requested.",
+            (1.0 if requested == "mm" else 1000.0),
+            f"The calibration is taken to be in {requested}, as requested.",
         )
     cameras = sorted(read.cameras, key=lambda camera: natural_key(camera.name))
     scaled = [dataclasses.replace(camera, translation=camera.translation * scale) for camera in cameras]

@@ -1,6 +1,6 @@
 """Calibrations as OpenCV's samples write them: YAML or XML, one camera a file, or the stereo sample's pair.
 
-`calibration.cpp` writes image_width, image_height, camera_matrix, distortion_coefficients and, if asked,
+`calibration.cpp` writes image_width, image_height, camera_matrix, distortion_coefficients and, optionally,
 extrinsic_parameters: the board's place in each picture (a camera's place only where there is one picture).
 `stereo_calib.cpp` writes intrinsics.yml (M1, D1, M2, D2) and extrinsics.yml (R, T of the second camera from the first).
 Files with R and T of a camera, as the studio writes them, place it in the world.

@@ -109,7 +109,7 @@ class Storage:
         shape = (*sides, int(kind[1])) if kind[1] not in ("", "1") else tuple(sides)
         if values.size != int(np.prod(shape)):
             raise CalibrationError(
-                f"{self.where}: the matrix '{name}' is declared {'x'.join(map(str, shape))} and has {values.size} numbers.",
+                f"{self.where}: the matrix '{name}' is {'x'.join(map(str, shape))} but has {values.size} numbers.",
                 "Export the file again.",
             )
         return values.reshape(shape)

@@ -80,7 +80,7 @@ def open_stream(
 
 
 def _decoded(address: CameraAddress, parts: Iterator[bytes], clock: Callable[[], float]) -> Iterator[Shot]:
-    """Pictures of JPEG files as they come; one that is damaged is left out, the next one is awaited."""
+    """Pictures of JPEG files as they come; damaged ones are left out."""
     decoder = av.CodecContext.create("mjpeg", "r")
     assert isinstance(decoder, av.VideoCodecContext)
     decoder.thread_type = "NONE"

@@ -12,9 +12,9 @@ the same limit. Headers are believed no further: `video.measure_video` counts by
 
 Memory released by a video's decoder, returned to the system.
 
-A frame that was asked for its side data is part of a cycle, so it stays, 3 MB of full HD, until Python collects cycles,
-which it does seldom where few objects are made (`video` asks one frame of each file that it opens); and glibc keeps
-what threads freed for those threads.
+Reading a frame's side data makes it part of a cycle, so it stays, 3 MB of full HD, until Python collects cycles, which
+it does seldom where few objects are made (`video` reads that of one frame of each file); and glibc keeps memory freed
+by a thread for that thread.
 """
 
 import ctypes
@@ -137,7 +137,7 @@ def announced_frames(container: av.container.InputContainer, stream: av.video.Vi
 
 
 def check_turn(path: Path, frame: av.VideoFrame) -> int:
-    """Degrees clockwise by which the file asks to be shown turned. Raises FootageError for slanted or mirrored ones."""
+    """The rotation of the file in degrees clockwise. Raises FootageError for slanted or mirrored ones."""
     matrix = frame.side_data.get("DISPLAYMATRIX")
     if matrix is not None:
         a, b, _, c, d = np.frombuffer(memoryview(matrix), "<i4").astype(np.float64)[:5]
@@ -331,8 +331,8 @@ def _decoded(
 ) -> Iterator[av.VideoFrame]:
     """Frames in the order of showing, counted from `number`; damage becomes a FootageError.
 
-    How a frame is turned is looked up only where its rotation is another than the last one's: a frame that was asked
-    for its side data is part of a cycle, and stays until Python collects cycles, 3 MB of full HD each.
+    How a frame is turned is looked up only where its rotation is another than the last one's: reading a
+    frame's side data makes it part of a cycle, which stays until Python collects cycles, 3 MB of full HD each.
     """
     last, rotation = "", None
     try:

@@ -114,7 +114,7 @@ class Packing:
         """Append rows (N, C) and return the accessor's index.
 
         kind : glTF's SCALAR, VEC3, VEC4 or MAT4. storage : "f4", "u2" or "u4". target : what the view feeds. bounds :
-        write the smallest and largest value, which glTF asks for of positions and times.
+        write the smallest and largest value, which glTF requires for positions and times.
         """
         stored = np.ascontiguousarray(values, dtype=f"<{storage}")
         self.content.extend(b"\0" * (-len(self.content) % 4))

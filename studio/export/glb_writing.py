@@ -2,7 +2,7 @@
 
 glTF fixes metres and Y up. Every vertex hangs on one joint, so the cones stay stiff. Rotations are quaternions xyzw
 whose signs do not jump, read by linear interpolation; frames without a pose are interpolated, and the animation's
-extras tell which.
+extras list these.
 """
 
 import numpy as np

@@ -42,7 +42,7 @@ class Control:
         return self._change(model, value)
 
     def show(self, value: object) -> None:
-        """Show a value, soon; nobody is asked for it."""
+        """Show a value soon, without reporting it as user input."""
         self._loop.call_soon_threadsafe(self._write, value)
 
     def _write(self, value: object) -> None:

@@ -27,7 +27,7 @@ from studio.synthesis.cameras import placed_camera
 BOARD = Board("charuco", 5, 4, 90.0, 68.0, "DICT_4X4_50")
 
 
-def test_videos_are_looked_at_in_step_and_by_name(tmp_path: Path) -> None:
+def test_videos_are_read_in_step_and_by_name(tmp_path: Path) -> None:
     camera = placed_camera("cam1", (2500.0, 0.0, 1500.0), (0.0, 0.0, 900.0), size=(480, 360), focal_px=400.0)
     poses = close_boards(np.random.default_rng(4), BOARD, camera, 5)
     renderer = BoardRenderer(BOARD, [camera])

@@ -60,7 +60,7 @@ def test_the_pattern_is_opencvs(board: Board) -> None:
     np.testing.assert_array_equal(theirs > 127, drawn(board, per_mm) > 127)
 
 
-def test_a_chessboards_ends_are_told_apart_only_where_colours_differ() -> None:
+def test_a_chessboards_ends_are_distinguished_only_where_colours_differ() -> None:
     for across, down in [(4, 7), (7, 5), (6, 4), (9, 6)]:
         board = Board("chessboard", across, down, 30.0)
         picture = drawn(board, 1.0)

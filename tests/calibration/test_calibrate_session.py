@@ -1,4 +1,4 @@
-"""The verb and the command on a session: what was in use is kept and told; board footage out of step."""
+"""The verb and the command on a session: the earlier calibration is kept and reported; board footage out of step."""
 
 import shutil
 from pathlib import Path
@@ -23,7 +23,7 @@ def takes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return render_takes(tmp_path_factory.mktemp("takes"))
 
 
-def test_the_sessions_calibration_is_replaced_and_told(takes: Path) -> None:
+def test_the_sessions_calibration_is_replaced_and_reported(takes: Path) -> None:
     session = session_of_takes(Workspace().place_for("fresh"), takes)
     words = ["calibrate", "fresh", "--board", BOARD.spelling, "--extrinsics", str(takes / "extrinsics")]
     words += ["--intrinsics", str(takes / "intrinsics")]

@@ -46,7 +46,7 @@ def test_corners_to_a_fraction_of_a_pixel(board: Board) -> None:
     assert found >= 4
 
 
-def test_the_first_corner_is_told_by_its_colour_however_the_board_is_turned() -> None:
+def test_the_first_corner_is_identified_by_its_colour_however_the_board_is_turned() -> None:
     board = BOARDS[2]
     pose = close_boards(np.random.default_rng(0), board, CAMERA, 5)[4]
     picture = BoardRenderer(board, [CAMERA]).picture(0, 0, pose)
@@ -60,7 +60,7 @@ def test_the_first_corner_is_told_by_its_colour_however_the_board_is_turned() ->
     np.testing.assert_allclose(over.pixels, np.array([639.0, 479.0]) - upright.pixels, atol=0.3)
 
 
-def test_a_mirrored_charuco_board_is_found_and_said_to_be_mirrored() -> None:
+def test_a_mirrored_charuco_board_is_found_and_reported_as_mirrored() -> None:
     board = BOARDS[0]
     pose = close_boards(np.random.default_rng(0), board, CAMERA, 5)[4]
     picture = BoardRenderer(board, [CAMERA]).picture(0, 0, pose)

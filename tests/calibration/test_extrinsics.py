@@ -82,7 +82,7 @@ def test_wrong_views_are_left_out() -> None:
 
 
 def test_refining_lenses_leads_towards_the_truth_and_never_far_from_a_good_start() -> None:
-    """Boards at four metres say little of a focal length: the prior holds what the close ones said."""
+    """Boards at four metres say little of a focal length: the prior keeps the result of the close ones."""
     cameras = ring(4)
     poses, sightings = waved(CHARUCO, cameras, each=14)
     lenses = {camera.name: true_lens(camera) for camera in cameras}
@@ -117,7 +117,7 @@ def test_cameras_that_share_no_view_are_named() -> None:
         solve_rig(CHARUCO, apart, {camera.name: true_lens(camera) for camera in cameras})
 
 
-def test_footage_out_of_step_is_said() -> None:
+def test_unsynchronised_footage_is_reported() -> None:
     cameras = ring(4)
     _, sightings = waved(CHARUCO, cameras, each=14)
     late = [

@@ -84,8 +84,8 @@ def test_an_outlier_is_dropped_with_the_reason() -> None:
     np.testing.assert_allclose(lens.matrix[0, 0], CAMERA.matrix[0, 0], rtol=1e-2)
 
 
-def test_too_little_is_said_in_words() -> None:
-    """Five boards in the middle that all face the camera: focal length and distance cannot be told apart."""
+def test_too_few_pictures_are_reported() -> None:
+    """Five boards in the middle that all face the camera: focal length and distance cannot be separated."""
     middle = CHARUCO.points.mean(axis=0)
     ahead = [np.array([0.0, 0.0, 2500.0 + 20.0 * k]) - middle - CAMERA.translation for k in range(5)]
     facing = [rigid(CAMERA.rotation.T, CAMERA.rotation.T @ place) for place in ahead]
@@ -124,7 +124,7 @@ def test_coverage_names_the_parts_that_were_not_seen() -> None:
     ("camera", "focal"), [("cam01", 1681.2), ("cam02", 1673.8), ("cam03", 1681.6), ("cam04", 1675.2)]
 )
 def test_seven_real_pictures(real_data: Path, camera: str, focal: float) -> None:
-    """Focal lengths of the Qualisys calibration within 3 % (measured: 0.6 %), and what is wanting is said (show 1)."""
+    """Focal lengths of the Qualisys calibration within 3 % (measured: 0.6 %), and what is missing is named (show 1)."""
     board = board_from_text("chessboard:4x7,60")
     folder = real_data / "pose2sim-balance" / "calibration" / "intrinsics" / f"int_{camera}_img"
     finder = BoardFinder(board)

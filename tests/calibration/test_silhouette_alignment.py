@@ -103,6 +103,6 @@ def test_a_wrong_silhouette_does_not_turn_cameras(rig: tuple[Camera, ...]) -> No
     assert float(np.max(found.after)) < 1.0
 
 
-def test_too_little_to_align_by_is_said(rig: tuple[Camera, ...]) -> None:
+def test_too_little_to_align_by_is_reported(rig: tuple[Camera, ...]) -> None:
     with pytest.raises(CalibrationError, match="Too few silhouettes"):
         aligned_cameras(rig, outlines(rig, 1))

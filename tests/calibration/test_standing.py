@@ -52,19 +52,19 @@ def of_size(rig: str, factor: float) -> tuple[Camera, ...]:
 
 
 def sizes_named(cameras: tuple[Camera, ...], seen: Masks, height: float | None = HEIGHT) -> tuple[str, ...]:
-    """Codes of what is said."""
+    """Codes of the findings."""
     return tuple(finding.code for finding in silhouette_findings(cameras, seen, height))
 
 
 @pytest.mark.parametrize("posture", POSTURES.values(), ids=POSTURES)
 @pytest.mark.parametrize("rig", RIGS)
-def test_nothing_is_said_of_a_right_calibration_by_who_does_not_stand(rig: str, posture: dict) -> None:
+def test_no_finding_for_a_right_calibration_without_a_standing_person(rig: str, posture: dict) -> None:
     assert sizes_named(RIGS[rig], masks(rig, posture, stout=1.2)) == ()
 
 
 @pytest.mark.parametrize("factor", [0.7, 1.35])
 @pytest.mark.parametrize("rig", RIGS)
-def test_who_stands_tells_of_a_wrong_size_and_of_a_right_one(rig: str, factor: float) -> None:
+def test_a_standing_person_shows_a_wrong_and_a_right_size(rig: str, factor: float) -> None:
     standing = masks(rig, {"arms": (5.0, 10.0)}, frames=5, stout=1.2)
     assert sizes_named(RIGS[rig], standing) == ()
     (finding,) = silhouette_findings(of_size(rig, factor), standing, HEIGHT)
@@ -91,7 +91,7 @@ def test_who_is_tall_enough_in_any_frame_is_not_too_small() -> None:
     assert sizes_named(of_size("corners", 0.78), seen | {9: reached[0]}) == ()
 
 
-def test_without_feet_on_the_floor_nothing_is_said() -> None:
+def test_without_feet_on_the_floor_there_is_no_finding() -> None:
     """The legs behind a table: the mask ends at the knees in every view."""
     whole = masks("five", {}, frames=4, stout=1.2)
     cut = {

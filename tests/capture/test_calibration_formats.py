@@ -111,7 +111,7 @@ def test_a_pickle_is_never_opened(tmp_path: Path) -> None:
 
 
 @pytest.mark.real_data
-def test_the_qualisys_file_says_what_the_toml_made_from_it_says(real_data: Path) -> None:
+def test_the_qualisys_file_equals_the_toml_made_from_it(real_data: Path) -> None:
     folder = real_data / "pose2sim-balance" / "calibration"
     own, made = (read_calibration(folder / name) for name in ("Calib.qca.txt", "Calib_qualisys.toml"))
     assert "in mm" in own.unit_note
@@ -125,7 +125,7 @@ def test_the_qualisys_file_says_what_the_toml_made_from_it_says(real_data: Path)
 
 
 @pytest.mark.real_data
-def test_chessboards_tell_the_qualisys_lenses_from_those_divided_by_64(real_data: Path) -> None:
+def test_chessboards_distinguish_the_qualisys_lenses_from_those_divided_by_64(real_data: Path) -> None:
     folder = real_data / "pose2sim-balance" / "calibration"
     squares = np.zeros((28, 3), np.float32)
     squares[:, :2] = np.mgrid[0:4, 0:7].T.reshape(-1, 2) * 60.0

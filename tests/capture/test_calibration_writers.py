@@ -108,7 +108,7 @@ def test_the_studio_reads_what_it_wrote(tmp_path: Path, writer: str) -> None:
             np.testing.assert_allclose(getattr(a, part), getattr(b, part), atol=1e-9)
 
 
-def test_pose2sim_has_no_k3_and_the_note_says_by_how_much(tmp_path: Path) -> None:
+def test_pose2sim_has_no_k3_and_the_note_has_the_error(tmp_path: Path) -> None:
     written = export_calibration(BENT, tmp_path / "c.toml", "pose2sim")
     largest = [float(note.split("at most ")[1].split(" px")[0]) for note in written.notes]
     assert len(largest) == 2
@@ -127,7 +127,7 @@ def test_pose2sim_has_no_k3_and_the_note_says_by_how_much(tmp_path: Path) -> Non
     assert without_k3(CAMERAS[0]) == (CAMERAS[0].distortion, 0.0)
 
 
-def test_a_skew_is_said_and_no_cameras_or_formats_are_refused(tmp_path: Path) -> None:
+def test_a_skew_is_reported_and_no_cameras_or_formats_are_refused(tmp_path: Path) -> None:
     camera = CAMERAS[0]
     skewed = camera.matrix + np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     slanted = Camera("s", 128, 96, skewed, camera.distortion, camera.rotation, camera.translation)

@@ -75,13 +75,13 @@ def test_passwords_are_not_shown() -> None:
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "[::1]", "0.0.0.0", "127.1.2.3"])
-def test_the_studio_does_not_ask_itself(host: str) -> None:
+def test_the_studio_does_not_connect_to_itself(host: str) -> None:
     with pytest.raises(FootageError, match="no camera"):
         without_own(camera_address("cam1", f"http://{host}:8642/"), (8642,))
     without_own(camera_address("cam1", f"http://{host}:8081/"), (8642,))
 
 
-def test_keys_of_hosting_companies_are_not_asked_for() -> None:
+def test_keys_of_hosting_companies_are_not_requested() -> None:
     with pytest.raises(FootageError, match="no camera"):
         without_own(camera_address("cam1", "http://169.254.169.254/latest/meta-data"), ())
 

@@ -19,7 +19,7 @@ NEVER = lambda seconds: False  # noqa: E731
 
 
 class Listening:
-    """A server on loopback that gives one answer to whoever connects, and notes what it was asked."""
+    """A server on loopback that gives one answer to every connection, and records the requests."""
 
     def __init__(self, answer: bytes, more: bytes = b"", pieces: int = 0) -> None:
         self.answer, self.more, self.pieces = answer, more, pieces
@@ -145,7 +145,7 @@ def test_parts_without_measure_are_refused(answer: bytes, more: bytes, why: str)
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 300_000
 
 
-def test_a_password_is_given_when_it_is_asked_for() -> None:
+def test_a_password_is_sent_on_request() -> None:
     with served({"a": [jpeg(picture())]}) as streams:
         streams.locked.add("a")
         url = streams.address("a").replace("http://", "http://ich:ge%20heim@")

@@ -56,7 +56,7 @@ def test_mask_videos_are_thresholded_too(tmp_path: Path) -> None:
     assert np.mean(mask != shape[:, :, 0]) < 0.01
 
 
-def test_a_picture_looked_at_again_is_the_same_array(footage: Footage) -> None:
+def test_a_picture_read_again_is_the_same_array(footage: Footage) -> None:
     first = footage.picture("a", 7)
     assert footage.picture("a", 7) is first
     with pytest.raises(ValueError, match="read-only"):

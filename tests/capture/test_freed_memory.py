@@ -26,7 +26,7 @@ print(resident_mb() - before)
 """
 
 
-def test_it_may_be_asked_at_any_time() -> None:
+def test_it_may_be_called_at_any_time() -> None:
     give_back_freed_memory()
     give_back_freed_memory()
 
@@ -80,7 +80,7 @@ def test_all_open_footage_keeps_no_more_than_so_many_bytes(
     assert kept.bytes == 160 * 120 * 3
 
 
-def test_what_nobody_looks_at_is_given_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unused_memory_is_returned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     kept = footage._KeptPictures(footage.KEPT_BYTES_IN_ALL)
     monkeypatch.setattr(footage, "_PICTURES", kept)
     session = make_session(tmp_path / "toy")

@@ -1,4 +1,4 @@
-"""Readers of live cameras: states, back-off, pairing; the clock only moves when it is told to."""
+"""Readers of live cameras: states, back-off, pairing; the clock only moves when it is set."""
 
 from collections.abc import Iterator, Sequence
 
@@ -136,7 +136,7 @@ def test_nearest_pictures_are_paired() -> None:
     assert paired({}, ("a",), STEP, 0.0) is None
 
 
-def test_pictures_far_apart_are_said_to_be_and_who_lags() -> None:
+def test_pictures_far_apart_are_reported_with_the_lagging_camera() -> None:
     recent = {"a": shots(1.0), "b": shots(1.001), "c": shots(1.030)}
     found = paired(recent, (), STEP, after=0.0)
     assert found is not None

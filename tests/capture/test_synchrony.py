@@ -82,7 +82,7 @@ def test_key_frames_of_the_codec_do_not_count() -> None:
     assert found.offsets == {"a": 9, "b": 0}
 
 
-def test_trusted_pairs_that_contradict_each_other_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_trusted_pairs_that_contradict_each_other_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     lags = {("a", "b"): 0, ("b", "c"): 0, ("a", "c"): 20}
 
     def planted(first: str, second: str, *_: object) -> PairLag:
@@ -146,7 +146,7 @@ def test_energy_is_the_mean_difference_of_grey_levels() -> None:
 
 
 @pytest.mark.real_data
-def test_the_balancing_man_moves_too_slowly_to_tell_the_frame(real_data: Path) -> None:
+def test_the_balancing_man_moves_too_slowly_to_determine_the_offset(real_data: Path) -> None:
     energies = {}
     for name in ("cam01", "cam02"):
         reader = VideoReader(real_data / "pose2sim-balance" / "videos" / f"{name}.mp4", 100)

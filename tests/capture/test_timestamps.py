@@ -56,7 +56,7 @@ def test_numbers_of_frames_go_before_the_order_of_lines(tmp_path: Path) -> None:
     assert [len(moments) for moments in read_timestamps(older).values()] == [50, 50]
 
 
-def test_drift_and_lost_frames_are_said() -> None:
+def test_drift_and_lost_frames_are_reported() -> None:
     a = np.arange(100) / FPS
     lost = np.delete(a, [40, 41])
     found = offsets_from_times({"a": a, "b": lost})

@@ -40,7 +40,7 @@ def test_measured_by_decoding(videos: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_frame_at_random_is_the_one_asked_for(videos: Path, name: str) -> None:
+def test_every_frame_at_random_is_the_requested_one(videos: Path, name: str) -> None:
     reader = VideoReader(videos / name, COUNT)
     order = [
         0,

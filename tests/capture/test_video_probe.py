@@ -53,7 +53,7 @@ def test_what_a_file_announces(plain: Path) -> None:
         ((0, -ONE, 0, ONE, 0, 0, 0, WIDTH << 16, LAST), 270),
     ],
 )
-def test_the_rotation_that_a_file_asks_for(plain: Path, matrix: tuple[int, ...], turned: int) -> None:
+def test_the_rotation_of_a_file(plain: Path, matrix: tuple[int, ...], turned: int) -> None:
     path = with_matrix(plain, *matrix)
     found = probe_video(path)
     assert found.turned == turned

@@ -33,7 +33,7 @@ def moving_poses(body: BodyModel, frames: int = FRAMES, fps: float = 60.0, seed:
 
 
 def track_of(poses: np.ndarray, frames: np.ndarray | None = None, states: tuple[str, ...] = ()) -> Track:
-    """A derived track of poses, all tracked unless said otherwise."""
+    """A derived track of poses, all tracked by default."""
     numbers = np.arange(len(poses)) if frames is None else frames
     sure = np.linspace(0.5, 0.99, len(poses))
     made_by = {"verb": "made", "from": "raw"}

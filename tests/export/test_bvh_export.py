@@ -107,7 +107,7 @@ def test_end_sites_are_at_the_tips(make_run, tmp_path: Path) -> None:
         assert np.linalg.norm(seen - tip, axis=-1).max() < LEAST_MM, limb.name
 
 
-def test_a_gap_is_interpolated_and_said(make_run, tmp_path: Path) -> None:
+def test_a_gap_is_interpolated_and_reported(make_run, tmp_path: Path) -> None:
     """Twenty frames lost in the middle: their rotations lie between those at the ends, and the report says so."""
     states = tuple("lost" if 100 <= frame < 120 else "tracked" for frame in range(FRAMES))
     session, run = make_run("planar_arm4", lambda body: track_of(moving_poses(body), states=states))

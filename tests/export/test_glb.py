@@ -206,7 +206,7 @@ def test_an_hour_is_long_for_32_bit_times_and_yet_reads_back(make_run, tmp_path:
     assert np.all(np.diff(times) > 0.0)
 
 
-def test_gaps_are_told(make_run, tmp_path: Path) -> None:
+def test_gaps_are_reported(make_run, tmp_path: Path) -> None:
     track = np.arange(FRAMES)
     kept = (track < 10) | (track >= 30)
     session, run = make_run(

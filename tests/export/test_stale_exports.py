@@ -38,7 +38,7 @@ def test_a_file_older_than_its_track_is_stale(arm) -> None:
     assert {file.name: bool(file.stale) for file in exported_files(run)}[written.file] is False
 
 
-def test_the_way_says_which_file_is_old(arm) -> None:
+def test_the_guided_setup_names_the_old_file(arm) -> None:
     session, run = arm
     written = export_into_run(session, run, FORMATS["csv"], {"track": MADE})
     track = read_track(run, MADE)

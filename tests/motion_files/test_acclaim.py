@@ -123,7 +123,7 @@ def test_what_is_wrong_is_named_with_its_line(
     assert caught.value.hint
 
 
-def test_a_missing_skeleton_is_asked_for(tmp_path: Path) -> None:
+def test_a_missing_skeleton_is_requested(tmp_path: Path) -> None:
     motion = files(tmp_path)
     (tmp_path / "07.asf").rename(tmp_path / "elsewhere.asf")
     with pytest.raises(StudioError, match=r"07\.asf"):

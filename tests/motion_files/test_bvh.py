@@ -81,7 +81,7 @@ def test_what_is_wrong_is_named_with_its_line(tmp_path: Path, old: str, new: str
     assert caught.value.hint
 
 
-def test_a_file_says_which_joints_move_and_keeps_its_own_axes(tmp_path: Path) -> None:
+def test_a_file_lists_its_moving_joints_and_keeps_its_own_axes(tmp_path: Path) -> None:
     text = TEXT.replace(
         "CHANNELS 3 Yrotation Zrotation Xrotation", "CHANNELS 3 Xposition Yposition Zposition"
     )

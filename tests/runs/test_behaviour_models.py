@@ -53,7 +53,7 @@ def made(session: Session, tracker: str, name: str = "", **changes: object) -> S
 
 
 def tracked(session: Session, run: StoredRun, stop: Callable[[int], bool] = lambda _: False) -> np.ndarray:
-    """The run's poses; stop : asked after each layer whether to leave and take the run up again."""
+    """The run's poses; stop : called after each layer; True closes the run and resumes it."""
     steps, over = 0, False
     while not over:
         with opened(session, run) as tracking:
@@ -72,7 +72,7 @@ def models(session_on_disk: Session) -> Path:
     return keep_arm_model(session_on_disk.path.parent)
 
 
-def test_the_only_model_that_fits_is_taken_and_said(session_on_disk: Session, models: Path) -> None:
+def test_the_only_model_that_fits_is_used_and_reported(session_on_disk: Session, models: Path) -> None:
     write_model(arm_model(), models.with_name("other.behaviour"))
     other = dataclasses.replace(
         arm_model(), space=dataclasses.replace(arm_model().space, parameters=("a", "b", "c", "d"))
@@ -106,7 +106,7 @@ def refused(session: Session, **wanted: object) -> StudioError:
     return caught.value
 
 
-def test_refusals_say_which_models_there_are(session_on_disk: Session) -> None:
+def test_refusals_list_the_models(session_on_disk: Session) -> None:
     none = refused(session_on_disk, tracker="behaviour")
     assert isinstance(none, BehaviourError)
     assert "none of body 'planar_arm4'" in none.message

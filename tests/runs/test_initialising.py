@@ -118,11 +118,11 @@ def test_the_session_gets_a_start_pose_once_and_nothing_is_lost(session_on_disk:
     assert keep_pose(session, found(session, 2, "human25"), replace=True).name == "start_pose-frame-2.csv"
 
 
-def test_where_a_pose_came_from_is_said_with_its_confidence(session_on_disk: Session) -> None:
+def test_the_source_of_a_pose_names_its_confidence(session_on_disk: Session) -> None:
     assert found(session_on_disk, 7).source == "found in frame 7, confidence 88 %"
 
 
-def test_nothing_to_be_seen_is_refused(session_on_disk: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_frame_without_a_body_is_refused(session_on_disk: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("studio.runs.initialising.anything_seen", lambda _: False)
     with pytest.raises(RunError, match="shows no body"):
         initialise(session_on_disk, 0)

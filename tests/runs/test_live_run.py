@@ -115,7 +115,7 @@ def test_other_frames_give_another_run(session_on_disk: Session) -> None:
     assert set(different) >= both - {0, 1}, "what comes after a dropped frame starts from elsewhere"
 
 
-def test_what_is_cancelled_stays_and_can_be_gone_on_with(session_on_disk: Session) -> None:
+def test_a_cancelled_run_stays_and_can_be_resumed(session_on_disk: Session) -> None:
     run = live_run(session_on_disk)
     with driving(session_on_disk, run) as drive:
         drive.frame(1.6 * FRAME)
@@ -146,7 +146,7 @@ def test_forth_and_back_goes_on_behind_the_end(session_on_disk: Session) -> None
     assert compare(run, replayed(session_on_disk, run)).different == ()
 
 
-def test_a_live_run_recovers_quickly_unless_asked_otherwise(session_on_disk: Session) -> None:
+def test_a_live_run_recovers_quickly_by_default(session_on_disk: Session) -> None:
     assert live_run(session_on_disk, "a").record.settings["recovery"] == SPREAD
     requested = live_run(session_on_disk, "b", changes={"recovery": INITIALISE})
     assert requested.record.settings["recovery"] == INITIALISE

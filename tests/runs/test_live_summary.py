@@ -41,7 +41,7 @@ def test_a_meter_goes_on_where_a_run_stood() -> None:
 
 
 def test_incomplete_sets_are_not_dropped_frames(tmp_path: Path) -> None:
-    """Numbers of a take tell the time: of 0-9 there are sets 0, 3, 4, 6, 7 and 9."""
+    """Numbers of a take give the time: of 0-9 there are sets 0, 3, 4, 6, 7 and 9."""
     (tmp_path / LIVE).mkdir()
     lines = tmp_path / LIVE / SETS_NAME
     lines.write_text("frame,moment\n0,0\n3,30\n4,40\n")
@@ -85,7 +85,7 @@ def test_dropped_frames_in_words() -> None:
     assert in_words([]) == ""
 
 
-def test_storing_keeps_the_order_and_tells_what_failed() -> None:
+def test_storing_keeps_the_order_and_raises_errors() -> None:
     done: list[int] = []
 
     def fail() -> None:

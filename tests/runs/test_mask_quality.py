@@ -50,7 +50,7 @@ def test_good_masks_agree_in_every_view() -> None:
     assert exact < found.hull_litres[0] < 1.5 * exact
 
 
-def test_a_bystander_in_one_view_is_told_of_that_view_only() -> None:
+def test_a_bystander_in_one_view_is_reported_for_that_view_only() -> None:
     cameras = ring()
     masks = [ball_mask(camera) for camera in cameras]
     masks[1][20:120, 20:60] = 255
@@ -75,7 +75,7 @@ def test_a_hole_is_blamed_on_the_camera_that_has_it() -> None:
     assert min(view.covered for view in found.views if view.camera != "c2") < 0.9
 
 
-def test_nothing_seen_is_said() -> None:
+def test_empty_masks_are_reported() -> None:
     cameras = ring()
     found = judged([np.zeros((240, 320), np.uint8) for _ in cameras], cameras)
     assert not found.usable

@@ -1,4 +1,4 @@
-"""What is not asked for is filled in, and what is wrong is refused before anything is made."""
+"""Defaults are filled in, and errors are raised before anything is made."""
 
 import msgspec
 import numpy as np
@@ -95,7 +95,7 @@ def test_a_run_begins_in_the_frame_of_the_start_pose(session_on_disk: Session) -
     run = prepare_run(session, RunRequest(name="usual"))
     assert (run.record.first, run.record.last) == (3, FRAMES)
     assert np.allclose(run.record.start_pose or (), true_poses()[3])
-    named = prepare_run(session, RunRequest(name="told", first=1, last=2))
+    named = prepare_run(session, RunRequest(name="named", first=1, last=2))
     assert (named.record.first, named.record.last) == (1, 2)
     assert "begins in frame 1, the session's start pose is of frame 3" in named.record.notes[-1]
     given = prepare_run(session, RunRequest(name="given", start_pose=true_poses()[0]))

@@ -123,7 +123,7 @@ def test_the_frame_of_the_search_annealed_again_is_the_same(
     assert np.array_equal(result.estimate.pose, results[9].estimate.pose)
 
 
-def test_switched_off_nothing_is_looked_for(black: Session) -> None:
+def test_recovery_can_be_switched_off(black: Session) -> None:
     run = made(black, name="off", last=7, changes={"recovery": "off"})
     results = tracked(black, run)
     assert {result.tracking for result in results} == {TRACKED}

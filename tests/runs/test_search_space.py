@@ -1,4 +1,4 @@
-"""What trackers are told of a body."""
+"""The search space of a body."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The shape that a run's first frames show: found, kept, said, and left alone where it cannot be told."""
+"""The shape from a run's first frames: fitted, stored, reported, and unchanged where it is undetermined."""
 
 import dataclasses
 import shutil
@@ -80,7 +80,7 @@ def test_a_run_begins_with_the_shape_says_so_and_fits_it_once(
     assert run_changes(walk, walk.run(first.name)) == []
 
 
-def test_few_frames_and_one_camera_tell_no_shape(walk: Session, session_on_disk: Session) -> None:
+def test_few_frames_or_one_camera_give_no_shape(walk: Session, session_on_disk: Session) -> None:
     late = RunRequest(first=145, start_pose=walk.start_pose())
     assert prepare_run(walk, late).record.dimensions == dict(walk.body().dimensions)
     start = np.zeros(4)

@@ -1,4 +1,4 @@
-"""The bundled walk with its legs exchanged for a while: put right in a track of its own, and said."""
+"""The bundled walk with its legs exchanged for a while: corrected in a separate track, and reported."""
 
 from collections.abc import Iterator
 from contextlib import closing
@@ -44,7 +44,7 @@ def problems(session: Session, run: StoredRun) -> Iterator[ProblemSource]:
         yield source
 
 
-def test_legs_are_put_right_once_and_what_was_tracked_stays(
+def test_legs_are_corrected_once_and_the_raw_track_stays(
     run: StoredRun, truth: np.ndarray, problems: ProblemSource
 ) -> None:
     raw, read = read_track(run), list[int]()
@@ -83,7 +83,7 @@ def test_a_run_that_is_sound_has_no_such_track(
     assert "sides" not in track_names(again)
 
 
-def test_a_run_that_is_tracked_to_its_end_is_looked_at(session: Session, truth: np.ndarray) -> None:
+def test_a_finished_runs_sides_are_checked(session: Session, truth: np.ndarray) -> None:
     batch, job = planted(session, truth), planted(session, truth)
     steps: list[str] = []
     track_to_end(session, batch, lambda step, _done, _total: steps.append(step))

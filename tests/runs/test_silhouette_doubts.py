@@ -1,4 +1,4 @@
-"""A calibration that does not belong to its footage is told by the footage's own silhouettes, by name."""
+"""The footage's silhouettes name the fault of a calibration that does not belong to it."""
 
 import dataclasses
 import shutil
@@ -71,7 +71,9 @@ def test_a_mirrored_video_is_named(rig: tuple[Camera, ...], masks: dict) -> None
     assert (found.code, found.cameras) == ("mirrored-video", ("cam3",))
 
 
-def test_a_wrong_size_blocks_unless_it_is_only_the_told_height(rig: tuple[Camera, ...], masks: dict) -> None:
+def test_a_wrong_size_blocks_unless_only_the_given_height_differs(
+    rig: tuple[Camera, ...], masks: dict
+) -> None:
     larger = tuple(dataclasses.replace(camera, translation=1.3 * camera.translation) for camera in rig)
     (finding,) = silhouette_doubts(larger, masks, HEIGHT)
     assert (finding.code, finding.severity) == ("square-size", "warns")
@@ -80,7 +82,7 @@ def test_a_wrong_size_blocks_unless_it_is_only_the_told_height(rig: tuple[Camera
     assert unseen.severity == "blocks"
 
 
-def test_what_the_file_alone_shows_is_not_said_twice(rig: tuple[Camera, ...], masks: dict) -> None:
+def test_faults_shown_by_the_file_alone_are_not_repeated(rig: tuple[Camera, ...], masks: dict) -> None:
     in_metres = tuple(dataclasses.replace(camera, translation=camera.translation / 1000.0) for camera in rig)
     assert silhouette_doubts(in_metres, masks, HEIGHT) == ()
 
@@ -91,7 +93,7 @@ def walk(tmp_path: Path) -> Session:
     return Session(Path(shutil.copytree(sample_folder("walk"), tmp_path / "walk")))
 
 
-def test_measuring_the_masks_tells_of_exchanged_cameras(walk: Session) -> None:
+def test_measuring_the_masks_finds_exchanged_cameras(walk: Session) -> None:
     """From a session's videos: the walk's own masks, and two of its cameras under each other's names."""
     cameras = walk.cameras()
     write_calibration(exchanged(cameras, 0, 2), walk.path / CAMERAS_PATH)

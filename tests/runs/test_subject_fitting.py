@@ -61,7 +61,7 @@ def test_a_written_subject_is_that_very_body(tmp_path: Path) -> None:
     assert (tmp_path / "subject-before.toml").exists()
 
 
-def test_wishes_that_cannot_be_met_are_refused(session_on_disk: Session) -> None:
+def test_impossible_requests_are_refused(session_on_disk: Session) -> None:
     for request, message in (
         (FitRequest(lengths=False, radii=False), "Neither"),
         (FitRequest(frames=(100000,)), "does not lie"),

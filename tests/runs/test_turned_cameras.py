@@ -1,4 +1,4 @@
-"""Cameras turned by their silhouettes: found, told, kept, and undone byte for byte."""
+"""Cameras turned by their silhouettes: measured, reported, stored, and undone byte for byte."""
 
 from pathlib import Path
 
@@ -109,7 +109,7 @@ def test_another_calibration_since_is_not_turned(session: Session, aligned: Sess
         turn_cameras(turned, aligned)
 
 
-def test_the_nudge_is_what_the_oracle_says() -> None:
+def test_the_nudge_equals_the_oracles() -> None:
     wrong, right = nudged(true_cameras()), true_cameras()
     assert [
         one.name for one, two in zip(wrong, right, strict=True) if not np.allclose(one.rotation, two.rotation)

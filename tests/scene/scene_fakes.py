@@ -1,4 +1,4 @@
-"""A tracking process that only remembers what it was asked, and a person's hand on viser's controls."""
+"""A tracking process that only records its commands, and user input on viser's controls."""
 
 import asyncio
 import math

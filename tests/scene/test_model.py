@@ -236,7 +236,7 @@ def test_what_is_in_use_and_since_when(shown: Model) -> None:
     assert again.knobs is not None
     assert again.knobs.since is None
     assert knob(again) == knob(shown), "what was requested was about the run before"
-    assert "one" in again.knobs.requested, "its refusal is told all the same"
+    assert "one" in again.knobs.requested, "its refusal is reported anyway"
     assert knob(after(other, dataclasses.replace(PAUSED, state="lost"))) == 0.7
     assert changed_settings(default_settings(), {"survival": 0.7}) == applied.knobs.settings
 

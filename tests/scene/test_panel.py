@@ -134,7 +134,7 @@ def test_a_change_that_fails_frees_its_control(server: GuardedServer, posted: Po
     assert handle.value == 0.5
 
 
-def test_every_knob_has_a_control_that_says_what_it_is(settings: Settings) -> None:
+def test_every_knob_has_a_labelled_control(settings: Settings) -> None:
     declared = all_knobs(default_settings())
     assert set(settings.panel.inputs) == {knob.name for knob in declared}
     for knob in declared:
@@ -250,7 +250,7 @@ def test_the_show_tab_changes_options_and_follows_them(server: GuardedServer, po
     assert "truth" in legend_html(tokens, "weight", 4, truth=True)
 
 
-def test_the_pose_tab_speaks_degrees_and_asks_in_radians(
+def test_the_pose_tab_shows_degrees_and_requests_radians(
     server: GuardedServer, human: BodyModel, posted: Posted
 ) -> None:
     tab = server.gui.add_tab_group().add_tab("Pose")

@@ -46,7 +46,7 @@ def test_only_the_last_changes_are_remembered(monkeypatch: pytest.MonkeyPatch) -
     assert [pose[0] for pose in edit.past] == [5.0, 6.0, 7.0]
 
 
-def test_a_correction_begins_anew_and_the_start_pose_is_gone_back_to() -> None:
+def test_a_correction_restarts_and_the_start_pose_can_be_restored() -> None:
     edit = pose_edit.begun(pose_edit.entry_moved(start(), 0, 1.0))
     assert edit.pose.tolist() == [1.0, 0.0], "what was edited before is gone on with"
     corrected = pose_edit.begun(edit, np.full(2, 7.0), 3)
@@ -59,7 +59,7 @@ def test_a_correction_begins_anew_and_the_start_pose_is_gone_back_to() -> None:
     assert pose_edit.begun(kept).pose.tolist() == [2.0, 2.0], "the start pose is the one that was saved"
 
 
-def test_a_found_pose_says_so_until_the_editing_ends() -> None:
+def test_a_found_pose_is_marked_until_the_editing_ends() -> None:
     found = pose_edit.begun(start(), np.ones(2), found="confidence 92 %")
     assert found.found == "confidence 92 %"
     assert pose_edit.ended(found).found == ""

@@ -170,7 +170,7 @@ def test_the_editing_ends_when_the_run_is_tracked_or_another_is_opened(
     until(lambda: stage.shown.run == "" and not stage.shown.editing)
 
 
-def test_refining_tells_shows_and_can_fail(
+def test_refining_reports_shows_and_can_fail(
     stage: SceneServer, human: BodyModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begin(stage)

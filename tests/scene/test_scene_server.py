@@ -118,7 +118,7 @@ def test_a_reannealed_frame_stands_beside_the_stored_answer(
     until(lambda: not ghosts[0].visible)
 
 
-def test_a_setting_selects_the_shown_frame_and_is_asked_for(stage: SceneServer, control: FakeControl) -> None:
+def test_a_setting_selects_the_shown_frame_and_is_requested(stage: SceneServer, control: FakeControl) -> None:
     open_run(stage)
     stage.show_frame(2)
     until(lambda: stage.shown.frame == 2)
@@ -160,7 +160,7 @@ def test_knobs_are_about_the_run_that_is_shown(stage: SceneServer, control: Fake
     until(lambda: survival.handle.value == 0.7)
 
 
-def test_playback_shows_one_frame_after_another_and_tells_the_page(
+def test_playback_shows_one_frame_after_another_and_notifies_the_page(
     workspace: Workspace, control: FakeControl
 ) -> None:
     selections: list[Selection] = []
@@ -168,7 +168,7 @@ def test_playback_shows_one_frame_after_another_and_tells_the_page(
     open_run(stage)
     stage.show_frame(0)
     until(lambda: stage.shown.frame == 0)
-    assert selections == [], "who asked is not told"
+    assert selections == [], "the caller is not notified"
     stage.play(True, speed=4.0)
     until(lambda: {shown.frame for shown in selections} >= set(range(1, FRAMES - 1)) and len(selections) > 6)
     stage.stop()

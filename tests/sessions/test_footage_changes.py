@@ -35,7 +35,7 @@ def test_offsets_keep_the_smallest_at_zero(session: Session) -> None:
     assert Session(session.path).manifest == back.manifest
 
 
-def test_what_a_change_makes_stale_is_said(session: Session) -> None:
+def test_the_notes_name_stale_parts(session: Session) -> None:
     assert session.thumbnail() is not None
     old = prepare_run(session, RunRequest(name="old"))
     change = change_footage(session, {"cam_2": 1})

@@ -67,7 +67,7 @@ def test_offsets_and_turns_by_hand(tmp_path: Path) -> None:
         ({}, {"cam_1": 45}, "cannot be turned by 45 degrees"),
     ],
 )
-def test_what_cannot_be_asked(
+def test_impossible_requests(
     tmp_path: Path, offsets: dict[str, int], rotations: dict[str, int], message: str
 ) -> None:
     source = video_source(tmp_path / "source")

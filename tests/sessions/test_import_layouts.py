@@ -1,4 +1,4 @@
-"""Other tools' folders, recognised without being told."""
+"""Other tools' folders, recognised automatically."""
 
 import shutil
 from collections.abc import Callable

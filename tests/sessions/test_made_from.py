@@ -81,7 +81,7 @@ def test_a_run_is_stale_where_its_snapshot_differs(session):
     assert step(moved, "track").state == "ready"
 
 
-def test_footage_whose_file_is_gone_is_said(session):
+def test_a_missing_footage_file_is_reported(session):
     source = session.manifest.footage
     lost = tuple(dataclasses.replace(camera, path="pictures/nowhere") for camera in source.cameras)
     manifest = msgspec.structs.replace(session.manifest, footage=dataclasses.replace(source, cameras=lost))

@@ -99,7 +99,7 @@ def test_looking_writes_nothing(tmp_path: Path) -> None:
     assert (path.stat().st_size, path.stat().st_mtime_ns) == before
 
 
-def test_a_place_that_is_no_file_is_said_to_be_none(tmp_path: Path) -> None:
+def test_a_place_that_is_no_file_is_reported(tmp_path: Path) -> None:
     assert not ProcessLock.is_held(tmp_path)
     with pytest.raises(SessionError, match="cannot be written"):
         ProcessLock.take(tmp_path)

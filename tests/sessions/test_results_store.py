@@ -236,13 +236,13 @@ def test_a_writer_killed_in_the_middle_of_a_frame_leaves_whole_frames_only(tmp_p
         write(writer, 2)
 
 
-def test_a_damaged_store_is_said_to_be_one(tmp_path: Path) -> None:
+def test_a_damaged_store_is_reported(tmp_path: Path) -> None:
     (tmp_path / FILE_NAME).write_bytes(b"not a database at all" * 100)
     with ResultsReader(tmp_path) as reader, pytest.raises(SessionError, match="cannot be read"):
         reader.frames()
 
 
-def test_a_damaged_blob_is_said_to_be_one_and_the_rest_stays_readable(tmp_path: Path) -> None:
+def test_a_damaged_blob_is_reported_and_the_rest_stays_readable(tmp_path: Path) -> None:
     with ResultsWriter(tmp_path) as writer:
         write(writer, 0)
         write(writer, 1)

@@ -16,7 +16,7 @@ export function alignmentBox(setup, place, changed) {
   let failed = null;
   let busy = false;
   let stopped = false;
-  let requested = false; // whether a person asked for the measurement
+  let requested = false; // whether the user requested the measurement
 
   function verdict(job) {
     if (job.kept) return "The session uses the turned cameras.";

@@ -25,7 +25,7 @@ export function maskPictures(setup, paint) {
     return `${here}/frames/${state.frame}/views/${encodeURIComponent(camera)}.jpg?show=${show}&height=${HEIGHT}&age=${state.age}${settings}`;
   }
 
-  /** One request a picture at a time; what was wanted meanwhile is asked for afterwards. */
+  /** One request a picture at a time; later requests follow afterwards. */
   function load(view) {
     const wanted = (view.seen ? "" : first(view.camera.name)) || address(view.camera.name);
     if (view.busy || view.wanted === wanted) return;

@@ -154,11 +154,11 @@ def add_footage(
     over where it has one (and subject, start pose and truth, where the session has none). An existing camera
     gets the new footage. All is read before anything changes; on failure the session is unchanged. Raises StudioError.
     """
-    asked, report = options or ImportOptions(), watched(progress, cancelled, "The import")
-    _check_request(source, asked)
+    request, report = options or ImportOptions(), watched(progress, cancelled, "The import")
+    _check_request(source, request)
     session.check_idle()
     with folder_of(source.resolve(), FOOTAGE_PARTS, session.path / "take") as folder:
-        return _added(session, folder, asked, report)
+        return _added(session, folder, request, report)
 
 
 def _added(session: Session, source: Path, options: ImportOptions, report: Progress) -> ImportReport:

@@ -152,7 +152,7 @@ def check_counts(counts: Mapping[str, int], aligned: bool) -> None:
 
 
 def common_rate(
-    measured: tuple[MeasuredCamera, ...], asked: float | None, known: float | None, warnings: list[str]
+    measured: tuple[MeasuredCamera, ...], requested: float | None, known: float | None, warnings: list[str]
 ) -> float:
     """Frames per second: the user's, the layout's, or that of the videos, which must agree."""
     videos = [
@@ -160,14 +160,16 @@ def common_rate(
     ]
     rates = {name: found.fps for name, found in videos}
     uneven = {name: found.uneven_frame for name, found in videos if found.uneven_frame >= 0}
-    if asked is not None:
-        other = [f"{name}: {rate:g}" for name, rate in rates.items() if abs(rate / asked - 1.0) > SAME_RATE]
+    if requested is not None:
+        other = [
+            f"{name}: {rate:g}" for name, rate in rates.items() if abs(rate / requested - 1.0) > SAME_RATE
+        ]
         if other or uneven:
             warnings.append(
-                f"Taken as {asked:g} frames per second as requested; the videos' own differ"
+                f"Taken as {requested:g} frames per second as requested; the videos' own differ"
                 f" ({', '.join(other) or 'uneven times in ' + listed(uneven)})."
             )
-        return asked
+        return requested
     if uneven:
         name, frame = next(iter(uneven.items()))
         raise FootageError(
@@ -283,10 +285,10 @@ def _measure_camera(
 
 
 def _measure(path: Path, step: str, progress: Progress) -> VideoMeasure | PicturesMeasure:
-    def told(done: int, total: int) -> None:
+    def report(done: int, total: int) -> None:
         progress(step, done, total)
 
-    return measure_pictures(path, told) if path.is_dir() else measure_video(path, told)
+    return measure_pictures(path, report) if path.is_dir() else measure_video(path, report)
 
 
 def _bars(entry: MeasuredCamera) -> Margins:
@@ -385,8 +387,8 @@ def in_step(offsets: Mapping[str, int]) -> dict[str, int]:
 
 def requested_turns(plan: SourcePlan, footage: Mapping[str, Path]) -> dict[str, Turn]:
     """Turns by camera. footage : of every camera. Raises FootageError for names and angles that are none."""
-    asked = _by_camera(plan.rotations, footage)
-    return {camera: checked_turn(camera, degrees) for camera, degrees in asked.items()}
+    requested = _by_camera(plan.rotations, footage)
+    return {camera: checked_turn(camera, degrees) for camera, degrees in requested.items()}
 
 
 def with_offsets(
@@ -403,12 +405,12 @@ def with_offsets(
         offsets = _recorded(plan.timestamps, measured, known, notes, warnings)
     by_hand = _by_camera(plan.offsets, {entry.camera.name: entry.footage for entry in measured})
     offsets = in_step(offsets | by_hand)
-    told = bool(by_hand) or plan.timestamps is not None
+    given = bool(by_hand) or plan.timestamps is not None
     if any(offsets.values()):
         words = ", ".join(f"{name}: {offset}" for name, offset in offsets.items())
         notes.append(f"Frame 0 of all cameras is frame so-and-so of their footage: {words}.")
     placed = tuple(dataclasses.replace(entry, offset=offsets[entry.camera.name]) for entry in measured)
-    return placed, tuple(notes), told
+    return placed, tuple(notes), given
 
 
 def _recorded(
@@ -440,10 +442,10 @@ def _recorded(
     return found.offsets
 
 
-def _by_camera(asked: Mapping[str, int], footage: Mapping[str, Path]) -> dict[str, int]:
+def _by_camera(requested: Mapping[str, int], footage: Mapping[str, Path]) -> dict[str, int]:
     """Requested values by camera, from names of cameras or of their footage. Raises FootageError for other names."""
     found: dict[str, int] = {}
-    for name, value in asked.items():
+    for name, value in requested.items():
         fitting = [camera for camera, path in footage.items() if name in (camera, path.name, path.stem)]
         if len(fitting) != 1:
             raise FootageError(
