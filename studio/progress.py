@@ -10,6 +10,10 @@ Cancelled = Callable[[], bool]
 """Asked often; True once nobody wants the work any more."""
 
 
+def unheard(_step: str, _done: int, _total: int) -> None:
+    """Progress that nobody is shown."""
+
+
 def watched(progress: Progress | None, cancelled: Cancelled | None, work: str) -> Progress:
     """What the work calls: tells `progress` if somebody listens, raises WorkCancelledError once it is cancelled.
 

@@ -5,7 +5,7 @@ from typing import Literal
 from pydantic import Field
 
 from studio.web.job_schemas import SessionJob
-from studio.web.schemas import Answer, Request
+from studio.web.schemas import Answer
 
 MOST_OFFSET = 1_000_000
 
@@ -36,19 +36,6 @@ class FootageState(Answer):
     cameras: list[FootageCamera]
     stale_runs: list[str]
     notes: list[str] = Field(default_factory=list)
-
-
-class FootageWish(Request):
-    """Offsets and turns to change, by camera; cameras that are not named keep theirs."""
-
-    offsets: dict[str, int] = Field(default_factory=dict, max_length=64)
-    rotations: dict[str, Literal[0, 90, 180, 270]] = Field(default_factory=dict, max_length=64)
-
-
-class SynchronyWish(Request):
-    """How far apart the cameras may have begun, at most, seconds."""
-
-    within: float = Field(5.0, gt=0, le=600)
 
 
 class TimedAnswer(Answer):

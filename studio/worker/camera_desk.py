@@ -3,16 +3,17 @@
 import contextlib
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from studio.capture.camera_addresses import CameraAddress
 from studio.capture.camera_sets import SpreadFigures
 from studio.capture.camera_streams import Shot
 from studio.capture.live_cameras import CameraStanding
 from studio.errors import NotFoundError, RunError, StudioError
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.sessions.recordings import check_cameras, import_recording
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -120,12 +121,12 @@ class CameraDesk:
             lambda: self._record(readers, folder, place, calibration, seconds),
         )
 
-    def track(self, base: Session, wish: TakeWish, request: RunRequest, on_run: OnRun) -> DeskRecording:
+    def track(self, base: Session, wish: TakeWish, wanted: Mapping[str, Any], on_run: OnRun) -> DeskRecording:
         """Record the cameras into a take and hand its live run to whoever tracks. Raises RunError, FootageError."""
         readers = self._free_readers(wish.into)
         return self._begin(
             DeskRecording("track", wish.into.name, "getting ready", limit=wish.seconds),
-            lambda: self._track(readers, base, wish, request, on_run),
+            lambda: self._track(readers, base, wish, wanted, on_run),
         )
 
     def stop(self) -> DeskRecording | None:
@@ -192,11 +193,11 @@ class CameraDesk:
         self._change(state="done", words=spreads.in_words, notes=report.warnings)
 
     def _track(
-        self, readers: CameraReaders, base: Session, wish: TakeWish, request: RunRequest, on_run: OnRun
+        self, readers: CameraReaders, base: Session, wish: TakeWish, wanted: Mapping[str, Any], on_run: OnRun
     ) -> None:
         recording = open_take(base, readers, wish)
         try:
-            run = prepare_run(recording.session, request)
+            run = prepare_run(recording.session, **wanted)
             on_run(recording.session, run)
         except BaseException:
             discard_take(recording)

@@ -10,8 +10,8 @@ from click.testing import CliRunner, Result
 from moving_bodies import c3d_of, swinging
 
 from studio.body.catalogue import load_body
-from studio.cli import behaviour_commands
 from studio.cli.main import main
+from studio.operations import behaviours
 from studio.sessions.beginning import begin_session
 from studio.sessions.workspace import Workspace, workspace_root
 
@@ -99,7 +99,7 @@ def test_a_cancelled_learning_leaves_nothing(motions: Path, monkeypatch: pytest.
     def interrupted(*_arguments: object, **_options: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(behaviour_commands, "learn", interrupted)
+    monkeypatch.setattr(behaviours, "learn_from", interrupted)
     result = run("learn", str(motions / "one.c3d"), "--into", "mine", *QUICK)
     assert result.exit_code == 130
     assert not (workspace_root() / "models").exists()

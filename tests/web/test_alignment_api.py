@@ -9,7 +9,7 @@ import pytest
 from nudged_camera import NUDGED, make_nudged_session
 from web_doubles import Studio
 
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.sessions.session import CAMERAS_PATH, Session
 from studio.web import alignment_routes
 
@@ -47,7 +47,7 @@ def calibration_why(studio: Studio) -> str:
 
 def test_cameras_are_measured_turned_and_turned_back(studio: Studio, session: Session) -> None:
     before = (session.path / CAMERAS_PATH).read_bytes()
-    run = prepare_run(session, RunRequest(start_pose=session.body().neutral, last=2, name="old"))
+    run = prepare_run(session, start_pose=session.body().neutral, last=2, name="old")
     told = studio.client.get(PLACE).json()
     assert (told["possible"], told["job"], told["turned"]) == (True, None, False)
     assert studio.client.post(PLACE, json={}).status_code == 202

@@ -11,7 +11,7 @@ from toy_session import BODY, HEIGHT, WIDTH, true_poses
 
 import studio
 from studio.body.catalogue import load_body
-from studio.notebook.progress import told
+from studio.operations.progress import reporting as told
 from studio.sessions.session import Session
 
 FEW = {"particles": 20, "layers": 2}
