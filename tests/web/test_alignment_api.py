@@ -9,9 +9,9 @@ import pytest
 from nudged_camera import NUDGED, make_nudged_session
 from web_doubles import Studio
 
+from studio.operations import cameras
 from studio.runs.new_run import prepare_run
 from studio.sessions.session import CAMERAS_PATH, Session
-from studio.web import alignment_routes
 
 PLACE = "/api/sessions/nudged/alignment"
 
@@ -88,7 +88,7 @@ def test_measuring_is_cancelled_and_fails_in_words(
             progress("looking at silhouettes", 1, 16)
             time.sleep(0.01)
 
-    monkeypatch.setattr(alignment_routes, "align_cameras", waits)
+    monkeypatch.setattr(cameras, "align_cameras", waits)
     assert studio.client.post(PLACE, json={}).status_code == 202
     assert studio.client.post(PLACE, json={}).json()["code"] == "run"
     studio.client.delete(PLACE)
