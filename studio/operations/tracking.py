@@ -9,7 +9,7 @@ from typing import Annotated, Concatenate, ParamSpec, TypeVar
 from pydantic import Field
 
 from studio.declaring import Body, Despite, Knobs, Model, OneOf, Seed, Terminal, Values, Web, operation
-from studio.errors import RunError
+from studio.errors import RunError, SettingsError
 from studio.operations.footage import Cameras, addresses_of
 from studio.operations.opening import RunName, SessionName, Tracked, open_run, open_session, session_of
 from studio.operations.progress import Reporting, reporting, say
@@ -254,7 +254,7 @@ def correct(
 
     Ctrl-C stops; what was tracked stays, and forwards the new run can be gone on with.
 
-    Raises RunError unless exactly one pose is given.
+    Raises SettingsError unless exactly one pose is given.
     """
     stored = open_run(run)
     new = corrected_run(stored, frame, pose, from_track, back_to, name)
@@ -279,7 +279,7 @@ def correct(
 def corrected_run(
     run: StoredRun,
     frame: int,
-    pose: Pose | None,
+    pose: Pose | None = None,
     from_track: str = "",
     back_to: int | None = None,
     name: str = "",
@@ -287,7 +287,7 @@ def corrected_run(
 ) -> StoredRun:
     """The run that `correct` makes, before anything of it is tracked. source : where the pose came from, in words."""
     if (pose is None) == (not from_track):
-        raise RunError("A corrected frame needs a pose.", "Give one, or the track to take it from.")
+        raise SettingsError("A corrected frame needs a pose.", "Give one, or the track to take it from.")
     if pose is None:
         given, source = pose_in_track(run, from_track, frame), f"track {from_track}"
     else:
