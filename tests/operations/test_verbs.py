@@ -140,7 +140,7 @@ def test_exclusions_are_painted_and_taken_back(session_on_disk: Session) -> None
 
 
 def test_a_height_in_metres_is_refused(session_on_disk: Session) -> None:
-    with pytest.raises(studio.StudioError, match="no person's"):
+    with pytest.raises(studio.StudioError, match="'height_mm' cannot be 1.76"):
         studio.subject("toy", 1.76)
     assert studio.subject("toy").name == BODY
 
