@@ -24,6 +24,10 @@ FACTOR = 2.0
 KEPT = 64
 
 
+def unheard(_step: str, _done: int, _total: int) -> None:
+    """Progress that nobody is shown."""
+
+
 def watched(progress: Progress | None, cancelled: Cancelled | None, work: str) -> Progress:
     """What the work calls: passes on to `progress`, raises WorkCancelledError once it is cancelled.
 

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -24,7 +25,7 @@ from studio.capture.frame_clock import ReplayClock
 from studio.errors import RunError
 from studio.progress import Progress
 from studio.runs.live_summary import LiveSummary, summary_of
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.scene.scene_server import SceneServer
 from studio.sessions.manifest import write_manifest
 from studio.sessions.session import Session
@@ -117,11 +118,11 @@ def run_live_benchmark(report: Progress, seconds: float = SECONDS) -> dict[str, 
         model = learn_walk(Path(folder) / "walk.behaviour")
         stages = measure_stages(session, model, report)
         request = live_request(model, seconds)
-        watched = track_watched(workspace, session, prepare_run(session, request), report)
-        pressed = _pressed(workspace, session, replace(request, name="pressed", last=None), report)
-        alone_run = prepare_run(session, replace(request, name="alone"))
+        watched = track_watched(workspace, session, prepare_run(session, **request), report)
+        pressed = _pressed(workspace, session, {**request, "name": "pressed", "last": None}, report)
+        alone_run = prepare_run(session, **{**request, "name": "alone"})
         alone = track_watched(workspace, session, alone_run, report, scene=False)
-        fast_run = prepare_run(session, replace(request, name="fast"))
+        fast_run = prepare_run(session, **{**request, "name": "fast"})
         fast = track_live(
             session,
             fast_run,
@@ -145,14 +146,14 @@ def run_live_benchmark(report: Progress, seconds: float = SECONDS) -> dict[str, 
     }
 
 
-def _pressed(workspace: Workspace, session: Session, request: RunRequest, report: Progress) -> Watched:
+def _pressed(workspace: Workspace, session: Session, request: dict[str, Any], report: Progress) -> Watched:
     """The whole video at 36 Hz with the scene open."""
     manifest = session.manifest
     faster = replace(manifest.footage, fps=PRESSED)
     write_manifest(session.path, msgspec.structs.replace(manifest, footage=faster))
     try:
         again = workspace.session(session.name)
-        return track_watched(workspace, again, prepare_run(again, request), report)
+        return track_watched(workspace, again, prepare_run(again, **request), report)
     finally:
         write_manifest(session.path, manifest)
 

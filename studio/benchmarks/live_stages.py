@@ -10,6 +10,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,6 @@ from studio.evidence.pipeline import EvidenceMaker
 from studio.numba_in_threads import numba
 from studio.progress import Progress
 from studio.runs.live_summary import LiveSummary
-from studio.runs.new_run import RunRequest
 from studio.runs.search_space import search_space, session_sigma
 from studio.sessions.session import Session
 from studio.settings import changed_settings, default_settings
@@ -48,11 +48,17 @@ LEARNING, MEASURED = 22, 60
 """Frames: until the blobs are learnt, and that are measured after."""
 
 
-def live_request(model: Path, seconds: float = SECONDS, fps: float = WANTED) -> RunRequest:
+def live_request(model: Path, seconds: float = SECONDS, fps: float = WANTED) -> dict[str, Any]:
     """The live run of Show 6."""
     last = round(seconds * fps)
-    return RunRequest(
-        TRACKER, WEIGHTING, last=last, changes=CHANGES, name="live", behaviour=str(model), live=True
+    return dict(
+        tracker=TRACKER,
+        weighting=WEIGHTING,
+        last=last,
+        knobs=CHANGES,
+        name="live",
+        behaviour=str(model),
+        live=True,
     )
 
 

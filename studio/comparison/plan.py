@@ -19,7 +19,7 @@ from studio.comparison.tracked import Attempt, Tracked, tracking_trial
 from studio.comparison.trials import Outcome, Trial
 from studio.errors import RunError, TruthError
 from studio.runs.behaviour_models import ChosenModel, chosen_model, needs_model
-from studio.runs.new_run import checked_frames, start_pose
+from studio.runs.new_run import checked_frames, start_of
 from studio.sessions.session import Session
 from studio.settings import DEFAULT_WEIGHTING
 from studio.tracking.frame_refinement import FrameRefinementSettings
@@ -152,7 +152,7 @@ def plan_comparison(
         )
     begin, end = checked_frames(session, first, last)
     model = session.body(body or None)
-    start_pose(session, model, None)
+    start_of(session, model, None)
     taking_part = candidates(replace(lineup, weighting=weighting))
     chosen = _chosen_model(session, model, taking_part, behaviour)
     return Plan(

@@ -62,7 +62,7 @@ class InitialPose:
     names : of the parameters. pose : (D,). body : its name. confidence : 0 to 1, that the body stands so and faces so.
     margin : log weight by which the best pose that faces the other way is beaten, inf without one. rival : that pose.
     agreement : share of the last searches that face this way. overlap : f_s. hull_litres : volume of the hull, 0 where
-    there was none. note : what a person should know, "" if nothing.
+    there was none. note : what a person should know, "" if nothing. file : that it was written to.
     """
 
     frame: int
@@ -77,6 +77,7 @@ class InitialPose:
     hull_litres: float
     evaluations: int
     note: str
+    file: Path | None = None
 
     @property
     def source(self) -> str:

@@ -85,7 +85,9 @@ class FittedSize:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FittedSubject:
-    """A subject that was found. frames, poses (F, D) : with it. overlap_before, overlap : (F,) f_s."""
+    """A subject that was found. frames, poses (F, D) : with it. overlap_before, overlap : (F,) f_s. file : that it was
+    written to.
+    """
 
     subject: Subject
     body: BodyModel
@@ -96,6 +98,7 @@ class FittedSubject:
     overlap: Array
     poses_from: str
     evaluations: int
+    file: Path | None = None
 
 
 def fit_session_subject(

@@ -21,7 +21,7 @@ from studio.runs.initialising import (
     seek,
     whole_problem,
 )
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.search_space import default_sigma, parameter_names, search_space
 from studio.runs.start_pose_file import start_pose_from_file
 from studio.sessions.session import Session
@@ -82,7 +82,7 @@ def test_people_in_random_moments_and_headings_are_found(people: Session) -> Non
 
 def test_a_run_without_start_pose_finds_one(people: Session) -> None:
     steps: list[tuple[str, int, int]] = []
-    run = prepare_run(people, RunRequest(first=1, last=2), lambda *told: steps.append(told))
+    run = prepare_run(people, first=1, last=2, progress=lambda *told: steps.append(told))
     assert run.record.start_pose is not None
     assert run.record.start_source.startswith("found in frame 1, confidence ")
     assert steps[-1][0] == "looking for each limb"

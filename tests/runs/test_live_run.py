@@ -8,7 +8,7 @@ from toy_session import FPS, true_poses
 from studio.errors import NotFoundError, RunError
 from studio.runs.live_replay import compare, prepare_replay, replay
 from studio.runs.live_summary import summary_of
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.problem_source import ProblemSource
 from studio.runs.run_footage import footage_of
 from studio.sessions.session import Session
@@ -150,17 +150,17 @@ def test_a_live_run_recovers_quickly_unless_asked_otherwise(session_on_disk: Ses
     assert live_run(session_on_disk, "a").record.settings["recovery"] == SPREAD
     asked = live_run(session_on_disk, "b", changes={"recovery": INITIALISE})
     assert asked.record.settings["recovery"] == INITIALISE
-    assert prepare_run(session_on_disk, RunRequest(name="c")).record.settings["recovery"] == INITIALISE
+    assert prepare_run(session_on_disk, name="c").record.settings["recovery"] == INITIALISE
 
 
 def test_what_cannot_be_done_live_is_refused(session_on_disk: Session) -> None:
     with pytest.raises(RunError, match="cannot teach"):
-        prepare_run(session_on_disk, live_request(changes={"online_learning": True}))
+        prepare_run(session_on_disk, **live_request(knobs={"online_learning": True}))
     with pytest.raises(RunError, match="Only a live run"):
-        prepare_run(session_on_disk, RunRequest(to_and_fro=True))
+        prepare_run(session_on_disk, to_and_fro=True)
     with pytest.raises(RunError, match="do not lie"):
-        prepare_run(session_on_disk, live_request(last=9))
-    plain = prepare_run(session_on_disk, RunRequest(name="plain"))
+        prepare_run(session_on_disk, **live_request(last=9))
+    plain = prepare_run(session_on_disk, name="plain")
     with pytest.raises(NotFoundError, match="not tracked live"):
         summary_of(plain)
     with pytest.raises(RunError, match="no frames"):

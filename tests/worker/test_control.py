@@ -19,7 +19,7 @@ from toy_session import make_session, true_poses
 from waiting import until
 
 from studio.errors import RunError, SettingsError
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
@@ -42,8 +42,7 @@ def control(session_on_disk: Session) -> Iterator[StudioControl]:
 
 def new_run(session: Session, name: str, last: int = 8, **changed: object) -> StoredRun:
     changes = {"particles": 100, "layers": 10, "start_repeats": 1} | changed
-    request = RunRequest(name=name, seed=11, start_pose=true_poses()[0], last=last, changes=changes)
-    return prepare_run(session, request)
+    return prepare_run(session, name=name, seed=11, start_pose=true_poses()[0], last=last, knobs=changes)
 
 
 def wait_for(watching: Subscription, wanted: Callable[[Event], bool]) -> Event:
