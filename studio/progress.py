@@ -1,15 +1,12 @@
-"""How long work tells how far it is, hears that it is not wanted any more, and how much longer it will take."""
+"""How long work tells how far it is, how it is ended, and how much longer it will take."""
 
 import math
 import time
 from collections.abc import Callable, Sequence
 
-from studio.errors import WorkCancelledError
-
 Progress = Callable[[str, int, int], None]
-"""Called with a step in words, how many parts of it are done and how many there are (0: unknown)."""
-Cancelled = Callable[[], bool]
-"""Called often; True once the work is no longer wanted."""
+"""Called often, with a step in words, how many parts of it are done and how many there are (0: unknown). What it raises
+ends the work, such as WorkCancelledError where that is no longer wanted; nothing half done is kept then."""
 
 LEAST_TAKEN = 5
 """Measured stretches of work before anything is said."""
@@ -26,21 +23,6 @@ KEPT = 64
 
 def unheard(_step: str, _done: int, _total: int) -> None:
     """Progress that nobody is shown."""
-
-
-def watched(progress: Progress | None, cancelled: Cancelled | None, work: str) -> Progress:
-    """What the work calls: passes on to `progress`, raises WorkCancelledError once it is cancelled.
-
-    work : what is going on, as a sentence begins with it: "The export".
-    """
-
-    def tell(step: str, done: int, total: int) -> None:
-        if cancelled is not None and cancelled():
-            raise WorkCancelledError(f"{work} was cancelled.", "Start it again when you like.")
-        if progress is not None:
-            progress(step, done, total)
-
-    return tell
 
 
 def time_left(taken: Sequence[tuple[float, float]], left: float) -> float | None:

@@ -16,7 +16,7 @@ from studio.behaviour.model_learning import learn_model
 from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import load_body
 from studio.capture.footage import folded
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 from studio.sessions.manifest import write_manifest
 from studio.sessions.session import Session
 from studio.synthesis.clips import ClipWriter
@@ -27,14 +27,14 @@ RECIPE = "walk-five-cameras"
 QUALITY = 19.0
 
 
-def make_footage(place: Path, seconds: float, progress: Progress | None = None) -> Session:
+def make_footage(place: Path, seconds: float, progress: Progress = unheard) -> Session:
     """The session, made in the folder `place`, which is not there yet. progress : told (step, done, total)."""
     synthesize(RECIPE, place, progress)
     lengthen(Session(place), seconds, progress)
     return Session(place)
 
 
-def lengthen(session: Session, seconds: float, progress: Progress | None = None) -> None:
+def lengthen(session: Session, seconds: float, progress: Progress = unheard) -> None:
     """Write a session's videos anew, so long and forth and back; nothing where they are long enough."""
     manifest = session.manifest
     source, count = manifest.footage, round(seconds * manifest.fps)
@@ -51,8 +51,7 @@ def lengthen(session: Session, seconds: float, progress: Progress | None = None)
                 writer.add(clip[folded(frame, source.frame_count)])
         entry = longer.relative_to(session.path).as_posix()
         cameras.append(dataclasses.replace(camera, path=entry, frame_count=count))
-        if progress is not None:
-            progress("writing long videos", number + 1, len(source.cameras))
+        progress("writing long videos", number + 1, len(source.cameras))
     footage.close()
     changed = dataclasses.replace(source, frame_count=count, cameras=tuple(cameras))
     write_manifest(session.path, msgspec.structs.replace(manifest, footage=changed))

@@ -144,7 +144,7 @@ def knob_option(entry: Knob, with_default: bool) -> click.Option:
         return click.Option(spelling, type=click.Choice(entry.choices), help=entry.help)
     default = f"; default {entry.default}" if with_default else ""
     words = f"{entry.help} ({allowed(entry)}{default})"
-    return click.Option(spelling, metavar=entry.kind.__name__.upper(), help=words)
+    return click.Option(spelling, metavar=click.types.convert_type(entry.kind).name.upper(), help=words)
 
 
 def _knob_options(entry: Parameter, knobs: Knobs) -> list[click.Parameter]:

@@ -1,7 +1,7 @@
 """The exports that lie in a run's folder: `exports/<file>`, each with what was said of it when it was written."""
 
 import datetime
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import msgspec
@@ -11,7 +11,7 @@ from studio.export.exporting import ExportReport, export_run
 from studio.export.formats import ExportFormat
 from studio.export.options import ExportOptions
 from studio.export.task import Writer
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 from studio.runs.tracks import BEST, RAW, best_track, read_track, track_digest, track_names
 from studio.runs.way_results import ExportedFile
 from studio.sessions.record_files import RecordFile
@@ -53,8 +53,7 @@ def export_into_run(
     form: ExportFormat,
     asked: Mapping[str, str | int | float | bool],
     *,
-    progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    progress: Progress = unheard,
     record_scene: Writer | None = None,
 ) -> KeptExport:
     """Export a run into its own folder; several files become one zip. The same wish writes over its file.
@@ -70,7 +69,6 @@ def export_into_run(
         asked,
         folder / f"{_stem(session, run, form, asked)}.{form.name}",
         progress=progress,
-        cancelled=cancelled,
         record_scene=record_scene,
         pack=True,
     )

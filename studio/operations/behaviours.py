@@ -31,7 +31,7 @@ Sources = Annotated[
         description="Motion files (.amc with its .asf, .bvh, .npz, .c3d, .trc), folders of them, runs as SESSION/RUN,"
         " or recipes (their motion alone).",
     ),
-    Web(kind=Annotated[list[str], Field(max_length=500)]),
+    Web(kind=list[str]),
 ]
 
 

@@ -11,7 +11,7 @@ from studio.calibration.board_pdf import PAGES, usual_board, write_board_pdf
 from studio.calibration.boards import Board, board_from_text
 from studio.calibration.findings import Finding
 from studio.calibration.verbs import Calibrated
-from studio.declaring import Terminal, Whose, operation
+from studio.declaring import Terminal, Web, Whose, operation
 from studio.errors import SettingsError
 from studio.geometry.camera import Camera
 from studio.operations.opening import SessionName, open_session
@@ -56,7 +56,12 @@ def calibrate(
         Whose(""),
         Terminal(kind=str, metavar="SESSION_OR_FOLDER"),
     ],
-    board: Annotated[Board | str, Field(description=SPELLING), Terminal("--board", "BOARD", kind=str)],
+    board: Annotated[
+        Board | str,
+        Field(max_length=120, description=SPELLING),
+        Terminal("--board", "BOARD", kind=str),
+        Web(kind=str),
+    ],
     *,
     intrinsics: Annotated[
         str | Path | None,

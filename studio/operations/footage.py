@@ -36,11 +36,12 @@ Into = Annotated[
     Field(description="Name of the new session in the workspace, or a path."),
     Terminal("--into", "SESSION", kind=str),
 ]
+Place = Annotated[str | None, Field(max_length=4096)]
 Chosen = Annotated[
     str | Path | None,
     Field(description="Which calibration to take, where there are several."),
     Terminal(kind=Path),
-    Web(kind=Annotated[str | None, Field(max_length=4096)]),
+    Web(kind=Place),
 ]
 Rate = Annotated[
     float | None,
@@ -50,7 +51,7 @@ Trial = Annotated[
     str | None,
     Field(description="Which trial, where a folder holds several."),
     Terminal(metavar="NAME"),
-    Web(kind=Annotated[str | None, Field(max_length=4096)]),
+    Web(kind=Place),
 ]
 Turn = Literal[0, 90, 180, 270]
 Offsets = Annotated[
@@ -105,7 +106,7 @@ def new_session(
     title: Annotated[
         str,
         Field(max_length=200, description="What people see; the name unless given."),
-        Web(kind=Annotated[str, Field(max_length=200)]),
+        Web(kind=str),
     ] = "",
     body: Annotated[Body, Field(description="The body that is tracked; the studio's own unless given.")] = "",
 ) -> Session:
@@ -307,7 +308,9 @@ def record(
     seconds: Annotated[
         Seconds, Field(description="For so long; default: until the streams end, or Ctrl-C.")
     ] = None,
-    fps: Annotated[float, Field(ge=0, description="Pictures a second; default: as measured.")] = 0.0,
+    fps: Annotated[
+        float | None, Field(gt=0, le=10_000, description="Pictures a second; default: as measured.")
+    ] = None,
     finish: Annotated[
         str | Path | None,
         Field(description="Make a session of a recording that was cut off, instead."),

@@ -43,7 +43,10 @@ def background(
         Web(left_out=True),
     ] = None,
     knobs: Annotated[
-        Values, Field(description="Knobs of the masks, by name."), Knobs(others=True), Web("knobs")
+        Values,
+        Field(max_length=64, description="Knobs of the masks, by name."),
+        Knobs(others=True),
+        Web("knobs"),
     ] = None,
     tune: Annotated[
         bool, Field(description="Try knobs, keep those under which the views agree best.")

@@ -46,7 +46,9 @@ def of_new_run(
             **own,
             "return": function.__annotations__["return"],
         }
-        function.__signature__ = inspect.signature(make)  # pyright: ignore[reportFunctionMemberAccess]
+        shown, kept = inspect.signature(make), inspect.signature(function).parameters
+        entries = [kept.get(name, entry) for name, entry in shown.parameters.items()]
+        function.__signature__ = shown.replace(parameters=entries)  # pyright: ignore[reportFunctionMemberAccess]
         return function
 
     return take

@@ -7,7 +7,7 @@ needs no truth (`runs.mask_quality`).
 """
 
 import dataclasses
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import msgspec
@@ -22,7 +22,7 @@ from studio.evidence.masks import PackedMask, reduced, uncleaned
 from studio.evidence.pipeline import EvidenceMaker, RawMask
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
-from studio.progress import Progress, watched
+from studio.progress import Progress, unheard
 from studio.runs.clean_plates import clean_plates
 from studio.runs.mask_quality import JUDGED_SIDE, ROUGH, MaskQuality, count_frame, spread_frames, summed
 from studio.runs.session_settings import session_settings
@@ -82,13 +82,12 @@ def set_up_background(
     knobs: Mapping[str, Knob] | None = None,
     tune: bool = True,
     exclude_unused: bool = False,
-    progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    progress: Progress = unheard,
 ) -> BackgroundSetup:
     """Choose a session's background and keep it. knobs : of masks, as they shall be. tune : try others for the rest.
 
     exclude_unused : what no hull comes near in any frame does not count (only where backgrounds are cleaned; exclusions
-    that are there stay). What fails or is cancelled leaves the session's backgrounds and knobs as they were. Raises
+    that are there stay). What fails or is stopped leaves the session's backgrounds and knobs as they were. Raises
     FootageError for a source that is not there, SettingsError for a knob.
     """
     _check_source(session, source)
@@ -97,7 +96,7 @@ def set_up_background(
     manifest, evidence = session.manifest, read_evidence(session)
     had_evidence = (session.path / EVIDENCE_NAME).exists()
     try:
-        return _set_up(session, source, chosen, tune, exclude_unused, progress, cancelled)
+        return _set_up(session, source, chosen, tune, exclude_unused, progress)
     except BaseException:
         described_anew(session, manifest)
         if had_evidence:
@@ -113,8 +112,7 @@ def _set_up(
     chosen: dict[str, Knob],
     tune: bool,
     exclude_unused: bool,
-    progress: Progress | None,
-    cancelled: Callable[[], bool] | None,
+    progress: Progress,
 ) -> BackgroundSetup:
     """`set_up_background` for what was checked."""
     session = given_backgrounds(session)
@@ -122,7 +120,7 @@ def _set_up(
     model = MODEL_OF[source]
     if source == "combined" and len(session.manifest.footage.cameras) >= CLEANING_VIEWS:
         settings = _settings(session, {"background_model": "combined", **chosen})
-        plates = clean_plates(session, settings, progress=progress, cancelled=cancelled)
+        plates = clean_plates(session, settings, progress=progress)
         session = use_cleaned(session, {name: plate.picture for name, plate in plates.items()})
         model = "gaussian"
         for name, plate in plates.items():
@@ -132,7 +130,7 @@ def _set_up(
     own: dict[str, Knob] = {"background_model": model, **chosen}
     quality = None
     if tune and len(session.manifest.footage.cameras) > 1:
-        own, quality = _tuned(session, own, watched(progress, cancelled, "Making the background"))
+        own, quality = _tuned(session, own, progress)
     write_evidence(session, msgspec.structs.replace(read_evidence(session), knobs=own))
     return BackgroundSetup(source, own, tuple(notes), quality)
 

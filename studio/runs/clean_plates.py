@@ -12,7 +12,7 @@ at a time: for the small pictures, and for the backgrounds themselves, whose fra
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -31,7 +31,7 @@ from studio.evidence.masks import cleaned, reduced, reduced_cleaning
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
 from studio.numba_in_threads import njit
-from studio.progress import Progress, watched
+from studio.progress import Progress, unheard
 from studio.sessions.session import Session
 from studio.volume.hull_settings import HullSettings
 from studio.volume.hull_silhouette import silhouette
@@ -81,13 +81,12 @@ def clean_plates(
     settings: EvidenceSettings,
     *,
     frames: int = FRAMES,
-    progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    progress: Progress = unheard,
 ) -> Mapping[str, CleanPlate]:
     """Clean backgrounds by camera, from the plates, clips or medians that the session has.
 
     settings : of the masks. frames : how many of the footage are looked at, evenly spread. Raises RunError for fewer
-    than three cameras (the hull of one says too little about another) or where it was cancelled, FootageError.
+    than three cameras (the hull of one says too little about another), FootageError.
     """
     cameras = session.cameras()
     if len(cameras) < 3:
@@ -97,8 +96,7 @@ def clean_plates(
         )
     footage = session.footage()
     try:
-        tell = watched(progress, cancelled, "Making the background")
-        cleaning = _Cleaning(cameras, footage, dataclasses.replace(settings, **CLEARED), frames, tell)
+        cleaning = _Cleaning(cameras, footage, dataclasses.replace(settings, **CLEARED), frames, progress)
         return cleaning.run(session.path)
     finally:
         footage.close()

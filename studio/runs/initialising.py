@@ -17,7 +17,7 @@ from studio.body.model import BodyModel
 from studio.errors import RunError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
-from studio.progress import Cancelled, Progress, watched
+from studio.progress import Progress, unheard
 from studio.runs.behaviour_models import fitting, model_folders, model_path
 from studio.runs.initial_limbs import limbs_put_right
 from studio.runs.problem_source import ProblemSource
@@ -93,17 +93,14 @@ def initialise(
     behaviour: str = "",
     weighting: str = WEIGHTING,
     seed: int = 0,
-    progress: Progress | None = None,
-    cancelled: Cancelled | None = None,
+    progress: Progress = unheard,
 ) -> InitialPose:
     """The pose of the session's body in a frame.
 
-    body : the session's own by default. behaviour : name or path of a model whose prototypes are candidates. cancelled
-    : asked often; True ends the search with WorkCancelledError. Raises RunError where nothing is to be seen
-    in the frame, NotFoundError for a frame that is not there.
+    body : the session's own by default. behaviour : name or path of a model whose prototypes are candidates. Raises
+    RunError where nothing is to be seen in the frame, NotFoundError for a frame that is not there.
     """
     tree = body or session.body()
-    tell = watched(progress, cancelled, "The search for a start pose")
     settings = session_settings(session, DEFAULT_TRACKER, weighting)
     prototypes = None
     if behaviour:
@@ -111,7 +108,7 @@ def initialise(
         prototypes = fitting(model, tree, session.manifest.fps).prototypes.poses
     problems = ProblemSource(session, tree)
     try:
-        tell("looking at the frame", 0, 1)
+        progress("looking at the frame", 0, 1)
         evidence = problems.evidence(frame, settings)
         masks = problems.evidence(frame, session_settings(session, DEFAULT_TRACKER, WEIGHTING))
         cameras = problems.cameras_in(frame)
@@ -133,9 +130,9 @@ def initialise(
         cameras=len(cameras),
         seed=seed,
         prototypes=prototypes,
-        progress=lambda done, total: tell("searching for the pose", done, total),
+        progress=lambda done, total: progress("searching for the pose", done, total),
     )
-    tell("looking for each limb", 0, 1)
+    progress("looking for each limb", 0, 1)
     stands = limbs_put_right(tree, cameras, masks, found.pose, seed, draw=len(cameras) >= FEWEST_VIEWS)
     shares = stands.off.shares()
     denied = [limb for limb, share in shares.items() if share > LIMB_LOST_SHARE]

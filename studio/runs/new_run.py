@@ -20,8 +20,9 @@ from studio.declaring import Body, Despite, Knobs, Model, OneOf, Seed, Terminal,
 from studio.errors import BodyError, RunError, StudioError
 from studio.geometry.reach import within_reach
 from studio.knobs import Knob
+from studio.progress import Progress, unheard
 from studio.runs.behaviour_models import chosen_model
-from studio.runs.initialising import InitialPose, Progress, initialise
+from studio.runs.initialising import InitialPose, initialise
 from studio.runs.live_request import check_live, live_changes
 from studio.runs.search_space import parameter_names, session_sigma
 from studio.runs.session_settings import session_settings
@@ -86,7 +87,7 @@ def prepare_run(
         str,
         Field(max_length=200, description="Where that pose came from, in words."),
         Terminal(left_out=True),
-        Web(kind=Annotated[str, Field(max_length=200)]),
+        Web(kind=str),
     ] = "",
     behaviour: Annotated[
         Model,
@@ -127,7 +128,7 @@ def prepare_run(
         Field(description="A live run goes forth and back; last may lie behind the end."),
         Terminal(left_out=True),
     ] = False,
-    progress: Progress | None = None,
+    progress: Progress = unheard,
 ) -> StoredRun:
     """A new run, ready to be tracked; what is left out is the session's own or the studio's default.
 
@@ -265,7 +266,7 @@ def start_of(
 
 
 def _found(
-    session: Session, frame: int, body: BodyModel, model: str, seed: int, progress: Progress | None
+    session: Session, frame: int, body: BodyModel, model: str, seed: int, progress: Progress
 ) -> InitialPose:
     """The pose in a run's first frame. Raises RunError where there is none to be found."""
     try:

@@ -24,7 +24,7 @@ from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
-from studio.progress import Cancelled, Progress, watched
+from studio.progress import Progress, unheard
 from studio.runs.initialising import initialise
 from studio.runs.search_space import parameter_names
 from studio.runs.session_settings import session_settings
@@ -105,22 +105,20 @@ def fit_session_subject(
     session: Session,
     request: FitRequest | None = None,
     *,
-    progress: Progress | None = None,
-    cancelled: Cancelled | None = None,
+    progress: Progress = unheard,
 ) -> FittedSubject:
     """The subject of a session, fitted to its silhouettes. Nothing is written: see `keep_subject`.
 
     progress : the step in words, how much of it is done, and how much there is. Raises RunError where nothing is to be
-    seen in a frame or nothing may change, NotFoundError for a frame or run that is not there, WorkCancelledError.
+    seen in a frame or nothing may change, NotFoundError for a frame or run that is not there.
     """
     asked = request or FitRequest()
     if not asked.lengths and not asked.radii:
         raise RunError("Neither lengths nor radii are to be fitted.", "Choose at least one of them.")
-    tell = watched(progress, cancelled, "Fitting the subject")
     body, subject = _first_body(session, asked)
-    tell("choosing frames", 0, 1)
-    frames, start, poses_from = _first_poses(session, body, asked, tell)
-    evidence = _evidence(session, frames, tell)
+    progress("choosing frames", 0, 1)
+    frames, start, poses_from = _first_poses(session, body, asked, progress)
+    evidence = _evidence(session, frames, progress)
     space = shape_space(body, symmetric=asked.symmetric, lengths=asked.lengths, radii=asked.radii)
     space = levelled(space) if asked.symmetric else space
     limbs = {name: number for number, name in enumerate(dict.fromkeys(p.limb for p in body.parameters))}
@@ -134,10 +132,10 @@ def fit_session_subject(
         prior,
         settings=ShapeSearchSettings(particles=asked.particles, layers=asked.layers),
         seed=asked.seed,
-        progress=lambda done, total: tell("fitting lengths and radii", done, total),
+        progress=lambda done, total: progress("fitting lengths and radii", done, total),
     )
     found = search.run(start)
-    tell("refining lengths and radii", 0, 1)
+    progress("refining lengths and radii", 0, 1)
     borders = [silhouette_distances(one) for one in evidence]
     refiner = ShapeRefiner(silhouettes.programs, session.cameras(), borders, prior)
     refined = refiner.refine(found.shape, found.poses, asked.seed, others=(start,))

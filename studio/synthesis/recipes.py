@@ -17,7 +17,7 @@ from studio.geometry.camera import Camera
 from studio.motion_files.reading import read_recording
 from studio.motion_files.recorded_motion import RecordedMotion
 from studio.motion_files.trc import MarkerMotion, write_trc
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 from studio.sessions.importers.bodytrack import RATE, read_numbers
 from studio.sessions.importers.importing import import_source
 from studio.sessions.manifest import read_manifest, write_manifest
@@ -44,7 +44,7 @@ SUBJECT_OF_SHAPE, SUBJECT_OF_HEIGHT, SIGMA_NAME = "subject_shape.toml", "subject
 
 
 def synthesize(
-    recipe: Path | str, into: Path, progress: Progress | None = None, frames: int | None = None
+    recipe: Path | str, into: Path, progress: Progress = unheard, frames: int | None = None
 ) -> Path:
     """Render a recipe's footage and make a session of it; returns the session's folder.
 
@@ -95,7 +95,7 @@ def render_source(
     recipe: Recipe,
     recipe_folder: Path,
     source: Path,
-    progress: Progress | None = None,
+    progress: Progress = unheard,
     frames: int | None = None,
 ) -> None:
     """Write the folder that `import` understands: videos, background, masks, calibration, truth, subject, start pose.

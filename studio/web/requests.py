@@ -1,7 +1,7 @@
 """Bodies of requests made from the declarations of verbs."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Annotated, Any, get_args, get_origin
+from typing import Annotated, Any, NamedTuple, get_args, get_origin
 
 from fastapi import Depends
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
@@ -11,8 +11,17 @@ from studio.web.schemas import RunName, Value
 
 MaybeName = Annotated[RunName | None, BeforeValidator(lambda value: None if value == "" else value)]
 
-MADE: dict[str, tuple[type[BaseModel], dict[str, str]]] = {}
-"""The bodies that were made: by name the model, and which entry is which parameter."""
+
+class Made(NamedTuple):
+    """A body that was made of a verb. entries : the verb's parameter by the name of the entry."""
+
+    verb: str
+    model: type[BaseModel]
+    entries: dict[str, str]
+
+
+MADE: dict[str, Made] = {}
+"""The bodies that were made, by the names of their schemas."""
 
 
 class Asked(Mapping[str, Any]):
@@ -58,7 +67,7 @@ def body_of(
     model = create_model(
         name, __config__=ConfigDict(extra="forbid"), __doc__=operation.about, **{**more, **fields}
     )
-    MADE[name] = model, {key: entry.name for key, entry in entries.items()}
+    MADE[name] = Made(operation.name, model, {key: entry.name for key, entry in entries.items()})
 
     def read(body: BaseModel) -> Asked:
         given = {entry.name: getattr(body, own[key]) for key, entry in entries.items()}
@@ -81,7 +90,7 @@ def _field(entry: Parameter, key: str) -> tuple[Any, Any]:
     if get_origin(kind) in (list, dict) and default is not REQUIRED:
         default = [] if get_origin(kind) is list else {}
     return (
-        kind if entry.web.kind else entry.limited(kind),
+        entry.limited(kind),
         Field(... if default is REQUIRED else default, alias=key, description=entry.help),
     )
 

@@ -90,9 +90,16 @@ def test_a_run_without_start_pose_finds_one(people: Session) -> None:
 
 
 def test_a_cancelled_search_ends(people: Session) -> None:
-    asked = iter([False, False, True])
+    steps: list[str] = []
+
+    def stopped(step: str, _done: int, _total: int) -> None:
+        steps.append(step)
+        if len(steps) == 3:
+            raise WorkCancelledError("Stopped.")
+
     with pytest.raises(WorkCancelledError):
-        initialise(people, 0, cancelled=lambda: next(asked))
+        initialise(people, 0, progress=stopped)
+    assert len(steps) == 3
 
 
 def test_a_frame_that_is_not_there(people: Session) -> None:

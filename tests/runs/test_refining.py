@@ -121,14 +121,12 @@ def test_refusals_keep_what_is_there(session_on_disk: Session, run: StoredRun) -
 
 
 def test_a_cancelled_refinement_keeps_nothing(session_on_disk: Session, run: StoredRun) -> None:
-    asked: list[int] = []
-
-    def cancelled() -> bool:
-        asked.append(1)
-        return len(asked) > 3
+    def stopped(_step: str, done: int, _total: int) -> None:
+        if done == 2:
+            raise WorkCancelledError("Stopped.")
 
     with pytest.raises(WorkCancelledError):
-        refine_run(session_on_disk, run, cancelled=cancelled)
+        refine_run(session_on_disk, run, progress=stopped)
     assert track_names(run) == ("raw",)
 
 

@@ -177,7 +177,7 @@ def test_what_a_restarted_process_left_unanswered_is_refused(control: StudioCont
     refused = ThreadPoolExecutor(1).submit(control.request, commands.Pause())
     until(lambda: control._answers)
     control.restart()
-    with pytest.raises(RunError, match="died before it answered"):
+    with pytest.raises(RunError, match="died"):
         refused.result(PATIENCE)
     with pytest.raises(RunError, match="No run is open"):
         control.request(commands.Pause())
