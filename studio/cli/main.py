@@ -99,7 +99,7 @@ COMMANDS = {
         "Compare all that is stored with its checksums; repair frames.",
     ),
     "doctor": (
-        "session_commands",
+        "doctor_commands",
         "doctor_command",
         "Try all that the studio stands on, and say what to do.",
     ),

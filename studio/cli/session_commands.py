@@ -1,14 +1,13 @@
-"""What there is and how it stands: `bodies`, `runs`, `way`, `doctor`."""
+"""What there is and how it stands: `bodies`, `runs`, `way`."""
 
 from dataclasses import asdict
 
 import click
 
 from studio.cli.deriving import Call, command_of
-from studio.cli.output import EXIT_CODE, FOUND_FAULTS, command
+from studio.cli.output import command
 from studio.operations.opening import bodies, way
 from studio.runs.way import Way
-from studio.self_check import doctor
 from studio.sessions.stored_run import damage_in_words
 from studio.sessions.workspace import Workspace
 
@@ -79,15 +78,3 @@ def way_command(call: Call) -> dict[str, object]:
     said = f"Next: {found.next}." if found.next else "Nothing is left to be done."
     steps = [asdict(step) for step in found.steps]
     return {"steps": steps, "next": found.next, "text": "\n".join((*lines, said))}
-
-
-@command_of(doctor)
-def doctor_command(call: Call) -> dict[str, object]:
-    found = call()
-    lines = [f"{'ok   ' if one.good else 'FAULT'} {one.name:18} {one.found}" for one in found]
-    lines += [f"remedy for {one.name}: {one.remedy}" for one in found if not one.good]
-    return {
-        EXIT_CODE: 0 if all(one.good for one in found) else FOUND_FAULTS,
-        "checks": [asdict(one) for one in found],
-        "text": "\n".join(lines),
-    }

@@ -1,0 +1,19 @@
+"""`doctor`, which loads all of the studio; no other command waits for that."""
+
+from dataclasses import asdict
+
+from studio.cli.deriving import Call, command_of
+from studio.cli.output import EXIT_CODE, FOUND_FAULTS
+from studio.self_check import doctor
+
+
+@command_of(doctor)
+def doctor_command(call: Call) -> dict[str, object]:
+    found = call()
+    lines = [f"{'ok   ' if one.good else 'FAULT'} {one.name:18} {one.found}" for one in found]
+    lines += [f"remedy for {one.name}: {one.remedy}" for one in found if not one.good]
+    return {
+        EXIT_CODE: 0 if all(one.good for one in found) else FOUND_FAULTS,
+        "checks": [asdict(one) for one in found],
+        "text": "\n".join(lines),
+    }
