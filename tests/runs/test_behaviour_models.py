@@ -114,7 +114,7 @@ def test_refusals_say_which_models_there_are(session_on_disk: Session) -> None:
     assert isinstance(unknown, NotFoundError)
     assert "'swings'" in unknown.hint
     keep_arm_model(session_on_disk.path.parent, "more")
-    several = refused(session_on_disk, changes={"prediction": "behaviour"})
+    several = refused(session_on_disk, knobs={"prediction": "behaviour"})
     assert "'more', 'swings'" in several.message
     (models_folder(session_on_disk.path.parent) / "broken.behaviour").write_bytes(b"no model")
     broken = refused(session_on_disk, behaviour="broken")

@@ -61,7 +61,7 @@ def test_a_slow_tracker_takes_the_newest_and_counts_the_others(session_on_disk: 
 
 def test_the_body_is_followed_over_dropped_frames(session_on_disk: Session) -> None:
     changes = {"particles": 150, "layers": 6}
-    run = live_run(session_on_disk, changes=changes)
+    run = live_run(session_on_disk, knobs=changes)
     with driving(session_on_disk, run) as drive:
         drive.to_end(1.8 * FRAME)
     with run.results() as results:
@@ -148,7 +148,7 @@ def test_forth_and_back_goes_on_behind_the_end(session_on_disk: Session) -> None
 
 def test_a_live_run_recovers_quickly_unless_asked_otherwise(session_on_disk: Session) -> None:
     assert live_run(session_on_disk, "a").record.settings["recovery"] == SPREAD
-    asked = live_run(session_on_disk, "b", changes={"recovery": INITIALISE})
+    asked = live_run(session_on_disk, "b", knobs={"recovery": INITIALISE})
     assert asked.record.settings["recovery"] == INITIALISE
     assert prepare_run(session_on_disk, name="c").record.settings["recovery"] == INITIALISE
 
