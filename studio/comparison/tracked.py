@@ -1,5 +1,6 @@
 """A tracker on a footage, kept in memory only: the trial that most experiments are made of."""
 
+import dataclasses
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
@@ -88,7 +89,8 @@ class Tracked:
 
     frames : numbers in the footage. per_frame_mm : mean over markers. lost : per frame the names of limbs that are
     lost (a marker more than 150 mm off). evaluations : poses weighed in a frame after the first. seconds : of the
-    search (weighting and tracker), without reading and preparing pictures.
+    search (weighting and tracker), without reading and preparing pictures. named : per frame the limbs that the tracker
+    itself called lost, as a run's timeline shows them.
     """
 
     frames: list[int]
@@ -100,6 +102,7 @@ class Tracked:
     lost_limbs: list[str]
     evaluations: int
     seconds: float
+    named: list[list[str]] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,11 +163,13 @@ def track(
         on_layer,
     )
     weigher = WEIGHTINGS[attempt.weighting].prepare(body, seen_with, settings.weighting)
-    seconds, evaluations = 0.0, 0
+    seconds, evaluations, named = 0.0, 0, list[list[str]]()
     for number, frame in enumerate(frames):
         seen = evidence(frame)
         began = time.perf_counter()
-        evaluations = following.step(frame, weigher.problem(seen), seen).evaluations
+        result = following.step(frame, weigher.problem(seen), seen)
+        evaluations = result.evaluations
+        named.append(list(result.limbs_lost))
         seconds += time.perf_counter() - began if number else 0.0
         if on_frame is not None:
             on_frame(number + 1, len(frames))
@@ -176,7 +181,9 @@ def track(
             return known_silhouettes(body, seen_with, evidence(frame), poses[row], following.memories[row])
 
         poses = with_sides_right(body, seen_with, np.array(frames), poses, rate, silhouettes_of)[0]
-    return measured(session, body, poses, np.array(frames), evaluations, seconds)
+    found = measured(session, body, poses, np.array(frames), evaluations, seconds)
+    by_frame = dict(zip(frames, named, strict=True))
+    return dataclasses.replace(found, named=[by_frame[frame] for frame in found.frames])
 
 
 def measured(

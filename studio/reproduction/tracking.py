@@ -107,6 +107,19 @@ def lost_percent(run: Tracked) -> float:
     return 100.0 * run.lost_frames / len(run.frames)
 
 
+def named_percent(runs: Runs, *, lost: bool) -> float:
+    """Of all runs' frames in which a limb is lost (or, not `lost`, in which none is) the tracker named one in these per
+    cent; nan without such frames.
+    """
+    named = [
+        bool(ours)
+        for run in runs
+        for ours, true in zip(run.named, run.lost, strict=True)
+        if bool(true) == lost
+    ]
+    return 100.0 * float(np.mean(named)) if named else float("nan")
+
+
 def mean_number(name: str, runs: Runs, paper: float | None = None) -> Number:
     """The mean over seeds of the mean error, mm, beside the paper's."""
     return number(name, mean_errors(runs), "mm", paper=paper, better="lower")

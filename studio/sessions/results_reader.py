@@ -29,8 +29,10 @@ from studio.settings import SettingsEntry
 from studio.tracking.tracker import TRACKED, FrameResult, LayerRecord
 
 FILE_NAME = "results.sqlite"
-SCHEMA_VERSION = 1
-"""A store of this version may lack tables that came later; these are made when it is written to."""
+SCHEMA_VERSION = 2
+"""Stores of version 1 hold npz archives, which `results_codec.unpack` reads too, and may lack tables that came later;
+one that is written to becomes one of this version.
+"""
 Unpacked = TypeVar("Unpacked")
 LATER_TABLES = (("tracking", ("state", "overlap", "doubts")), ("arrivals", ("arrived", "ready")))
 UNWATCHED = (TRACKED, None, 0)

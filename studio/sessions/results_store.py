@@ -58,6 +58,7 @@ CREATE TABLE IF NOT EXISTS arrivals (frame INTEGER PRIMARY KEY, arrived REAL NOT
 CREATE TABLE IF NOT EXISTS checksums (
     what TEXT NOT NULL, number INTEGER NOT NULL, sums TEXT NOT NULL, PRIMARY KEY (what, number));
 """
+_NOTE_VERSION = f"INSERT OR REPLACE INTO meta VALUES ('schema', '{SCHEMA_VERSION}')"
 _SUMS = "INSERT OR REPLACE INTO checksums VALUES (?, ?, ?)"
 
 
@@ -73,7 +74,7 @@ def create_store(run_folder: Path) -> None:
         with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as connection:
             connection.execute("PRAGMA journal_mode = WAL")
             connection.executescript(SCHEMA)
-            connection.execute("INSERT OR IGNORE INTO meta VALUES ('schema', ?)", (str(SCHEMA_VERSION),))
+            connection.execute(_NOTE_VERSION)
     except sqlite3.DatabaseError as error:
         raise unwritable(RESULTS, path, error) from None
 
@@ -144,6 +145,8 @@ class ResultsWriter:
                 connection.execute("PRAGMA journal_mode = WAL")
                 connection.execute("PRAGMA synchronous = NORMAL")
                 connection.executescript(SCHEMA)
+                # Whoever reads it from now on has to understand this version.
+                connection.execute(_NOTE_VERSION)
             except BaseException:
                 connection.close()
                 raise

@@ -228,6 +228,8 @@ def search_frame(
 
 def held_over(settings: Any, held: Any) -> Any:  # noqa: ANN401
     """`settings`, but knobs that do not take effect with the next layer as they are in `held`."""
+    if settings == held:
+        return settings
     slow = [entry.name for entry in knobs_of(type(settings)) if entry.takes_effect != "next layer"]
     return dataclasses.replace(settings, **{name: getattr(held, name) for name in slow})
 

@@ -17,8 +17,8 @@ class Maps(NamedTuple):
 def joined_maps(
     views: Sequence[Sequence[tuple[NDArray[Any], NDArray[Any] | None]]], padding: Sequence[int], dtype: type
 ) -> Maps:
-    """The maps of every view, one or two, all of its picture's size. A map is a picture (H, W) and the table (256,)
-    that its values are looked up in, None for the values themselves; `padding` follows each.
+    """The maps of every view, one or two, all of its picture's size. A map is a picture (H, W) uint8 and the table
+    (256,) that its values are looked up in, None for the values themselves; `padding` follows each.
     """
     size = sum(picture.size + len(padding) for view in views for picture, _ in view)
     values, places = np.empty(size, dtype=dtype), np.zeros((len(views), 4), dtype=np.int64)

@@ -86,7 +86,8 @@ class Silhouettes:
 def halved(mask: Mask) -> Mask:
     """(ceil(H / 2), ceil(W / 2)) a mask (H, W) at half resolution."""
     # A last row or column without a neighbour counts twice, which changes no majority.
-    bits = np.pad(mask, ((0, mask.shape[0] % 2), (0, mask.shape[1] % 2)), mode="edge").astype(np.uint8)
+    odd = mask.shape[0] % 2, mask.shape[1] % 2
+    bits = (np.pad(mask, ((0, odd[0]), (0, odd[1])), mode="edge") if any(odd) else mask).view(np.uint8)
     count = bits[::2, ::2] + bits[1::2, ::2] + bits[::2, 1::2] + bits[1::2, 1::2]
     found = count > 2
     for first in (0, 1):

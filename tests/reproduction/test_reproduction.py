@@ -43,7 +43,7 @@ def test_everything_is_written_and_nothing_is_run_twice(tmp_path: Path) -> None:
     first = run([toy("toy", log)], out, processes=2, report=lambda *words: told.append(words))
     assert (first.measured, first.kept, first.failed) == (4, 0, 0)
     assert len({line.split()[0] for line in lines(log)}) == 2
-    assert told[-1] == ("toy: " + told[-1][0].removeprefix("toy: "), 4, 4, 0.0)
+    assert told[-1] == ("toy: " + told[-1][0].removeprefix("toy: "), 4, 4)
     document = first.documents[0]
     assert document["verdict"] == "reproduced"
     assert document["firm"] is False
@@ -242,7 +242,7 @@ def start_waiting(tmp_path: Path) -> subprocess.Popen:
         stderr=subprocess.PIPE,
     )
     deadline = time.monotonic() + 120
-    while len(lines(tmp_path / "log")) < 2:
+    while len(lines(tmp_path / "log")) < 2 or not any((tmp_path / "out" / "trials").glob("*.json")):
         assert time.monotonic() < deadline
         assert process.poll() is None, process.communicate()
         time.sleep(0.05)

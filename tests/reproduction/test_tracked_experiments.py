@@ -51,6 +51,8 @@ def made(trial: Trial, error: float, lost: tuple[int, ...] = ()) -> Outcome:
         lost_limbs=["left arm"] if lost else [],
         evaluations=1000,
         seconds=1.0,
+        # The tracker notices a frame late.
+        named=[["left arm"] if frame - 1 in lost else [] for frame in range(count)],
     )
     return Outcome(trial, json.loads(json.dumps(asdict(run))))
 
@@ -188,6 +190,11 @@ def test_generalisation_counts_frames_with_a_limb_lost() -> None:
         100.0 * 3 / 450 / clips
     )
     assert numbers["frames with a limb lost, condensation, reporting"] == pytest.approx(0.0)
+    assert numbers["named of frames with a limb lost, condensation, choosing"] == pytest.approx(200.0 / 3)
+    assert np.isnan(numbers["named of frames with a limb lost, condensation, reporting"])
+    frames = sum(450 if kind != "walk-20hz" else 150 for kind in KINDS)
+    assert numbers["named of other frames, condensation, choosing"] == pytest.approx(100.0 / (frames - 3))
+    assert numbers["named of other frames, swarm, choosing"] == 0.0
 
 
 def test_generalisation_is_measured_with_a_model_where_one_is_asked_for() -> None:

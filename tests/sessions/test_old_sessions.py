@@ -4,6 +4,7 @@
 last one whose checksums and exports had no version. Both hold a run of three frames, tracked and read by that version.
 """
 
+import contextlib
 import json
 import sqlite3
 import tomllib
@@ -58,6 +59,11 @@ def test_a_run_can_be_written_on(old: Path) -> None:
     with run.results() as results:
         assert 2 not in results.unchecked()
         assert results.frames() == [0, 1, 2]
+        again = results.layers(2)
+        assert [layer.poses.tolist() for layer in again] == [layer.poses.tolist() for layer in layers]
+        assert len(results.layers(1)) == len(again), "older frames are read as before"
+    with contextlib.closing(sqlite3.connect(run.folder / FILE_NAME)) as connection:
+        assert connection.execute("SELECT value FROM meta WHERE key = 'schema'").fetchone() == ("2",)
 
 
 def test_checksums_and_exports_without_a_version_are_understood(tmp_path: Path) -> None:
@@ -82,12 +88,12 @@ def test_stores_and_calibrations_of_newer_versions_are_refused(
         packed.extractall(tmp_path)
     run = Session(tmp_path / "toy").run("run-1")
     connection = sqlite3.connect(run.folder / FILE_NAME)
-    connection.execute("UPDATE meta SET value = '2' WHERE key = 'schema'")
+    connection.execute("UPDATE meta SET value = '3' WHERE key = 'schema'")
     connection.commit()
     connection.close()
-    with pytest.raises(SessionError, match="schema version 2"):
+    with pytest.raises(SessionError, match="schema version 3"):
         run.summary()
-    with pytest.raises(SessionError, match="schema version 2"):
+    with pytest.raises(SessionError, match="schema version 3"):
         ResultsWriter(run.folder)
     path = tmp_path / "cameras.toml"
     write_calibration(session_on_disk.cameras(), path)

@@ -19,7 +19,7 @@ from studio.comparison.trials import Outcome, Scale, Trial, kept_as
 from studio.reproduction.caillette.training_set import Training, model_file
 from studio.reproduction.drawing import heat_chart
 from studio.reproduction.experiment import Experiment, Part, each_seed
-from studio.reproduction.tracking import Contender, Runs, by_group, lost_percent
+from studio.reproduction.tracking import Contender, Runs, by_group, lost_percent, named_percent
 from studio.runs.shape_on_the_way import FIRST_FRAMES
 from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING
 from studio.synthesis.drawn_recipes import CHOOSING, HALVES, KINDS, clip_name
@@ -101,6 +101,8 @@ COLUMNS: Mapping[str, Callable[[Runs], float]] = {
     "largest (mm)": lambda runs: max(run.worst_mm for run in runs),
     "frames with a limb lost (%)": LOST,
     "highest seed (%)": lambda runs: max(map(lost_percent, runs)),
+    "named of frames with a limb lost (%)": partial(named_percent, lost=True),
+    "named of other frames (%)": partial(named_percent, lost=False),
     "search (ms a frame)": lambda runs: (
         1000.0 * float(np.mean([run.seconds / max(1, len(run.frames) - 1) for run in runs]))
     ),
@@ -166,6 +168,12 @@ def _half(half: str, found: Mapping[str, Mapping[str, Runs]]) -> Iterator[Part]:
         yield number(f"mean error, {words}", map(MEAN, by_seed), "mm", better="lower")
         yield number(f"clips with a mean of at most {NEAR_MM:.0f} mm, {words}", near, "%", better="higher")
         yield number(f"frames with a limb lost, {words}", map(LOST, by_seed), "%", better="lower")
+        for lost, of, better in (
+            (True, "frames with a limb lost", "higher"),
+            (False, "other frames", "lower"),
+        ):
+            share = [named_percent(runs, lost=lost) for runs in by_seed]
+            yield number(f"named of {of}, {words}", share, "%", better=better)
     means = {
         entry.name: float(np.mean([MEAN(runs) for runs in found[entry.name].values()]))
         for entry in ENTRIES
