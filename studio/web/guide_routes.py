@@ -11,6 +11,7 @@ from starlette.responses import HTMLResponse
 import studio
 from studio.behaviour.settings import LearningSettings
 from studio.declaring import REQUIRED, Knobs, Operation, Parameter, declared
+from studio.errors import NotFoundError
 from studio.evidence.settings import EvidenceSettings
 from studio.knobs import Knob, allowed, knobs_of
 from studio.settings import RecordingSettings
@@ -31,31 +32,27 @@ VERBS_WORDS = (
     " for them over HTTP. A keyword, an option and an entry of a body are one declaration."
 )
 VERB_COLUMNS = ("Keyword", "What it means", "Default", "Option", "HTTP")
+TEXTS = {
+    "": ("guide.md", "Guide"),
+    "python": ("python.md", "Python"),
+    "adding": ("adding.md", "Adding your own"),
+    "figures": ("figures.md", "How well, how fast"),
+}
+"""The packaged texts and their titles, by the addresses below /guide."""
+VERBS = "verbs"
+FRESH = {"cache-control": "no-cache"}
 COLUMNS = ("Name", "What it does", "Range", "Default", "Unit", "Takes effect")
 
 
 @router.get("/guide")
-def guide() -> HTMLResponse:
-    """The guide as a page."""
-    return HTMLResponse(rendered("guide.md", "Guide"), headers={"cache-control": "no-cache"})
-
-
-@router.get("/guide/python")
-def python_examples() -> HTMLResponse:
-    """The page of examples for scripts and notebooks."""
-    return HTMLResponse(rendered("python.md", "Python"), headers={"cache-control": "no-cache"})
-
-
-@router.get("/guide/verbs")
-def verbs() -> HTMLResponse:
-    """Every verb with its entries, made from the declarations."""
-    return HTMLResponse(verbs_page(), headers={"cache-control": "no-cache"})
-
-
-@router.get("/guide/adding")
-def adding() -> HTMLResponse:
-    """How to add a body, a tracker, a likelihood, a format."""
-    return HTMLResponse(rendered("adding.md", "Adding your own"), headers={"cache-control": "no-cache"})
+@router.get("/guide/{page}")
+def guide(page: str = "") -> HTMLResponse:
+    """The guide, and what it refers to: examples for Python, all verbs, how to add one's own, figures."""
+    if page == VERBS:
+        return HTMLResponse(verbs_page(), headers=FRESH)
+    if page not in TEXTS:
+        raise NotFoundError(f"The guide has no page '{page[:40]}'.", "Begin at /guide.")
+    return HTMLResponse(rendered(*TEXTS[page]), headers=FRESH)
 
 
 @cache
@@ -110,11 +107,11 @@ def _entry(entry: Parameter) -> tuple[str, ...]:
     default = "" if entry.default in (REQUIRED, None, "", ()) else str(entry.default)
     option = "" if entry.terminal.left_out or entry.mark(Knobs) else entry.option
     body = "" if entry.web.left_out else entry.web.name or entry.name
-    told = "SESSION/RUN" if entry.whose == "run" else "Name or folder." if entry.whose else entry.help
+    meaning = "SESSION/RUN" if entry.whose == "run" else "Name or folder." if entry.whose else entry.help
     if knobs := entry.mark(Knobs):
-        told = f"{told} {', '.join(knob.name for knob in knobs.listed())}".strip()
+        meaning = f"{meaning} {', '.join(knob.name for knob in knobs.listed())}".strip()
     code = [f"<code>{html.escape(word)}</code>" if word else "" for word in (default, option, body)]
-    return f"<code>{entry.name}</code>", html.escape(told), *code
+    return f"<code>{entry.name}</code>", html.escape(meaning), *code
 
 
 def anchor_of(heading: str) -> str:
