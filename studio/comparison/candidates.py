@@ -70,7 +70,7 @@ class Lineup:
 
 
 def candidates(lineup: Lineup) -> tuple[Candidate, ...]:
-    """The candidates, all with the same number of evaluations. Raises SettingsError naming the candidate and its fault."""
+    """The candidates, all with the same number of evaluations. Raises SettingsError for a faulty one."""
     names = expanded(lineup.names)
     if not names:
         raise SettingsError(

@@ -76,7 +76,7 @@ class EvidenceMaker:
         return ViewEvidence(camera, picture, mask, self._edges(picture, mask))
 
     def _from_pixels(self) -> bool:
-        """Whether a hull is carved from pixels: by the knob; "auto": where every camera has an empty view and no masks."""
+        """Whether a hull is carved from pixels: by the knob; "auto": if all cameras have an empty view, none masks."""
         if self.settings.hull_evidence != "auto":
             return self.settings.hull_evidence == "pixels"
         return self.settings.background_model in ("auto", "gaussian") and all(

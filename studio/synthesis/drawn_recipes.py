@@ -250,7 +250,7 @@ def clip_names(half: str) -> tuple[str, ...]:
 
 
 def drawn_recipe(half: str, kind: str) -> Recipe:
-    """The recipe of a kind in one of the HALVES. Reads the recorded motions; raises StudioError where they are missing."""
+    """The recipe of a kind in one of the HALVES. Raises StudioError where recorded motions are missing."""
     chosen = KINDS[kind]
     if chosen.like:
         shared = drawn_recipe(half, chosen.like)

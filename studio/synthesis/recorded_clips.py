@@ -48,7 +48,7 @@ STANDING_MM = 20.0  # a foot this much higher than the other counts less by e
 
 @dataclass(frozen=True, slots=True)
 class Variation:
-    """Variation between performances, standard deviations. tempo : of the logarithm of the speed. degrees : of joints."""
+    """Variation between performances, standard deviations. tempo : of the log speed. degrees : of joints."""
 
     tempo: float = 0.1
     degrees: float = 4.0

@@ -64,7 +64,7 @@ def count_limbs(quads, turns, signed, corner, size, step, far, counts):
 
 @njit(**EXACT)
 def count_uncovered(quads, turns, signed, corner, step, far, counts):
-    """Fill the last column of counts (L, 3) of one view: silhouette that is far from every limb, at the nearest limb."""
+    """Fill the last column of counts (L, 3) of one view: silhouette far from every limb, at the nearest limb."""
     left, top = corner
     height, width = signed.shape
     for row in range(-(-top // step), (top + height - 1) // step + 1):

@@ -89,7 +89,7 @@ class Onlooker:
     def looking(
         self, evidence: FrameEvidence, problem: FrameProblem | None = None
     ) -> Callable[[Array], Sight]:
-        """`sight` of one frame as a function of poses (D,). It holds only the evidence's silhouettes, one bit a pixel."""
+        """`sight` of one frame as a function of poses (D,). Holds only the evidence's silhouettes, a bit a pixel."""
         lost = isinstance(problem, SelfJudging) and problem.lost_evidence
         blank = np.array([is_blank(view) for view in evidence.views])
         carved = all(view.background is not None for view in evidence.views)

@@ -214,7 +214,7 @@ def _with_new_clusters(
 def _root_joined(
     root: RootMotion, recordings: Sequence[Array], strange: Indices, shares: Array
 ) -> RootMotion:
-    """The root motion with that of the new clusters, from the frames `strange` by their shares (n, K) in the clusters."""
+    """The root motion with that of the new clusters, from frames `strange` by their shares (n, K) in the clusters."""
     changes = np.concatenate([root.frame.changes(poses) for poses in recordings])
     return root.joined(gaussians_of(changes[strange], shares))
 

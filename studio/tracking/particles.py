@@ -86,7 +86,7 @@ def settled_first(
     sigma: Array,
     rules: Rules,
 ) -> ParticleSet:
-    """A frame's first set with its impossible particles redrawn; unchanged where it does not keep what they came from."""
+    """A frame's first set with its impossible particles redrawn; unchanged where it does not keep their origins."""
     extra = {name: value for name, value in particles.extra.items() if name != CAME_FROM}
     if CAME_FROM not in particles.extra:
         return particles

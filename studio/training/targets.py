@@ -67,7 +67,7 @@ def marker_names(body: BodyModel) -> tuple[str, ...]:
 
 
 def pointers_of(body: BodyModel, *, movable: bool) -> tuple[Pointer, ...]:
-    """The pointers of a body's head, hands and feet; `movable`: only of those with a rotation parameter of their own."""
+    """The pointers of a body's head, hands and feet; `movable`: only of those with their own rotation parameter."""
     frames = joint_frames(body, body.neutral)[0]
     shapes, found = kinematic_tables(body).limb_shape, []
     for limb, shape in zip(body.drawn, shapes, strict=True):

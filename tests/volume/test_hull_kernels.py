@@ -1,4 +1,4 @@
-"""What pixels and masks say of a voxel: against plain NumPy and Eq. 6 spelt out."""
+"""Classification of voxels by pixels and masks: against plain NumPy and Eq. 6 written out."""
 
 import numpy as np
 import pytest

@@ -193,7 +193,7 @@ def _weigher(session: Session) -> BlobWeigher:
 
 
 def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    """The table beside the paper's; the verdict is on the paper's claims about it, which do not depend on the machine."""
+    """The table beside the paper's; the verdict is on the paper's claims, which do not depend on the machine."""
     runs, large = (
         [outcome.measured for outcome in outcomes if outcome.trial.arguments["footage"] == footage]
         for footage in (TEST, TEST_640)
