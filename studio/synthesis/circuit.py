@@ -231,7 +231,7 @@ def _halt(options: Options, gait: Gait) -> Halt:
         return Halt(NEVER, 2.0 * NEVER)
     if begin < gait.cycle or end < begin + 0.5:
         raise StudioError(
-            f"A halt from {begin:g} to {end:g} s cannot be path_length into and out of.",
+            f"A halt from {begin:g} to {end:g} s cannot be walked into and out of.",
             f"Begin it after {gait.cycle:.1f} s (still_from_s) and let it last half a second (still_until_s).",
         )
     return Halt(begin, end)

@@ -178,8 +178,8 @@ def test_only_seen_transitions_are_possible() -> None:
 @pytest.mark.parametrize(
     ("recordings", "words"),
     [
-        ([], "nothing to learn"),
-        ([np.zeros(0, dtype=int)], "nothing to learn"),
+        ([], "no labels to learn"),
+        ([np.zeros(0, dtype=int)], "no labels to learn"),
         ([np.array([0, 3])], "outside 0 to 2"),
     ],
 )

@@ -143,7 +143,7 @@ def test_footage_of_another_motion_is_refused(shelf, tmp_path) -> None:
     empty = FootageShelf(tmp_path)
     with pytest.raises(TruthError, match="another motion") as refused:
         true_motion(empty, stale, LAST)  # pyright: ignore[reportArgumentType]
-    assert "rendered anew" in refused.value.hint
+    assert "rendered again" in refused.value.hint
     no_recipe = SimpleNamespace(path=tmp_path, truth_path=session.truth_path, **fields)
     with pytest.raises(TruthError, match="not made by a recipe"):
         true_motion(empty, no_recipe, LAST)  # pyright: ignore[reportArgumentType]

@@ -130,7 +130,7 @@ def _fig_11(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield from errors("longest time off", groups, longest_loss, "s")
     yield (
         f"To have lost track: off by more than {OFF_MM:.0f} mm RMS for a second at a stretch. The paper's automatic "
-        "recovery by starting the automaton anew is not in these runs."
+        "recovery by restarting the automaton is not in these runs."
     )
     yield summary_table("Blobs fitted from the tracker's own expectations", groups)
     yield curves("RMS joint position error over the first exercise", groups, POSITION)

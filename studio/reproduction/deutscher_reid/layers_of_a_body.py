@@ -136,7 +136,7 @@ def fig_3(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield number("spread of the last cloud", spreads[:, -1], "mm")
     yield number("last cloud's middle from the true place", measured(outcomes, "distance"), "mm")
     yield (
-        f"To cover: within {COVERED:g} standard deviations. The person who was rendered is not made of cones, and a "
+        f"To cover: within {COVERED:g} standard deviations. The rendered person is not made of cones, and a "
         "layer of Eq. 13 first spreads more than it selects."
     )
     clouds = tuple(

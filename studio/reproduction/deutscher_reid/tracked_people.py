@@ -131,7 +131,7 @@ def _fig_8(groups: Groups) -> Iterator[Part]:
     for name, runs in groups.items():
         yield number(f"{name}: mean error", mean_errors(runs), "mm")
     yield (
-        f"{SUCCESS_WORDS} The verdict is on who tracks and who does not. A run that ends well counts with its whole "
+        f"{SUCCESS_WORDS} The verdict is on which trackers succeed. A run that ends well counts with its whole "
         "length as the time to its failure. The studio's choice (all three terms, Eq. 18, crossover by limbs, limbs "
         "kept apart) is not in the paper; it says what the footage allows. The paper names no frame rate (60 a second "
         f"here), and its Condensation has a likelihood of its own. {EQ17_WORDS}"
