@@ -50,7 +50,7 @@ def place_for_model(name_or_path: str, workspace: Workspace, *, replace: bool = 
         path = models_folder(workspace.root) / f"{name}{SUFFIX}"
     if path.is_dir() or (path.exists() and not replace):
         raise BehaviourError(
-            f"A model exists at '{path}'.", "Choose another name, or replace it with --force."
+            f"A model already exists at '{path}'.", "Choose another name, or replace it with --force."
         )
     return path
 
@@ -74,7 +74,7 @@ def rename_model(workspace: Workspace, name: str, new_name: str) -> Path:
     place = path.with_name(f"{checked_name(new_name, 'model')}{SUFFIX}")
     taken = {entry.stem.lower() for entry in path.parent.glob(f"*{SUFFIX}") if entry != path}
     if new_name.lower() in taken:
-        raise BehaviourError(f"A model '{new_name}' exists.", "Choose another name.")
+        raise BehaviourError(f"A model '{new_name}' already exists.", "Choose another name.")
     os.rename(path, place)
     atomic_files.sync_folder(place.parent)
     return place

@@ -159,7 +159,7 @@ def test_progress_is_reported() -> None:
     ("points", "search", "words"),
     [
         (np.zeros((100, 38)), Search(most=5), "100 frames are too few"),
-        (np.full((100, 2), np.nan), Search(most=5), "no numbers"),
+        (np.full((100, 2), np.nan), Search(most=5), "not finite"),
         (np.zeros((100, 2)), Search(most=5, least=6), "from 5 down to 6"),
         (np.zeros((100, 2)), Search(most=5, covariance="round"), "'round'"),
     ],
