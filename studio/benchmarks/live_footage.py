@@ -1,8 +1,7 @@
-"""Footage and behaviour model that live tracking is measured on: all that is needed comes with the studio.
+"""Footage and behaviour model for the live benchmark, made from what is installed with the studio.
 
-Two seconds of a rendered walk are too short to sustain anything, and rendering more takes minutes. So every video is
-written anew, forth and back through its frames until it is long enough: files of that length, decoded frame by frame
-as any recording is.
+Two seconds of a rendered walk are too short, and rendering more takes minutes. So every video is rewritten, playing its
+frames forwards and backwards until it is long enough, and decoded frame by frame as any recording.
 """
 
 import dataclasses
@@ -28,14 +27,14 @@ QUALITY = 19.0
 
 
 def make_footage(place: Path, seconds: float, progress: Progress = unheard) -> Session:
-    """The session, made in the folder `place`, which is not there yet. progress : told (step, done, total)."""
+    """The session, made in the new folder `place`. progress : called with (step, done, total)."""
     synthesize(RECIPE, place, progress)
     lengthen(Session(place), seconds, progress)
     return Session(place)
 
 
 def lengthen(session: Session, seconds: float, progress: Progress = unheard) -> None:
-    """Write a session's videos anew, so long and forth and back; nothing where they are long enough."""
+    """Extend a session's videos to `seconds` by playing them forwards and backwards, unless they are long enough."""
     manifest = session.manifest
     source, count = manifest.footage, round(seconds * manifest.fps)
     if count <= source.frame_count:
@@ -58,7 +57,7 @@ def lengthen(session: Session, seconds: float, progress: Progress = unheard) -> 
 
 
 def learn_walk(place: Path, seed: int = 0) -> Path:
-    """What the footage's person does, forth and back, as a behaviour model in the file `place`."""
+    """The behaviour model of the footage's motion, forwards and backwards, in the file `place`."""
     body = load_body("human25")
     recording = recipe_recording(RECIPE, body)
     sources = [recording.poses, np.ascontiguousarray(recording.poses[::-1])]

@@ -1,7 +1,7 @@
-"""Footage of planar arms: one camera facing the plane, the picture being the tracker's own body, moving smoothly.
+"""Footage of planar arms: one camera facing the plane shows the tracker's own body, moving smoothly.
 
-Deutscher & Reid 6.1 and 6.2.2: the arms are the model itself, and what is studied is the search, not the fit of a model
-to a person. The mask is exact: a pixel is arm when its centre lies in the outline of a drawn limb.
+Deutscher & Reid 6.1 and 6.2.2: the arms are the model itself, so that the search is studied, not the fit of a model to
+a person. The mask is exact: a pixel is arm when its centre lies in the outline of a drawn limb.
 """
 
 from pathlib import Path

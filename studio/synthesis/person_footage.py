@@ -29,8 +29,8 @@ def render_person(
     source: Path,
     progress: Progress = unheard,
 ) -> None:
-    """Write videos/, and background/ and masks/ as the recipe includes them, into `source`; nothing of cameras that
-    are missing.
+    """Write videos/, and background/ and masks/ as the recipe includes them, into `source`; nothing for missing
+    cameras.
     """
     cameras = cameras_left(cameras, recipe.damage.missing)
     picture, renderer = recipe.picture, recipe_renderer(recipe, motion, cameras)
@@ -56,7 +56,7 @@ def render_person(
 
 
 def recipe_renderer(recipe: Recipe, motion: PersonMotion, cameras: tuple[Camera, ...]) -> Renderer:
-    """The renderer of a recipe's room and person: the very pictures of its footage, and their exact masks."""
+    """The renderer of a recipe's room and person: the pictures of its footage, and their exact masks."""
     height = recipe.options.get("height_mm", STEPPED_OVER_HEIGHT) if recipe.motion == STEPPED_OVER else 0.0
     room = room_called(recipe.room, height)
     things: tuple[Block, ...] = (stool(motion.skeleton, recipe.options),) if recipe.motion == SAT_ON else ()

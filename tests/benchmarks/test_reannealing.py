@@ -1,4 +1,4 @@
-"""The answer to a moved slider is measured from the wish to the last layer."""
+"""The answer to a moved slider is measured from the change to the last layer."""
 
 import pytest
 
