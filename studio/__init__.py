@@ -10,50 +10,61 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from studio.errors import StudioError as StudioError
-    from studio.notebook.aligning import align as align
-    from studio.notebook.aligning import unalign as unalign
-    from studio.notebook.checking import check as check
-    from studio.notebook.doctor import doctor as doctor
-    from studio.notebook.exporting import export_run as export_run
-    from studio.notebook.learning import learn as learn
-    from studio.notebook.opening import list_runs as list_runs
-    from studio.notebook.opening import list_sessions as list_sessions
-    from studio.notebook.opening import open_run as open_run
-    from studio.notebook.opening import open_session as open_session
-    from studio.notebook.preparing import background as background
-    from studio.notebook.preparing import fit_subject as fit_subject
-    from studio.notebook.preparing import import_footage as import_footage
-    from studio.notebook.preparing import initialise as initialise
-    from studio.notebook.preparing import mask_quality as mask_quality
-    from studio.notebook.preparing import subject as subject
-    from studio.notebook.preparing import synthesize as synthesize
-    from studio.notebook.recording import record as record
-    from studio.notebook.results import evaluate as evaluate
-    from studio.notebook.results import list_tracks as list_tracks
-    from studio.notebook.results import markers as markers
-    from studio.notebook.results import read_track as read_track
-    from studio.notebook.solving_cameras import calibrate as calibrate
-    from studio.notebook.tracking import correct as correct
-    from studio.notebook.tracking import go_on as go_on
-    from studio.notebook.tracking import refine as refine
-    from studio.notebook.tracking import smooth as smooth
-    from studio.notebook.tracking import track as track
+    from studio.operations.behaviours import learn as learn
+    from studio.operations.behaviours import models as models
+    from studio.operations.cameras import align as align
+    from studio.operations.cameras import board as board
+    from studio.operations.cameras import calibrate as calibrate
+    from studio.operations.cameras import unalign as unalign
+    from studio.operations.comparing import compare as compare
+    from studio.operations.footage import add_footage as add_footage
+    from studio.operations.footage import import_footage as import_footage
+    from studio.operations.footage import new_session as new_session
+    from studio.operations.footage import record as record
+    from studio.operations.footage import synchronise as synchronise
+    from studio.operations.footage import synthesize as synthesize
+    from studio.operations.masks import background as background
+    from studio.operations.masks import mask_quality as mask_quality
+    from studio.operations.opening import bodies as bodies
+    from studio.operations.opening import list_runs as list_runs
+    from studio.operations.opening import list_sessions as list_sessions
+    from studio.operations.opening import open_run as open_run
+    from studio.operations.opening import open_session as open_session
+    from studio.operations.opening import way as way
+    from studio.operations.person import fit_subject as fit_subject
+    from studio.operations.person import initialise as initialise
+    from studio.operations.person import subject as subject
+    from studio.operations.results import check as check
+    from studio.operations.results import evaluate as evaluate
+    from studio.operations.results import export_run as export_run
+    from studio.operations.results import list_tracks as list_tracks
+    from studio.operations.results import markers as markers
+    from studio.operations.results import read_track as read_track
+    from studio.operations.results import refine as refine
+    from studio.operations.results import smooth as smooth
+    from studio.operations.results import verify as verify
+    from studio.operations.tracking import correct as correct
+    from studio.operations.tracking import go_on as go_on
+    from studio.operations.tracking import live as live
+    from studio.operations.tracking import new_run as new_run
+    from studio.operations.tracking import replay as replay
+    from studio.operations.tracking import resume_live as resume_live
+    from studio.operations.tracking import track as track
+    from studio.self_check import doctor as doctor
 
 _PLACES = {
     "errors": ("StudioError",),
-    "notebook.opening": ("list_runs", "list_sessions", "open_run", "open_session"),
-    "notebook.preparing": (
-        "background", "fit_subject", "import_footage", "initialise", "mask_quality", "subject", "synthesize",
-    ),
-    "notebook.aligning": ("align", "unalign"),
-    "notebook.checking": ("check",),
-    "notebook.doctor": ("doctor",),
-    "notebook.solving_cameras": ("calibrate",),
-    "notebook.tracking": ("correct", "go_on", "refine", "smooth", "track"),
-    "notebook.recording": ("record",),
-    "notebook.exporting": ("export_run",),
-    "notebook.results": ("evaluate", "list_tracks", "markers", "read_track"),
-    "notebook.learning": ("learn",),
+    "self_check": ("doctor",),
+    "operations.opening": ("bodies", "list_runs", "list_sessions", "open_run", "open_session", "way",),
+    "operations.footage": ("add_footage", "import_footage", "new_session", "record", "synchronise", "synthesize",),
+    "operations.cameras": ("align", "board", "calibrate", "unalign",),
+    "operations.masks": ("background", "mask_quality",),
+    "operations.person": ("fit_subject", "initialise", "subject",),
+    "operations.tracking": ("correct", "go_on", "live", "new_run", "replay", "resume_live", "track",),
+    "operations.results": ("check", "evaluate", "export_run", "list_tracks", "markers", "read_track", "refine",
+                           "smooth", "verify",),
+    "operations.behaviours": ("learn", "models",),
+    "operations.comparing": ("compare",),
 }  # fmt: skip
 _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
 

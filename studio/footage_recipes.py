@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from studio.body.person import PersonMotion, Skeleton
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 
 
 def recipe_names() -> tuple[str, ...]:
@@ -33,7 +33,7 @@ def person_of_recipe(
 
 
 def synthesize(
-    recipe: str | Path, into: Path, progress: Progress | None = None, frames: int | None = None
+    recipe: str | Path, into: Path, progress: Progress = unheard, frames: int | None = None
 ) -> Path:
     """Render a recipe's footage and make a session of it in the new folder `into`; returns it.
 

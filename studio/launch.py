@@ -12,7 +12,7 @@ import click
 import uvicorn
 
 from studio.errors import StudioError
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.scene.window_scenes import WindowScenes
 from studio.sessions.atomic_files import write_text
 from studio.sessions.process_lock import ProcessLock
@@ -96,7 +96,7 @@ def demo(workspace_root: Path, port: int = 0, *, announce: Announce = click.echo
     session = prepare_demo(workspace_root)
     runs = session.runs()
     unfinished = [run for run in runs if run.summary().status in ("new", "interrupted")]
-    run = unfinished[-1] if unfinished else prepare_run(session, RunRequest(seed=len(runs)))
+    run = unfinished[-1] if unfinished else prepare_run(session, seed=len(runs))
     serve(
         workspace_root, port=port, open_session=session.name, open_run=run.name, track=True, announce=announce
     )

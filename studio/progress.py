@@ -4,12 +4,9 @@ import math
 import time
 from collections.abc import Callable, Sequence
 
-from studio.errors import WorkCancelledError
-
 Progress = Callable[[str, int, int], None]
-"""Called with the name of a step, the number of parts done and of all (0: unknown)."""
-Cancelled = Callable[[], bool]
-"""Called often; True once the work is cancelled."""
+"""Called often, with the name of a step, the number of parts done and of all (0: unknown). Its exception ends the work,
+such as WorkCancelledError when the work is cancelled; nothing half done is kept then."""
 
 LEAST_TAKEN = 5
 """Measured stretches of work before an estimate is given."""
@@ -24,19 +21,8 @@ FACTOR = 2.0
 KEPT = 64
 
 
-def watched(progress: Progress | None, cancelled: Cancelled | None, work: str) -> Progress:
-    """The callback of the work: passes on to `progress`, raises WorkCancelledError once it is cancelled.
-
-    work : the subject of the message: "The export".
-    """
-
-    def report(step: str, done: int, total: int) -> None:
-        if cancelled is not None and cancelled():
-            raise WorkCancelledError(f"{work} was cancelled.", "Start it again when you like.")
-        if progress is not None:
-            progress(step, done, total)
-
-    return report
+def unheard(_step: str, _done: int, _total: int) -> None:
+    """Progress that is not shown."""
 
 
 def time_left(taken: Sequence[tuple[float, float]], left: float) -> float | None:

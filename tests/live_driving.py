@@ -3,13 +3,14 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 from toy_session import true_poses
 
 from studio.capture.frame_clock import ReplayClock
 from studio.runs.live_problems import LiveProblems
 from studio.runs.live_run import LiveRun
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.problem_source import ProblemSource
 from studio.runs.run_footage import footage_of
 from studio.sessions.session import Session
@@ -31,15 +32,15 @@ class HandClock:
         self.now += seconds
 
 
-def live_request(name: str = "live", **wanted: object) -> RunRequest:
+def live_request(name: str = "live", **wanted: object) -> dict[str, Any]:
     """A quick live run of the toy session."""
-    changes = {**QUICK, **wanted.pop("changes", {})}  # pyright: ignore[reportGeneralTypeIssues]
-    return RunRequest(name=name, seed=7, start_pose=true_poses()[0], live=True, changes=changes, **wanted)  # pyright: ignore[reportArgumentType]
+    changes = {**QUICK, **wanted.pop("knobs", {})}  # pyright: ignore[reportGeneralTypeIssues]
+    return dict(name=name, seed=7, start_pose=true_poses()[0], live=True, knobs=changes, **wanted)
 
 
 def live_run(session: Session, name: str = "live", **wanted: object) -> StoredRun:
     """The same, on disk."""
-    return prepare_run(session, live_request(name, **wanted))
+    return prepare_run(session, **live_request(name, **wanted))
 
 
 @dataclass

@@ -9,7 +9,7 @@ from store_records import layer_of, result_of
 from studio.body.inverse_kinematics import pose_from_markers
 from studio.evaluation.errors import rows_of_frames
 from studio.motion_files.trc import read_trc
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -43,7 +43,7 @@ def planted(session: Session, truth: NDArray[np.float64]) -> StoredRun:
 
 def stored(session: Session, poses: NDArray[np.float64], run: StoredRun | None = None) -> StoredRun:
     """A finished run that found these poses."""
-    run = run or prepare_run(session, RunRequest(last=LAST, fit_shape=False))
+    run = run or prepare_run(session, last=LAST, fit_shape=False)
     writer = ResultsWriter(run.folder)
     for frame, pose in enumerate(poses):
         result = result_of(frame, size=len(pose))

@@ -100,7 +100,7 @@ def people_session(
     """A session whose frame k is the motion's pose k; it has a subject and a truth, but no start pose."""
     source = folder.with_name(folder.name + "-source")
     source.mkdir(parents=True)
-    render_person(recipe, motion, cameras, source, None)
+    render_person(recipe, motion, cameras, source)
     (source / "calibration").mkdir()
     write_calibration(cameras, source / "calibration" / "rendered.toml")
     (source / "truth").mkdir()

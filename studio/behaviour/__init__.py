@@ -1,1 +1,1 @@
-"""What a body tends to do: clusters of elementary movements, and an automaton over them."""
+"""Behaviour models: clusters of elementary movements, and an automaton over them."""

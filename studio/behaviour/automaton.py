@@ -1,7 +1,7 @@
 """A variable-length Markov model as a probabilistic finite-state automaton (Caillette et al. 2007, section 4.2).
 
-M = (Q, K, τ, γ, s): states are strings of labels ("contexts") of variable length, τ says which state follows a state
-and a label, γ how probable the label is, s how the states are spread. How contexts are learnt: automaton_learning.
+M = (Q, K, τ, γ, s): states are strings of labels ("contexts") of variable length, τ gives the state after a state
+and a label, γ the probability of a label, s the distribution of the states. Learning: automaton_learning.
 """
 
 import math
@@ -33,10 +33,10 @@ class Arcs:
 
 @dataclass(frozen=True, eq=False)
 class Automaton:
-    """The automaton over K labels with Q states; state 0 is the empty context, before anything is known.
+    """The automaton over K labels with Q states; state 0 is the empty context, without history.
 
-    contexts : Q strings of labels, oldest first. kept : (Q,) bool, contexts that passed the ε test; the others are
-    there so that the automaton is deterministic, and predict as their longest kept suffix does. next_state : (Q, K) τ.
+    contexts : Q strings of labels, oldest first. kept : (Q,) bool, contexts that passed the ε test; the others
+    make the automaton deterministic, and predict as their longest kept suffix does. next_state : (Q, K) τ.
     probabilities : (Q, K) γ, rows sum to 1. start : (Q,) s, the share of the training frames that each state was
     entered in. smoothing : share of probability spread evenly over all labels in code lengths, and only there.
     back_off : share that `predictions` take from shorter contexts.
@@ -74,8 +74,9 @@ class Automaton:
     def predictions(self) -> Array:
         """(Q, K) γ for particles: the share `back_off` of each is the longest suffix's, down to single labels.
 
-        A long context that was seen a few times forbids nearly everything; what its suffixes have seen stays possible.
-        Where all recordings end, a label leads to itself alone; there the share is that of all labels.
+        A long context that was seen a few times excludes nearly all labels; those seen after its suffixes stay
+        possible. Where all recordings end, a label leads only to itself; there the share is spread by the labels'
+        frequencies.
         """
         found = self.probabilities.copy()
         place = {context: number for number, context in enumerate(self.contexts)}

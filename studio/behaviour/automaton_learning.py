@@ -1,10 +1,10 @@
 """Learning the automaton: contexts of variable length by the ε test (Ron, Singer & Tishby 1996).
 
 A context s = σ s' is worth keeping if it is not rare and predicts differently from its suffix s': some label k that it
-makes probable enough has γ(k | s) / γ(k | s') >= 1 + ε or <= 1 / (1 + ε). Longer contexts are looked at even below one
-that fails the test; one that passes keeps all its suffixes. The kept strings are the prediction suffix tree; the
+makes probable enough has γ(k | s) / γ(k | s') >= 1 + ε or <= 1 / (1 + ε). Longer contexts are tested even below one
+that fails; one that passes keeps all its suffixes. The kept strings are the prediction suffix tree; the
 automaton that walks it label by label has all their prefixes as states too (then the longest suffix of state and label
-is the longest suffix of the whole history), and every label by itself, so that a state tells its cluster (5.1).
+is the longest suffix of the whole history), and every label alone, so that a state determines its cluster (5.1).
 """
 
 from collections.abc import Sequence
@@ -25,10 +25,10 @@ LEAST_LABEL = 0.001
 
 @dataclass(frozen=True, slots=True)
 class ContextTest:
-    """What a context must do to be kept.
+    """Conditions for keeping a context.
 
     memory : its greatest length. epsilon : ε. least_probability : share of all training labels that must follow it;
-    once is not enough to know what follows, so that at least two must.
+    at least two must.
     """
 
     memory: int
@@ -82,7 +82,7 @@ class _Text:
         lengths = [len(labels) for labels in recordings]
         if not sum(lengths):
             raise BehaviourError(
-                "There is nothing to learn an automaton from.", "Give at least one recording."
+                "There are no labels to learn an automaton from.", "Give at least one recording."
             )
         self.labels = np.concatenate([np.asarray(labels, dtype=np.int64) for labels in recordings])
         if self.labels.min() < 0 or self.labels.max() >= symbols:
@@ -95,7 +95,7 @@ class _Text:
 
 
 def _kept_contexts(text: _Text, symbols: int, test: ContextTest) -> dict[Context, Array]:
-    """The prediction suffix tree: kept contexts with the counts (K,) of what follows them."""
+    """The prediction suffix tree: kept contexts with the counts (K,) of the labels that follow."""
     everything = np.arange(len(text.labels))
     least = max(2.0, test.least_probability * len(everything))
     counts: dict[Context, Array] = {(): _following(text, everything, symbols)}
@@ -128,7 +128,7 @@ def _extensions(text: _Text, places: IntArray, length: int) -> list[tuple[int, I
 
 
 def _following(text: _Text, places: IntArray, symbols: int) -> Array:
-    """(K,) how often each label stands at the places."""
+    """(K,) counts of each label at the places."""
     return np.bincount(text.labels[places], minlength=symbols).astype(np.float64)
 
 
@@ -149,7 +149,7 @@ def _closed(kept: dict[Context, Array], singles: Sequence[Context]) -> tuple[Con
 
 
 def _longest_suffix(string: Context, among: dict[Context, Array] | dict[Context, int]) -> Context:
-    """The longest suffix of a string that is among the contexts; the empty one is."""
+    """The longest suffix of a string among the contexts, which include the empty one."""
     for start in range(len(string)):
         if string[start:] in among:
             return string[start:]

@@ -23,7 +23,7 @@ class FeatureSpace:
     """Which parameters of which body are modelled, and the frame rate that derivatives belong to.
 
     body : name of the body. parameters : names of all D entries of its pose vector. columns : (d,) places of the
-    modelled ones, the rest being global. rest : (D,) a rest pose, for what is not modelled. turning : (d,) bool, angles
+    modelled ones, the rest being global. rest : (D,) a rest pose, for the other parameters. turning : (d,) bool, angles
     (rad; else lengths, mm). middle : (d,) middle of the limits, the rest pose's where there are none. fps : frames per
     second.
     """
@@ -47,7 +47,7 @@ class FeatureSpace:
         return tuple(self.parameters[column] for column in self.columns)
 
     def angles(self, poses: Array) -> Array:
-        """(N, D) poses to the (N, d) modelled parameters, as they are written."""
+        """(N, D) poses to the (N, d) modelled parameters, unchanged."""
         return self.checked(poses)[:, self.columns]
 
     def continuous(self, poses: Array) -> Array:
@@ -64,7 +64,7 @@ class FeatureSpace:
     def features(self, poses: Array) -> Array:
         """(F, 2 d) features (x_t, ẋ_t) of one recording, F >= 2; the first frame has the second's derivative.
 
-        Raises BehaviourError for a single frame, other shapes and what is not finite.
+        Raises BehaviourError for a single frame, wrong shapes and values that are not finite.
         """
         if len(poses) < 2:
             raise BehaviourError(
@@ -100,13 +100,13 @@ class FeatureSpace:
         poses = np.asarray(poses, dtype=np.float64)
         if poses.ndim != 2 or poses.shape[1] != len(self.parameters):
             raise BehaviourError(
-                f"Poses of shape {poses.shape} are none of body '{self.body}'.",
+                f"Poses of shape {poses.shape} do not fit body '{self.body}'.",
                 f"Give rows of {len(self.parameters)} parameters.",
             )
         if not np.isfinite(poses).all():
             frame = int(np.flatnonzero(~np.isfinite(poses).all(axis=1))[0])
             raise BehaviourError(
-                f"The pose of frame {frame} holds a value that is no number.",
+                f"The pose of frame {frame} holds a value that is not finite.",
                 "Leave such frames out, and cut the recording there.",
             )
         return poses
@@ -115,15 +115,15 @@ class FeatureSpace:
 def feature_space(body: BodyModel, fps: float) -> FeatureSpace:
     """The features of a body: all parameters but those of a root that moves and turns freely.
 
-    fps : of the recordings. Raises BehaviourError for a body that is all root, and unless fps > 0.
+    fps : of the recordings. Raises BehaviourError for a body with only a root, and unless fps > 0.
     """
     if not (math.isfinite(fps) and fps > 0.0):
-        raise BehaviourError(f"{fps:g} frames per second are no frame rate.", "Give a number above 0.")
+        raise BehaviourError(f"{fps:g} is not a valid frame rate.", "Give a number above 0.")
     root = _global(body)
     columns = np.array([row for row in range(len(body.parameters)) if row not in root], dtype=np.int64)
     if not len(columns):
         raise BehaviourError(
-            f"Body '{body.name}' has nothing but a position and an orientation.",
+            f"Body '{body.name}' has only a position and an orientation.",
             "Take a body with joints.",
         )
     entries = [body.parameters[column] for column in columns]

@@ -1,19 +1,20 @@
-"""Gaussian mixtures whose number of components is found (Figueiredo & Jain, PAMI 24(3), 2002; their CEM²).
+"""Gaussian mixtures with an unknown number of components (Figueiredo & Jain, PAMI 24(3), 2002; their CEM²).
 
 EM that updates one component at a time. A component's weight is max(0, n_m - N / 2) / Σ_j max(0, n_j - N / 2): n_m
-points support it, N is the number of its parameters; one that cannot pay for its own parameters is annihilated, so that
-no component can collapse onto a few points. When EM has settled, one component is removed and EM goes on, down to
-`least`; the mixture of the shortest message is the answer. Starting from many components everywhere in the data, the
-start is not delicate. Ours differs from the paper in three places, each measured on mixtures with known truth (30 draws
-each of three to five components in two and three dimensions):
+points support it, N is the number of its parameters; one with too few points for its parameters is annihilated, so that
+no component can collapse onto a few points. When EM has settled, one component is removed and EM continues, down to
+`least`; the mixture of the shortest message is the result. As it starts from many components throughout the data, it
+is insensitive to the start. Ours differs from the paper in three places, each measured on mixtures with known truth (30
+draws each of three to five components in two and three dimensions):
 
 - The message is N / 2 Σ_m ln n_m + k / 2 ln n - ln p(points). Their Eq. 15 has n α_m / 12 for n_m and k (N + 1) / 2
-  more. The twelfths make components of three or four points cheaper than nothing (right in 25, 22 and 25 draws of 30);
-  their own program leaves the constants out, which we follow, and α_m is small by N / 2 points where those matter most.
-- The component that is removed is the one that is missed least, not the one of the smallest weight: that one may be a
-  small cluster far from all others, while a large one is there twice.
+  more. With the twelfths components of three or four points have negative cost (right in 25, 22 and 25 draws of 30);
+    their own program leaves the constants out, which we follow, and α_m is small by N / 2 points where those matter
+    most.
+- The component whose removal costs least likelihood is removed, not the one of the smallest weight: that may be a small
+  cluster far from all others, while a large one exists twice.
 - EM has settled when a sweep shortens the message by less than `tolerance` nats a point. A share of the length, which
-  may be 0, says something else for every unit the points are measured in.
+  may be 0, depends on the points' units.
 """
 
 import math
@@ -55,9 +56,9 @@ class Settled:
 
 @dataclass(frozen=True, slots=True)
 class Search:
-    """How the number of components is sought.
+    """Settings of the search for the number of components.
 
-    most : components at the start. least : fewest looked at. covariance : "full" or "diagonal". tolerance : EM has
+    most : components at the start. least : fewest tried. covariance : "full" or "diagonal". tolerance : EM has
     settled when a sweep changes the message length by less than this, nats a point. patience : components removed in a
     row without a shorter message before the search ends; 0 goes on to `least`.
     """
@@ -75,7 +76,7 @@ def fit_mixture(
     """The mixture of the shortest message for points (n, p), and what EM settled at on the way.
 
     progress(step in words, components removed, components at the start). Raises BehaviourError where there are too few
-    points for one component, values that are not finite, and for a search that makes no sense.
+    points for one component, values that are not finite, and for an invalid search.
     """
     _check(points, search)
     state = _Components(points, rng, search)
@@ -107,11 +108,11 @@ def _check(points: Array, search: Search) -> None:
         )
     if not 1 <= search.least <= search.most:
         raise BehaviourError(
-            f"A search from {search.most} down to {search.least} clusters is none.",
+            f"A search from {search.most} down to {search.least} clusters is impossible.",
             "Give 1 <= least <= most.",
         )
     if points.ndim != 2 or not np.isfinite(points).all():
-        raise BehaviourError("Points to cluster hold values that are no numbers.", "Leave such frames out.")
+        raise BehaviourError("Points to cluster hold values that are not finite.", "Leave such frames out.")
     needed = parameters_of(points.shape[1], search.covariance) // 2 + 1
     if len(points) < max(2, needed):
         raise BehaviourError(
@@ -175,7 +176,7 @@ class _Components:
         self._remove(int(np.argmin(losses_without(self.log_densities, np.log(self.weights), self.totals))))
 
     def _sweep(self) -> None:
-        """One update of every component, in turn (component-wise EM: each sees the others as they have become)."""
+        """One update of every component in turn (component-wise EM: each uses the others' updated values)."""
         number = 0
         while number < self.size:
             shares = shares_of(self.log_densities[number], math.log(self.weights[number]), self.totals)
@@ -188,7 +189,7 @@ class _Components:
         self.totals = self._totals()
 
     def _update(self, number: int, shares: Array, strength: float) -> None:
-        """A component's new weight and moments, and what they make of the densities."""
+        """Update a component's weight and moments, and the densities."""
         active = np.flatnonzero(shares > LEAST_SHARE)
         own, share = self.points[active], shares[active]
         self.means[number] = share @ own / share.sum()

@@ -26,7 +26,7 @@ def shares_of(log_densities: Array, log_weight: float, totals: Array) -> Array:
 
 @njit(**KERNEL)
 def sum_of_others(log_densities: Array, log_weights: Array, number: int, point: int) -> float:
-    """Log of the density that all components but one give a point."""
+    """Log density of a point under all components but one."""
     largest = -np.inf
     for other in range(len(log_weights)):
         if other != number:
@@ -46,7 +46,7 @@ def replace_component(
 ) -> None:
     """Puts a component's new log densities (n,) into row `number` of (k, n) and corrects the totals (n,) in place.
 
-    log_weights : (k,) as they are in the totals. log_weight : the component's new one. Where the old component was
+    log_weights : (k,) as used in the totals. log_weight : the component's new one. Where the old component was
     nearly all of the total, the others are summed afresh: a difference would leave rounding errors.
     """
     for point in range(len(totals)):

@@ -1,6 +1,6 @@
 """A learnt behaviour: clusters of elementary movements and the automaton that orders them (Caillette et al. 2007).
 
-Learnt by `model_learning.learn_model`, kept in a file by `model_file`, walked by `prediction`.
+Learnt by `model_learning.learn_model`, stored by `model_file`, used by `prediction`.
 """
 
 import dataclasses
@@ -28,7 +28,7 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Making:
-    """How a model came about. frames : of training. sources : their names, one a recording, may be empty. labels : the
+    """Origin of a model. frames : of training. sources : their names, one a recording, may be empty. labels : the
     recordings' clusters (F,), from which the automaton can be learnt again with another memory. entropy_train,
     entropy_test : Eq. 2 in nats, NaN where there is none. learnt_fps : frame rate of the recordings.
     """
@@ -44,12 +44,12 @@ class Making:
 
 @dataclass(frozen=True, eq=False)
 class BehaviourModel:
-    """What a body tends to do.
+    """A behaviour model of a body.
 
-    mixture : the clusters in the reduced space, where frames are labelled and the likelihood of Eq. 3 is taken (what
-    the reduction leaves out is taken to say the same of every cluster). dynamics : the same clusters as Gaussians of
-    the features (x, ẋ), for Eq. 4 and sampling. prototypes : a real pose of each. root : how position and orientation
-    change in each, None for a body without.
+    mixture : the clusters in the reduced space, where frames are labelled and the likelihood of Eq. 3 is taken (the
+    components left out by the reduction are taken as equal in all clusters). dynamics : the same clusters as Gaussians
+    of the features (x, ẋ), for Eq. 4 and sampling. prototypes : a real pose of each. root : changes of position and
+    orientation in each, None for a body without root.
     """
 
     space: FeatureSpace
@@ -78,7 +78,7 @@ class BehaviourModel:
 
     @property
     def steps_per_frame(self) -> float:
-        """How many steps of the automaton a frame takes: the rate it was learnt at over the rate it is used at."""
+        """Steps of the automaton a frame: the rate it was learnt at over the rate it is used at."""
         return self.making.learnt_fps / self.space.fps
 
     @cached_property

@@ -29,7 +29,7 @@ KIND = "studio behaviour model"
 
 
 class _Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What is no array."""
+    """The parts of a model that are not arrays."""
 
     kind: str
     version: int
@@ -71,11 +71,11 @@ def write_model(model: BehaviourModel, path: Path) -> None:
 def read_model(path: Path) -> BehaviourModel:
     """The model in a file.
 
-    Raises BehaviourError for a file that is missing, damaged, no behaviour model, or of another version.
+    Raises BehaviourError for a file that is missing, damaged, not a behaviour model, or of another version.
     """
     if not path.exists():
         raise BehaviourError(
-            f"There is no behaviour model '{path.name}'.", "`studio models` lists those there are."
+            f"There is no behaviour model '{path.name}'.", "List the models with `studio models`."
         )
     with foreign_file(path, BehaviourError, "a behaviour model", "Learn it again with `studio learn`."):
         with path.open("rb") as file:
@@ -106,7 +106,7 @@ def _head(model: BehaviourModel) -> bytes:
 
 
 def _checked_head(path: Path, content: bytes) -> _Head:
-    """The head, if it is of a model that this program reads."""
+    """The head. Raises BehaviourError for another version."""
     known = json.loads(content)
     version = known.get("version")
     if known.get("kind") == KIND and version != VERSION:

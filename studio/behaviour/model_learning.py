@@ -30,7 +30,7 @@ def learn_model(
     progress: Progress | None = None,
     sources: Sequence[str] = (),
 ) -> BehaviourModel:
-    """The behaviour in recordings of poses (F, D) on one body, all at `fps`; nothing is joined across recordings.
+    """The behaviour in recordings of poses (F, D) on one body, all at `fps`; recordings are independent.
 
     progress(step in words, done, total). sources : names of the recordings, kept with the model. Raises BehaviourError
     for recordings that are empty, of another body or not finite, and for too few frames.
@@ -44,7 +44,7 @@ def learn_model(
         most=settings.most_clusters, covariance=settings.covariance, patience=settings.clustering_patience
     )
     found, _ = fit_mixture(points, rng, search, progress)
-    # A cluster that no frame belongs to for the most part is no label.
+    # A cluster that is no frame's likeliest one is not used as a label.
     mixture = found.chosen(np.unique(found.labels(points)))
     labels = _split(mixture.labels(points), [len(part) for part in features])
     shares = mixture.responsibilities(points)
@@ -67,7 +67,7 @@ def learn_model(
 
 
 def _features(space: FeatureSpace, recordings: Sequence[Array]) -> list[Array]:
-    """The features of every recording. Raises BehaviourError naming the recording that has none."""
+    """The features of every recording. Raises BehaviourError naming a recording without features."""
     if not recordings:
         raise BehaviourError("There is no recording to learn from.", "Give at least one.")
     found = []

@@ -1,4 +1,4 @@
-"""A real pose of each cluster: where a search may start, and what a picture of the cluster shows (Fig. 2)."""
+"""A real pose of each cluster, for starts of searches and for pictures of the cluster (Fig. 2)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

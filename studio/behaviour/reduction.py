@@ -52,7 +52,7 @@ def fit_reduction(features: Array, dimensions: int) -> Reduction:
     values, vectors = np.linalg.eigh(covariance)
     chosen = vectors[:, ::-1][:, :dimensions].T
     largest = np.abs(chosen).argmax(axis=1)
-    # An eigenvector's sign is the library's whim: the largest entry is made positive.
+    # An eigenvector's sign is arbitrary: the largest entry is made positive.
     signs = np.sign(chosen[np.arange(dimensions), largest])
     kept = float(values[::-1][:dimensions].sum() / max(values.sum(), SMALLEST_SCALE))
     return Reduction(mean, scale, chosen * signs[:, None], kept)
@@ -61,9 +61,9 @@ def fit_reduction(features: Array, dimensions: int) -> Reduction:
 def full_clusters(features: Array, shares: Array, floor: Array) -> GaussianMixture:
     """Clusters found in a reduced space as Gaussians of the features: moments weighted by `shares` (n, K).
 
-    The first r principal components say which cluster a frame belongs to; what they leave out still differs from
-    cluster to cluster and is correlated with them. Hence not loadings · Σ · loadingsᵀ plus one residual, but every
-    cluster's own mean and covariance in the full space, drawn to the clusters' pooled covariance by as many frames as
+    The first r principal components determine a frame's cluster; the others still differ between clusters and are
+    correlated with them. Hence not loadings · Σ · loadingsᵀ plus one residual, but every
+    cluster's own mean and covariance in the full space, shrunk to the clusters' pooled covariance by as many frames as
     there are features, since a cluster may hold fewer frames than that. floor : (p,) variances added.
     """
     size, width = shares.shape[1], features.shape[1]

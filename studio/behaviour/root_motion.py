@@ -1,11 +1,11 @@
-"""How the whole body moves in each cluster: turning in a pirouette, hardly in a stance (beyond Caillette, Galata &
-Howard 2007, section 5.2).
+"""Motion of the root in each cluster: turning in a pirouette, little in a stance (beyond Caillette, Galata & Howard
+2007, section 5.2).
 
-The paper moves the six global parameters with Gaussian noise and does not say how wide. One width for all of a dance is
-wrong everywhere: in the reproduction's exercises the heading changes by 1 degree a frame in most frames and by 24 in a
-pirouette. Clusters know the difference. So each has a Gaussian of its own, learnt from the same frames: how the
-parameters of the root change in a frame, the horizontal ones seen along the body's heading. Labels and features do not
-know of it; behaviour is still joint angles and their derivatives alone.
+The paper moves the six global parameters with Gaussian noise of unspecified width. One width for a whole dance is wrong
+everywhere: in the reproduction's exercises the heading changes by 1 degree a frame in most frames and by 24 in a
+pirouette. So each cluster has its own Gaussian, learnt from the same frames, of the root's change in a frame,
+the horizontal parameters relative to the body's heading. Labels and features do not use it; behaviour is still joint
+angles and their derivatives alone.
 """
 
 import math
@@ -24,14 +24,14 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 LEAST_SHARE = 1e-3
-"""Of a parameter's variance over all of the training: every cluster has at least this much of it."""
+"""Least variance of a parameter in a cluster, as a share of that over the whole training."""
 LEAST_VARIANCE = 1e-12
 UP = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RootFrame:
-    """The parameters of a root that moves freely, and what is horizontal of them.
+    """The parameters of a root that moves freely, and which of them are horizontal.
 
     columns : (r,) places in the pose vector. turning : (r,) bool, angles (rad; else mm). heading : place in the pose
     vector of the turn about the vertical that comes first, -1 for none. level : (2,) entries of `columns` that move
@@ -44,8 +44,8 @@ class RootFrame:
     level: IntArray
 
     def changes(self, poses: Array) -> Array:
-        """(F, r) from poses (F, D) of one recording in order: the change into every frame, horizontally along the
-        heading of the frame before; the first frame has the second's.
+        """(F, r) changes into every frame of poses (F, D) of one recording, horizontally relative to the heading of the
+        frame before; the first frame has the second's.
         """
         moved = np.diff(poses[:, self.columns], axis=0)
         wrapped = (moved + math.pi) % (2.0 * math.pi) - math.pi
@@ -80,11 +80,11 @@ class RootMotion:
     changes: GaussianMixture
 
     def at_ratio(self, ratio: float) -> "RootMotion":
-        """For frames that last `ratio` times as long."""
+        """The motion for frames that last `ratio` times as long."""
         return RootMotion(self.frame, self.changes.mapped(ratio * np.eye(len(self.frame.columns))))
 
     def joined(self, other: GaussianMixture) -> "RootMotion":
-        """With the clusters of `other` after its own."""
+        """The motion with the clusters of `other` appended."""
         own = self.changes
         pairs = ((own.weights, other.weights), (own.means, other.means), (own.covariances, other.covariances))
         return RootMotion(self.frame, GaussianMixture(*(np.concatenate(pair) for pair in pairs)))
@@ -116,7 +116,9 @@ def root_frame(body: BodyModel) -> RootFrame | None:
 
 
 def learn_root_motion(body: BodyModel, recordings: Sequence[Array], shares: Array) -> RootMotion | None:
-    """From recordings of poses (F, D); shares : (all F, K) of every frame in every cluster. None without a root."""
+    """The root motion of recordings of poses (F, D); shares : (all F, K) of every frame in every cluster. None without
+    a root.
+    """
     frame = root_frame(body)
     if frame is None:
         return None
@@ -126,7 +128,7 @@ def learn_root_motion(body: BodyModel, recordings: Sequence[Array], shares: Arra
 
 def gaussians_of(changes: Array, shares: Array) -> GaussianMixture:
     """One Gaussian a cluster of changes (n, r), by the shares (n, K) of the frames in it; a cluster of few frames is
-    drawn to what all have in common.
+    shrunk to the common one.
     """
     return full_clusters(changes, shares, np.maximum(LEAST_SHARE * changes.var(axis=0), LEAST_VARIANCE))
 

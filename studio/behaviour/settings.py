@@ -7,13 +7,13 @@ from studio.knobs import knob
 
 @dataclass(frozen=True, slots=True)
 class LearningSettings:
-    """What a behaviour model is learnt with; the paper's memory is 10, 20 or 30, its ε is not given."""
+    """The settings of learning; the paper's memory is 10, 20 or 30, its ε is not given."""
 
     title = "Behaviour learning"
 
     memory: int = knob(
         10, 0, 100, 1, unit="frames", takes_effect="new run",
-        help="Longest history of cluster labels that a state of the automaton may stand for; 0 forgets everything.",
+        help="Longest history of cluster labels in a state of the automaton; 0 is no memory.",
     )  # fmt: skip
     epsilon: float = knob(
         0.5, 0.0, 1000.0, 0.01, label="ε", takes_effect="new run",
@@ -22,26 +22,26 @@ class LearningSettings:
     )  # fmt: skip
     least_probability: float = knob(
         0.001, 0.0, 0.5, 0.0001, label="least probability", takes_effect="new run",
-        help="Histories that are rarer than this share of all training frames are not looked at.",
+        help="Histories rarer than this share of all training frames are not considered.",
     )  # fmt: skip
     smoothing: float = knob(
         0.01, 0.0, 0.5, 0.001, takes_effect="new run",
-        help="Share of every state's probability that is spread evenly over all labels in the entropy, so that what "
-        "was never seen has a finite code length; predictions are not smoothed.",
+        help="Share of every state's probability that is spread evenly over all labels in the entropy, so that "
+        "unseen labels have a finite code length; predictions are not smoothed.",
     )  # fmt: skip
     back_off: float = knob(
         0.05, 0.0, 1.0, 0.01, label="back-off", takes_effect="new run",
-        help="Share of a state's predictions that is taken from shorter histories, down to one label: what a long "
-        "history has not seen stays possible. 0 allows only what the state itself has seen, as in the paper.",
+        help="Share of a state's predictions that is taken from shorter histories, down to one label, so that labels "
+        "unseen after a long history stay possible. 0 allows only labels seen in the state, as in the paper.",
     )  # fmt: skip
     most_clusters: int = knob(
         200, 1, 1000, 1, label="most clusters", takes_effect="new run",
-        help="Clusters that the search for elementary movements starts with; it ends with as many as pay for "
-        "themselves.",
+        help="Clusters that the search for elementary movements starts with; it removes those without enough "
+        "frames.",
     )  # fmt: skip
     covariance: str = knob(
         "full", choices=("full", "diagonal"), takes_effect="new run",
-        help="Shape of the clusters where they are found; a full one costs more frames to live.",
+        help="Shape of the clusters where they are found; a full one needs more frames.",
     )  # fmt: skip
     reduced_dimensions: int = knob(
         6, 0, 200, 1, label="reduced dimensions", takes_effect="new run",

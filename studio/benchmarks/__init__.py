@@ -1,1 +1,1 @@
-"""What the kernels, the hulls and a live run cost on this machine."""
+"""Cost of the kernels, the hulls and a live run on this machine."""

@@ -1,8 +1,8 @@
-"""How fast a visual hull is carved, beside the paper's Table 1 (Caillette, Galata & Howard 2007).
+"""Time to carve a visual hull, compared with the paper's Table 1 (Caillette, Galata & Howard 2007).
 
-The scene is made here: a person of cones in the middle of a ring of 320 × 240 cameras, before an empty view with a
-sensor's noise. From pixels is what the paper times (background test, octree and colours); from masks leaves out the
-making of the masks. The best of the repeats counts, on as many threads as Numba is set to.
+The scene is generated: a person of cones in the middle of a ring of 320 × 240 cameras, before an empty view with a
+sensor's noise. "From pixels" is measured as in the paper (background test, octree and colours); "from masks" leaves out
+making the masks. The best of the repeats counts, on as many threads as Numba is set to.
 """
 
 import dataclasses
@@ -32,12 +32,13 @@ Bytes = NDArray[np.uint8]
 
 WIDTH, HEIGHT, FOCAL = 320, 240, 300.0
 DISTANCE, LOW, HIGH, MIDDLE = 3300.0, 1500.0, 2500.0, 950.0
-"""mm: the ring's radius, the cameras' heights in turn, and that of a person's middle."""
+"""mm: the ring's radius, the cameras' alternating heights, and that of a person's middle."""
 VIEWS, DEPTHS = (3, 4, 5), (6, 7, 8)
 TABLE_1 = {3: (11.0, 24.1, 73.5), 4: (11.1, 22.8, 66.0), 5: (12.8, 28.1, 78.6)}
 """Milliseconds by number of views, at depths 6, 7 and 8."""
 DARK, LIGHT, NOISE, EMPTY_FRAMES = 90.0, 60.0, 2.0, 20
-"""Grey levels: the empty view, how much the person is brighter, a sensor's noise; pictures to learn the view from."""
+"""Grey levels: the empty view, how much the person is brighter, a sensor's noise; pictures from which the view is
+learnt."""
 
 
 def run_hull_benchmark(
@@ -45,7 +46,7 @@ def run_hull_benchmark(
 ) -> dict[str, object]:
     """Milliseconds a hull with 3, 4 and 5 views at depths 6, 7 and 8, from pixels and from masks, beside Table 1.
 
-    repeats : of every measurement, in turns, so that a busy machine disturbs all alike. progress : told (step, done,
+    repeats : of every measurement, in turns, so that other load disturbs all alike. progress : called with (step, done,
     total).
     """
     rng = np.random.default_rng(0)
@@ -84,7 +85,7 @@ def run_hull_benchmark(
 
 
 def ring_of_small_cameras(count: int) -> tuple[Camera, ...]:
-    """Cameras around the world's origin, looking at a person's middle, in turn lower and higher."""
+    """Cameras around the world's origin, looking at a person's middle, alternately lower and higher."""
     middle, size = np.array([0.0, 0.0, MIDDLE]), (WIDTH, HEIGHT)
     places = (
         (2.0 * np.pi * number / count + 0.3, DISTANCE, (HIGH if number % 2 else LOW) - MIDDLE)

@@ -1,12 +1,11 @@
-"""How fast poses are weighed, against the fastest that memory allows.
+"""Speed of pose evaluation, compared with the limit set by memory.
 
-The scene is made here: four 640 × 480 cameras like those of the Lee walk around the default body, a
-silhouette and a noisy picture. The limit is the edge and region weighting's own loads and nothing else: the
-map reads of the index stream that it really produced for some of the same poses, in the same run. The stream
-is replayed sixteen poses at a time, so that it comes from the cache as it does in the weighting: read from
-memory as a whole the loads alone would take half as long again, and flatter the weighting. Everything is
-repeated in turns and the best of each counted, so that another process taking a core for a moment changes
-little."""
+The scene is generated: four 640 × 480 cameras like those of the Lee walk around the default body, a
+silhouette and a noisy picture. The limit is the edge and region weighting's own loads alone: the
+map reads of the index stream that it produced for some of the same poses, in the same run. The stream is
+replayed sixteen poses at a time, so that it comes from the cache as it does in the weighting: read from memory
+as a whole the loads alone would take half as long again, and flatter the weighting. Everything is repeated in
+turns and the best of each counts, so that other processes change little."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -44,12 +43,12 @@ FOCAL, DISTANCE, ABOVE = 560.0, 3300.0, 1700.0
 FRAMES_PER_SECOND = 60.0
 POSES = 1008
 LIMIT_BLOCKS, LIMIT_PASSES = 4, 20
-"""The limit takes about as long as weighing all poses, so that a busy machine disturbs both alike."""
+"""The limit takes about as long as weighing all poses, so that other load disturbs both alike."""
 
 
 @dataclass(frozen=True, slots=True)
 class Contest:
-    """One thing that is timed. run : does it once. evaluations : in one go."""
+    """One timed task. run : executes it once. evaluations : of one run."""
 
     name: str
     run: Callable[[], object]
@@ -60,10 +59,10 @@ class Contest:
 def run_benchmark(
     body_name: str = "human31", repeats: int = 80, progress: Progress | None = None
 ) -> dict[str, object]:
-    """Evaluations a second of every weighting, one thread unless it says otherwise, and the limit of
+    """Evaluations a second of every weighting, on one thread unless noted, and the limit of
     edge-region's.
 
-    repeats : of every measurement. progress : told (step, done, total). Changes the number of Numba's threads
+    repeats : of every measurement. progress : called with (step, done, total). Changes the number of Numba's threads
     while it runs, and sets it back."""
     body = load_body(body_name)
     cameras = ring_of_cameras(body)
@@ -109,7 +108,7 @@ def ring_of_cameras(body: BodyModel) -> tuple[Camera, ...]:
 def made_evidence(
     body: BodyModel, cameras: tuple[Camera, ...], rng: np.random.Generator
 ) -> dict[str, FrameEvidence]:
-    """A frame of the body in its neutral pose as its cones, brighter than a noisy ground, by kind of edge map."""
+    """A frame of the body's cones in its neutral pose on a darker noisy background, by kind of edge map."""
     corners, _ = OutlineProjector.of_body(body, cameras).corners(body.neutral[None])
     frames: dict[str, list[ViewEvidence]] = {"proximity": [], "bodytrack": []}
     for camera, outlines in zip(cameras, corners[0], strict=True):
@@ -148,7 +147,7 @@ def weighing_contests(
 def silhouette_problems(
     body: BodyModel, cameras: tuple[Camera, ...], evidence: FrameEvidence
 ) -> dict[str, FrameProblem]:
-    """The weightings that look at the bidirectional silhouette, at half and at full resolution."""
+    """The weightings with the bidirectional silhouette, at half and at full resolution."""
     found: dict[str, FrameProblem] = {}
     for resolution in (HALF, FULL):
         edges = EdgeSilhouetteSettings(silhouette_resolution=resolution)

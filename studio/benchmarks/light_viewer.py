@@ -1,7 +1,7 @@
-"""A viewer without a screen: it connects to the scene as a browser does, takes everything and draws nothing.
+"""A viewer without a screen: it connects to the scene as a browser does, receives everything and draws nothing.
 
-For measuring what an open scene costs the tracking. What a browser's own drawing costs is another matter: where it has
-a graphics card next to nothing, where it draws in software as much as a core gives.
+It measures the cost of an open scene to the tracking. A browser's own drawing is not included: almost nothing with a
+graphics card, up to a whole core in software.
 """
 
 import contextlib
@@ -29,11 +29,11 @@ CAMERA: dict[str, object] = {
     "look_at": (0.0, 0.0, 1.0),
     "up_direction": (0.0, 0.0, 1.0),
 }
-"""What a browser says of its view when it comes; viser counts it as a client from then on."""
+"""A browser's first message about its view; viser counts it as a client from then on."""
 
 
 class LightViewer:
-    """port, headers : of the scene, see `SceneServer`. messages, size : that came so far, and their bytes."""
+    """port, headers : of the scene, see `SceneServer`. messages, size : number and bytes received so far."""
 
     def __init__(self, port: int, headers: Mapping[str, str]) -> None:
         self.messages = self.size = 0
@@ -55,7 +55,7 @@ class LightViewer:
             raise StudioError("The scene sends nothing to a viewer.", "See the log.")
 
     def close(self) -> None:
-        """Leave."""
+        """Disconnect."""
         self._socket.close()
         self._thread.join()
 

@@ -1,4 +1,5 @@
-"""The live benchmark as a whole: footage and model made, stages timed, and live runs with and without the scene."""
+"""The live benchmark as a whole: footage and model are made, stages timed, and live runs measured with and without the
+scene."""
 
 import os
 import tempfile
@@ -6,6 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -24,7 +26,7 @@ from studio.capture.frame_clock import ReplayClock
 from studio.errors import RunError
 from studio.progress import Progress
 from studio.runs.live_summary import LiveSummary, summary_of
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.scene.scene_server import SceneServer
 from studio.sessions.manifest import write_manifest
 from studio.sessions.session import Session
@@ -35,7 +37,7 @@ from studio.worker.events import Event, StateChanged
 from studio.worker.live_tracking import track_live
 from studio.worker.watchers import Subscription
 
-# A live run tracked as the studio does it, in a process of its own, with the scene open and a viewer taking part.
+# A live run in its own process as in the studio, with the scene open and a viewer connected.
 
 
 PATIENCE_SECONDS = 120.0
@@ -43,7 +45,7 @@ PATIENCE_SECONDS = 120.0
 
 @dataclass(frozen=True, slots=True)
 class Watched:
-    """live : how the run went. viewer_messages, viewer_bytes : what the viewer was sent a second, NaN without one."""
+    """live : summary of the run. viewer_messages, viewer_bytes : sent to the viewer a second, NaN without one."""
 
     live: LiveSummary
     viewer_messages: float
@@ -54,7 +56,7 @@ def track_watched(
     workspace: Workspace, session: Session, run: StoredRun, report: Progress, *, scene: bool = True
 ) -> Watched:
     """Track a prepared live run of a session of the workspace to its end. scene : open it, with a viewer; else track
-    in the process of its own alone.
+    without it.
 
     Raises RunError when the tracking fails or falls silent.
     """
@@ -83,7 +85,7 @@ def track_watched(
 
 
 def _until(events: Subscription[Event], is_reached: Callable[[StateChanged], bool], report: Progress) -> None:
-    """Wait for a state of the tracking process, telling how it keeps up."""
+    """Wait for a state of the tracking process, reporting its frame rate."""
     while True:
         event = events.get(timeout=PATIENCE_SECONDS)
         if not isinstance(event, StateChanged):
@@ -97,17 +99,17 @@ def _until(events: Subscription[Event], is_reached: Callable[[StateChanged], boo
 
 
 PRESSED = 36.0
-"""Frames a second: a clock of 30 cannot show more than 30, nor forgive a dropped frame. The same video, a little
-faster, can."""
+"""Frames a second: a clock of 30 cannot show more than 30, nor make up for a dropped frame; a slightly faster one
+can."""
 FASTER = 2.0
-"""Times the footage's rate: what is sustained of that is all that the machine can do."""
+"""Times the footage's rate: the rate sustained then is the machine's maximum."""
 
 
 def run_live_benchmark(report: Progress, seconds: float = SECONDS) -> dict[str, object]:
     """Show 6 of the real-time tracker: stages beside Table 1, and whether 30 frames a second are sustained.
 
     seconds : of replayed video with the scene open, at 30 Hz and then at 36. Sustained are 30 frames a second where
-    the first run drops next to nothing, or the second tracks as many.
+    the first run drops almost nothing, or the second tracks as many.
     """
     with tempfile.TemporaryDirectory(prefix="studio-bench-") as folder:
         workspace = Workspace(Path(folder))
@@ -117,11 +119,11 @@ def run_live_benchmark(report: Progress, seconds: float = SECONDS) -> dict[str, 
         model = learn_walk(Path(folder) / "walk.behaviour")
         stages = measure_stages(session, model, report)
         request = live_request(model, seconds)
-        watched = track_watched(workspace, session, prepare_run(session, request), report)
-        pressed = _pressed(workspace, session, replace(request, name="pressed", last=None), report)
-        alone_run = prepare_run(session, replace(request, name="alone"))
+        watched = track_watched(workspace, session, prepare_run(session, **request), report)
+        pressed = _pressed(workspace, session, {**request, "name": "pressed", "last": None}, report)
+        alone_run = prepare_run(session, **{**request, "name": "alone"})
         alone = track_watched(workspace, session, alone_run, report, scene=False)
-        fast_run = prepare_run(session, replace(request, name="fast"))
+        fast_run = prepare_run(session, **{**request, "name": "fast"})
         fast = track_live(
             session,
             fast_run,
@@ -145,14 +147,14 @@ def run_live_benchmark(report: Progress, seconds: float = SECONDS) -> dict[str, 
     }
 
 
-def _pressed(workspace: Workspace, session: Session, request: RunRequest, report: Progress) -> Watched:
+def _pressed(workspace: Workspace, session: Session, request: dict[str, Any], report: Progress) -> Watched:
     """The whole video at 36 Hz with the scene open."""
     manifest = session.manifest
     faster = replace(manifest.footage, fps=PRESSED)
     write_manifest(session.path, msgspec.structs.replace(manifest, footage=faster))
     try:
         again = workspace.session(session.name)
-        return track_watched(workspace, again, prepare_run(again, request), report)
+        return track_watched(workspace, again, prepare_run(again, **request), report)
     finally:
         write_manifest(session.path, manifest)
 

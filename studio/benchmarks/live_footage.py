@@ -1,8 +1,7 @@
-"""Footage and behaviour model that live tracking is measured on: all that is needed comes with the studio.
+"""Footage and behaviour model for the live benchmark, made from what is installed with the studio.
 
-Two seconds of a rendered walk are too short to sustain anything, and rendering more takes minutes. So every video is
-written anew, forth and back through its frames until it is long enough: files of that length, decoded frame by frame
-as any recording is.
+Two seconds of a rendered walk are too short, and rendering more takes minutes. So every video is rewritten, playing its
+frames forwards and backwards until it is long enough, and decoded frame by frame as any recording.
 """
 
 import dataclasses
@@ -16,7 +15,7 @@ from studio.behaviour.model_learning import learn_model
 from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import load_body
 from studio.capture.footage import folded
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 from studio.sessions.manifest import write_manifest
 from studio.sessions.session import Session
 from studio.synthesis.clips import ClipWriter
@@ -27,15 +26,15 @@ RECIPE = "walk-five-cameras"
 QUALITY = 19.0
 
 
-def make_footage(place: Path, seconds: float, progress: Progress | None = None) -> Session:
-    """The session, made in the folder `place`, which is not there yet. progress : told (step, done, total)."""
+def make_footage(place: Path, seconds: float, progress: Progress = unheard) -> Session:
+    """The session, made in the new folder `place`. progress : called with (step, done, total)."""
     synthesize(RECIPE, place, progress)
     lengthen(Session(place), seconds, progress)
     return Session(place)
 
 
-def lengthen(session: Session, seconds: float, progress: Progress | None = None) -> None:
-    """Write a session's videos anew, so long and forth and back; nothing where they are long enough."""
+def lengthen(session: Session, seconds: float, progress: Progress = unheard) -> None:
+    """Extend a session's videos to `seconds` by playing them forwards and backwards, unless they are long enough."""
     manifest = session.manifest
     source, count = manifest.footage, round(seconds * manifest.fps)
     if count <= source.frame_count:
@@ -51,15 +50,14 @@ def lengthen(session: Session, seconds: float, progress: Progress | None = None)
                 writer.add(clip[folded(frame, source.frame_count)])
         entry = longer.relative_to(session.path).as_posix()
         cameras.append(dataclasses.replace(camera, path=entry, frame_count=count))
-        if progress is not None:
-            progress("writing long videos", number + 1, len(source.cameras))
+        progress("writing long videos", number + 1, len(source.cameras))
     footage.close()
     changed = dataclasses.replace(source, frame_count=count, cameras=tuple(cameras))
     write_manifest(session.path, msgspec.structs.replace(manifest, footage=changed))
 
 
 def learn_walk(place: Path, seed: int = 0) -> Path:
-    """What the footage's person does, forth and back, as a behaviour model in the file `place`."""
+    """The behaviour model of the footage's motion, forwards and backwards, in the file `place`."""
     body = load_body("human25")
     recording = recipe_recording(RECIPE, body)
     sources = [recording.poses, np.ascontiguousarray(recording.poses[::-1])]

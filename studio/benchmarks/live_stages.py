@@ -1,4 +1,4 @@
-"""What each stage of a live frame costs on one core, beside the paper's Table 1 (Caillette, Galata & Howard 2007).
+"""Cost of each stage of a live frame on one core, compared with the paper's Table 1 (Caillette, Galata & Howard 2007).
 
 Five views of 320 × 240, hulls of depth 7, blobs fitted, 1000 particles guided by a behaviour model. A stage's time is
 one core's, the median over the frames that come after the blobs are learnt; one thread does them one after the other.
@@ -10,6 +10,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,6 @@ from studio.evidence.pipeline import EvidenceMaker
 from studio.numba_in_threads import numba
 from studio.progress import Progress
 from studio.runs.live_summary import LiveSummary
-from studio.runs.new_run import RunRequest
 from studio.runs.search_space import search_space, session_sigma
 from studio.sessions.session import Session
 from studio.settings import changed_settings, default_settings
@@ -48,11 +48,17 @@ LEARNING, MEASURED = 22, 60
 """Frames: until the blobs are learnt, and that are measured after."""
 
 
-def live_request(model: Path, seconds: float = SECONDS, fps: float = WANTED) -> RunRequest:
+def live_request(model: Path, seconds: float = SECONDS, fps: float = WANTED) -> dict[str, Any]:
     """The live run of Show 6."""
     last = round(seconds * fps)
-    return RunRequest(
-        TRACKER, WEIGHTING, last=last, changes=CHANGES, name="live", behaviour=str(model), live=True
+    return dict(
+        tracker=TRACKER,
+        weighting=WEIGHTING,
+        last=last,
+        knobs=CHANGES,
+        name="live",
+        behaviour=str(model),
+        live=True,
     )
 
 
@@ -64,26 +70,28 @@ class StageClock:
     _since: float = 0.0
 
     def start(self) -> None:
-        """A frame begins."""
+        """Start a frame."""
         self._since = time.thread_time()
         for times in self.spent.values():
             times.append(0.0)
 
     def lap(self, stage: str) -> None:
-        """What was done since the last lap belongs to this stage."""
+        """Assign the time since the last lap to this stage."""
         now = time.thread_time()
         self.spent[stage][-1] += 1e3 * (now - self._since)
         self._since = now
 
     def medians(self, begin: int) -> dict[str, float]:
-        """Of each stage over the frames from `begin` on, and of whole frames."""
+        """Medians of each stage over the frames from `begin` on, and of whole frames."""
         table = np.array(list(self.spent.values()))[:, begin:]
         found = dict(zip(self.spent, np.median(table, axis=1).tolist(), strict=True))
         return found | {"whole frame": float(np.median(table.sum(axis=0)))}
 
 
 def measure_stages(session: Session, model: Path, progress: Progress | None = None) -> dict[str, float]:
-    """Milliseconds of each stage of a frame, and of a whole one, on one thread. progress : told (step, done, total)."""
+    """Milliseconds of each stage of a frame, and of a whole one, on one thread. progress : called with (step, done,
+    total).
+    """
     threads = numba.get_num_threads()
     numba.set_num_threads(1)
     try:
@@ -115,12 +123,14 @@ def _measured(session: Session, model: Path, progress: Progress | None) -> dict[
         particles = tracker.begin_frame(generator(0, frame, -1), carried, space, settings.tracker)
         clock.lap("prediction and evaluation")
         expected = tracker.expectations(particles, space, settings.tracker)  # pyright: ignore[reportAttributeAccessIssue]
-        told = problem.expecting(expected, carried.memory)
+        informed = problem.expecting(expected, carried.memory)
         clock.lap("blob fitting")
-        weighed, _ = tracker.step_layer(generator(0, frame, 0), particles, 0, told, space, settings.tracker)
+        weighed, _ = tracker.step_layer(
+            generator(0, frame, 0), particles, 0, informed, space, settings.tracker
+        )
         pose = tracker.end_frame(weighed, space, settings.tracker).pose
         clock.lap("prediction and evaluation")
-        carried = Carried(weighed, pose, carried.estimate, told.remembered(pose))
+        carried = Carried(weighed, pose, carried.estimate, informed.remembered(pose))
         clock.lap("the rest")
         if progress is not None:
             progress("a live frame's stages", frame + 1, frames)
@@ -135,7 +145,7 @@ def stage_rows(found: Mapping[str, float]) -> list[dict[str, object]]:
 
 
 def live_figures(found: LiveSummary) -> dict[str, object]:
-    """How a live run went, as the benchmark tells it."""
+    """The figures of a live run."""
     return {
         "frames_per_second": round(found.frames_per_second, 2),
         "tracked": len(found.tracked),
@@ -149,14 +159,14 @@ def live_figures(found: LiveSummary) -> dict[str, object]:
     }
 
 
-def in_words(told: Mapping[str, object]) -> str:
+def in_words(report: Mapping[str, object]) -> str:
     """The benchmark's document as a table for a person."""
-    lines = [f"Live: {told['setting']}", f"  {'stage, ms on one core':32}{'ours':>8}{'Table 1':>10}"]
-    for row in told["stages"]:  # pyright: ignore[reportGeneralTypeIssues]
+    lines = [f"Live: {report['setting']}", f"  {'stage, ms on one core':32}{'ours':>8}{'Table 1':>10}"]
+    for row in report["stages"]:  # pyright: ignore[reportGeneralTypeIssues]
         paper = "" if row["paper_ms"] is None else f"{row['paper_ms']:.1f}"
         lines.append(f"  {row['stage']:32}{row['ms']:8.1f}{paper:>10}")
     for key, words in RUNS.items():
-        run = told.get(key)
+        run = report.get(key)
         if isinstance(run, dict):
             latency = run["latency_ms"]
             lines.append(

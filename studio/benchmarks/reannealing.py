@@ -1,4 +1,4 @@
-"""How long a person waits for the answer to a moved slider: from the wish to the last new layer at the server."""
+"""Latency of a moved slider: from the change to the arrival of the last new layer at the server."""
 
 import statistics
 import time
@@ -34,7 +34,7 @@ def measure_reannealing(
 ) -> Latency:
     """Track the run's frames, then move the survival rate `repeats` times and wait for each answer.
 
-    The first answer, which may still compile, is not counted. Raises RunError when nothing comes.
+    The first answer, which may still compile, is not counted. Raises RunError without an answer.
     """
     watcher = control.subscribe()
     try:
@@ -59,7 +59,7 @@ def measure_reannealing(
 
 
 def _answered(control: StudioControl, watcher: Subscription[Event], survival: float) -> float:
-    """Milliseconds until a re-annealed frame has come, all its layers before it."""
+    """Milliseconds until a re-annealed frame has arrived, after all its layers."""
     began = time.perf_counter()
     control.change_settings(survival=survival)
     while True:

@@ -1,4 +1,4 @@
-"""How long pieces of work take beside each other on a machine that other programs use, too."""
+"""Comparable timings of tasks on a machine that other programs use, too."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -15,10 +15,10 @@ def quickest(
     threads: Mapping[K, int] | None = None,
     on_round: Callable[[int], None] = lambda done: None,
 ) -> dict[K, float]:
-    """Seconds of each work in the quickest of its rounds; they take turns, so that a busy moment disturbs all alike.
+    """Seconds of each task in its quickest round; tasks take turns, so that other load disturbs all alike.
 
-    A first round, which compiles and warms up, does not count. threads : Numba's for each work, as they are for the
-    rest; set back at the end. on_round : called with the rounds done, 0 after the first.
+    A first round, which compiles and warms up, does not count. threads : Numba's for each task, unchanged for the
+    rest; restored at the end. on_round : called with the rounds done, 0 after the first.
     """
     before, best = numba.get_num_threads(), dict[K, float]()
     try:

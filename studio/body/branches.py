@@ -1,9 +1,9 @@
-"""The same attitude in other angles: a pose rewritten into its body's limits, where it has another spelling there.
+"""The same attitude in other angles: a pose rewritten within its body's limits, where equivalent angles allow it.
 
-One attitude of a body has several pose vectors: whole turns; of three angles α, β, γ about three different axes
+One attitude of a body has several pose vectors: by whole turns; of three angles α, β, γ about three different axes
 also α + π, π - β, γ + π; and a limb turned about its own axis by π whose hinge then bends the other way. Limits
-such as "a knee bends backwards" mean one of these spellings, and a pose from elsewhere may be written in another
-(the Lee walk's initial pose is, in both arms and the right leg).
+such as "a knee bends backwards" admit one of these branches, and a pose from elsewhere may be on another (the Lee
+walk's initial pose is, in both arms and the right leg).
 """
 
 import math
@@ -14,7 +14,7 @@ from studio.arrays import Array
 from studio.body.forward_kinematics import joint_frames, marker_points
 from studio.body.model import TURN, BodyModel, Joint, kinematic_tables
 
-# How far (mm; and share of a limb's cross-section) a rewritten body may differ: rounding and nothing else.
+# Difference (mm; and share of a limb's cross-section) allowed to a rewritten body: rounding only.
 SAME = 1e-6
 
 # A limit where there is none.
@@ -22,15 +22,15 @@ BOUNDLESS = 1e12
 
 
 def within_limits(body: BodyModel, pose: Array) -> Array:
-    """(D,) the same attitude within the body's limits, or with the least excess that its spellings have.
+    """(D,) the same attitude within the body's limits, or with the least excess among its branches.
 
-    pose : (D,) radians and mm, finite. Joints that keep their limits are left as they are. Axes, ends and
+    pose : (D,) radians and mm, finite. Joints within their limits are unchanged. Axes, ends and
     cross-sections of all drawn limbs and all markers stay where they are; frames may turn by π about a limb's axis.
     """
     lower, upper = _limits(body)
     best = _wound(np.asarray(pose, dtype=np.float64), lower, upper)
     here = _attitude(body, best)
-    for spellings in _joint_spellings(body):
+    for spellings in _joint_branches(body):
         written = best
         for spelling in spellings:
             other = _wound(spelling(written), lower, upper)
@@ -40,8 +40,8 @@ def within_limits(body: BodyModel, pose: Array) -> Array:
     return best
 
 
-class _Spelling:
-    """One other way of writing a joint: maps a pose to a pose."""
+class _Branch:
+    """One equivalent branch of a joint's angles: maps a pose to a pose."""
 
     def __init__(self, ball: tuple[int, ...], hinges: list[int], over: bool, turned: bool) -> None:
         self.ball, self.hinges, self.over, self.turned = ball, hinges, over, turned
@@ -58,8 +58,8 @@ class _Spelling:
         return other
 
 
-def _joint_spellings(body: BodyModel) -> list[list[_Spelling]]:
-    """For each joint with three angles, parents first, what else it can be written as."""
+def _joint_branches(body: BodyModel) -> list[list[_Branch]]:
+    """Equivalent branches of each joint with three angles, parents first."""
     found = []
     for index, joint in enumerate(body.joints):
         ball = _ball(joint)
@@ -68,7 +68,7 @@ def _joint_spellings(body: BodyModel) -> list[list[_Spelling]]:
         hinges = [_hinge(child) for child in body.joints if child.parent == index]
         bends = [parameter for parameter in hinges if parameter >= 0]
         choices = [(True, False), (False, True), (True, True)] if bends else [(True, False)]
-        found.append([_Spelling(ball, bends, over, turned) for over, turned in choices])
+        found.append([_Branch(ball, bends, over, turned) for over, turned in choices])
     return found
 
 
@@ -98,7 +98,7 @@ def _limits(body: BodyModel) -> tuple[Array, Array]:
 
 
 def _wound(pose: Array, lower: Array, upper: Array) -> Array:
-    """The pose with every angle that lies outside its limits taken by whole turns as near their middle as can be."""
+    """The pose with every angle outside its limits moved by whole turns nearest to their middle."""
     middle = np.where((pose < lower) | (pose > upper), 0.5 * (lower + upper), pose)
     return pose - 2.0 * math.pi * np.round((pose - middle) / (2.0 * math.pi))
 
@@ -109,7 +109,7 @@ def _excess(pose: Array, lower: Array, upper: Array) -> float:
 
 
 def _attitude(body: BodyModel, pose: Array) -> Array:
-    """What is to be seen of a pose, as one flat array: limbs' ends, cross-sections and markers."""
+    """Limbs' ends, cross-sections and markers of a pose as one flat array."""
     tables = kinematic_tables(body)
     frames = joint_frames(body, pose)[0]
     limbs = frames[tables.limb_joint]

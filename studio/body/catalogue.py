@@ -1,4 +1,4 @@
-"""The bodies at hand: those of the package and those of a user's folders."""
+"""The available bodies: those of the package and those of a user's folders."""
 
 from importlib import resources
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a body file says, entry by entry, before names are looked up.
+"""The entries of a body file, before names are resolved.
 
 A body file is TOML. Lengths in mm, angles in degrees. The body's name is the file's name without `.toml`.
 

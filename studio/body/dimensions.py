@@ -14,8 +14,8 @@ FOOT = "foot"
 
 
 def with_usual_feet(body: BodyModel) -> BodyModel:
-    """The body with feet of the usual share of its height where its file knows of feet, but their length is zero;
-    itself where it has feet or knows of none. Its pose vector stays what it is.
+    """The body with feet of the usual share of its height where its file has feet of zero length; else the body
+    unchanged. Its pose vector stays the same.
     """
     if body.definition is None:
         return body
@@ -32,7 +32,7 @@ def with_usual_feet(body: BodyModel) -> BodyModel:
 
 
 def with_dimensions(body: BodyModel, changes: Mapping[str, float]) -> BodyModel:
-    """The body with some dimensions changed: its steps, limbs and markers are built anew.
+    """The body with some dimensions changed: its steps, limbs and markers are rebuilt.
 
     changes : dimension name to mm (or ratio). Raises BodyError for an unknown name, and for a value that is
     not finite or negative.

@@ -1,8 +1,8 @@
 """A limb's end dragged to a place: the pose follows by inverse kinematics, limits kept.
 
 First the chain from the root to the limb moves, its outer joints more readily than its inner ones; the root stays.
-Where the chain does not reach, the whole body follows, the other ends holding on to where they are, and then the chain
-takes the rest of the way. Least squares (trust region, scipy) from the present pose, so that a drag is smooth.
+Where the chain does not reach, the whole body follows, the other ends held in place, and then the chain moves the
+rest. Least squares (trust region, scipy) from the present pose, so that a drag is smooth.
 """
 
 import math
@@ -20,7 +20,7 @@ from studio.errors import BodyError
 from studio.geometry.reach import within_reach
 
 REACHED = 1.0
-"""mm; a chain that comes this near needs no help of the rest of the body."""
+"""mm; at this distance the chain has reached the target and the rest of the body stays."""
 PULL, PULL_INWARDS = 0.3, 3.0
 """Residual (mm) of one radian off the present pose, of the outermost joint and more with every joint inwards."""
 ROOT_PULL = 20.0
@@ -28,14 +28,14 @@ ROOT_PULL = 20.0
 HOLD = 0.2
 """Weight of the other ends' places while the whole body follows."""
 BEND = 0.4
-"""Share of the way to the middle of its limits by which a chain is bent where it did not reach as it was."""
+"""Share of the way to the middle of its limits by which a chain that did not reach is bent."""
 DIFFERENCE = 1e-5
 MOST_STEPS = 40
 
 
 @dataclass(frozen=True, slots=True)
 class Grip:
-    """What can be taken hold of: the far end of a drawn limb. limb : its index among the drawn. root : whether only the
+    """A point to drag: the far end of a drawn limb. limb : its index among the drawn. root : whether only the
     root moves it.
     """
 
@@ -47,14 +47,14 @@ class Grip:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Dragged:
-    """pose : (D,). left_mm : how far the grip still is from where it was dragged."""
+    """pose : (D,). left_mm : distance of the grip from its target."""
 
     pose: Array
     left_mm: float
 
 
 class Dragger:
-    """Drags one body. Holds nothing that changes; about 10 ms a drag of a person."""
+    """Drags one body; immutable. About 10 ms a drag of a person."""
 
     def __init__(self, body: BodyModel) -> None:
         self.body = body
@@ -71,7 +71,7 @@ class Dragger:
         )
 
     def points(self, pose: Array) -> Array:
-        """(G, 3) where the grips are, mm."""
+        """(G, 3) positions of the grips, mm."""
         return limb_ends(self.body, pose)[0, :, 1]
 
     def grip(self, name: str) -> Grip:
@@ -83,39 +83,39 @@ class Dragger:
         return found
 
     def dragged(self, pose: Array, name: str, target: Array) -> Dragged:
-        """The pose (D,) with the grip at `target` (3,) mm, or as near as limits let it. Raises BodyError for an unknown
+        """The pose (D,) with the grip at `target` (3,) mm, or as near as limits allow. Raises BodyError for an unknown
         grip and for numbers that do not fit.
         """
-        grip, wanted = self.grip(name), np.asarray(target, dtype=np.float64)
+        grip, goal = self.grip(name), np.asarray(target, dtype=np.float64)
         given = np.asarray(pose, dtype=np.float64)
-        fits = given.shape == (len(self.body.parameters),) and wanted.shape == (3,)
-        if not fits or not within_reach(given) or not within_reach(wanted):
+        fits = given.shape == (len(self.body.parameters),) and goal.shape == (3,)
+        if not fits or not within_reach(given) or not within_reach(goal):
             raise BodyError(
                 f"A drag of body '{self.body.name}' needs {len(self.body.parameters)} numbers and a place.",
                 "Give a finite pose in the order of its parameters, and x, y, z in mm.",
             )
         start = np.clip(within_limits(self.body, given), self._lower, self._upper)
-        found = self._pulled(start, start, grip, wanted)
-        if not self._reached(found, grip, wanted):
-            bent = self._pulled(self._bent(start, grip), start, grip, wanted)
-            found = bent if self._left(bent, grip, wanted) < self._left(found, grip, wanted) else found
-        if not self._reached(found, grip, wanted):
+        found = self._pulled(start, start, grip, goal)
+        if not self._reached(found, grip, goal):
+            bent = self._pulled(self._bent(start, grip), start, grip, goal)
+            found = bent if self._left(bent, grip, goal) < self._left(found, grip, goal) else found
+        if not self._reached(found, grip, goal):
             everything = np.arange(len(start))
-            found = self._fitted(found, start, everything, self._whole_pull(), grip, wanted, self._ends)
-            found = self._pulled(found, found, grip, wanted)
-        return Dragged(found, self._left(found, grip, wanted))
+            found = self._fitted(found, start, everything, self._whole_pull(), grip, goal, self._ends)
+            found = self._pulled(found, found, grip, goal)
+        return Dragged(found, self._left(found, grip, goal))
 
     def root_frame(self, pose: Array) -> Array | None:
         """(3, 4) world from root, mm; None for a body that is fixed to the world."""
         return None if self._joint < 0 else joint_frames(self.body, pose)[0, self._joint]
 
     def with_root(self, pose: Array, frame: Array) -> Array:
-        """The pose with its root as near to `frame` (3, 4) as its parameters let it be; all else as it is."""
+        """The pose with its root as near to `frame` (3, 4) as its parameters allow; all else unchanged."""
         if self._joint < 0:
             return np.asarray(pose, dtype=np.float64).copy()
         free = np.flatnonzero(self._root)
         scale = self._scale[free]
-        wanted = np.concatenate([frame[:, :3].T * MM_PER_RADIAN + frame[:, 3], frame[None, :, 3]])
+        goal = np.concatenate([frame[:, :3].T * MM_PER_RADIAN + frame[:, 3], frame[None, :, 3]])
 
         def full(values: Array) -> Array:
             poses = np.repeat(np.asarray(pose, dtype=np.float64)[None], len(values), axis=0)
@@ -125,24 +125,24 @@ class Dragger:
         def residuals(values: Array) -> Array:
             root = joint_frames(self.body, full(values[None]))[0, self._joint]
             points = np.concatenate([root[:, :3].T * MM_PER_RADIAN + root[:, 3], root[None, :, 3]])
-            return (points - wanted).ravel()
+            return (points - goal).ravel()
 
         begin = np.asarray(pose)[free] / scale
         limits = (self._lower[free] / scale, self._upper[free] / scale)
         answer = least_squares(residuals, begin, bounds=limits, max_nfev=MOST_STEPS)
         return full(answer.x[None])[0]
 
-    def _pulled(self, pose: Array, start: Array, grip: Grip, wanted: Array) -> Array:
+    def _pulled(self, pose: Array, start: Array, grip: Grip, goal: Array) -> Array:
         """Only the chain moves."""
         chain = self._chains[grip.limb]
         if not len(chain):
             return pose
         inwards = np.arange(len(chain))[::-1] / max(1, len(chain) - 1)
         pull = PULL + (PULL_INWARDS - PULL) * inwards
-        return self._fitted(pose, start, chain, pull, grip, wanted, ())
+        return self._fitted(pose, start, chain, pull, grip, goal, ())
 
-    def _reached(self, pose: Array, grip: Grip, wanted: Array) -> bool:
-        return not grip.root and self._left(pose, grip, wanted) < REACHED
+    def _reached(self, pose: Array, grip: Grip, goal: Array) -> bool:
+        return not grip.root and self._left(pose, grip, goal) < REACHED
 
     def _bent(self, start: Array, grip: Grip) -> Array:
         """The pose with the chain part of the way to the middle of its limits: a stretched one cannot bend."""
@@ -155,8 +155,8 @@ class Dragger:
     def _whole_pull(self) -> Array:
         return np.where(self._root, ROOT_PULL, PULL_INWARDS)
 
-    def _left(self, pose: Array, grip: Grip, wanted: Array) -> float:
-        return float(np.linalg.norm(self.points(pose)[grip.limb] - wanted))
+    def _left(self, pose: Array, grip: Grip, goal: Array) -> float:
+        return float(np.linalg.norm(self.points(pose)[grip.limb] - goal))
 
     def _fitted(
         self,
@@ -165,15 +165,15 @@ class Dragger:
         free: Indices,
         pull: Array,
         grip: Grip,
-        wanted: Array,
+        goal: Array,
         held: tuple[int, ...],
     ) -> Array:
-        """The pose with its `free` parameters at the least squares: the grip at `wanted`, the held ends where they are
-        in `start`, everything near `start`.
+        """The pose with its `free` parameters at the least squares: the grip at `goal`, the held ends as in `start`,
+        everything near `start`.
         """
         held = tuple(at for at in held if at != grip.limb)
         weights = np.array([1.0, *[HOLD] * len(held)])[:, None]
-        places = np.concatenate([wanted[None], self.points(start)[list(held)]])
+        places = np.concatenate([goal[None], self.points(start)[list(held)]])
         limbs = [grip.limb, *held]
         scale, lower, upper = self._scale[free], self._lower[free], self._upper[free]
         home = start[free] / scale

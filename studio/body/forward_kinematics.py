@@ -1,4 +1,4 @@
-"""Where joints, limbs and markers are, for N poses at once.
+"""Positions of joints, limbs and markers for N poses at once.
 
 A joint's frame is its parent's frame times its steps, left to right (`body/model.py`). Frames are (3, 4)
 motions world_from_joint: three axis columns and the origin (mm).
@@ -59,10 +59,10 @@ def marker_points(body: BodyModel, poses: ArrayLike) -> Array:
 def checked_poses(body: BodyModel, poses: ArrayLike) -> Array:
     """(N, D) contiguous poses; a single (D,) becomes (1, D). Raises BodyError when D is not the body's."""
     array = np.ascontiguousarray(np.atleast_2d(np.asarray(poses, dtype=np.float64)))
-    wanted = len(body.parameters)
-    if array.ndim != 2 or array.shape[1] != wanted:
+    size = len(body.parameters)
+    if array.ndim != 2 or array.shape[1] != size:
         cause = (
-            f"Poses of shape {np.shape(poses)} do not fit body '{body.name}', which has {wanted} parameters."
+            f"Poses of shape {np.shape(poses)} do not fit body '{body.name}', which has {size} parameters."
         )
         raise BodyError(cause, "Give one row of parameters a pose, in the body's order.")
     return array

@@ -2,9 +2,9 @@
 
 Least squares over the pose, limits respected where finite (trust region, scipy). The root is found first:
 from several headings of the start and of the rest pose the root alone is fitted; the best of these are then
-fitted whole. While markers stay away, the best pose is shaken and fitted again, with random numbers that are
-the same in every call. A pull towards the start, far too weak to move a marker, settles what the points leave
-open (twists of straight limbs).
+fitted whole. While markers stay away, the best pose is perturbed and fitted again, with the same random numbers
+in every call. A pull towards the start, far too weak to move a marker, determines what the points leave open
+(twists of straight limbs).
 """
 
 import math
@@ -23,20 +23,20 @@ from studio.errors import BodyError
 HEADINGS = 8
 FULL_FITS = 4
 
-# Fits of the shaken best pose; standard deviation (radians) of the noise on its angles below the root.
+# Fits of the perturbed best pose; standard deviation (radians) of the noise on its angles below the root.
 SHAKES = 12
 SHAKE = 0.7
 
 # Step of the central differences: radians, and mm when multiplied by MM_PER_RADIAN.
 DIFFERENCE = 1e-5
 
-# A length that weighs like one radian: about a person's limb.
+# A length that counts like one radian: about a person's limb.
 MM_PER_RADIAN = 400.0
 
 # Residual (mm) of one radian off the start; against markers of 1 mm it moves no joint by 0.01 mm.
 PULL = 0.02
 
-# A root fit that leaves less than this (mm) is not improved by other starts.
+# A root fit with a smaller error (mm) is not improved by other starts.
 EXACT = 0.5
 
 
@@ -66,7 +66,7 @@ def pose_from_markers(
 
 
 def known_markers(body: BodyModel, names: Sequence[str]) -> tuple[list[int], tuple[str, ...]]:
-    """Which of `names` are markers of the body: their places in `names`, and these names."""
+    """The markers of the body among `names`: their places in `names`, and their names."""
     known = {marker.name for marker in body.markers}
     places = [place for place, name in enumerate(names) if name in known]
     return places, tuple(names[place] for place in places)

@@ -1,4 +1,4 @@
-"""Distances between a body's markers by its dimensions, and which of them the pose leaves alone."""
+"""Distances between a body's markers by its dimensions, and which of them do not depend on the pose."""
 
 import itertools
 import math
@@ -11,8 +11,8 @@ from studio.body.dimensions import with_dimensions
 from studio.body.forward_kinematics import marker_points
 from studio.body.model import BodyModel
 
-# How far joints bend in an ordinary standing posture, and how little a distance that is measured standing may
-# change by it.
+# Bend of joints in an ordinary standing posture, and the largest change by it of a distance that is measured
+# standing.
 STANDING_BEND = math.radians(15.0)
 STANDING_CHANGE = 0.05
 
@@ -20,7 +20,7 @@ STANDING_CHANGE = 0.05
 # dimension is without effect.
 SAME = 1e-9
 
-# Stands for a distance of zero where one is divided by it, mm.
+# Replaces a distance of zero as divisor, mm.
 TINY = 1e-6
 
 
@@ -53,7 +53,7 @@ class MarkerDistances:
     ) -> tuple[dict[str, tuple[float, bool]], list[str]]:
         """The pairs that set dimensions: pair to (mm, whether no pose changes it), and notes on all others.
 
-        fixed : dimensions that are given and set by nothing else.
+        fixed : dimensions that are given directly.
         """
         measured: dict[str, tuple[float, bool]] = {}
         notes: list[str] = []

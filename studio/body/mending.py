@@ -1,8 +1,8 @@
-"""Recorded motion made fit to be looked at and learnt from: trembling is smoothed, lost feet follow the floor.
+"""Repair of recorded motion: jitter is smoothed, lost feet are placed on the floor.
 
-In the dancers' clips the feet's markers were not told apart: their ankles jump between two angles 90 degrees apart,
-and stand upside down for whole seconds. Such feet are made anew: on the floor as the ankle's height lets them stand,
-flat or on the toes; in the air stretched as a dancer's. In one of them a knee is on the wrong side for two seconds.
+In the dancers' clips the feet's markers were confused: their ankles jump between two angles 90 degrees apart, and stand
+upside down for whole seconds. Such feet are replaced: on the floor as the ankle's height allows, flat or on the toes;
+in the air stretched as a dancer's. In one of them a knee is on the wrong side for two seconds.
 """
 
 import numpy as np
@@ -19,21 +19,24 @@ TURNED_OVER = 1.0  # trace of a turn by 90 degrees
 STRETCHED = np.radians(35.0)  # of a foot in the air
 STEEPEST = np.radians(70.0)  # of a foot on its toes
 BENT_UP, BENT_DOWN = np.radians(-30.0), np.radians(65.0)
-TOES = 0.70  # where the toes are, of the foot's length in front of the ankle
+TOES = 0.70  # of the toes in front of the ankle, as a share of the foot's length
 HAND_CLEARANCE, ARM_SPREAD_S = 40.0, 0.2  # mm of the fingers' ends above the floor
-ON_TOES, IN_THE_AIR = 0.8, 1.4  # of the toes' reach: how high an ankle stands at most, from where on it flies
+ON_TOES, IN_THE_AIR = (
+    0.8,
+    1.4,
+)  # of the toes' reach: greatest height of a standing ankle; least in the air
 LOST_BELOW, LOST_ABOVE, LOST_SHARE = np.radians(-40.0), np.radians(75.0), 0.05
 
 
 def mended(motion: PersonMotion) -> PersonMotion:
-    """The motion smoothed (a Gaussian of SMOOTHING_S), level on the floor, with feet made anew where they are lost."""
+    """The motion smoothed (a Gaussian of SMOOTHING_S), level on the floor, with lost feet replaced."""
     lost = feet_lost(motion)
     smooth = smoothed(with_knees_forward(motion), SMOOTHING_S)
     return above_floor(with_feet_on_floor(_levelled(smooth)) if lost else smooth)
 
 
 def feet_lost(motion: PersonMotion) -> bool:
-    """Whether the ankles of a recording bend as nobody's do in more than LOST_SHARE of the frames."""
+    """Whether the ankles of a recording bend impossibly in more than LOST_SHARE of the frames."""
     bends = np.stack([ankle_bend(motion, side) for side in SIDES])
     return float(np.mean((bends < LOST_BELOW) | (bends > LOST_ABOVE))) > LOST_SHARE
 
@@ -69,7 +72,7 @@ def with_knees_forward(motion: PersonMotion) -> PersonMotion:
 
 
 def _steps(turns: Array) -> Array:
-    """(F - 1, 3, 3) what each frame is turned by against the one before."""
+    """(F - 1, 3, 3) rotation of each frame against the one before."""
     return np.swapaxes(turns[:-1], 1, 2) @ turns[1:]
 
 
@@ -81,7 +84,7 @@ def smoothed(motion: PersonMotion, seconds: float) -> PersonMotion:
 
 
 def _smooth(values: Array, width: float) -> Array:
-    """Values (F, ...) smoothed along frames; at their ends they go on as they came, so that nobody slows down there."""
+    """Values (F, ...) smoothed along frames; both ends are extrapolated, so that movement does not slow down there."""
     margin = min(int(np.ceil(4.0 * width)), len(values) - 1)
     before = 2.0 * values[:1] - values[margin:0:-1]
     after = 2.0 * values[-1:] - values[-2 : -margin - 2 : -1]
@@ -90,7 +93,7 @@ def _smooth(values: Array, width: float) -> Array:
 
 
 def with_feet_on_floor(motion: PersonMotion) -> PersonMotion:
-    """Feet that hinge on their ankles: flat or on the toes where the floor is in reach, stretched where it is not."""
+    """Feet hinged at their ankles: flat or on the toes where the floor is in reach, else stretched."""
     bones, points, turns = motion.skeleton, joint_points(motion), dict(motion.turns)
     reach = TOES * bones.foot
     for side in SIDES:
@@ -110,7 +113,7 @@ def with_feet_on_floor(motion: PersonMotion) -> PersonMotion:
 
 
 def with_hands_above_floor(motion: PersonMotion) -> PersonMotion:
-    """Arms raised at the shoulders for as long as their fingers would go into the floor."""
+    """The motion with arms raised at the shoulders while their fingers would be in the floor."""
     turns, points = dict(motion.turns), joint_points(motion)
     spread = max(1, round(ARM_SPREAD_S * motion.fps))
     for side in SIDES:

@@ -1,7 +1,7 @@
-"""A pose seen in a mirror: what the left limbs do the right ones do, and the other way round.
+"""Mirror images of poses: left and right limbs exchanged.
 
-Which parameters are twins follows from their groups' names (left and right), with which sign from the body itself: the
-turn that a parameter makes at rest, mirrored, is its twin's, or the reverse of it. A body without sides has no mirror.
+Twin parameters follow from their groups' names (left and right), their sign from the body: the rotation that a
+parameter makes at rest, mirrored, is its twin's or its inverse. A body without sides has no mirror.
 """
 
 import math
@@ -20,11 +20,11 @@ from studio.geometry.rotations import vector_from_rotation
 
 SMALL = 1e-3
 UNEVEN = 5.0
-"""mm; limbs that stay farther off are fitted one by one: the body's own sides differ."""
+"""mm; limbs with a larger error are fitted one by one: the body's sides differ."""
 PULL = 0.02
-"""Residual (mm) of one radian: settles twists that no limb's end shows."""
+"""Residual (mm) of one radian: determines twists that no limb's end shows."""
 LEVEL = 0.3
-"""Of a body whose own sideways is steeper than that (its level part) the mirror is not upright."""
+"""Least level part of a body's sideways axis for an upright mirror."""
 
 
 class Mirror:
@@ -37,7 +37,7 @@ class Mirror:
         sides = np.array([limb.side for limb in body.drawn])
         if not (self.limb_twins != np.arange(len(sides))).any() or not (sides == "left").any():
             raise BodyError(
-                f"Body '{body.name}' has no left and right to be exchanged.",
+                f"Body '{body.name}' has no left and right limbs to exchange.",
                 "Choose a body whose limbs come in left and right.",
             )
         rest = limb_ends(body, body.neutral)[0]
@@ -48,7 +48,7 @@ class Mirror:
         self._sign = self._signs()
 
     def mirrored(self, pose: Array) -> Array:
-        """The pose (D,) mirrored where it stands, facing where it faces."""
+        """The pose (D,) mirrored, with the same place and facing."""
         ends, sideways = limb_ends(self.body, pose)[0], self.sideways(pose)
         return self._placed(self._exchanged(pose), self._reflected(ends, sideways))
 
@@ -67,19 +67,19 @@ class Mirror:
 
     def exchanged(self, pose: Array, own: Indices, limbs: Indices) -> Array:
         """The pose (D,) with each of a pair's limbs (indices of drawn ones) where its twin is, as near as the pair's
-        own parameters can bring them; all else stays.
+        own parameters allow; all else unchanged.
         """
-        wanted = limb_ends(self.body, pose)[0][self.limb_twins[limbs]]
+        target = limb_ends(self.body, pose)[0][self.limb_twins[limbs]]
         start = pose.copy()
         start[own] = self._exchanged(pose)[own]
-        return self._fitted(start, wanted, own, limbs)[0]
+        return self._fitted(start, target, own, limbs)[0]
 
     def about_face(self, pose: Array) -> Array:
         """The pose (D,) facing the other way with every limb where its twin is, as near as joint limits allow."""
-        wanted = limb_ends(self.body, pose)[0][self.limb_twins]
+        target = limb_ends(self.body, pose)[0][self.limb_twins]
         rest = self.body.neutral
         rest[self._root] = pose[self._root]
-        return self._placed(rest, wanted, whole=True)
+        return self._placed(rest, target, whole=True)
 
     def _exchanged(self, pose: Array) -> Array:
         rest = self.body.neutral
@@ -88,7 +88,7 @@ class Mirror:
         return swapped
 
     def _reflected(self, ends: Array, normal: Array) -> Array:
-        """(L, 2, 3) where the limbs are to be: their twins' ends, mirrored in the plane through the root."""
+        """(L, 2, 3) target ends of the limbs: their twins' ends, mirrored in the plane through the root."""
         swapped = ends[self.limb_twins]
         middle = ends.reshape(-1, 3).mean(axis=0)
         return swapped - 2.0 * ((swapped - middle) @ normal)[..., None] * normal
@@ -102,22 +102,22 @@ class Mirror:
         level = own * [1.0, 1.0, 0.0]
         return level / np.linalg.norm(level) if np.linalg.norm(level) > LEVEL else own
 
-    def _placed(self, pose: Array, wanted: Array, *, whole: bool = False) -> Array:
-        """The pose with its root where the limbs are nearest to `wanted`; a body that is not quite even, whole."""
+    def _placed(self, pose: Array, target: Array, *, whole: bool = False) -> Array:
+        """The pose with its root where the limbs are nearest to `target`; an asymmetric body is fitted as a whole."""
         best, least = pose, math.inf
         for begin in self._beginnings(pose):
-            found, cost = self._fitted(begin, wanted, self._root)
+            found, cost = self._fitted(begin, target, self._root)
             if cost < least:
                 best, least = found, cost
         best = within_limits(self.body, best)
-        if whole or math.sqrt(least / len(wanted)) > UNEVEN:
-            best = self._fitted(best, wanted, np.arange(len(best)))[0]
+        if whole or math.sqrt(least / len(target)) > UNEVEN:
+            best = self._fitted(best, target, np.arange(len(best)))[0]
         return best
 
     def _fitted(
-        self, pose: Array, wanted: Array, free: Indices, limbs: Indices | None = None
+        self, pose: Array, target: Array, free: Indices, limbs: Indices | None = None
     ) -> tuple[Array, float]:
-        """The pose with its `free` parameters where the limbs are nearest to `wanted`, limits kept, and half the sum of
+        """The pose with its `free` parameters where the limbs are nearest to `target`, limits kept, and half the sum of
         squares that remains. limbs : which drawn ones, None for all.
         """
         entries = [self.body.parameters[at] for at in free.tolist()]
@@ -136,7 +136,7 @@ class Mirror:
 
         def offsets(values: Array) -> Array:
             ends = limb_ends(self.body, placed(values))[:, which]
-            return (ends - wanted).reshape(len(values), -1)
+            return (ends - target).reshape(len(values), -1)
 
         def residuals(values: Array) -> Array:
             return np.concatenate([offsets(values[None])[0], PULL * (values - begin)])
@@ -153,7 +153,7 @@ class Mirror:
         return placed(answer.x[None])[0], float(answer.cost)
 
     def _beginnings(self, pose: Array) -> list[Array]:
-        """The pose as it is, and with half a turn about each of the root's axes."""
+        """The pose, and the pose with half a turn about each of the root's axes."""
         found = [pose]
         for place in self._root.tolist():
             if self.body.parameters[place].kind == "angle":
@@ -173,7 +173,7 @@ class Mirror:
                 if step.parameter >= 0:
                     turn = frames[step.parameter + 1, joint] @ frames[0, joint].T
                     turns[step.parameter] += vector_from_rotation(turn)
-        # What turns both sides against each other adds up to nothing, and is its own mirror image.
+        # A parameter that turns both sides against each other sums to zero, and is its own mirror image.
         # A turn is an axial vector: in the mirror its part along the mirror's normal stays.
         mirrored = 2.0 * (turns @ self._across)[:, None] * self._across - turns
         along = np.einsum("dk,dk->d", mirrored[self._twin], turns)

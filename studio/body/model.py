@@ -1,6 +1,6 @@
 """The articulated body as data: a kinematic tree, its dimensions, its limbs and its markers.
 
-A `BodyModel` is frozen and says nothing about any particular pose. Each joint's frame is its parent's frame
+A `BodyModel` is frozen and independent of any particular pose. Each joint's frame is its parent's frame
 times a sequence of elementary `Step`s (a move along, or a turn about, one of the current x, y, z axes by a
 fixed number or by one parameter of the pose vector), so any order and direction of rotation can be written
 down. Lengths in mm, angles in radians here (degrees in body files).
@@ -110,8 +110,8 @@ class BodyModel:
     """A body: parameters in the order of the pose vector, joints parents first, limbs, markers, dimensions.
 
     dimensions : the named lengths and radii (mm; ratios without unit) that the steps, limbs and markers were
-    built from. definition : the body file's entries, from which other dimensions give another body (None:
-    built by hand, its dimensions cannot change).
+    built from. definition : the body file's entries, from which a body of other dimensions is built (None:
+    built in code, its dimensions cannot change).
     """
 
     name: str
@@ -125,7 +125,7 @@ class BodyModel:
 
     @property
     def drawn(self) -> tuple[Limb, ...]:
-        """The limbs that have a length, in order: the ones that are counted, weighed and shown."""
+        """The limbs with a length, in order: those that are counted, weighed and shown."""
         return tuple(limb for limb in self.limbs if limb.length != 0.0)
 
     @property

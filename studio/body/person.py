@@ -1,8 +1,8 @@
-"""A person's skeleton, whatever tracks it: lengths, segment frames over time, and the 15 markers.
+"""A person's skeleton, independent of any tracker: lengths, segment frames over time, and the 15 markers.
 
-Recorded motion is put on it, rendered people have it inside; no tracker's body file has a part in it. Segment frames
-have x forward, y to the person's left and z up when standing upright with hanging arms. Trunk: the neck's base lies on
-the thorax's z axis, which turns about the pelvis centre. Knees and elbows are hinges about y.
+Recorded motion is retargeted to it and rendered people are built on it; it is independent of the trackers' body files.
+Segment frames have x forward, y to the person's left and z up when standing upright with hanging arms. Trunk: the
+neck's base lies on the thorax's z axis, which turns about the pelvis centre. Knees and elbows are hinges about y.
 """
 
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ from studio.arrays import Array
 from studio.motion_files.trc import MarkerMotion
 
 SIDES = ("left", "right")
-# Frames on either side of what is sampled that the curves go through.
+# Frames before and after the sampled ones that the curves go through.
 MARGIN_FRAMES = 12
 MARKERS = (
     *("Hip", "Neck", "Head"),

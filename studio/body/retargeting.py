@@ -1,9 +1,9 @@
-"""A recorded motion on the synthetic skeleton: every segment turned as the recorded one, the root's way scaled by
-the length of the legs, the feet kept out of the floor.
+"""A recorded motion on the synthetic skeleton: every segment rotated as the recorded one, the root's path scaled
+by the length of the legs, the feet kept out of the floor.
 
 A segment's frame in the recording's rest pose is known: z against the bone, x to the side it bends to (a table per
-family of skeletons). What turned the recorded segment since turns that frame. Trunk and head follow the lines between
-hips, shoulders and crown instead, since their joints are divided differently everywhere.
+family of skeletons). It is rotated as the recorded segment was since. Trunk and head follow the lines between hips,
+shoulders and crown instead, since skeletons divide their joints differently.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,8 @@ Vector = tuple[float, float, float]
 
 FORWARD: Vector = (1.0, 0.0, 0.0)
 CMU_ELBOW: Vector = (0.866, 0.0, 0.5)
-"""Where the forearms of CMU's T pose bend to: the elbow's axis in the ASF files lies 30 degrees off the vertical."""
+"""Direction in which the forearms of CMU's T pose bend: the elbow's axis in the ASF files lies 30 degrees off the
+vertical."""
 FLOOR_SHARE = 0.1
 SPREAD_S = 0.1
 UP = np.array([0.0, 0.0, 1.0])
@@ -28,8 +29,8 @@ UP = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, slots=True)
 class Bone:
-    """One segment of a side. `{s}` stands for the side's prefix. joint : whose turns it follows. begin, end : joints
-    that its bone runs between in the rest pose. front : where its x axis points in the rest pose, about.
+    """One segment of a side. `{s}` stands for the side's prefix. joint : whose rotation it follows. begin, end : joints
+    at the bone's ends in the rest pose. front : approximate direction of its x axis in the rest pose.
     """
 
     segment: str
@@ -41,8 +42,8 @@ class Bone:
 
 @dataclass(frozen=True, slots=True)
 class Family:
-    """How a kind of skeleton is named. prefixes : of left and right. crown : joint at the top of the head, "" where
-    the head's own turn says where it points.
+    """Joint names of a kind of skeleton. prefixes : of left and right. crown : joint at the top of the head, "" where
+    the head's own rotation is used.
     """
 
     prefixes: tuple[str, str]
@@ -103,19 +104,19 @@ FAMILIES = (ACCLAIM, BIOVISION, HUMANOID)
 
 
 def family_of(recorded: RecordedMotion) -> Family:
-    """How the recording's skeleton is named. Raises StudioError for one that no table fits."""
+    """The joint names of the recording's skeleton. Raises StudioError for an unknown one."""
     for family in FAMILIES:
-        wanted = {family.pelvis, family.thorax, family.neck, family.head} | {family.crown or family.head}
+        required = {family.pelvis, family.thorax, family.neck, family.head} | {family.crown or family.head}
         for side in range(2):
             patterns = [
                 family.clavicle,
                 *(p for bone in family.bones for p in (bone.joint, bone.begin, bone.end)),
             ]
-            wanted |= {family.named(pattern, side) for pattern in patterns}
-        if wanted <= set(recorded.names):
+            required |= {family.named(pattern, side) for pattern in patterns}
+        if required <= set(recorded.names):
             return family
     raise StudioError(
-        f"The joints of '{recorded.source}' are not named like those of a known skeleton.",
+        f"The joints of '{recorded.source}' have the names of no known skeleton.",
         "Take a CMU clip (ASF/AMC or BVH), or arrays of the AMP humanoid.",
     )
 
@@ -148,10 +149,10 @@ def on_floor(motion: PersonMotion) -> PersonMotion:
 
 
 def above_floor(motion: PersonMotion) -> PersonMotion:
-    """The motion raised for as long as a foot would go into the floor, smoothly and no pose changed."""
+    """The motion raised smoothly while a foot would be in the floor; poses are unchanged."""
     below = np.max([-lowest_of_sole(motion, side) for side in SIDES], axis=0)
     spread = max(1, round(SPREAD_S * motion.fps))
-    # The widest the smoothing reaches is as far as the largest depth is held, so that it never undercuts.
+    # The largest depth is held as far as the smoothing reaches, so that it never undercuts.
     held = maximum_filter1d(np.maximum(below, 0.0), 2 * spread + 1, mode="nearest")
     lift = gaussian_filter1d(held, spread / 3.0, radius=spread, mode="nearest")
     return PersonMotion(motion.skeleton, motion.fps, motion.root + lift[:, None] * UP, motion.turns)
@@ -204,14 +205,14 @@ def _trunk(recorded: RecordedMotion, family: Family) -> dict[str, Array]:
 
 
 def _clavicle(recorded: RecordedMotion, family: Family, thorax: Array, side: int) -> Array:
-    """(F, 3, 3) the thorax's turn and what the recorded collar bone is turned against the recorded thorax."""
+    """(F, 3, 3) the thorax's rotation times that of the recorded collar bone against the recorded thorax."""
     own = recorded.rotations[:, recorded.index(family.named(family.clavicle, side))]
     carrier = recorded.rotations[:, recorded.index(family.thorax)]
     return thorax @ np.swapaxes(carrier, 1, 2) @ own
 
 
 def _followed(recorded: RecordedMotion, family: Family, bone: Bone, side: int) -> Array:
-    """(F, 3, 3) of a segment that turns with a joint, from its frame in the rest pose."""
+    """(F, 3, 3) rotations of a segment that turns with a joint, from its frame in the rest pose."""
     joint, begin, end = (
         recorded.index(family.named(name, side)) for name in (bone.joint, bone.begin, bone.end)
     )

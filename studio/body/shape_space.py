@@ -1,8 +1,8 @@
-"""A body's size as a few numbers: what a fit of the subject searches besides the poses.
+"""A body's size as a few numbers, which a fit of the subject searches besides the poses.
 
 Dimensions of a body file that set a joint's place or a limb's length are *lengths*, those that are a cone's radius are
-*radii*; nothing here knows a body by name. Dimensions that a person has alike (left and right) make a group, whose one
-number is the logarithm of a common factor: 0 is the body as it is, 0.1 is 10.5 % more, and no value is impossible. A
+*radii*. Dimensions that are equal in a person (left and right) make a group, whose one number is the
+logarithm of a common factor: 0 is the unchanged body, 0.1 is 10.5 % more, and no value is impossible. A
 cone's two radii are two groups: shins taper more than the body file's, and a cone that cannot has its joints moved.
 """
 
@@ -22,12 +22,12 @@ from studio.errors import BodyError
 
 SIDE = re.compile(r"(^|_)(left|right)(_|$)")
 SMALL = ("foot_heel", "foot_drop", "ankle_height")
-"""Offsets within a foot: they follow from the height, silhouettes do not tell them."""
+"""Offsets within a foot: they follow from the height, as silhouettes do not show them."""
 
 
 @dataclass(frozen=True, slots=True)
 class ShapeGroup:
-    """Dimensions with a common factor. name : for people, such as "thigh_length". kind : what they are."""
+    """Dimensions with a common factor. name : such as "thigh_length". kind : "length" or "radius"."""
 
     name: str
     kind: Literal["length", "radius"]
@@ -36,14 +36,14 @@ class ShapeGroup:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ShapeSpace:
-    """Groups of a body's dimensions, S of them. body : the one whose shape is 0."""
+    """S groups of a body's dimensions. body : of shape 0."""
 
     body: BodyModel
     groups: tuple[ShapeGroup, ...]
 
     @property
     def names(self) -> tuple[str, ...]:
-        """(S,) of the groups."""
+        """(S,) names of the groups."""
         return tuple(group.name for group in self.groups)
 
     def dimensions(self, shape: Array) -> dict[str, float]:
@@ -73,18 +73,18 @@ def shape_space(
 ) -> ShapeSpace:
     """The shape space of a body read from a file.
 
-    symmetric : left and right are one group. lengths, radii : what may change; "ends": only lengths that no tape
-    measures (`end_lengths`). Dimensions that are zero (limbs that are not there) stay so. Raises BodyError where
+    symmetric : left and right are one group. lengths, radii : what may change; "ends": only lengths that cannot be
+    taped (`end_lengths`). Dimensions that are zero (absent limbs) stay so. Raises BodyError where
     nothing can change.
     """
     kinds = dimension_kinds(body.definition) if body.definition else {}
     ends = end_lengths(body.definition) if body.definition else frozenset[str]()
-    wanted = {"length": bool(lengths), "radius": radii}
+    chosen = {"length": bool(lengths), "radius": radii}
     found: dict[tuple[str, str], list[str]] = {}
     for name, kind in kinds.items():
         if lengths == "ends" and kind == "length" and name not in ends:
             continue
-        if wanted[kind] and body.dimensions[name] > 0.0 and name not in SMALL:
+        if chosen[kind] and body.dimensions[name] > 0.0 and name not in SMALL:
             found.setdefault((_group_name(name, symmetric), kind), []).append(name)
     if not found:
         raise BodyError(
@@ -115,7 +115,7 @@ def dimension_kinds(definition: BodyDefinition) -> dict[str, str]:
 
 
 def end_lengths(definition: BodyDefinition) -> frozenset[str]:
-    """Lengths of limbs from which nothing hangs: hands, feet, head."""
+    """Lengths of limbs at the ends of the body: hands, feet, head."""
     parents = {joint.parent for joint in definition.joints}
     found = {_name(limb.length) for limb in definition.limbs if limb.joint not in parents}
     return frozenset(found & definition.dimensions.keys())
@@ -131,7 +131,7 @@ def _group_name(name: str, symmetric: bool) -> str:
 
 
 def mean_sides(space: ShapeSpace, dimensions: Mapping[str, float]) -> dict[str, float]:
-    """The dimensions with the mean over each group that has a left and a right in it, else as they are."""
+    """The dimensions, those of groups with a left and a right replaced by the group's mean."""
     levelled = dict(dimensions)
     for group in space.groups:
         pairs: dict[str, list[str]] = {}

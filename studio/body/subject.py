@@ -1,27 +1,27 @@
-"""A person (or animal, or machine) in front of the cameras: which body, and how large.
+"""A subject (person, animal or machine): its body and size.
 
 A subject file is TOML:
 
     body = "human31"
     height_mm = 1780
-    [lengths_mm]                 # distances of two markers, in any number
+    [lengths_mm]                 # distances of two markers, any number of them
     RHip_RKnee = 420
-    [dimensions_mm]              # dimensions of the body itself, taken as they are
+    [dimensions_mm]              # dimensions of the body itself, used unchanged
     left_foot_length = 260
     [ratios]
     torso_scale_x = 0.88
 
 Rules of the fit (`fit_subject`):
-1. `dimensions_mm` and `ratios` are taken as they are.
+1. `dimensions_mm` and `ratios` are used unchanged.
 2. A pair of markers whose distance no pose changes counts fully. One whose distance an ordinary standing
 posture
-   leaves alone (5 % over 15 degrees in any joint, such as shoulder to shoulder) is read as measured standing
+   hardly changes (5 % over 15 degrees in any joint, such as shoulder to shoulder) is read as measured standing
    and decides only what the others leave open. All other pairs, and those that no dimension sets, are
    ignored.
 3. The dimensions that set these distances are fitted to them together by least squares. Where fewer equations
 than
    dimensions are given, all are scaled alike from the prior, which has equal left and right sides.
-4. The prior and all that is missing, hands and feet included, is `of_height` times the height: published
+4. The prior and all missing dimensions, hands and feet included, are `of_height` times the height: published
    proportions, cited in the body file. Without `height_mm` the height is the median of what the fitted
    dimensions imply; without lengths either, the body keeps its own dimensions.
 """
@@ -44,7 +44,7 @@ from studio.typed_decoding import decode_toml
 
 DEFAULT_BODY = "human31"
 
-# A distance that is measured standing counts this little beside one that no pose changes.
+# Weight of a distance measured standing, relative to one that no pose changes.
 STANDING_WEIGHT = 0.03
 
 # Steps of Gauss and Newton; the distances are nearly linear in the dimensions, three suffice.
@@ -52,11 +52,11 @@ FIT_STEPS = 20
 
 SHORTEST_MM, TALLEST_MM = 300.0, 3000.0
 LONGEST_MM = 10_000.0
-"""Of a limb or a distance of markers; a ratio is far below it."""
+"""Longest limb or distance of markers, mm; ratios are far below it."""
 
 
 class Subject(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What is known of a subject.
+    """The known sizes of a subject.
 
     body : a body's name. height_mm : None where unknown. lengths_mm : "MarkerA_MarkerB" to mm.
     dimensions_mm, ratios : dimension names of the body to their values.
@@ -174,7 +174,7 @@ def _proportions(body: BodyModel, height: float, known: Mapping[str, float]) -> 
 
 
 def _levelled(body: BodyModel, given: Mapping[str, float]) -> dict[str, float]:
-    """The body's own dimensions with the mean of left and right on either side, as far as they were not
+    """The body's own dimensions with the mean of left and right on either side, unless they were
     given.
     """
     levelled = {}
@@ -194,7 +194,7 @@ def _fit(
     changes scaled by √x, whose least norm scales all undetermined dimensions alike.
     """
     pairs = list(measured)
-    wanted = np.array([measured[pair][0] for pair in pairs])
+    measured_mm = np.array([measured[pair][0] for pair in pairs])
     weights = np.array([1.0 if measured[pair][1] else STANDING_WEIGHT for pair in pairs])
     slopes = distances.slopes(pairs, distances.start)
     moving = [name for name in distances.names if np.any(slopes[:, distances.index[name]])]
@@ -204,9 +204,9 @@ def _fit(
     for _ in range(FIT_STEPS):
         roots = np.sqrt(values[columns])
         slopes = distances.slopes(pairs, values)[:, columns]
-        remaining = weights * (wanted - distances.distances(pairs, values))
+        remaining = weights * (measured_mm - distances.distances(pairs, values))
         change, *_ = np.linalg.lstsq(weights[:, None] * slopes * roots, remaining, rcond=1e-9)
-        # A dimension may at most halve or double in a step: none becomes zero or negative.
+        # A dimension at most halves or doubles in a step: none becomes zero or negative.
         values[columns] *= np.clip(1.0 + change / roots, 0.5, 2.0)
     return {name: float(values[distances.index[name]]) for name in free}
 

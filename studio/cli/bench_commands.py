@@ -14,7 +14,7 @@ from studio.benchmarks.live_stages import in_words
 from studio.benchmarks.reannealing import measure_reannealing
 from studio.cli.output import command, progress
 from studio.progress import Progress
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.sessions.workspace import Workspace
 from studio.web.samples import install_sample
 from studio.worker.control import StudioControl
@@ -35,7 +35,7 @@ def _slider(report: Progress) -> dict[str, object]:
         session = install_sample(workspace, "walk")
         control = StudioControl(workspace)
         try:
-            latency = measure_reannealing(control, session, prepare_run(session, RunRequest(last=2)))
+            latency = measure_reannealing(control, session, prepare_run(session, last=2))
         finally:
             control.close()
     report("re-annealing", 1, 1)

@@ -1,18 +1,15 @@
-"""`studio doctor`."""
+"""`doctor`, which loads all of the studio; no other command waits for that."""
 
 from dataclasses import asdict
 
-import click
+from studio.cli.deriving import Call, command_of
+from studio.cli.output import EXIT_CODE, FOUND_FAULTS
+from studio.self_check import doctor
 
-from studio.cli.output import EXIT_CODE, FOUND_FAULTS, command
-from studio.notebook.doctor import doctor
 
-
-@click.command("doctor")
-@command
-def doctor_command() -> dict[str, object]:
-    """Try all that the studio stands on, and say what to do where something fails; ends with 1 then."""
-    found = doctor()
+@command_of(doctor)
+def doctor_command(call: Call) -> dict[str, object]:
+    found = call()
     lines = [f"{'ok   ' if one.good else 'FAULT'} {one.name:18} {one.found}" for one in found]
     lines += [f"remedy for {one.name}: {one.remedy}" for one in found if not one.good]
     return {

@@ -1,135 +1,129 @@
-"""`studio synchronise`."""
+"""Footage into sessions: `import`, `new`, `add-footage`, `synthesize`, `record`, `synchronise`."""
 
-from pathlib import Path
+from collections.abc import Mapping
 
-import click
-
-from studio.capture.synchrony import MOST_SECONDS, Synchrony, in_words
+from studio.capture.live_cameras import SpreadFigures
+from studio.capture.synchrony import Synchrony, in_words
 from studio.capture.timestamps import TimedOffsets
-from studio.cli.arguments import OFFSET_OPTION, ROTATE_OPTION, camera_numbers
-from studio.cli.output import command, note, progress
-from studio.errors import FootageError
-from studio.sessions.footage_changes import (
-    FootageChange,
-    change_footage,
-    recorded_offsets,
-    stale_runs,
-    synchrony_of,
+from studio.cli.deriving import Call, command_of
+from studio.cli.output import note
+from studio.operations.footage import (
+    Synchronised,
+    add_footage,
+    import_footage,
+    new_session,
+    record,
+    synchronise,
+    synthesize,
 )
+from studio.sessions.footage_changes import stale_runs
 from studio.sessions.session import Session
-from studio.sessions.workspace import Workspace
 
 
-@click.command()
-@click.argument("session")
-@OFFSET_OPTION
-@ROTATE_OPTION
-@click.option(
-    "--timestamps",
-    type=click.Path(path_type=Path, exists=True, dir_okay=False),
-    help="A recorder's times of the frames (timestamps.csv), instead of an estimate.",
-)
-@click.option(
-    "--within",
-    type=float,
-    default=MOST_SECONDS,
-    show_default=True,
-    help="Largest offset that is looked for, seconds.",
-)
-@click.option("--apply", "applied", is_flag=True, help="Write what was estimated or read into the session.")
-@command
-def synchronise(
-    session: str,
-    offsets: tuple[str, ...],
-    rotations: tuple[str, ...],
-    timestamps: Path | None,
-    within: float,
-    applied: bool,
-) -> dict[str, object]:
-    """Tell by how many frames the cameras of a SESSION began apart.
-
-    Without options, estimates it from what moves in the pictures and shows how far to trust it; nothing is changed
-    unless --apply is given. --offset and --rotate are written at once.
-    """
-    opened = Workspace().resolve(session)
-    by_hand, turns = camera_numbers(offsets, "--offset"), camera_numbers(rotations, "--rotate")
-    if by_hand or turns:
-        if applied or timestamps is not None:
-            raise FootageError(
-                "Offsets cannot be given by hand and estimated or read at once.",
-                "Leave out --apply and --timestamps.",
-            )
-        return _told(opened, change_footage(opened, by_hand, turns))
-    if timestamps is not None:
-        return _recorded(opened, timestamps, applied)
-    return _estimated(opened, within, applied)
-
-
-def _estimated(session: Session, within: float, applied: bool) -> dict[str, object]:
-    """Offsets by motion energy, applied only where they can be trusted and were asked for."""
-    if not 0.0 < within <= 600.0:
-        raise FootageError(f"--within {within:g} is no time to look in.", "Give seconds between 0 and 600.")
-    with progress("Estimating") as report:
-        found = synchrony_of(session, report, within)
-    said = in_words(found)
-    if not applied:
-        note("Nothing was changed; write it with --apply, or by hand with --offset CAMERA=FRAMES.")
-        return {**_answer(session), "estimate": _values(found), "text": said}
-    if not found.sure:
-        note(said)
-        raise FootageError(
-            "The estimate is not reliable enough to be applied.",
-            "Give the offsets by hand with --offset CAMERA=FRAMES.",
-        )
-    told = _told(session, change_footage(session, found.offsets))
-    return {**told, "estimate": _values(found), "text": f"{said}\n{told['text']}"}
-
-
-def _recorded(session: Session, path: Path, applied: bool) -> dict[str, object]:
-    """Offsets by recorded times."""
-    found: TimedOffsets = recorded_offsets(session, path)
-    lines = [f"{name}: {offset:+d} frames" for name, offset in found.offsets.items()]
-    said = "\n".join(
-        [*lines, f"At most {found.apart:.2f} frames apart at {found.fps:.2f} frames a second.", *found.notes]
-    )
-    if not applied:
-        note("Nothing was changed; write it with --apply.")
-        return {
-            **_answer(session),
-            "recorded": {"offsets": found.offsets, "apart": found.apart},
-            "text": said,
-        }
-    told = _told(session, change_footage(session, found.offsets))
-    return {**told, "text": f"{said}\n{told['text']}"}
-
-
-def _told(session: Session, change: FootageChange) -> dict[str, object]:
-    lines = [f"{camera.name}: {camera.offset}" for camera in change.session.manifest.footage.cameras]
+@command_of(import_footage, name="import")
+def import_command(call: Call) -> dict[str, object]:
+    session: Session = call()
+    said = session.manifest
     return {
-        **_answer(change.session),
-        "notes": list(change.notes),
+        "session": str(session.path),
+        "layout": said.layout,
+        "cameras": [f"{match.footage} → {match.camera} ({match.how})" for match in said.matching],
+        "notes": list(said.notes),
+        "warnings": list(said.warnings),
         "text": "\n".join(
-            [f"Session {session.name}, first frames of each file: {', '.join(lines)}", *change.notes]
+            [
+                f"Session {session.name} in {session.path}",
+                *(f"  {match.footage} → {match.camera}" for match in said.matching),
+            ]
         ),
     }
 
 
-def _answer(session: Session) -> dict[str, object]:
-    """The session's offsets and turns as they are."""
-    footage = session.manifest.footage
+@command_of(new_session, name="new")
+def new_command(call: Call) -> dict[str, object]:
+    return {"session": str(call().path), "next": "footage"}
+
+
+@command_of(add_footage)
+def add_footage_command(call: Call) -> dict[str, object]:
+    added = call()
+    footage = added.session.manifest.footage
     return {
+        "session": str(added.session.path),
+        "cameras": [camera.name for camera in footage.cameras],
+        "frames": footage.frame_count,
+        "fps": footage.fps,
+        "calibrated": added.session.is_calibrated,
+        "warnings": list(added.warnings),
+    }
+
+
+@command_of(synthesize)
+def synthesize_command(call: Call) -> dict[str, object]:
+    session: Session = call()
+    return {"session": str(session.path), "text": f"Session {session.name} in {session.path}"}
+
+
+@command_of(record)
+def record_command(call: Call) -> dict[str, object]:
+    found = call()
+    footage = found.session.manifest.footage
+    told: dict[str, object] = {
+        "session": found.session.name,
+        "frames": footage.frame_count,
+        "fps": footage.fps,
+        "offsets": {camera.name: camera.offset for camera in footage.cameras},
+        **spread_figures(found.spread),
+        "warnings": list(found.warnings),
+    }
+    if found.standing is not None:
+        told["cameras"] = {
+            name: {
+                "pictures": one.pictures,
+                "repeated": one.repeated,
+                "left_out": one.left_out,
+                "missed": found.standing.missed[name],
+            }
+            for name, one in found.standing.figures.items()
+        }
+    words = f"{found.session.name}: {footage.frame_count} frames of {len(footage.cameras)} cameras at {footage.fps:g}"
+    return {**told, "text": f"{words} a second; {found.spread.in_words}"}
+
+
+def spread_figures(spread: SpreadFigures) -> dict[str, object]:
+    """How far apart pictures came, as `--json` has it."""
+    return {
+        "spread_ms": {"median": spread.median, "p95": spread.most, "worst": spread.worst},
+        "apart": spread.apart,
+        "lagging": spread.lagging,
+    }
+
+
+@command_of(synchronise)
+def synchronise_command(call: Call) -> Mapping[str, object]:
+    done: Synchronised = call()
+    footage = done.session.manifest.footage
+    answer: dict[str, object] = {
         "frames": footage.frame_count,
         "offsets": {camera.name: camera.offset for camera in footage.cameras},
         "rotations": {camera.name: camera.turned for camera in footage.cameras},
-        "stale_runs": list(stale_runs(session)),
+        "stale_runs": list(stale_runs(done.session)),
     }
-
-
-def _values(found: Synchrony) -> dict[str, object]:
-    return {
-        "offsets": found.offsets,
-        "confidence": found.confidence,
-        "within": found.within,
-        "sure": found.sure,
-        "notes": list(found.notes),
-    }
+    words: list[str] = []
+    found = done.found
+    if isinstance(found, Synchrony):
+        names = ("offsets", "confidence", "within", "sure")
+        answer["estimate"] = {name: getattr(found, name) for name in names} | {"notes": list(found.notes)}
+        words.append(in_words(found))
+    elif isinstance(found, TimedOffsets):
+        answer["recorded"] = {"offsets": found.offsets, "apart": found.apart}
+        words += [f"{name}: {offset:+d} frames" for name, offset in found.offsets.items()]
+        words.append(f"At most {found.apart:.2f} frames apart at {found.fps:.2f} frames a second.")
+        words += found.notes
+    if done.change is None:
+        note("Nothing was changed; write it with --apply, or by hand with --offset CAMERA=FRAMES.")
+    else:
+        first = ", ".join(f"{camera.name}: {camera.offset}" for camera in footage.cameras)
+        words += [f"Session {done.session.name}, first frames of each file: {first}", *done.change.notes]
+        answer["notes"] = list(done.change.notes)
+    return {**answer, "text": "\n".join(words)}

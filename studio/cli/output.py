@@ -17,7 +17,7 @@ import msgspec
 from rich.console import Console
 
 from studio.errors import StudioError
-from studio.notebook.progress import bar
+from studio.operations.progress import Display, bar
 from studio.progress import Progress, TimeLeft, left_in_words
 from studio.registry import Registry
 from studio.sessions.atomic_files import write_bytes
@@ -163,21 +163,20 @@ def note(text: str) -> None:
     messages.print(_plain(text))
 
 
-def notes_once(folder: Path, lines: Iterable[str]) -> None:
-    """Lines for the person at the terminal, each but the first time that it is said of what lies in the folder (a
-    session). What cannot be remembered is said again.
+def notes(lines: Iterable[str], once_in: Path | None = None) -> None:
+    """Lines for the person at the terminal; with a folder (a session's) each but the first time that it is said of what
+    lies there. What cannot be remembered is said again.
     """
-    place = folder / SAID
-    try:
-        said = set(msgspec.json.decode(place.read_bytes(), type=list[str]))
-    except (OSError, msgspec.DecodeError):
-        said = set[str]()
+    said = set[str]()
+    if once_in is not None:
+        with suppress(OSError, msgspec.DecodeError):
+            said = set(msgspec.json.decode((once_in / SAID).read_bytes(), type=list[str]))
     new = [line for line in lines if line not in said]
     for line in new:
         note(line)
-    if new:
+    if new and once_in is not None:
         with suppress(OSError):
-            write_bytes(place, msgspec.json.encode(sorted(said.union(new))))
+            write_bytes(once_in / SAID, msgspec.json.encode(sorted(said.union(new))))
 
 
 @contextmanager
@@ -208,3 +207,7 @@ def progress_lines(
         note(", ".join(filter(None, (f"{step or title}: {done} of {total}", left_in_words(estimate)))))
 
     return report
+
+
+shown_progress = Display(progress, notes)
+"""How verbs show what they do in a terminal."""

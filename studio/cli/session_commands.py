@@ -1,105 +1,31 @@
-"""`studio import`, `bodies` and `runs`."""
+"""What there is and how it stands: `bodies`, `runs`, `way`."""
 
-from pathlib import Path
+from dataclasses import asdict
 
 import click
 
-from studio.body.catalogue import list_bodies, load_body
-from studio.capture.calibration_files import WORLDS
-from studio.cli.arguments import camera_numbers, footage_options
-from studio.cli.output import command, note, progress
-from studio.sessions.importers.importing import import_source
+from studio.cli.deriving import Call, command_of
+from studio.cli.output import command
+from studio.operations.opening import bodies, way
+from studio.runs.way import Way
 from studio.sessions.stored_run import damage_in_words
 from studio.sessions.workspace import Workspace
 
-INTO_HELP = "Name of the new session in the workspace, or a path."
+MARKS = {"done": "✓", "ready": "·", "blocked": " ", "stale": "!", "running": "…"}
 
 
-@click.command("import")
-@click.argument("source", type=click.Path(path_type=Path))
-@click.option("--into", required=True, metavar="SESSION", help=INTO_HELP)
-@click.option(
-    "--calibration", type=click.Path(path_type=Path), help="The file to take where there are several."
-)
-@footage_options
-@click.option(
-    "--unit", type=click.Choice(("mm", "m")), help="The calibration's unit, where it is taken wrongly."
-)
-@click.option(
-    "--up",
-    type=click.Choice(tuple(WORLDS)),
-    default="z",
-    show_default=True,
-    help="The axis of the calibration's world that points up.",
-)
-@command
-def import_command(
-    source: Path,
-    into: str,
-    calibration: Path | None,
-    fps: float | None,
-    trial: str | None,
-    offsets: tuple[str, ...],
-    rotations: tuple[str, ...],
-    unit: str | None,
-    up: str,
-    despite_findings: bool,
-    copy: bool,
-) -> dict[str, object]:
-    """Make a session from a folder (or an archive) of footage and calibration, checking one against the other.
-
-    Folders of Pose2Sim, FreeMoCap, Caliscope, anipose, EasyMocap and PARSEC are recognised.
-    """
-    place = Workspace().place_for(into)
-    with progress("Importing") as report:
-        told = import_source(
-            source,
-            place,
-            calibration=calibration,
-            fps=fps,
-            copy=copy,
-            trial=trial,
-            offsets=camera_numbers(offsets, "--offset"),
-            rotations=camera_numbers(rotations, "--rotate"),
-            unit=unit or "",
-            up=up,
-            despite_findings=despite_findings,
-            progress=report,
-        )
-    for line in (*told.notes, *(f"Warning: {warning}" for warning in told.warnings)):
-        note(line)
-    return {
-        "session": str(place),
-        "layout": told.layout,
-        "cameras": [f"{match.footage} → {match.camera} ({match.how})" for match in told.matching],
-        "notes": list(told.notes),
-        "warnings": list(told.warnings),
-        "text": "\n".join(
-            [
-                f"Session {place.name} in {place}",
-                *(f"  {match.footage} → {match.camera}" for match in told.matching),
-            ]
-        ),
-    }
-
-
-@click.command()
-@command
-def bodies() -> dict[str, object]:
-    """List the bodies that are shipped and those of the workspace."""
-    folders = tuple(folder for folder in (Workspace().root / "bodies",) if folder.is_dir())
-    entries: list[dict[str, object]] = []
-    for name in list_bodies(folders):
-        body = load_body(name, folders)
-        entries.append(
-            {
-                "name": body.name,
-                "title": body.title,
-                "parameters": len(body.parameters),
-                "limbs": len(body.drawn),
-                "markers": [marker.name for marker in body.markers],
-            }
-        )
+@command_of(bodies)
+def bodies_command(call: Call) -> dict[str, object]:
+    entries: list[dict[str, object]] = [
+        {
+            "name": body.name,
+            "title": body.title,
+            "parameters": len(body.parameters),
+            "limbs": len(body.drawn),
+            "markers": [marker.name for marker in body.markers],
+        }
+        for body in call()
+    ]
     lines = [
         f"{entry['name']:18} {entry['parameters']:>3} parameters {entry['limbs']:>3} limbs   {entry['title']}"
         for entry in entries
@@ -107,11 +33,11 @@ def bodies() -> dict[str, object]:
     return {"bodies": entries, "text": "\n".join(lines)}
 
 
-@click.command()
+@click.command("runs")
 @click.argument("session", required=False)
 @command
-def runs(session: str | None) -> dict[str, object]:
-    """List the runs of a SESSION, or of all sessions in the workspace."""
+def runs_command(session: str | None) -> dict[str, object]:
+    """List the runs of a session, or of all sessions in the workspace."""
     workspace = Workspace()
     if session:
         opened = workspace.resolve(session)
@@ -140,3 +66,15 @@ def runs(session: str | None) -> dict[str, object]:
         for entry, (_, run) in zip(entries, found, strict=True)
     ]
     return {"workspace": str(workspace.root), "runs": entries, "text": "\n".join(lines) or "No runs yet."}
+
+
+@command_of(way)
+def way_command(call: Call) -> dict[str, object]:
+    found: Way = call()
+    lines = [
+        f"{MARKS[step.state]} {step.step:12} {step.words}{f'  ({step.why})' if step.why else ''}"
+        for step in found.steps
+    ]
+    said = f"Next: {found.next}." if found.next else "Nothing is left to be done."
+    steps = [asdict(step) for step in found.steps]
+    return {"steps": steps, "next": found.next, "text": "\n".join((*lines, said))}

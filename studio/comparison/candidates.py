@@ -1,8 +1,8 @@
-"""Who takes part in a comparison: trackers by name, each with the same number of evaluations a frame.
+"""The candidates of a comparison: trackers by name, each with the same number of evaluations a frame.
 
 A name is a tracker, `annealed`, or a tracker with a label, `annealed:eq13`, so that one tracker may take part
-several times. Known labels bring their knobs with them (VARIANTS); any other label is a name of one's own and needs
-a change of its own. A name of LINEUPS stands for several.
+several times. Known labels imply their knobs (VARIANTS); any other label is free and needs a change of its own. A
+name of LINEUPS stands for several.
 """
 
 import re
@@ -18,7 +18,7 @@ from studio.tracking.tracker import Value
 LABEL = re.compile(r"[A-Za-z0-9_-]{1,40}")
 WEIGHTING = "weighting"
 DEFAULT_LAYERS = 10
-# Of the number of evaluations that was asked for: rounding, not an advantage.
+# Allowed deviation from the requested evaluations, as a share: rounding, not an advantage.
 UNEQUAL_SHARE = 0.01
 
 
@@ -38,7 +38,7 @@ LINEUPS: dict[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A tracker that takes part. name : unique in its comparison. changes : knobs by flat name, the evaluations'
+    """A tracker in a comparison. name : unique in it. changes : knobs by flat name, those of the evaluations
     included. evaluations : poses weighed in a frame.
     """
 
@@ -49,17 +49,17 @@ class Candidate:
     changes: Mapping[str, Value]
 
     def settings(self) -> RunSettings:
-        """All of its knobs."""
+        """All knobs of its run."""
         return changed_settings(default_settings(self.tracker, self.weighting), self.changes)
 
 
 @dataclass(frozen=True, slots=True)
 class Lineup:
-    """Who shall take part, as a person writes it.
+    """The requested candidates.
 
     names : trackers, tracker:label, or names of LINEUPS. weighting : of all. evaluations : a frame. layers : of
-    annealed trackers that say nothing else. changes : by name, knobs by flat name; under "" those of all trackers
-    that have them; `weighting` is taken as a knob.
+    annealed trackers without their own. changes : by name, knobs by flat name; under "" those of all trackers that
+    have them; `weighting` counts as a knob.
     """
 
     names: tuple[str, ...]
@@ -70,7 +70,7 @@ class Lineup:
 
 
 def candidates(lineup: Lineup) -> tuple[Candidate, ...]:
-    """Everyone with the same number of evaluations. Raises SettingsError naming what is wrong with whom."""
+    """The candidates, all with the same number of evaluations. Raises SettingsError for a faulty one."""
     names = expanded(lineup.names)
     if not names:
         raise SettingsError(
@@ -89,7 +89,7 @@ def candidates(lineup: Lineup) -> tuple[Candidate, ...]:
 
 
 def expanded(names: Sequence[str]) -> tuple[str, ...]:
-    """The names with those of LINEUPS taken apart. Raises SettingsError for one that is neither."""
+    """The names with those of LINEUPS expanded. Raises SettingsError for an unknown one."""
     found = [one for name in names for one in LINEUPS.get(name, (name,))]
     for name in found:
         tracker, colon, label = name.partition(":")
@@ -98,7 +98,7 @@ def expanded(names: Sequence[str]) -> tuple[str, ...]:
             raise SettingsError(f"There is no tracker '{tracker}'.", f"Known: {known}.")
         if colon and not LABEL.fullmatch(label):
             hint = "After the colon write letters, digits, - and _, like annealed:eq13."
-            raise SettingsError(f"'{name}' is no name of a tracker.", hint)
+            raise SettingsError(f"'{name}' is not a tracker's name.", hint)
     return tuple(found)
 
 
@@ -112,7 +112,7 @@ def read_assignments(assignments: Sequence[str]) -> dict[str, dict[str, Value]]:
         left, equals, value = assignment.partition("=")
         if not equals or not left.strip():
             hint = "Write NAME.KNOB=VALUE, like annealed:eq13.adaptive_diffusion=false."
-            raise SettingsError(f"'{assignment}' changes nothing.", hint)
+            raise SettingsError(f"'{assignment}' is not an assignment.", hint)
         name, _, knob = left.strip().rpartition(".")
         changes.setdefault(name, {})[knob] = value.strip()
     return changes
@@ -131,15 +131,15 @@ def _candidate(name: str, lineup: Lineup) -> Candidate:
             f"Change a knob of it, as in --set {name}.KNOB=VALUE; labels with knobs of their own: {known}.",
         )
     variant = VARIANTS[name].changes if name in VARIANTS else {}
-    wanted = {**shared, **variant, **own}
+    requested = {**shared, **variant, **own}
     layers = (
-        getattr(changed_settings(settings, wanted).tracker, "layers", 0)
-        if "layers" in wanted
+        getattr(changed_settings(settings, requested).tracker, "layers", 0)
+        if "layers" in requested
         else lineup.layers
     )
     equal = knobs_for_evaluations(tracker, lineup.evaluations, layers)
     usual = TRACKERS[tracker].evaluations(changed_settings(settings, equal).tracker)
-    changed = changed_settings(settings, {**equal, **wanted})
+    changed = changed_settings(settings, {**equal, **requested})
     total = TRACKERS[tracker].evaluations(changed.tracker)
     if abs(total - lineup.evaluations) > max(
         abs(usual - lineup.evaluations), UNEQUAL_SHARE * lineup.evaluations
@@ -149,16 +149,17 @@ def _candidate(name: str, lineup: Lineup) -> Candidate:
             f"Leave {', '.join(equal)} as they follow from the evaluations, or change them together.",
         )
     chosen = values(changed)
-    return Candidate(name, tracker, weighting, total, {knob: chosen[knob] for knob in {**equal, **wanted}})
+    return Candidate(name, tracker, weighting, total, {knob: chosen[knob] for knob in {**equal, **requested}})
 
 
 def _check_shared(shared: Mapping[str, Value], names: Sequence[str], weighting: str) -> None:
-    """Raise SettingsError for a knob that nobody has."""
+    """Raise SettingsError for a knob that no candidate has."""
     known = {knob for name in names for knob in values(default_settings(name.partition(":")[0], weighting))}
     for knob in shared:
         if knob == WEIGHTING:
             raise SettingsError(
-                "The weighting of all is no knob.", "Choose it with --weighting, or of one by its name."
+                "The weighting of all trackers is not a knob.",
+                "Choose it with --weighting, or for one tracker by its name.",
             )
         if knob not in known:
             raise SettingsError(

@@ -1,4 +1,4 @@
-"""A comparison as the findings of an experiment (so that it is drawn as those are), as plain JSON, CSV and words."""
+"""A comparison as an experiment's findings (drawn in the same way), as plain JSON, CSV and text."""
 
 import csv
 import io
@@ -15,13 +15,13 @@ COLUMNS = (
     "runs without loss", "search (ms a frame)",
 )  # fmt: skip
 NOT_INDEPENDENT = (
-    "Frames that follow each other are alike, so the frames' p is smaller than it should be: it describes, it does"
+    "Consecutive frames are correlated, so the frames' p is too small: it describes, it does"
     " not prove. Seeds are independent."
 )
 
 
 def findings(comparison: Comparison) -> Findings:
-    """Mean errors with their intervals over the seeds, the table, error curves, the sign tests in words."""
+    """Mean errors with their intervals over the seeds, the table, error curves, the sign tests as text."""
     return Findings(
         verdict="answered",
         words=in_words(comparison),
@@ -70,7 +70,7 @@ def seeds_chart(comparison: Comparison) -> Chart:
 
 
 def document(comparison: Comparison) -> dict[str, Any]:
-    """What `studio compare --json` prints: `trackers` with their seeds, the sign tests; without single frames."""
+    """The JSON of `studio compare --json`: `trackers` with their seeds, the sign tests; without single frames."""
     plan = comparison.plan
     return {
         "session": plan.session,
@@ -109,23 +109,23 @@ def frames_csv(comparison: Comparison) -> str:
 
 
 def in_words(comparison: Comparison) -> str:
-    """Who did best, and each pair's sign tests in a sentence."""
+    """The ranking, and each pair's sign tests, as sentences."""
     ranked = sorted(comparison.trackers, key=lambda result: result.mean_mm)
     order = ", ".join(f"{result.tracker} {result.mean_mm:.1f} mm" for result in ranked)
     count, seeds = len(comparison.frames), len(comparison.plan.seeds)
-    told = [
+    sentences = [
         f"Mean error over {count} frames and {seeds} {'seed' if seeds == 1 else 'seeds'}, best first: {order}."
     ]
-    told += [pair_words(pair) for pair in comparison.pairs]
+    sentences += [pair_words(pair) for pair in comparison.pairs]
     if comparison.pairs:
-        told.append(NOT_INDEPENDENT)
+        sentences.append(NOT_INDEPENDENT)
         if 0.5 ** (seeds - 1) > SIGNIFICANT:
             least = 0.5 ** (seeds - 1)
-            told.append(
+            sentences.append(
                 f"With {seeds} {'seed' if seeds == 1 else 'seeds'} the seeds' p cannot fall below {least:.2g};"
             )
-            told[-1] += " six or more can show a difference at 5 %."
-    return " ".join(told)
+            sentences[-1] += " six or more can show a difference at 5 %."
+    return " ".join(sentences)
 
 
 def pair_words(pair: PairTest) -> str:
@@ -139,12 +139,12 @@ def pair_words(pair: PairTest) -> str:
 
 
 def p_words(p: float) -> str:
-    """A probability as it is written in a sentence."""
+    """A probability as text."""
     return "p < 0.0001" if p < 1e-4 else f"p = {p:.2g}"
 
 
 def table_text(comparison: Comparison) -> str:
-    """The table and the words for a terminal."""
+    """The table and the text for a terminal."""
     rows = [[str(cell) for cell in row] for row in ([*COLUMNS], *_table(comparison).rows)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(COLUMNS))]
     lines = [
@@ -204,7 +204,7 @@ def _tests(comparison: Comparison) -> Table:
 
 def _settings(comparison: Comparison) -> dict[str, Any]:
     plan = comparison.plan
-    told: dict[str, Any] = {
+    listed: dict[str, Any] = {
         "session": plan.session,
         "frames": f"{plan.first} to {plan.last - 1} at {plan.fps:g} per second",
         "body": plan.body or "the session's",
@@ -212,10 +212,10 @@ def _settings(comparison: Comparison) -> dict[str, Any]:
     }
     for candidate in plan.entrants:
         defaults = values(candidate.settings())
-        told[candidate.name] = ", ".join(
+        listed[candidate.name] = ", ".join(
             [candidate.weighting, *(f"{knob} {defaults[knob]}" for knob in candidate.changes)]
         )
-    return told
+    return listed
 
 
 def _plain_tracker(result: TrackerResult, seeds: tuple[int, ...]) -> dict[str, Any]:

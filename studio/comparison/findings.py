@@ -1,6 +1,6 @@
-"""What trials have shown, as plain values: numbers with verdicts, tables, and charts as what is drawn, not how.
+"""The findings of trials as plain values: numbers with verdicts, tables, and charts as data.
 
-The report and the studio's pages draw them alike.
+The report and the studio's pages draw them in the same way.
 """
 
 from collections.abc import Mapping
@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from studio.comparison.trials import Plain
 
 VERDICTS = ("reproduced", "better", "not reproduced", "answered")
-# What stands in a verdict's place where a trial failed or the conclusion could not be drawn.
+# In place of a verdict where a trial failed or no conclusion could be drawn.
 FAILED = "failed"
-# A verdict is firm with so many seeds or more.
+# Least seeds of a firm verdict.
 FIRM_SEEDS = 10
 
 KINDS = ("lines", "bars", "points", "heat")
@@ -23,7 +23,7 @@ class Series:
 
     x, y : the same length, y NaN for gaps. low, high : an interval around each y, or empty. group : series of one
     group share a colour (every seed of a tracker, say). thin : drawn faintly behind the others (single seeds);
-    only the thick one of a group stands in the legend. dashed : for what the paper printed.
+    only the thick one of a group stands in the legend. dashed : for the paper's values.
     """
 
     name: str
@@ -67,11 +67,11 @@ class Chart:
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """One of our numbers beside the paper's.
+    """One of our numbers compared with the paper's.
 
     ours : over all seeds; low, high : its bootstrap 95 % interval over seeds. paper : None where the paper
     prints none. better : "lower" or "higher" if a difference to that side is an improvement, "" if not. seeds :
-    how many went into it. verdict : "reproduced" where the interval contains the paper's value, "better" where
+    their number. verdict : "reproduced" where the interval contains the paper's value, "better" where
     it lies wholly on the better side, else "not reproduced"; "answered" without a paper's value.
     """
 
@@ -97,7 +97,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Heading:
-    """What findings are about. name : a word. source, claim : where it was claimed, and what."""
+    """The subject of findings. name : a word. source, claim : of the claim, and its text."""
 
     name: str
     title: str
@@ -107,10 +107,10 @@ class Heading:
 
 @dataclass(frozen=True, slots=True)
 class Findings:
-    """What an experiment found.
+    """The findings of an experiment.
 
-    verdict : of the whole, one of VERDICTS. words : what was seen, in a sentence or three, with the deviations from
-    the paper that matter. settings : knobs and sizes that the numbers belong to.
+    verdict : of the whole, one of VERDICTS. words : summary in one to three sentences, with the
+    relevant deviations from the paper. settings : knobs and sizes that the numbers belong to.
     """
 
     verdict: str

@@ -1,6 +1,6 @@
-"""Findings as plain values that any JSON reader takes: what the report, the studio's pages and scripts read.
+"""Findings as plain JSON values, for the report, the studio's pages and scripts.
 
-NaN and infinity become null; numbers keep six significant figures, which no chart can show more of.
+NaN and infinity become null; numbers keep six significant figures, more than a chart can show.
 """
 
 import math
@@ -16,17 +16,17 @@ from studio.comparison.trials import Plain, Scale
 FIGURES = 6
 Document = dict[str, Any]
 
-# Where documents of reproduced figures lie in the workspace, and the files of all of them together.
+# Folder of the reproduced figures' documents in the workspace, and the file of all of them together.
 REPRODUCTIONS = "reproduction"
 RESULTS, SUMMARY, REPORT = "results.json", "summary.md", "report.html"
 
 
 @dataclass(frozen=True, slots=True)
 class Making:
-    """How findings came about.
+    """Origin of findings.
 
-    scale : what was run. trials : how many. seconds : of all of them, one after the other. software : what drew
-    the conclusion; measured_by : what measured the trials. date : UTC, ISO 8601.
+    scale : of the experiment. trials : their number. seconds : of all of them in sequence. software : version that
+    drew the conclusion; measured_by : versions that measured the trials. date : UTC, ISO 8601.
     """
 
     scale: Scale
@@ -38,7 +38,7 @@ class Making:
 
 
 def as_document(heading: Heading, findings: Findings, making: Making) -> Document:
-    """An experiment that was run to its end."""
+    """The document of a finished experiment."""
     numbers = [_without_nan(asdict(number)) for number in findings.numbers]
     for number, entry in zip(findings.numbers, numbers, strict=True):
         entry["firm"] = number.seeds >= FIRM_SEEDS
@@ -57,11 +57,11 @@ def as_document(heading: Heading, findings: Findings, making: Making) -> Documen
 
 
 def failed_document(heading: Heading, reasons: Sequence[tuple[str, str]], making: Making) -> Document:
-    """An experiment without findings. reasons : what failed (a trial's label), and why."""
+    """The document of an experiment without findings. reasons : what failed (a trial's label), and why."""
     failed = sum(1 for label, _ in reasons if label)
     first = ": ".join(part for part in reasons[0] if part)
     if len(reasons) > 1:
-        words = f"Not concluded, for {failed} of {making.trials} trials failed; the first: {first}"
+        words = f"Not concluded: {failed} of {making.trials} trials failed; the first: {first}"
     else:
         words = f"Not concluded. {first}"
     return {
@@ -94,7 +94,7 @@ def _head(heading: Heading, making: Making) -> Document:
 
 
 def _seeds(findings: Findings, making: Making) -> int:
-    """How many seeds the verdict rests on: the fewest of a number that was compared with the paper's."""
+    """Number of seeds behind the verdict: the fewest of a number that was compared with the paper's."""
     compared = [number.seeds for number in findings.numbers if number.verdict != "answered"]
     return min(compared, default=len(making.scale.seeds))
 

@@ -1,4 +1,4 @@
-"""The comparisons of a session: where a new one goes, finding them, throwing them away and bringing them back."""
+"""The comparisons of a session: folders, listing, trash and restoring."""
 
 import os
 from collections.abc import Mapping
@@ -27,7 +27,7 @@ FOLDER_NAME = "comparisons"
 
 
 def new_comparison(folder: Path, plan: Plan) -> KeptComparison:
-    """Make a comparison's folder, whole or not at all. Raises SessionError if something is there."""
+    """Make a comparison's folder, atomically. Raises SessionError if it exists."""
     record = ComparisonRecord(name=folder.name, created=now(), software=software_version(), plan=plan)
     made = atomic_files.new_folder_beside(folder)
     try:
@@ -36,16 +36,14 @@ def new_comparison(folder: Path, plan: Plan) -> KeptComparison:
         RECORD.write(made / RECORD_NAME, record)
         atomic_files.move_into_place(made, folder)
     except FileExistsError:
-        raise SessionError(
-            f"There is something at '{folder}' already.", "Choose another name or folder."
-        ) from None
+        raise SessionError(f"'{folder}' already exists.", "Choose another name or folder.") from None
     finally:
         atomic_files.discard(made)
     return KeptComparison(folder)
 
 
 def place_of(session: Session, name: str = "") -> Path:
-    """Where a comparison of a session goes; without a name to comparison-1, comparison-2, …"""
+    """The folder for a comparison of a session; without a name comparison-1, comparison-2, …"""
     folder = session.path / FOLDER_NAME
     taken = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
     return folder / (
@@ -59,7 +57,7 @@ def kept_comparisons(session: Session) -> tuple[KeptComparison, ...]:
 
 
 def comparison_count(session: Session) -> int:
-    """How many comparisons a session has."""
+    """Number of a session's comparisons."""
     return len(_folders(session))
 
 
@@ -75,7 +73,7 @@ def kept_comparison(session: Session, name: str) -> KeptComparison:
 
 
 def unfinished_like(session: Session, plan: Plan) -> KeptComparison | None:
-    """The newest comparison of a session that asked for the same and can go on, None without one."""
+    """The newest comparison of a session with the same plan that can be resumed, None without one."""
     for kept in kept_comparisons(session):
         try:
             same = not differences(plan, kept.plan(session))
@@ -94,7 +92,7 @@ def throw_away(workspace: Workspace, session: Session, kept: KeptComparison) -> 
 
 
 def bring_back(workspace: Workspace, trashed_name: str) -> tuple[Session, KeptComparison]:
-    """Bring a comparison back from the trash into its session. Raises NotFoundError."""
+    """Restore a comparison from the trash into its session. Raises NotFoundError."""
     thrown = KeptComparison(inside(workspace.root / TRASH_NAME, trashed_name))
     record = thrown.record()
     for owner in (trashed_name.partition("--")[0], record.plan.session):
@@ -106,13 +104,13 @@ def bring_back(workspace: Workspace, trashed_name: str) -> tuple[Session, KeptCo
             os.rename(thrown.folder, place)
             return session, KeptComparison(place)
     raise NotFoundError(
-        f"Session '{record.plan.session}' of this comparison is gone.", "Restore the session first."
+        f"Session '{record.plan.session}' of this comparison does not exist.", "Restore the session first."
     )
 
 
-def differences(asked: Plan, kept: Plan) -> tuple[str, ...]:
-    """The names of what two plans differ in; where the session lies does not count."""
-    first, second = _comparable(asked), _comparable(kept)
+def differences(requested: Plan, kept: Plan) -> tuple[str, ...]:
+    """The names of the fields in which two plans differ; the session's path does not count."""
+    first, second = _comparable(requested), _comparable(kept)
     return tuple(name for name in first if first[name] != second[name])
 
 
@@ -131,7 +129,7 @@ def _is_comparison(path: Path) -> bool:
 
 
 def _made(path: Path) -> tuple[str, int, str]:
-    """What orders folders by age; one that cannot be read counts as oldest."""
+    """Sort key of folders by age; one that cannot be read counts as oldest."""
     try:
         created = KeptComparison(path).record().created
     except SessionError:

@@ -1,7 +1,7 @@
 """The footage of experiments and its evidence, so that trials on the same frames compute them once.
 
-A shelf belongs to one process. It holds the evidence of whole sequences, the pictures themselves only where a
-weighting reads them (about 2.5 MB a frame of four 640 × 480 cameras without), the longest unused first to go.
+The cache belongs to one process. It holds the evidence of whole sequences, the pictures only where a weighting reads
+them (about 2.5 MB a frame of four 640 × 480 cameras without), and drops the least recently used first.
 """
 
 import dataclasses
@@ -24,7 +24,7 @@ from studio.sessions.session import Session
 MOST_BYTES = 3_000_000_000
 NO_PICTURE = np.zeros((0, 0, 3), np.uint8)
 MOST_PREPARED = 3
-"""A sequence of visual hulls, ready to be weighed, takes some 100 MB."""
+"""Number of prepared sequences kept; one of visual hulls takes some 100 MB."""
 
 T = TypeVar("T")
 
@@ -58,7 +58,7 @@ class FootageShelf:
         edge_kind: str,
         pictures: bool = False,
     ) -> FrameEvidence:
-        """What is seen in a frame, the pictures themselves only if asked for. Raises FootageError, NotFoundError."""
+        """The evidence of a frame, with pictures only if `pictures`. Raises FootageError, NotFoundError."""
         made_by = (session.path, tuple(camera.name for camera in cameras), settings, edge_kind, pictures)
         key = (made_by, frame)
         if key in self._evidence:
@@ -75,7 +75,7 @@ class FootageShelf:
         return self._kept(key, seen)
 
     def prepared(self, key: Hashable, make: Callable[[], T]) -> T:
-        """What `make` makes, once for all trials that ask for the same key; few such things are kept."""
+        """The result of `make`, computed once a key; only the last few are kept."""
         if key not in self._prepared:
             self._prepared[key] = make()
             while len(self._prepared) > MOST_PREPARED:
@@ -84,7 +84,7 @@ class FootageShelf:
         return cast("T", self._prepared[key])
 
     def close(self) -> None:
-        """Let go of files and of everything kept."""
+        """Close files and drop everything kept."""
         self._evidence.clear()
         self._prepared.clear()
         self._bytes = 0

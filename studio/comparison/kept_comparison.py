@@ -1,7 +1,7 @@
-"""Comparisons on disk: a folder each, in the session they belong to, so that none is lost and all can go on.
+"""Comparisons on disk: a folder each, in the session they belong to, so that all can be resumed.
 
-`comparisons/<name>/`: `comparison.json` (what was asked), `behaviour.model` (a copy of the model of those that need
-one), `trials/` (one file an outcome, as soon as it is there),
+`comparisons/<name>/`: `comparison.json` (the request), `behaviour.model` (a copy of the model of those that need
+one), `trials/` (one file an outcome, as soon as it is measured),
 and once all are done `result.json` (numbers, findings, every frame) and `frames.csv`.
 """
 
@@ -33,9 +33,10 @@ SCHEMA_VERSION = 1
 
 
 class ComparisonRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What was asked. name : of the folder when it was made. created : UTC, ISO 8601. software : the studio's version.
+    """The requested comparison. name : of the folder when it was made. created : UTC, ISO 8601. software : the studio's
+    version.
 
-    ended : "cancelled" or "failed" where it was broken off so, "" else; problem : why, in words.
+    ended : "cancelled" or "failed" where it was stopped so, else ""; problem : the reason.
     """
 
     schema: int = SCHEMA_VERSION
@@ -58,7 +59,7 @@ RECORD = RecordFile(
 
 @dataclass(frozen=True, slots=True)
 class KeptComparison:
-    """A comparison's folder, whatever became of it."""
+    """A comparison's folder, in any state."""
 
     folder: Path
 
@@ -69,24 +70,24 @@ class KeptComparison:
 
     @property
     def kept_trials(self) -> KeptTrials:
-        """The outcomes that are there."""
+        """The measured outcomes."""
         return KeptTrials(self.folder / TRIALS_NAME)
 
     def record(self) -> ComparisonRecord:
-        """What was asked. Raises NotFoundError where there is nothing, SessionError where it cannot be read."""
+        """The request. Raises NotFoundError where there is none, SessionError where it cannot be read."""
         return RECORD.read(self.folder / RECORD_NAME)
 
     def plan(self, session: Session | None = None) -> Plan:
-        """What was asked; of the session where it lies now, if one is given."""
-        asked = self.record().plan
-        if asked.behaviour:
-            asked = replace(asked, behaviour_path=str((self.folder / BEHAVIOUR_NAME).absolute()))
+        """The requested plan; with the present path of the session, if one is given."""
+        plan = self.record().plan
+        if plan.behaviour:
+            plan = replace(plan, behaviour_path=str((self.folder / BEHAVIOUR_NAME).absolute()))
         if session is None:
-            return asked
-        return replace(asked, footage=str(session.path.absolute()), session=session.name)
+            return plan
+        return replace(plan, footage=str(session.path.absolute()), session=session.name)
 
     def status(self) -> str:
-        """running, done, cancelled, failed, or interrupted (its process is gone; it can go on)."""
+        """running, done, cancelled, failed, or interrupted (its process ended; it can be resumed)."""
         if (self.folder / RESULT_NAME).is_file():
             return "done"
         if self.is_running():
@@ -94,20 +95,20 @@ class KeptComparison:
         return self.record().ended or "interrupted"
 
     def is_running(self) -> bool:
-        """Whether a living process works at it."""
+        """Whether a process works on it."""
         return ProcessLock.is_held(self.folder / LOCK_NAME)
 
     def lock(self) -> ProcessLock | None:
-        """The right to work at it, None while another process does."""
+        """The lock for working on it, None while another process has it."""
         return ProcessLock.take(self.folder / LOCK_NAME)
 
     def end(self, how: str, problem: str = "") -> None:
-        """Write down that it was broken off ("cancelled", "failed") or goes on ("")."""
+        """Record that it was stopped ("cancelled", "failed") or resumed ("")."""
         ended = msgspec.structs.replace(self.record(), ended=how, problem=problem)
         RECORD.write(self.folder / RECORD_NAME, ended)
 
     def finish(self, comparison: Comparison) -> None:
-        """Write the result, the frames first, so that whoever sees a result finds both."""
+        """Write the result, the frames first, so that both exist once there is a result."""
         atomic_files.write_text(self.folder / FRAMES_NAME, frames_csv(comparison))
         atomic_files.write_bytes(
             self.folder / RESULT_NAME, msgspec.json.encode(result_of(comparison)) + b"\n"
@@ -120,8 +121,8 @@ class KeptComparison:
 
 
 def trial_key(trial: Trial) -> str:
-    """The name of a trial's outcome: made from its arguments, but not from where the session and the comparison's one
-    behaviour model lie.
+    """The name of a trial's outcome: made from its arguments, except the paths of the session and the comparison's
+    behaviour model.
     """
     elsewhere = ("footage", "behaviour")
     arguments = {name: value for name, value in plain(trial.arguments).items() if name not in elsewhere}
@@ -129,7 +130,7 @@ def trial_key(trial: Trial) -> str:
 
 
 def result_of(comparison: Comparison) -> dict[str, Any]:
-    """All that is kept of a comparison, plain; NaN is written as null."""
+    """The stored result of a comparison, plain; NaN is written as null."""
     return {
         **document(comparison),
         "per_frame": {
@@ -144,7 +145,7 @@ def result_of(comparison: Comparison) -> dict[str, Any]:
 
 
 def _findings_document(comparison: Comparison) -> dict[str, Any]:
-    """The comparison as an experiment's document, to be drawn as those are."""
+    """The comparison as an experiment's document."""
     plan = comparison.plan
     names = ", ".join(candidate.name for candidate in plan.entrants)
     heading = Heading(

@@ -1,8 +1,8 @@
-"""Outcomes on disk, one file each, so that nothing that was measured is measured twice.
+"""Outcomes on disk, one file each, so that nothing is measured twice.
 
 A file's name is made from all that an outcome depends on: the function that measures, its arguments, and the
-recipes of the footage that these name. Experiments that ask for the same trial share it; a program that was killed
-goes on where it was. A file is whole or not there.
+recipes of the footage that these name. Experiments with the same trial share it; a program that was killed
+resumes where it was. Files are written atomically.
 """
 
 import hashlib
@@ -20,7 +20,7 @@ from studio.sessions.atomic_files import write_text
 from studio.tracking.catalogue import TRACKERS
 from studio.weighting.catalogue import WEIGHTINGS
 
-# What decides on an outcome; pages, commands and reports do not.
+# Rooms whose code affects outcomes; pages, commands and reports do not.
 SCIENCE = (
     *("geometry", "motion_files", "body", "capture", "evidence", "volume", "weighting", "behaviour"),
     *("tracking", "runs", "evaluation", "training"),
@@ -29,10 +29,10 @@ SCIENCE = (
 
 @dataclass(frozen=True, slots=True)
 class KeptOutcome:
-    """What became of a trial.
+    """The outcome of a trial, or its failure.
 
-    measured : plain values, None where it failed. failure : why, "" where it did not. seconds : it took. software :
-    what measured it. finished : UTC, ISO 8601. label, arguments : of the trial, for people who read the file.
+    measured : plain values, None where it failed. failure : why, "" where it did not. seconds : its duration. software
+    : version that measured it. finished : UTC, ISO 8601. label, arguments : of the trial, for readers of the file.
     """
 
     measured: Mapping[str, Plain] | None
@@ -51,20 +51,20 @@ class KeptTrials:
         self.folder = folder
 
     def read(self, key: str) -> KeptOutcome | None:
-        """The outcome of that key; None where there is none, or a file that cannot be read as one."""
+        """The outcome of a key; None without a readable file."""
         try:
             return KeptOutcome(**json.loads((self.folder / f"{key}.json").read_text(encoding="utf-8")))
         except (OSError, ValueError, TypeError):
             return None
 
     def write(self, key: str, outcome: KeptOutcome) -> None:
-        """Keep an outcome, in the place of an older one. Raises OSError."""
+        """Store an outcome, replacing an older one. Raises OSError."""
         self.folder.mkdir(parents=True, exist_ok=True)
         write_text(self.folder / f"{key}.json", json.dumps(plain(asdict(outcome)), indent=1) + "\n")
 
 
 def measured_by() -> str:
-    """The studio's version and a digest of the code that decides on outcomes: "0.1.0+1a2b3c4d"; then the packages that
+    """The studio's version and a digest of the code that affects outcomes: "0.1.0+1a2b3c4d"; then the packages that
     add trackers or weightings.
     """
     packages = dict.fromkeys((*TRACKERS.packages, *WEIGHTINGS.packages))
@@ -89,10 +89,10 @@ def plain(value: Plain) -> Any:  # noqa: ANN401
 
 
 def _plain_value(value: Any) -> Any:  # noqa: ANN401
-    """NumPy's arrays and numbers, mappings and sets. Raises TypeError for what has no plain form."""
+    """NumPy's arrays and numbers, mappings and sets. Raises TypeError for other types."""
     as_list = getattr(value, "tolist", None)
     if callable(as_list):
         return as_list()
     if isinstance(value, Mapping):
         return dict(value)
-    raise TypeError(f"A {type(value).__name__} is no plain value.")
+    raise TypeError(f"A {type(value).__name__} is not a plain value.")

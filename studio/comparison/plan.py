@@ -1,7 +1,7 @@
 """Trackers compared fairly on one session with a known truth: the same evidence, weighting, start, σ0 and number of
 evaluations a frame, the same seeds.
 
-A comparison is a plan, its trials (one a tracker and seed, any of them in any process) and what follows from all of
+A comparison is a plan, its trials (one a tracker and seed, any of them in any process) and the conclusion from all of
 them: `trials`, `conclude`. Trials are made and measured as those of the experiments are (`tracking_trials`).
 """
 
@@ -19,7 +19,7 @@ from studio.comparison.tracked import Attempt, Tracked, tracking_trial
 from studio.comparison.trials import Outcome, Trial
 from studio.errors import RunError, TruthError
 from studio.runs.behaviour_models import ChosenModel, chosen_model, needs_model
-from studio.runs.new_run import checked_frames, start_pose
+from studio.runs.new_run import checked_frames, start_of
 from studio.sessions.session import Session
 from studio.settings import DEFAULT_WEIGHTING
 from studio.tracking.frame_refinement import FrameRefinementSettings
@@ -30,9 +30,9 @@ MOST_SEEDS = 1000
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What is compared. footage : the session's folder. session : its name. first, last : frames, half open. fps : of
-    the footage. body : a name, "" for the session's own. behaviour : name of the model of those that need one, "" for
-    none; behaviour_digest : of its file; behaviour_path : where it lies now.
+    """The plan of a comparison. footage : the session's folder. session : its name. first, last : frames, half open.
+    fps : of the footage. body : a name, "" for the session's own. behaviour : name of the model of those that need one,
+    "" for none; behaviour_digest : of its file; behaviour_path : its present path.
     """
 
     footage: str
@@ -50,7 +50,7 @@ class Plan:
 
     @property
     def frame_count(self) -> int:
-        """How many frames every trial tracks."""
+        """Number of frames that every trial tracks."""
         return self.last - self.first
 
 
@@ -88,7 +88,7 @@ class TrackerResult:
 
     @property
     def seconds(self) -> float:
-        """The search's, of all seeds."""
+        """Seconds of the search, over all seeds."""
         return sum(seed.seconds for seed in self.seeds)
 
     @property
@@ -113,7 +113,7 @@ class PairTest:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """What was found. frames : numbers of those with a truth. pairs : every two trackers."""
+    """The result of a comparison. frames : numbers of those with a truth. pairs : every two trackers."""
 
     plan: Plan
     frames: tuple[int, ...]
@@ -131,14 +131,14 @@ def plan_comparison(
     body: str = "",
     behaviour: str = "",
 ) -> Plan:
-    """Everything checked that can be before anything is tracked; lineup.weighting "" means the session's own,
-    behaviour "" the only model that fits where somebody needs one.
+    """A checked plan; lineup.weighting "" means the session's own, behaviour "" the only model that fits where a
+    tracker needs one.
 
-    Raises TruthError for a session without truth, SettingsError, RunError and BodyError for what cannot be done.
+    Raises TruthError for a session without truth, SettingsError, RunError and BodyError for impossible requests.
     """
     if session.truth_path is None:
         raise TruthError(
-            f"Session '{session.name}' has no truth to measure trackers against.",
+            f"Session '{session.name}' has no truth to compare trackers with.",
             "Take one made by 'studio synthesize', or import it with a truth/*.trc.",
         )
     weighting = WEIGHTINGS[lineup.weighting or session.manifest.weighting or DEFAULT_WEIGHTING].name
@@ -152,7 +152,7 @@ def plan_comparison(
         )
     begin, end = checked_frames(session, first, last)
     model = session.body(body or None)
-    start_pose(session, model, None)
+    start_of(session, model, None)
     taking_part = candidates(replace(lineup, weighting=weighting))
     chosen = _chosen_model(session, model, taking_part, behaviour)
     return Plan(
@@ -201,12 +201,12 @@ def conclude(plan: Plan, outcomes: Sequence[Outcome]) -> Comparison:
 
 
 def _chosen_model(
-    session: Session, body: BodyModel, taking_part: Sequence[Candidate], asked: str
+    session: Session, body: BodyModel, taking_part: Sequence[Candidate], behaviour: str
 ) -> ChosenModel | None:
-    """The model of all who need one; None where nobody does. Raises BehaviourError, NotFoundError."""
+    """The model for all candidates that need one; None where none does. Raises BehaviourError, NotFoundError."""
     for candidate in taking_part:
         if needs_model(candidate.tracker, candidate.settings().tracker):
-            return chosen_model(session, body, candidate.settings(), asked)
+            return chosen_model(session, body, candidate.settings(), behaviour)
     return None
 
 

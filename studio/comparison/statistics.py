@@ -1,4 +1,4 @@
-"""Intervals, tests and verdicts of the experiments: what several seeds say about one number.
+"""Intervals, tests and verdicts on numbers over several seeds.
 
 The verdict's rule: the bootstrap 95 % interval over the seeds contains the paper's value (reproduced), lies
 wholly on the better side of it (better), or does not (not reproduced). It is firm with FIRM_SEEDS seeds or more.
@@ -16,7 +16,7 @@ from scipy import stats
 from studio.comparison.findings import FIRM_SEEDS, Number
 
 Array = NDArray[np.float64]
-# Of a sample; one that takes `axis`, like NumPy's, is many times as fast.
+# Statistic of a sample; one that takes `axis`, like NumPy's, is many times as fast.
 Statistic = Callable[..., ArrayLike]
 
 RESAMPLES, LEVEL = 9999, 0.95
@@ -99,7 +99,7 @@ def ratio_number(
 
 
 def verdict_of(low: float, high: float, paper: float | None, better: str = "") -> str:
-    """The verdict on an interval: "answered" without a paper's value, else as the rule above says."""
+    """The verdict on an interval: "answered" without a paper's value, else by the rule above."""
     if better not in ("", "lower", "higher"):
         raise ValueError(f"better is '{better}', not 'lower', 'higher' or ''.")
     if paper is None:
@@ -111,8 +111,8 @@ def verdict_of(low: float, high: float, paper: float | None, better: str = "") -
 
 
 def overall(verdicts: Iterable[str]) -> str:
-    """The verdict of the whole: "not reproduced" as soon as one is, "better" only where all that can be compared
-    are, "answered" where none can.
+    """The overall verdict: "not reproduced" as soon as one is, "better" only where all comparable ones are,
+    "answered" where none is comparable.
     """
     compared = [verdict for verdict in verdicts if verdict != "answered"]
     if not compared:
@@ -123,7 +123,7 @@ def overall(verdicts: Iterable[str]) -> str:
 
 
 def firmness(seeds: int) -> str:
-    """Words to set behind a verdict: empty with seeds enough, else that it is not firm yet."""
+    """Text to add to a verdict: empty with enough seeds, else that it is not firm."""
     if seeds >= FIRM_SEEDS:
         return ""
     return f"not firm: {seeds} {'seed' if seeds == 1 else 'seeds'} of at least {FIRM_SEEDS}"
@@ -138,7 +138,7 @@ def _interval(samples: tuple[Array, ...], statistic: Statistic) -> tuple[float, 
         return value, value
     for method in ("BCa", "percentile"):
         with warnings.catch_warnings(), np.errstate(all="ignore"):
-            # Samples whose resamples hardly differ (a median, a maximum) have no acceleration: percentiles then.
+            # Samples whose resamples hardly differ (a median, a maximum) have no acceleration: use percentiles.
             warnings.simplefilter("ignore")
             found = stats.bootstrap(
                 samples,

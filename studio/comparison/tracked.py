@@ -1,4 +1,4 @@
-"""A tracker on a footage, kept in memory only: the trial that most experiments are made of."""
+"""A tracker on a footage, in memory only: the trial of most experiments."""
 
 import dataclasses
 import time
@@ -39,7 +39,7 @@ Array = NDArray[np.float64]
 
 
 AS_PUBLISHED: Mapping[str, Any] = {"refine_frames": False}
-"""The papers' trackers end where their search does; an attempt that refines says so."""
+"""Knobs without refinement, as in the papers; an attempt that refines sets them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,11 +47,11 @@ class Attempt:
     """One run: all that its poses depend on, plain values.
 
     footage : a recipe's name, or the path of a session. changes : knobs by flat name. first, last : frames, half
-    open; last None means all. every : only each so many frames are seen (fps is divided, σ0 multiplied). cameras :
+    open; last None means all. every : step between the frames used (fps is divided, σ0 multiplied). cameras :
     names, empty for all. body : a body's name or file, "" for the session's own. subject : a subject file beside the
     session's own, such as "subject_shape.toml" of the Lee-walk twin (no hands and feet), "" for its own. sigma_scale :
-    multiplies σ0. behaviour : a behaviour model, by its name in the workspace's models or by path. shape_frames : that
-    many frames are tracked first, and the shape that is fitted to them (`runs.shape_on_the_way`) has the run.
+    multiplies σ0. behaviour : a behaviour model, by its name in the workspace's models or by path. shape_frames :
+    number of frames tracked first, to which the shape of the run is fitted (`runs.shape_on_the_way`).
     """
 
     footage: str
@@ -70,7 +70,9 @@ class Attempt:
     shape_frames: int = 0
 
     def plain(self) -> dict[str, Any]:
-        """As a trial's arguments; without a model as they were before there were any, so that outcomes stay known."""
+        """As a trial's arguments; fields added later are left out at their defaults, so that stored outcomes stay
+        valid.
+        """
         return {
             name: value
             for name, value in asdict(self).items()
@@ -79,18 +81,18 @@ class Attempt:
 
     @classmethod
     def of_plain(cls, arguments: Mapping[str, Any]) -> "Attempt":
-        """From a trial's arguments, as they come back from JSON."""
+        """From a trial's arguments, as read from JSON."""
         return cls(**{**arguments, "cameras": tuple(arguments.get("cameras", ()))})
 
 
 @dataclass(frozen=True, slots=True)
 class Tracked:
-    """What an attempt reached, mm without alignment.
+    """The errors of an attempt, mm without alignment.
 
     frames : numbers in the footage. per_frame_mm : mean over markers. lost : per frame the names of limbs that are
     lost (a marker more than 150 mm off). evaluations : poses weighed in a frame after the first. seconds : of the
     search (weighting and tracker), without reading and preparing pictures. named : per frame the limbs that the tracker
-    itself called lost, as a run's timeline shows them.
+    itself reported lost, as in a run's timeline.
     """
 
     frames: list[int]
@@ -107,7 +109,7 @@ class Tracked:
 
 @dataclass(frozen=True, slots=True)
 class Changed:
-    """How an experiment may spoil what a tracker is given. cameras : of all views. evidence : of each frame."""
+    """Disturbance of a tracker's input by an experiment. cameras : of all views. evidence : of each frame."""
 
     cameras: Callable[[tuple[Camera, ...]], tuple[Camera, ...]] = lambda cameras: cameras
     evidence: Callable[[FrameEvidence], FrameEvidence] = lambda evidence: evidence
@@ -124,7 +126,7 @@ def track(
     on_frame: Callable[[int, int], None] | None = None,
     spoilt: Changed = UNCHANGED,
 ) -> Tracked:
-    """Track and measure. on_layer : is given every layer. on_frame : frames done, frames in all; may raise to stop.
+    """Track and measure. on_layer : called with every layer. on_frame : frames done, frames in all; may raise to stop.
 
     Raises TruthError for a footage without truth and what tracking raises.
     """
@@ -140,7 +142,7 @@ def track(
     frames = range(attempt.first, attempt.last or session.manifest.frame_count, attempt.every)
 
     def evidence(frame: int, name: str = attempt.weighting) -> FrameEvidence:
-        """What is seen in a frame, as a weighting wants it."""
+        """The evidence of a frame for a weighting."""
         kind, pictures = WEIGHTINGS[name].edge_kind, WEIGHTINGS[name].reads_pictures
         return spoilt.evidence(shelf.evidence(session, cameras, frame, settings.evidence, kind, pictures))
 
@@ -223,7 +225,7 @@ def _behaviour(
 
 
 def _cameras(session: Session, names: tuple[str, ...]) -> tuple[Camera, ...]:
-    """The session's cameras, or those of them that are named, in the session's order."""
+    """The session's cameras, or the named ones, in the session's order."""
     known = session.cameras()
     unknown = set(names) - {camera.name for camera in known}
     if unknown:
@@ -233,8 +235,8 @@ def _cameras(session: Session, names: tuple[str, ...]) -> tuple[Camera, ...]:
 
 
 def _start_pose(session: Session, body: BodyModel, first: int, fps: float) -> tuple[float, ...] | None:
-    """The session's start pose; for a later first frame, and for a body that the session's pose is not of, the body
-    laid on the true markers of that frame.
+    """The session's start pose; for a later first frame, and for a body other than the session's, the pose
+    fitted to the true markers of that frame.
     """
     is_own = body.name == session.manifest.body
     own = session.start_pose(body) if is_own else None
@@ -254,7 +256,7 @@ def _pose_on_truth(session: Session, body: BodyModel, frame: int, fps: float, ne
     return pose_from_markers(body, names, points, body.neutral if near is None else near)[0]
 
 
-# The trial that experiments on tracked footage and comparisons share: the same attempt is the same trial, whoever asks.
+# The trial that experiments on tracked footage and comparisons share: the same attempt is the same trial.
 
 
 def tracking_trial(group: str, attempt: Attempt) -> Trial:

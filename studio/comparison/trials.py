@@ -1,4 +1,4 @@
-"""A trial: one piece of work whose outcome depends on its arguments alone, run in any process, kept and found again."""
+"""A trial: one piece of work whose outcome depends on its arguments alone, run in any process, stored and reused."""
 
 import traceback
 from collections.abc import Callable, Mapping
@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from studio.comparison.footage_shelf import FootageShelf
 from studio.errors import StudioError
 
-# Numbers, words, lists and dictionaries: what JSON can hold.
+# Numbers, text, lists and dictionaries: the types of JSON.
 Plain = Any
 Measure = Callable[[Mapping[str, Plain], FootageShelf], dict[str, Plain]]
 M = TypeVar("M", bound=Callable[..., Any])
@@ -18,7 +18,7 @@ NAMED_BELOW = "studio.experiments"
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """How much is run. seeds : of the trials. quick : a look in minutes."""
+    """Extent of an experiment. seeds : of the trials. quick : a preview in minutes."""
 
     seeds: tuple[int, ...]
     quick: bool = False
@@ -26,7 +26,7 @@ class Scale:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One piece of work. label : words for the progress. arguments : all that its outcome depends on, plain;
+    """One piece of work. label : text for the progress. arguments : all that its outcome depends on, plain;
     the same arguments always give the same outcome, so a kept outcome is used again.
     """
 
@@ -36,7 +36,7 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """A trial and what was measured: plain values."""
+    """A trial and its measured values, plain."""
 
     trial: Trial
     measured: Mapping[str, Plain]
@@ -44,10 +44,10 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class TrialJob:
-    """A trial, ready to be run in any process.
+    """A trial that can run in any process.
 
-    key : under which its outcome is kept. experiment : the first that asks for it. footage : recipes that it looks
-    at. frames : how many of them from the first, None for all. alone : nothing else may run then.
+    key : under which its outcome is kept. experiment : the first that needs it. footage : recipes that it
+    uses. frames : number from the first, None for all. alone : nothing else may run at the same time.
     """
 
     key: str
@@ -61,7 +61,7 @@ class TrialJob:
 
 
 def kept_as(name: str) -> Callable[[M], M]:
-    """Give a measure the name that its outcomes are kept under, wherever its code moves to.
+    """Give a measure the name that its outcomes are stored under, independent of its module.
 
     The names are those of the modules in which outcomes were first measured, below NAMED_BELOW: another name is
     another trial, and everything is measured again.
@@ -75,12 +75,12 @@ def kept_as(name: str) -> Callable[[M], M]:
 
 
 def measure_name(measure: Measure) -> str:
-    """The name that a measure's outcomes are kept under: that of `kept_as`, else where it stands."""
+    """The name that a measure's outcomes are stored under: that of `kept_as`, else its module and function."""
     return getattr(measure, "kept_as", f"{measure.__module__}.{measure.__qualname__}")
 
 
 def failure_in_words(error: Exception) -> str:
-    """What went wrong: a StudioError's own words, else the kind of error and where it was raised."""
+    """The failure as text: a StudioError's message, else the kind of error and where it was raised."""
     if isinstance(error, StudioError):
         return str(error)
     place = traceback.extract_tb(error.__traceback__)[-1]

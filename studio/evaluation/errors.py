@@ -1,4 +1,4 @@
-"""How far found poses are from the true markers.
+"""Errors of tracked poses against true markers.
 
 The measure is that of Balan, Sigal & Black 2005 and HumanEva: the mean Euclidean distance of the markers in
 a frame, without any alignment, in mm. Beside it stand the two usual aligned ones: moved to the root marker
@@ -22,19 +22,19 @@ from studio.runs.marker_lines import marker_links, marker_sides
 FEWEST_POINTS = 3
 
 
-def moved_to_root(points: Array, wanted: Array, root: int) -> Array:
-    """(M, 3) `points` moved so that point `root` lies where it lies in `wanted`, (M, 3)."""
-    return points + (wanted[root] - points[root])
+def moved_to_root(points: Array, truth_points: Array, root: int) -> Array:
+    """(M, 3) `points` moved so that point `root` lies where it lies in `truth_points`, (M, 3)."""
+    return points + (truth_points[root] - points[root])
 
 
-def similarity_aligned(points: Array, wanted: Array) -> Array:
-    """(M, 3) `points` turned, scaled and moved to come closest to `wanted`, (M, 3), in the sum of squares.
+def similarity_aligned(points: Array, truth_points: Array) -> Array:
+    """(M, 3) `points` turned, scaled and moved to come closest to `truth_points`, (M, 3), in the sum of squares.
 
     The closed form of Umeyama, "Least-squares estimation of transformation parameters between two point
     patterns", PAMI 13(4), 1991, Eq. 40-43; mirroring is not allowed. Points that all coincide are only moved.
     """
-    from_middle, to_middle = points.mean(axis=0), wanted.mean(axis=0)
-    spread, target = points - from_middle, wanted - to_middle
+    from_middle, to_middle = points.mean(axis=0), truth_points.mean(axis=0)
+    spread, target = points - from_middle, truth_points - to_middle
     size = float(np.sum(spread**2))
     if size == 0.0:
         return np.broadcast_to(to_middle, points.shape).copy()
@@ -51,7 +51,7 @@ TRUNK = "head and trunk"
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """Errors of a run against a truth, mm; no alignment unless said.
+    """Errors of a run against a truth, mm; without alignment unless noted.
 
     frames : the frames that were measured (those that the truth has a row for). mean_mm : mean over frames
     of the frames' means; std_mm : their standard deviation; worst_mm : the worst frame's mean. lost_frames
@@ -61,11 +61,11 @@ class Evaluation:
     procrustes_mm : after the best turn, scale and move of each frame, None where no frame has three
     markers. without_offsets_mm : with each marker's constant offset removed, which two definitions of a joint or a
     calibration that is shifted make; offsets_mm : how long these are; common_offset_mm : the length of their mean.
-    unmatched_markers : names that only the body or only the truth knows.
-    angles_deg : by joint, how far the angle between the two limbs that meet there is off, mean over frames of the
+    unmatched_markers : names that only the body or only the truth has.
+    angles_deg : by joint, the error of the angle between the two limbs that meet there, mean over frames of the
     absolute difference, degrees; directions_deg : by limb, the mean angle between its direction and the true one. Both
-    are of the straight lines between markers, so that a turn of a limb about itself shows in neither. mean_… : over
-    joints, over limbs; None where the markers make none.
+    are of the straight lines between markers, so that a limb's twist about its axis shows in neither. mean_… : over
+    joints, over limbs; None without any.
     """
 
     frames: tuple[int, ...]
@@ -97,10 +97,10 @@ def evaluate(poses: Array, frames: Indices, body: BodyModel, truth: MarkerMotion
     fps. Raises TruthError when no marker or no frame is common to both.
     """
     names, of_body, of_truth, unmatched = _common_markers(body, truth)
-    numbers, kept, wanted = _common_frames(np.asarray(frames), truth, of_truth, fps)
+    numbers, kept, truth_points = _common_frames(np.asarray(frames), truth, of_truth, fps)
     found = marker_points(body, np.asarray(poses, dtype=float)[kept])[:, of_body]
-    seen = np.asarray(np.isfinite(wanted).all(axis=2))
-    distances = np.where(seen, np.linalg.norm(found - wanted, axis=2), np.nan)
+    seen = np.asarray(np.isfinite(truth_points).all(axis=2))
+    distances = np.where(seen, np.linalg.norm(found - truth_points, axis=2), np.nan)
     per_frame = np.nanmean(distances, axis=1)
     lost = np.nan_to_num(distances) > LOST_MM
     in_frame = np.asarray(lost.any(axis=1))
@@ -122,16 +122,16 @@ def evaluate(poses: Array, frames: Indices, body: BodyModel, truth: MarkerMotion
             if np.isfinite(distances[:, index]).any()
         },
         per_frame_mm=tuple(float(value) for value in per_frame),
-        root_aligned_mm=_root_aligned(found, wanted, seen),
-        procrustes_mm=_procrustes(found, wanted, seen),
+        root_aligned_mm=_root_aligned(found, truth_points, seen),
+        procrustes_mm=_procrustes(found, truth_points, seen),
         unmatched_markers=unmatched,
-        **_degrees_off(found, wanted, marker_links(body, names), names),
-        **_constant_part(found - wanted, names),
+        **_degrees_off(found, truth_points, marker_links(body, names), names),
+        **_constant_part(found - truth_points, names),
     )
 
 
 def _constant_part(off: Array, names: tuple[str, ...]) -> dict[str, Any]:
-    """The fields of `Evaluation` about constant offsets. off : (K, M, 3), NaN where the truth has nothing."""
+    """The fields of `Evaluation` about constant offsets. off : (K, M, 3), NaN where the truth has none."""
     known = np.isfinite(off[..., 0]).any(axis=0)
     off = off[:, known]
     offsets = np.nanmean(off, axis=0)
@@ -146,21 +146,21 @@ def _constant_part(off: Array, names: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _degrees_off(
-    found: Array, wanted: Array, links: list[tuple[int, int]], names: tuple[str, ...]
+    found: Array, truth_points: Array, links: list[tuple[int, int]], names: tuple[str, ...]
 ) -> dict[str, Any]:
-    """The fields in degrees of `Evaluation`. found, wanted : (K, M, 3), NaN where missing. links : (upper, lower) pairs
-    of markers, a limb each; a joint is where one ends and another begins.
+    """The fields in degrees of `Evaluation`. found, truth_points : (K, M, 3), NaN where missing. links : (upper, lower)
+    pairs of markers, a limb each; joints lie where two of them meet.
     """
     directions: dict[str, float] = {}
     angles: dict[str, float] = {}
     for upper, lower in links:
-        off = _between(found[:, lower] - found[:, upper], wanted[:, lower] - wanted[:, upper])
+        off = _between(found[:, lower] - found[:, upper], truth_points[:, lower] - truth_points[:, upper])
         _keep_mean(directions, f"{names[upper]}_{names[lower]}", off)
         onward = [other for start, other in links if start == lower]
         for other in onward:
             bent = [
                 _between(points[:, lower] - points[:, upper], points[:, other] - points[:, lower])
-                for points in (found, wanted)
+                for points in (found, truth_points)
             ]
             joint = names[lower] if len(onward) == 1 else f"{names[lower]} to {names[other]}"
             _keep_mean(angles, joint, np.abs(bent[0] - bent[1]))
@@ -242,8 +242,8 @@ def _common_frames(
     """
     rows = rows_of_frames(truth, fps)
     places = [place for place, frame in enumerate(frames) if int(frame) in rows]
-    wanted = truth.positions[[rows[int(frames[place])] for place in places]][:, of_truth]
-    seen = np.asarray(np.isfinite(wanted).all(axis=2))
+    truth_points = truth.positions[[rows[int(frames[place])] for place in places]][:, of_truth]
+    seen = np.asarray(np.isfinite(truth_points).all(axis=2))
     some = np.flatnonzero(seen.any(axis=1))
     if not len(frames):
         raise TruthError("The run has no finished frame to measure.", "Track the session first.")
@@ -253,24 +253,24 @@ def _common_frames(
             "Check that the truth belongs to this session and starts with its first frame.",
         )
     kept = np.array(places, dtype=np.int64)[some]
-    return frames[kept], kept, wanted[some]
+    return frames[kept], kept, truth_points[some]
 
 
-def _root_aligned(found: Array, wanted: Array, seen: NDArray[np.bool_]) -> float:
+def _root_aligned(found: Array, truth_points: Array, seen: NDArray[np.bool_]) -> float:
     """Mean over frames of the markers' mean distance, mm, the root (the first marker seen, in the body's
     order) laid on the true one.
     """
     means = []
-    for points, goal, there in zip(found, wanted, seen, strict=True):
+    for points, goal, there in zip(found, truth_points, seen, strict=True):
         laid = moved_to_root(points[there], goal[there], 0)
         means.append(float(np.linalg.norm(laid - goal[there], axis=1).mean()))
     return float(np.mean(means))
 
 
-def _procrustes(found: Array, wanted: Array, seen: NDArray[np.bool_]) -> float | None:
+def _procrustes(found: Array, truth_points: Array, seen: NDArray[np.bool_]) -> float | None:
     """Mean over frames of the markers' mean distance, mm, after the best similarity of each frame."""
     means = []
-    for points, goal, there in zip(found, wanted, seen, strict=True):
+    for points, goal, there in zip(found, truth_points, seen, strict=True):
         if there.sum() >= FEWEST_POINTS:
             laid = similarity_aligned(points[there], goal[there])
             means.append(float(np.linalg.norm(laid - goal[there], axis=1).mean()))

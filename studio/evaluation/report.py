@@ -1,4 +1,4 @@
-"""An evaluation in words and as one JSON object."""
+"""An evaluation as text and as one JSON object."""
 
 from dataclasses import asdict
 
@@ -11,7 +11,7 @@ def as_document(evaluation: Evaluation) -> dict[str, object]:
 
 
 def _constant_part(evaluation: Evaluation) -> list[str]:
-    """What is left without each marker's constant offset; nothing where that was not measured or is one frame."""
+    """Lines on the error without each marker's constant offset; none where that was not measured or for one frame."""
     if evaluation.without_offsets_mm is None or len(evaluation.frames) < 2:
         return []
     left, common = evaluation.without_offsets_mm, evaluation.common_offset_mm
@@ -21,7 +21,7 @@ def _constant_part(evaluation: Evaluation) -> list[str]:
 
 
 def in_words(evaluation: Evaluation) -> str:
-    """Lines for a person: every number with its alignment and threshold."""
+    """The evaluation as text: every number with its alignment and threshold."""
     procrustes = evaluation.procrustes_mm
     lines = [
         f"frames measured      {len(evaluation.frames)}",

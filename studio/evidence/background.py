@@ -1,10 +1,10 @@
-"""Background models: what a camera sees without the subject, and which pixels of a frame differ from it.
+"""Background models: a camera's view without the subject, and the pixels of a frame that differ from it.
 
 `GaussianBackground` keeps a mean and a standard deviation for each pixel and colour (section 4.2.2 uses
 thresholded background subtraction). Its shadow test follows Horprasert et al. 1999: a pixel whose
 colour is the background's, only darker, is background. OpenCV's MOG2 and KNN models are trained on a
-fixed set of frames and then only applied (learning rate 0), so that a frame's mask is the same whatever
-was looked at before.
+fixed set of frames and then only applied (learning rate 0), so that a frame's mask does not depend on the
+frames processed before.
 """
 
 import threading
@@ -26,12 +26,12 @@ GAIN_RANGE = (0.5, 2.0)
 GAIN_LEAST_LEVEL, GAIN_MOST_LEVEL = 20.0, 245.0
 GAIN_LEAST_PIXELS = 64
 GREY_SPREAD = 2.0
-"""A background whose colours differ by less than this on average is grey: no shadow can be told by
+"""Grey levels: a background whose colours differ by less on average is grey, and shadows cannot be detected by
 colour."""
 BACKGROUND_SHARE = 0.7
-"""Weight of the mixture's Gaussians that are background; what covers a pixel more rarely is foreground."""
+"""Weight of the mixture's Gaussians that are background; rarer ones are foreground."""
 LEAST_VARIANCE = 16.0
-"""Of the mixture's Gaussians: a few still training frames would make a pixel's noise look smaller than it is."""
+"""Least variance of the mixture's Gaussians: from a few still training frames a pixel's noise is underestimated."""
 FROZEN = {"mog2": 0.0, "knn": 1e-8}
 """Learning rates that change nothing (0 means "now" to OpenCV's KNN). Both models then see the training
 frames twice more, so that updates already due and the order of a mixture's Gaussians are settled."""
@@ -41,7 +41,7 @@ class BackgroundModel(Protocol):
     """One camera's background, fitted."""
 
     def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Bytes:
-        """(H, W) uint8, 255 where the picture shows something else, before any clean-up."""
+        """(H, W) uint8, 255 where the picture differs from the background, before any clean-up."""
         ...
 
 
@@ -62,7 +62,7 @@ class GaussianBackground:
         else:
             self.variance = np.ascontiguousarray(deviation, dtype=np.float32) ** 2
         self._samples = self.mean[::GAIN_STRIDE, ::GAIN_STRIDE].astype(np.float32)
-        self._telling = (self._samples > GAIN_LEAST_LEVEL) & (self._samples < GAIN_MOST_LEVEL)
+        self._in_range = (self._samples > GAIN_LEAST_LEVEL) & (self._samples < GAIN_MOST_LEVEL)
         self.is_grey = float(np.mean(np.ptp(self._samples, axis=2))) < GREY_SPREAD
 
     def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Bytes:
@@ -81,10 +81,10 @@ class GaussianBackground:
         )
 
     def gain(self, picture: Bytes) -> Floats:
-        """(3,) factor on each colour of the background that the median pixel asks for (people cover less than
+        """(3,) factor on each colour of the background, from the median pixel (people cover less than
         half)."""
         seen = np.ascontiguousarray(picture[::GAIN_STRIDE, ::GAIN_STRIDE])
-        usable = self._telling & (seen < GAIN_MOST_LEVEL)
+        usable = self._in_range & (seen < GAIN_MOST_LEVEL)
         ratios = np.divide(seen, self._samples, where=usable, out=np.zeros(usable.shape, np.float32))
         found = np.ones(3, np.float32)
         for channel in range(3):
@@ -95,7 +95,7 @@ class GaussianBackground:
 
 
 def _median(values: Floats) -> np.float32:
-    """As `np.median` of (K,) numbers, in a quarter of its time: this is asked for of every colour of every picture."""
+    """`np.median` of (K,) numbers in a quarter of its time: it is needed for every colour of every picture."""
     middle = len(values) // 2
     if len(values) % 2:
         return np.partition(values, middle)[middle]
@@ -125,7 +125,7 @@ class SubtractorBackground:
         self._lock = threading.Lock()
 
     def foreground(self, picture: Bytes, settings: EvidenceSettings) -> Bytes:
-        """(H, W) uint8, 255 for foreground; what OpenCV marks as shadow is background."""
+        """(H, W) uint8, 255 for foreground; OpenCV's shadow pixels are background."""
         with self._lock:
             if isinstance(self._model, cv2.BackgroundSubtractorMOG2):
                 self._model.setVarThreshold(settings.mask_threshold**2)

@@ -1,8 +1,7 @@
 """The background models of a session's cameras: fitted once, on the first frame that needs them, and kept.
 
-What a model is fitted to: the plate picture or empty clip that came with a camera, else frames of the
-footage spread evenly over it (a subject that moves is then absent from the median; one that stays
-leaves a ghost).
+A model is fitted to a camera's plate picture or empty clip, else to frames spread evenly over the footage
+(a moving subject is then absent from the median; one that stays leaves a ghost).
 """
 
 import threading
@@ -61,9 +60,9 @@ class Backgrounds:
             return found
 
     def release(self, camera: str) -> None:
-        """Forget what was fitted to one camera; whoever asks again fits it again."""
+        """Drop the models of one camera; they are fitted again when needed."""
         with self._locks[camera]:
-            # Other cameras' models may be added meanwhile: only copies of the keys are gone through.
+            # Other cameras' models may be added meanwhile: iterate over copies of the keys.
             for key in list(self._fitted):
                 if key[0] == camera:
                     del self._fitted[key]
@@ -73,14 +72,14 @@ class Backgrounds:
             self._exclusions.pop(camera, None)
 
     def exclusion(self, camera: str) -> Bytes | None:
-        """(H, W) uint8, 255 where evidence does not count, None where all does. Raises FootageError."""
+        """(H, W) uint8, 255 in excluded areas; None without any. Raises FootageError."""
         with self._locks[camera]:
             if camera not in self._exclusions:
                 self._exclusions[camera] = self._footage.exclusion(camera)
             return self._exclusions[camera]
 
     def combined(self, camera: str) -> tuple[GaussianBackground, NDArray[np.bool_]]:
-        """Plate (or clip) and footage combined, and where (H, W) that is doubtful; without a plate everywhere."""
+        """Plate (or clip) and footage combined, and a mask (H, W) of doubtful pixels: all without a plate."""
         plate, frames = self.empty_room(camera), self._spread(camera, MEDIAN_FRAMES)
         if plate is None:
             return gaussian_from_median(frames), np.ones(frames.shape[1:3], np.bool_)
@@ -183,10 +182,10 @@ def check_plate_size(plate: tuple[int, int], footage: tuple[int, int], name: str
 
 
 def fitted_plate(plate: Bytes, frame: Bytes, name: str) -> Bytes:
-    """A background picture made as large as the footage, the way that agrees best with one of its frames.
+    """A background picture fitted to the footage's size, in the way that agrees best with one of its frames.
 
-    Either cut evenly on both sides, or scaled as a whole and centred between black bars, as
-    `capture.footage_fit` has it. Raises FootageError as `check_plate_size` does.
+    Either cropped evenly on both sides, or scaled as a whole and centred between black bars, as in
+    `capture.footage_fit`. Raises FootageError as `check_plate_size` does.
     """
     height, width = frame.shape[:2]
     tall, wide = plate.shape[:2]
@@ -206,7 +205,7 @@ def fitted_plate(plate: Bytes, frame: Bytes, name: str) -> Bytes:
 
 
 def _centred(picture: Bytes, width: int, height: int) -> Bytes:
-    """A picture cut or surrounded by black to width x height, evenly on both sides."""
+    """A picture cropped or padded with black to width x height, evenly on both sides."""
     tall, wide = picture.shape[:2]
     left, top = max(0, (wide - width) // 2), max(0, (tall - height) // 2)
     inner = picture[top : top + height, left : left + width]

@@ -1,8 +1,8 @@
-"""The colours of a background made those of the footage: a gain and an offset for each, fitted robustly.
+"""Colours of a background fitted to the footage: a robust gain and offset for each.
 
 Plates are taken with another exposure or white balance, and a room's light changes. People cover less than half of a
-picture, so a least-squares line that drops what lies further away than twice its own median distance, again and
-again, is that of the background (least trimmed squares by repeated trimming, Rousseeuw 1984).
+picture, so a least-squares line that repeatedly drops points beyond twice the median distance is that of the
+background (least trimmed squares by repeated trimming, Rousseeuw 1984).
 """
 
 import numpy as np
@@ -22,7 +22,7 @@ MOST_GAIN = 2.0
 
 
 def fitted_line(background: NDArray[np.uint8] | Floats, frames: Bytes) -> tuple[Floats, Floats]:
-    """(3,) gain and (3,) offset of each colour that make a background as the footage's camera would have taken it.
+    """(3,) gain and (3,) offset of each colour that map a background to the footage's colours.
 
     background : (H, W, 3) BGR. frames : (K, H, W, 3) of the footage; the fit is to their median.
     """
@@ -31,9 +31,9 @@ def fitted_line(background: NDArray[np.uint8] | Floats, frames: Bytes) -> tuple[
 
 
 def colour_line(background: Floats, picture: Floats) -> tuple[Floats, Floats]:
-    """(3,) gain and (3,) offset, grey levels, of each colour, that make a background's pixels those of a picture.
+    """(3,) gain and (3,) offset, grey levels, of each colour, that map a background's pixels to those of a picture.
 
-    Both (H, W, 3). A colour with too few usable pixels, or with a gain beyond 2 or below 1/2, is left as it is.
+    Both (H, W, 3). A colour with too few usable pixels, or with a gain beyond 2 or below 1/2, is unchanged.
     """
     gains, offsets = np.ones(3, np.float32), np.zeros(3, np.float32)
     for channel in range(3):
@@ -49,7 +49,7 @@ def colour_line(background: Floats, picture: Floats) -> tuple[Floats, Floats]:
 
 
 def _trimmed_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
-    """Gain and offset of y over x, of the larger half that lies along one line."""
+    """Gain and offset of y over x, fitted to the larger half that lies along one line."""
     ratio = float(np.median(y / x))
     gain, offset = ratio, 0.0
     for _ in range(ROUNDS):

@@ -1,20 +1,20 @@
-"""A background from two imperfect ones: a plate with things in it that are gone, and footage with a person in it.
+"""A background from two imperfect ones: a plate with objects that were removed, and footage with a person in it.
 
-A plate shows the room behind a person who never leaves the place, but also whoever stood about when it was taken; the
-footage's own frames show the bystanders that are there now, but may never show what the person hides. Pixel by pixel:
+A plate shows the room behind a person who stays in one place, but also bystanders of that moment; the footage's frames
+show the present bystanders, but perhaps never the room behind the person. Pixel by pixel:
 
 1. The plate is fitted to the footage, colour by colour (`colour_fit`).
-2. Where some frames agree with the plate, it is right there: the background is these frames' own mean and deviation,
-   which know the footage's exposure and noise better than a plate does.
-3. Elsewhere nothing agrees with the plate: either it shows something that is gone, or a person hides the place all the
-   time. The footage's answer is its mode, the mean of the frames that most others agree with, where a frame counts as
-   much as the known places around show background in it: a person who stands there is seen to stand beside it too.
-4. Which of the two is right is decided region by region: the right one goes on, across the region's border, as what is
-   known outside; the wrong one ends there in an edge. In doubt it is the footage: what never moves is no one.
+2. Where some frames agree with the plate, it is right: the background is these frames' own mean and deviation, which
+match the footage's exposure and noise better than the plate.
+3. Elsewhere no frame agrees with the plate: either it shows something that was removed, or a person hides the place in
+all frames. The footage's estimate is its mode, the mean of the frames that most others agree with; a frame's weight is
+the share of background in the known surroundings, as a person there also covers these.
+4. Which of the two is right is decided region by region: the right one continues the known background across the
+region's border; the wrong one has an edge there. In doubt the footage is taken: what never moves is no person.
 
-One camera alone cannot tell a person from the same person in the plate; `runs.clean_plates` asks the other cameras.
-The method is this project's own, made of usual parts: the mode over time as background, and edges along the border of
-a still region telling what was left there from what was taken away.
+One camera alone cannot distinguish a person from the same person in the plate; `runs.clean_plates` uses the other
+cameras. The method is this project's own, made of standard parts: the mode over time as background, and edges along the
+border of a still region to distinguish abandoned from removed objects.
 """
 
 from dataclasses import dataclass
@@ -32,33 +32,33 @@ Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]
 
 AGREES = 16.0
-"""Grey levels in any colour: a frame this near to the plate shows the same thing."""
+"""Grey levels in any colour: within this a frame agrees with the plate."""
 LEAST_SHARE, LEAST_FRAMES = 0.08, 2
-"""Of the frames that must agree with the plate: fewer may be a sleeve of the wall's colour that passes by."""
+"""Share of the frames that must agree with the plate: fewer may be clothes of the wall's colour passing by."""
 STRIDE = 4
 REACHES = (8, 16, 32)
-"""Times STRIDE pixels: half sides of the squares that are a place's surroundings."""
+"""Half sides of the squares of surroundings, in units of STRIDE pixels."""
 ENOUGH_KNOWN = 0.15
 """Share of the surroundings that must be known."""
 VOTE = 8
 SMALLEST_REGION = 400
-"""Pixels: smaller regions are specks along edges, where the footage is always taken."""
+"""Pixels: smaller regions are specks along edges, which take the footage."""
 OPENED = 4
-"""Pixels: narrower threads do not join regions."""
+"""Pixels: narrower connections do not join regions."""
 RIM = 5
-"""Pixels: how far inside and outside a region's border is compared."""
+"""Pixels: width compared inside and outside a region's border."""
 PLATE_MUST_BEAT = 0.75
 """The plate's edge along the border must be this much weaker than the footage's."""
 MOST_EDGE = 60.0
 """Grey levels: no stronger edge counts for more."""
 DOUBT = 40
-"""Pixels around what is gone from the plate: the same skin or shirt in plate and footage hides its true extent."""
+"""Pixels around removed objects: the same skin or shirt in plate and footage hides their true extent."""
 MOST_DEVIATION = 6.0
-"""Grey levels: what varies more is no noise but people who passed by."""
+"""Grey levels: larger variation is not noise but people passing by."""
 
 
 class Origin(IntEnum):
-    """Where a pixel's background is from."""
+    """Source of a pixel's background."""
 
     AGREEING = 0
     MODE = 1
@@ -67,7 +67,7 @@ class Origin(IntEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Combination:
-    """How a combined background came about, which may be done again in finer pictures of the same.
+    """The decisions behind a combined background, which can be applied to the same pictures at a higher resolution.
 
     origin : (H, W) uint8, of Origin. shares :
     (K, h, w) of `background_nearby`. gains, offsets : (3,) of the plate's colours.
@@ -78,16 +78,16 @@ class Combination:
     gains: Floats
     offsets: Floats
 
-    def fill(self, plate: Bytes, frames: Bytes, top: int, wanted: NDArray[np.bool_], out: Bytes) -> None:
-        """Fill a band of rows, from `top` on, of the background as finer pictures show it.
+    def fill(self, plate: Bytes, frames: Bytes, top: int, selected: NDArray[np.bool_], out: Bytes) -> None:
+        """Fill a band of rows, from `top` on, of the background at a higher resolution.
 
-        plate, out : (H, W, 3), frames : (K, rows, W, 3) of the band. wanted : (rows, W), what is filled.
+        plate, out : (H, W, 3), frames : (K, rows, W, 3) of the band. selected : (rows, W) pixels to fill.
         """
         fill_finely(
             plate,
             frames,
             top,
-            wanted,
+            selected,
             self.origin,
             self.shares,
             self.gains,
@@ -98,7 +98,7 @@ class Combination:
 
 
 def combine(plate: Bytes, frames: Bytes) -> tuple[GaussianBackground, NDArray[np.bool_]]:
-    """The combined background, and where (H, W) it is doubtful: on and around what the plate shows that is gone.
+    """The combined background, and a mask (H, W) of doubtful pixels: on and around objects removed since the plate.
 
     plate : (H, W, 3). frames : (K, H, W, 3).
     """
@@ -107,15 +107,15 @@ def combine(plate: Bytes, frames: Bytes) -> tuple[GaussianBackground, NDArray[np
 
 
 def fewest_of(frames: Bytes) -> int:
-    """How many of the frames must agree with the plate."""
+    """Number of frames that must agree with the plate."""
     return max(LEAST_FRAMES, round(LEAST_SHARE * len(frames)))
 
 
 def combination(
     plate: Bytes, frames: Bytes, factor: float = 1.0
 ) -> tuple[GaussianBackground, NDArray[np.bool_], Combination]:
-    """`combine`, with how it came about. factor : how many times smaller these pictures were made: all that is counted
-    in pixels here is of the pictures as they were taken.
+    """`combine`, with its decisions. factor : by which these pictures were reduced; numbers of pixels here refer to the
+    original size.
     """
     gains, offsets = fitted_line(plate, frames)
     fitted = np.asarray(plate * gains + offsets, dtype=np.float32)
@@ -126,17 +126,17 @@ def combination(
     unsure = np.where(count >= fewest_of(frames), np.uint8(0), np.uint8(1))
     shares = background_nearby(frames, mean, unsure, factor)
     fill_from_most_alike(frames, unsure, shares, mean, deviation)
-    gone, origin = np.zeros_like(unsure), unsure.copy()
+    removed, origin = np.zeros_like(unsure), unsure.copy()
     rim = _fewer(RIM, factor)
     for region in _regions(unsure, rim, factor):
         y, x, inside = region
         if not _goes_on_better(fitted, mean, region, unsure, rim):
-            gone[y, x][inside] = 1
+            removed[y, x][inside] = 1
         else:
             mean[y, x][inside] = fitted[y, x][inside]
             deviation[y, x][inside] = 0.0
             origin[y, x][inside] = Origin.PLATE
-    doubtful = np.asarray(cv2.dilate(gone, _disc(_fewer(DOUBT, factor)))) > 0
+    doubtful = np.asarray(cv2.dilate(removed, _disc(_fewer(DOUBT, factor)))) > 0
     model = GaussianBackground(mean, np.minimum(deviation, MOST_DEVIATION))
     return model, doubtful, Combination(origin, shares, gains, offsets)
 
@@ -146,7 +146,7 @@ Region = tuple[slice, slice, NDArray[np.bool_]]
 
 
 def _fewer(pixels: int, factor: float) -> int:
-    """Pixels of pictures so many times smaller, at least one."""
+    """Pixels of pictures reduced by a factor, at least one."""
     return max(1, round(pixels / factor))
 
 
@@ -156,7 +156,7 @@ def _disc(reach: int) -> Bytes:
 
 
 def _regions(unsure: Bytes, rim: int, factor: float) -> list[Region]:
-    """The connected regions of a map that are worth a decision, each in a rectangle with a rim around it."""
+    """The connected regions of a map above the least size, each in a rectangle with a rim around it."""
     reach = _fewer(OPENED, factor)
     opened = cv2.morphologyEx(unsure, cv2.MORPH_OPEN, _disc(reach))
     count, labels, boxes, _ = cv2.connectedComponentsWithStats(opened)
@@ -166,7 +166,7 @@ def _regions(unsure: Bytes, rim: int, factor: float) -> list[Region]:
         if area >= SMALLEST_REGION / factor**2:
             y = slice(max(0, top - 2 * rim), top + height + 2 * rim)
             x = slice(max(0, left - 2 * rim), left + width + 2 * rim)
-            # Opening rounds corners off: what is unsure within its reach belongs to the region too.
+            # Opening rounds corners off: unsure pixels within its reach belong to the region too.
             square = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)
             grown = cv2.dilate((labels[y, x] == label).astype(np.uint8), square)
             found.append((y, x, (grown > 0) & (unsure[y, x] > 0)))
@@ -174,7 +174,7 @@ def _regions(unsure: Bytes, rim: int, factor: float) -> list[Region]:
 
 
 def _goes_on_better(plate: Floats, footage: Floats, region: Region, unsure: Bytes, reach: int) -> bool:
-    """Whether the plate continues what is known around a region clearly better than the footage does."""
+    """Whether the plate continues the known surroundings of a region clearly better than the footage does."""
     y, x, inside = region
     known = (unsure[y, x] == 0).astype(np.float32)
     window = (2 * reach + 1, 2 * reach + 1)
@@ -192,7 +192,7 @@ def _goes_on_better(plate: Floats, footage: Floats, region: Region, unsure: Byte
 
 
 def background_nearby(frames: Bytes, mean: Floats, unsure: Bytes, factor: float = 1.0) -> Floats:
-    """(K, h, w) how much of the known surroundings is background in each frame, 0 to 1, at every STRIDE-th pixel.
+    """(K, h, w) share of background in the known surroundings, by frame, 0 to 1, at every STRIDE-th pixel.
 
     frames : (K, H, W, 3). mean : (H, W, 3), right where unsure (H, W) is 0. The surroundings are the smallest of
     REACHES in which enough is known.
@@ -284,15 +284,15 @@ def fill_from_most_alike(frames, unsure, shares, mean, deviation):
 
 
 @njit(**KERNEL)
-def fill_finely(plate, frames, top, wanted, origin, shares, gains, offsets, fewest, out):
-    """`Combination.fill`: what was found of coarse pictures, pixel by pixel of finer ones."""
+def fill_finely(plate, frames, top, selected, origin, shares, gains, offsets, fewest, out):
+    """`Combination.fill`: apply the decisions of coarse pictures to each pixel of finer ones."""
     count, rows, width = frames.shape[:3]
     height = len(out)
     values, votes, fitted, total = np.empty((count, 3)), np.empty(count), np.empty((3, 3)), np.empty(3)
     for row in range(rows):
         y = top + row
         for x in range(width):
-            if not wanted[row, x]:
+            if not selected[row, x]:
                 continue
             kind = origin[y * origin.shape[0] // height, x * origin.shape[1] // width]
             # The plate's fitted colours there, and the least and greatest of the neighbours'.

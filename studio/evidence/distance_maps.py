@@ -1,4 +1,4 @@
-"""How far every pixel is from the silhouette's border, and the border itself, for searches that follow slopes."""
+"""Distances of pixels from the silhouette's border, and the border's points, for gradient-based refinement."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,9 +19,9 @@ FOREGROUND = 128
 MOST_POINTS = 300
 """Border points kept of a view: about every other pixel of a person 200 pixels tall."""
 SMOOTHED = 1.5
-"""Standard deviation, pixels, of the smoothing before a border's direction is read off."""
+"""Standard deviation, pixels, of the smoothing before a border's direction is measured."""
 MARGIN_SHARE = 16
-"""Distances are known this far about the silhouette: a sixteenth of the picture's longer side."""
+"""Distances are kept up to this from the silhouette, as a share of the picture's longer side."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,7 +30,7 @@ class SilhouetteDistances:
 
     size : width and height of the picture. corner : left and top of the part of it that `signed` (H, W) covers: pixels
     from the border, which runs between pixels; negative inside. border : (K, 2) centres of silhouette pixels at its
-    border, evenly spread; the picture's own border is none. outward : (K, 2) unit vectors away from the silhouette.
+    border, evenly spread; the picture's own border is left out. outward : (K, 2) unit vectors away from the silhouette.
     """
 
     size: tuple[int, int]
@@ -61,7 +61,7 @@ def silhouettes_by_camera(
 
 
 def distances_of(mask: Bytes, most: int = MOST_POINTS, *, exact: bool = True) -> SilhouetteDistances:
-    """The distances of a mask (H, W); where nothing or everything is silhouette, there is no border."""
+    """The distances of a mask (H, W); empty and full masks have no border."""
     size = (mask.shape[1], mask.shape[0])
     silhouette = np.greater_equal(mask, FOREGROUND).astype(np.uint8)
     left, top, width, height = cv2.boundingRect(silhouette)
@@ -96,8 +96,8 @@ def distances_of(mask: Bytes, most: int = MOST_POINTS, *, exact: bool = True) ->
 def _distances(mask: NDArray[np.uint8]) -> Floats:
     """(H, W) from every pixel's centre to that of the nearest pixel that is 0.
 
-    OpenCV's last bits depend on where in memory the mask happens to lie, and a descent makes millimetres of them.
-    Squared distances between pixels are whole numbers, so what was meant is known.
+    OpenCV's last bits depend on the mask's memory address, and a descent amplifies them to millimetres. Squared
+    distances between pixels are whole numbers, so the exact values are restored by rounding.
     """
     found = cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     return np.sqrt(np.rint(found * found))

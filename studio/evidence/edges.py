@@ -2,7 +2,7 @@
 
 `proximity_edges` is the studio's own, with the remap chosen so that the middle of a straight edge, as wide
 as a lens makes it, reaches 1 and the value falls off as a Gaussian with the distance from it.
-`bodytrack_edges` is the map of the benchmark that the Lee-walk data comes with, bit for bit: Sobel / 8,
+`bodytrack_edges` is the map of the benchmark published with the Lee-walk data, bit for bit: Sobel / 8,
 squared magnitude of at least 16, a 7-tap Gaussian of sigma 4 cut off to 8 bits after each pass, and a border
 of 3 pixels that is 0.
 """
@@ -21,7 +21,7 @@ EDGE_WIDTH = 4.0
 """Pixels on which the gradient of a body's edge passes the threshold; thinner edges stay below 1. On the sample walk
 4 tracks better than 2 (22 mm against 24, six seeds), where most of a clothed body's outline is saturated."""
 REACH = 2.0
-"""The Gaussian is cut off at this many sigma: an edge is felt no further."""
+"""The Gaussian is cut off at this many sigma."""
 BODYTRACK_SIGMA, BODYTRACK_TAPS = 4.0, 7
 BODYTRACK_THRESHOLD = 16.0
 
@@ -37,7 +37,7 @@ def proximity_edges(
     """(H, W) uint8 edge proximity, 255 on an edge.
 
     threshold : grey levels per pixel. smoothing : sigma, pixels. near, reach : if reach > 0, edges
-    further than this many pixels from the mask `near` are forgotten.
+    further than this many pixels from the mask `near` are dropped.
     """
     edges = edge_pixels(grey(picture), 64.0 * threshold * threshold)
     if near is not None and reach > 0:

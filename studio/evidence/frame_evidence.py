@@ -1,4 +1,4 @@
-"""What is seen in one frame, ready to be weighed."""
+"""The evidence of one frame."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ Bytes = NDArray[np.uint8]
 
 
 EDGE_KINDS = ("proximity", "bodytrack", "none", "hull")
-"""Maps that a weighting reads; "hull": no map, but what a visual hull is carved from (knob hull_evidence)."""
+"""Maps that a weighting reads; "hull": no map, but the evidence of a visual hull (knob hull_evidence)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,7 +21,7 @@ class ViewEvidence:
     picture : (H, W, 3) uint8 BGR. mask : (H, W) uint8, 0 background, 255 foreground.
     edges : (H, W) uint8 edge proximity map, 255 = on an edge (Eq. 14's p = edges / 255).
     background : the camera's empty view where the hull is to be carved from pixels; None: from the mask. A view
-    with a background may come with a mask that is all 0, because nobody asked for one.
+    with a background may have a mask of zeros, where none is needed.
     """
 
     camera: str

@@ -27,7 +27,7 @@ def cleaned(mask: Bytes, settings: EvidenceSettings) -> Bytes:
 
 
 def reduced(mask: Bytes, camera: Camera) -> Bytes:
-    """A mask (H, W) as large as a camera's pictures: 255 where at least half of what a pixel covers was foreground."""
+    """A mask (H, W) reduced to a camera's size: 255 where at least half of a pixel's area was foreground."""
     if mask.shape == (camera.height, camera.width):
         return mask
     shares = cv2.resize(mask, (camera.width, camera.height), interpolation=cv2.INTER_AREA)
@@ -35,7 +35,7 @@ def reduced(mask: Bytes, camera: Camera) -> Bytes:
 
 
 def reduced_cleaning(settings: EvidenceSettings, factor: float) -> EvidenceSettings:
-    """The settings for masks of pictures that are so many times smaller than those that the settings are for."""
+    """The settings for masks of pictures reduced by a factor."""
     return dataclasses.replace(
         settings,
         mask_opening=round(settings.mask_opening / factor),
@@ -46,7 +46,7 @@ def reduced_cleaning(settings: EvidenceSettings, factor: float) -> EvidenceSetti
 
 
 def uncleaned(settings: EvidenceSettings) -> EvidenceSettings:
-    """The settings without any clean-up: those of the same raw masks are equal."""
+    """The settings without clean-up; settings with equal raw masks give the same."""
     return dataclasses.replace(
         settings,
         mask_opening=0,
@@ -67,7 +67,7 @@ class PackedMask:
 
     @property
     def nbytes(self) -> int:
-        """What it holds."""
+        """Bytes held."""
         return self._bits.nbytes
 
     def unpacked(self) -> Bytes:
@@ -77,7 +77,7 @@ class PackedMask:
 
 
 class PackedMasks(Mapping[str, Bytes]):
-    """Masks by camera, packed; each is unpacked anew when it is asked for."""
+    """Masks by camera, packed; each is unpacked on access."""
 
     def __init__(self) -> None:
         self._packed: dict[str, PackedMask] = {}

@@ -1,7 +1,7 @@
 """One frame's evidence: pictures, masks and edge maps of all cameras.
 
-A maker is cheap to build (a changed knob builds another one); what is dear, the fitted background
-models, is in `Backgrounds` and shared. Cameras are independent: with an executor of two threads a frame
+A maker is cheap to build (a changed knob builds another one); the fitted background models are
+expensive, so they are shared in `Backgrounds`. Cameras are independent: with an executor of two threads a frame
 takes half the time.
 """
 
@@ -25,12 +25,12 @@ from studio.geometry.camera import Camera
 Bytes = NDArray[np.uint8]
 
 KINDS: dict[str, FittedKind] = {"median": "median", "combined": "combined", "mog2": "mog2", "knn": "knn"}
-"""Models by the knob's word; what is not here is a Gaussian."""
+"""Models by the knob's value; all others are Gaussians."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RawMask:
-    """A camera's mask (H, W), 0 or 255, before its clean-up. to_clean : whether there is to be one."""
+    """A camera's mask (H, W), 0 or 255, before its clean-up. to_clean : whether it is to be cleaned."""
 
     mask: Bytes
     to_clean: bool
@@ -76,7 +76,7 @@ class EvidenceMaker:
         return ViewEvidence(camera, picture, mask, self._edges(picture, mask))
 
     def _from_pixels(self) -> bool:
-        """Whether a hull is carved from pixels: as the knob says, "auto" where it can be done well."""
+        """Whether a hull is carved from pixels: by the knob; "auto": if all cameras have an empty view, none masks."""
         if self.settings.hull_evidence != "auto":
             return self.settings.hull_evidence == "pixels"
         return self.settings.background_model in ("auto", "gaussian") and all(
@@ -92,7 +92,7 @@ class EvidenceMaker:
         given = self._footage.has_masks(camera)
         if choice == "mask" and not given:
             raise FootageError(
-                f"No masks came with camera {camera}.", "Choose another background model, such as 'gaussian'."
+                f"Camera {camera} has no masks.", "Choose another background model, such as 'gaussian'."
             )
         if choice == "mask" or (choice == "auto" and given):
             mask = self._footage.mask(camera, frame)
@@ -103,13 +103,13 @@ class EvidenceMaker:
         return RawMask(model.foreground(picture, self.settings), True)
 
     def finished_mask(self, camera: str, raw: RawMask) -> Bytes:
-        """(H, W) 0 or 255: a raw mask cleaned where it is to be, without what is excluded."""
+        """(H, W) 0 or 255: a raw mask, cleaned if `to_clean`, without excluded areas."""
         mask = cleaned(raw.mask, self.settings) if raw.to_clean else raw.mask
         excluded = self._backgrounds.exclusion(camera)
         return mask if excluded is None else np.where(excluded > 0, np.uint8(0), mask)
 
     def _edges(self, picture: Bytes, mask: Bytes) -> Bytes:
-        """The edge map that the weighting asks for."""
+        """The edge map that the weighting uses."""
         if self.edge_kind == "bodytrack":
             return bodytrack_edges(picture)
         if self.edge_kind in ("none", "hull"):

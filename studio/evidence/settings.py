@@ -21,7 +21,7 @@ class EvidenceSettings:
         choices=BACKGROUND_MODELS,
         help="mask: the masks that came with the footage; gaussian: difference from the plate or empty clip,"
         " else from the footage's median; median: from the footage's median; combined: the plate where the footage"
-        " confirms it, what the footage shows most often where people stood in the plate; mog2, knn: OpenCV's"
+        " confirms it, else the footage's most frequent colour; mog2, knn: OpenCV's"
         " models, trained on the empty clip, else on the footage; auto: masks that came with it, else gaussian.",
     )
     mask_threshold: float = next_frame_knob(
@@ -31,7 +31,7 @@ class EvidenceSettings:
         0.25,
         label="mask threshold",
         unit="σ",
-        help="Foreground is what differs from the background by more than this many standard deviations.",
+        help="Pixels that differ from the background by more than this many standard deviations are foreground.",
     )
     mask_noise: float = next_frame_knob(
         4.0,
@@ -134,7 +134,7 @@ class EvidenceSettings:
         0.25,
         label="edge smoothing",
         unit="px",
-        help="Standard deviation of the Gaussian: from how far an edge is felt.",
+        help="Standard deviation of the Gaussian: the distance at which an edge has effect.",
     )
     edge_near_mask: int = next_frame_knob(
         0,
@@ -143,13 +143,13 @@ class EvidenceSettings:
         1,
         label="edges near the mask",
         unit="px",
-        help="Forget edges further than this from the foreground; 0 = keep all, as in the paper.",
+        help="Drop edges further than this from the foreground; 0 = keep all, as in the paper.",
     )
     hull_evidence: str = next_frame_knob(
         "auto",
         label="hull from",
         choices=HULL_EVIDENCE,
-        help="What carves the visual hull: pixels tested one by one against the background's colours, as in the paper"
+        help="Evidence for the visual hull: pixels tested one by one against the background's colours, as in the paper"
         " (no mask is made), or masks; auto: pixels where every camera has a plate or an empty clip and no masks.",
     )
     hull_noise: float = next_frame_knob(

@@ -1,10 +1,10 @@
 """The background as a full Gaussian in YUV for each pixel, with a second one for shadow (Caillette et al. 2007, 6.1).
 
 Y = 0.299 R + 0.587 G + 0.114 B, U = 0.492 (B - Y), V = 0.877 (R - Y), not rounded. The shadow's Gaussian has the
-same covariance and a mean whose Y is 10 % lower; of the two that one is taken whose mean luminance is nearer to
-the pixel's (the paper: "a simple test on the luminance"). The paper sums "Mahalanobis distances d_M" and compares
+same covariance and a mean whose Y is 10 % lower; the one whose mean luminance is nearer to the pixel's is
+used (the paper: "a simple test on the luminance"). The paper sums "Mahalanobis distances d_M" and compares
 them with a χ² threshold of 3 degrees of freedom a pixel: that is the distribution of the *squared* distance, which
-is what is computed here.
+is computed here.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ SHADOW = 0.1
 LEAST_NOISE = 2.5
 """Grey levels: the smallest standard deviation of a pixel in any direction of BGR."""
 LUMINANCE = np.array([0.114, 0.587, 0.299])
-"""Of B, G and R."""
+"""Weights of B, G and R in Y."""
 YUV_OF_BGR: Array = np.stack(
     [LUMINANCE, 0.492 * (np.array([1.0, 0, 0]) - LUMINANCE), 0.877 * (np.array([0, 0, 1.0]) - LUMINANCE)]
 )
@@ -95,9 +95,9 @@ def independent_background(
 
 
 def _background(mean: Array, covariance: Array, least_noise: float, pictures: int) -> YuvBackground:
-    """BGR mean (H, W, 3) and covariance (H, W, 3, 3), made even where it is too small, in YUV."""
+    """YUV Gaussians of BGR mean (H, W, 3) and covariance (H, W, 3, 3), raised to the noise floor."""
     spread, axes = np.linalg.eigh(covariance)
-    # YUV is linear in the colours, so the floor may be laid in BGR, where a sensor's noise is even in all directions.
+    # YUV is linear in the colours, so the floor is applied in BGR, where a sensor's noise is isotropic.
     axes = np.linalg.inv(YUV_OF_BGR).T @ axes
     spread = (1.0 + 1.0 / pictures) * np.maximum(spread, least_noise**2)
     precision = (axes / spread[..., None, :]) @ np.swapaxes(axes, -1, -2)

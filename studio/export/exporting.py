@@ -3,7 +3,7 @@
 import dataclasses
 import os
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from studio.export.motion import motion_of, no_motion
 from studio.export.options import AUTO, ExportOptions
 from studio.export.task import ExportTask, Writer, Written
 from studio.knobs import changed
-from studio.progress import Progress, watched
+from studio.progress import Progress, unheard
 from studio.runs.tracks import BEST, best_track
 from studio.sessions.atomic_files import discard, new_folder_beside, sync_folder
 from studio.sessions.session import Session
@@ -80,16 +80,14 @@ def export_run(
     requested: Mapping[str, object],
     place: Path,
     *,
-    progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    progress: Progress = unheard,
     record_scene: Writer | None = None,
     pack: bool = False,
 ) -> ExportReport:
     """Export a run to `place`, which is replaced only after the new file has been read back and checked.
 
     requested : options by name. record_scene : the writer of scene recordings. pack : several files become one zip.
-    cancelled : checked often; True ends it with WorkCancelledError. Raises ExportError, and the errors of reading
-    the run.
+    Raises ExportError, and the errors of reading the run.
     """
     options = settled(form, requested)
     writer = form.write or record_scene
@@ -103,10 +101,9 @@ def export_run(
     motion = no_motion(run) if form.what == "cameras" else motion_of(run, options)
     folder = _working_folder(place)
 
-    step = watched(progress, cancelled, "The export")
     try:
-        written = writer(ExportTask(session, run, motion, options, folder / place.name, step))
-        step("finishing", 1, 1)
+        written = writer(ExportTask(session, run, motion, options, folder / place.name, progress))
+        progress("finishing", 1, 1)
         files = _packed(written, place) if pack and len(written.files) > 1 else written.files
         moved = tuple(_in_place(path, place.parent) for path in files)
     except OSError as error:

@@ -1,7 +1,7 @@
 """The exports in a run's folder: `exports/<file>`, each with its report."""
 
 import datetime
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import msgspec
@@ -11,7 +11,7 @@ from studio.export.exporting import ExportReport, export_run
 from studio.export.formats import ExportFormat
 from studio.export.options import ExportOptions
 from studio.export.task import Writer
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 from studio.runs.tracks import BEST, RAW, best_track, read_track, track_digest, track_names
 from studio.runs.way_results import ExportedFile
 from studio.sessions.record_files import RecordFile
@@ -53,8 +53,7 @@ def export_into_run(
     form: ExportFormat,
     requested: Mapping[str, str | int | float | bool],
     *,
-    progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    progress: Progress = unheard,
     record_scene: Writer | None = None,
 ) -> KeptExport:
     """Export a run into its own folder; several files become one zip. The same request replaces its file.
@@ -70,7 +69,6 @@ def export_into_run(
         requested,
         folder / f"{_stem(session, run, form, requested)}.{form.name}",
         progress=progress,
-        cancelled=cancelled,
         record_scene=record_scene,
         pack=True,
     )

@@ -9,12 +9,12 @@ from studio.arrays import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera:
-    """A camera that is complete: it exists only when every value is known.
+    """A camera with all its parameters.
 
     width, height : picture size, pixels; the origin is the centre of the top-left pixel.
     matrix : (3, 3) intrinsic matrix, pixels (may hold a skew at [0, 1]). distortion : (5,) k1 k2 p1 p2 k3.
     rotation, translation : camera_from_world, (3, 3) and (3,) mm: x_camera = rotation @ x_world + translation.
-    quarter_turns : how often the picture is turned by 90 degrees clockwise to be *shown* upright (display only).
+    quarter_turns : clockwise turns by 90 degrees that *show* the picture upright (display only).
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Cameras as kernels read them: a table of numbers, and how far from its axis each may project."""
+"""Cameras as kernels read them: a table of numbers, and the limit of each camera's field of view."""
 
 from collections.abc import Callable, Sequence
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from studio.geometry.camera import Camera
 from studio.geometry.projection import distorted
 
-# Beyond tan²θ = 1e6 (90 degrees off the axis less 3.4 arc minutes) nothing is a picture.
+# tan²θ = 1e6 is 90 degrees off the axis less 3.4 arc minutes; no camera sees beyond.
 WIDEST_VIEW = 1.0e6
 BEYOND_PICTURE = 1.3
 RADII = np.linspace(0.0, 4.0, 4001)

@@ -24,7 +24,7 @@ def project(camera: Camera, points: Array) -> tuple[Array, Array]:
 
 
 def distorted(x: Any, y: Any, lens: Any) -> tuple[Any, Any, Any]:  # noqa: ANN401 - numbers or arrays
-    """Where the lens shows what lies at x, y (at depth 1), and the radial factor there; kernels compile this too.
+    """Distorted position of x, y (at depth 1), and the radial factor there; kernels compile this too.
 
     lens : k1 k2 p1 p2 k3.
     """

@@ -1,11 +1,11 @@
-"""How far numbers of places can be from zero and still mean a place: beyond it they are a wrong unit, or damage."""
+"""Plausible range of coordinates: numbers beyond it have a wrong unit or are corrupt."""
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 FARTHEST_MM = 1e7
 """10 km: more than any hall or field, and a pose's angles lie far below it, too."""
-REACH_HINT = "Coordinates lie within 10 km (1e7 mm) of the world's origin: check the unit and what wrote it."
+REACH_HINT = "Coordinates lie within 10 km (1e7 mm) of the world's origin: check the unit and their source."
 
 
 def within_reach(values: ArrayLike) -> bool:

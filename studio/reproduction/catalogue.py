@@ -1,4 +1,4 @@
-"""All experiments that `studio reproduce` knows, in the order of the report."""
+"""All experiments of `studio reproduce`, in the order of the report."""
 
 import difflib
 from collections.abc import Iterable
@@ -24,7 +24,7 @@ from studio.reproduction.deutscher_reid import (
 from studio.reproduction.experiment import Experiment
 from studio.reproduction.open_questions import generalisation, robustness
 
-# A new experiment is named here.
+# New experiments are added here.
 LISTED: tuple[Experiment, ...] = (
     layers_of_a_body.FIG_3,
     weight_of_a_knee.FIG_7,
@@ -56,12 +56,12 @@ LISTED: tuple[Experiment, ...] = (
 )
 
 ALL = "all"
-# Words of the command line, and folders beside the experiments' own.
+# Reserved names: words of the command line, and folders beside the experiments' own.
 RESERVED = (ALL, "list", "footage", "trials")
 
 
 def by_name(experiments: Iterable[Experiment]) -> dict[str, Experiment]:
-    """Experiments by name. Raises ValueError where two share one, or it means something else."""
+    """Experiments by name. Raises ValueError for duplicate or reserved names."""
     found: dict[str, Experiment] = {}
     for experiment in experiments:
         if experiment.name in (*found, *RESERVED):

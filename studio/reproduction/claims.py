@@ -1,4 +1,4 @@
-"""Numbers over seeds beside what a paper claims of them."""
+"""Numbers over seeds compared with a paper's claims."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
@@ -14,8 +14,8 @@ HALF = 0.5
 
 
 def share(name: str, held: Iterable[bool], paper: float | None = 1.0) -> Number:
-    """Share of the seeds in which something holds. A minority of the seeds never reproduces what the paper saw, even
-    where its interval is so wide that it contains it.
+    """Share of the seeds in which something holds. A minority of the seeds never counts as reproduced, even
+    where the interval is wide enough to contain the paper's value.
     """
     found = number(name, [float(value) for value in held], "of 1", paper=paper)
     if found.verdict == "reproduced" and paper is not None and abs(found.ours - paper) > HALF:
@@ -35,15 +35,15 @@ def ratio(name: str, ours: Sequence[float], theirs: Sequence[float], claim: str 
 
 
 def geometric_mean(values: Any, axis: int = -1) -> Any:  # noqa: ANN401 - what NumPy's own mean takes and gives
-    """exp of the mean log: of ratios, and of particles that were tried in equal ratios."""
+    """exp of the mean log: for ratios, and for numbers of particles tried in equal ratios."""
     return np.exp(np.mean(np.log(values), axis=axis))
 
 
 def sign_tests(
     of: Callable[[str], tuple[Sequence[float], Sequence[float]]], pairs: Iterable[tuple[str, str]]
 ) -> Table:
-    """Who has the smaller error in more seeds and in more frames, a line a pair. of : a setting's errors of seeds, and
-    of all their frames. Frames of one run follow from each other, so that their p flatters.
+    """Sign tests of pairs of settings over seeds and frames, a line a pair. of : a setting's errors of seeds, and of
+    all their frames. Frames of one run are correlated, so that their p is too small.
     """
     rows = []
     for first, second in pairs:

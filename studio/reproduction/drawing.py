@@ -1,4 +1,4 @@
-"""Series and tables that experiments have in common: what rows of seeds look like."""
+"""Series and tables common to the experiments: rows of seeds."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
@@ -25,7 +25,7 @@ def floats(values: ArrayLike) -> tuple[float, ...]:
 
 
 def line(name: str, x: Iterable[float], y: ArrayLike, *, dashed: bool = False) -> Series:
-    """A line in a colour of its own."""
+    """A line in its own colour."""
     return Series(name, tuple(map(float, x)), floats(y), group=name, dashed=dashed)
 
 

@@ -1,8 +1,8 @@
-"""What a reproduced figure or table is: trials that are run and kept one by one, and what follows from them.
+"""A reproduced figure or table: trials that are run and stored one by one, and their conclusion.
 
-An experiment says which trials it needs (each a few plain values, so that it can be run in any process and
-found again after the program was killed), how one trial is measured, and what all measurements say beside the
-paper's claim. Running, keeping and showing them is the same for all.
+An experiment declares its trials (each a few plain values, so that it can run in any process and be found
+again after the program was killed), the measurement of a trial, and the conclusion on the paper's claim.
+Running, storing and showing them is the same for all.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -22,7 +22,7 @@ Verdict = Callable[[Sequence[Number]], str]
 
 
 def verdict_on(*parts: str) -> Verdict:
-    """The verdict is that of the numbers whose names have one of these parts; without any, of all numbers."""
+    """A verdict on the numbers whose names contain one of these parts; without any, on all numbers."""
     return lambda numbers: overall(
         number.verdict for number in numbers if not parts or any(part in number.name for part in parts)
     )
@@ -36,11 +36,11 @@ class Experiment(Heading):
     """A figure, a table or a claim.
 
     name : as typed on the command line. source : paper and figure. claim : the paper's, in our words. trials : all
-    that are needed at a scale. measure : one trial's plain measurements (a module-level function: it runs in other
-    processes). shown : what all outcomes, in the order of the trials, say: numbers with their verdicts, tables,
-    charts, notes (words) and settings (mappings). verdict : of the whole, from the numbers. footage : recipes whose
+    at a scale. measure : one trial's plain measurements (a module-level function: it runs in other
+    processes). shown : the results of all outcomes, in the order of the trials: numbers with their verdicts,
+    tables, charts, notes (text) and settings (mappings). verdict : overall, from the numbers. footage : recipes whose
     sessions must be rendered first. alone : the trials measure time: they run one after the other when nothing else
-    does, in a process that may use all cores (every other trial has one core and shares the memory's bandwidth).
+    runs, in a process that may use all cores (every other trial has one core and shares the memory's bandwidth).
     """
 
     trials: Callable[[Scale], tuple[Trial, ...]]
@@ -77,7 +77,7 @@ class Experiment(Heading):
 def each_seed(
     label: str, seeds: Iterable[int], arguments: Callable[[int], Mapping[str, Any]]
 ) -> Iterator[Trial]:
-    """A trial a seed. label : contender and setting in words, the same for all. arguments : of a seed's trial."""
+    """A trial a seed. label : contender and setting as text, the same for all. arguments : of a seed's trial."""
     return (Trial(f"{label}, seed {seed}", arguments(seed)) for seed in seeds)
 
 
@@ -87,8 +87,8 @@ def group_of(trial: Trial) -> str:
 
 
 def grouped(outcomes: Iterable[Outcome], made: Callable[..., T] = dict) -> dict[str, list[T]]:
-    """What was measured, by the label of `each_seed` in the order of the trials, seeds in order. made : from the
-    measured fields.
+    """The measurements by the label of `each_seed` in the order of the trials, seeds in order. made : type made from
+    the measured fields.
     """
     found: dict[str, list[T]] = {}
     for outcome in outcomes:

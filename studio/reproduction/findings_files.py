@@ -31,7 +31,7 @@ Rows = Iterable[Sequence[Plain]]
 
 
 def write_findings(out: Path, document: Document) -> None:
-    """One experiment's folder; the CSV files of an earlier conclusion go. Raises OSError."""
+    """Write one experiment's folder; the CSV files of an earlier conclusion are deleted. Raises OSError."""
     folder = out / document["name"]
     folder.mkdir(parents=True, exist_ok=True)
     for old in (*folder.glob("chart-*.csv"), *folder.glob("table-*.csv")):
@@ -48,7 +48,7 @@ def write_findings(out: Path, document: Document) -> None:
 
 
 def read_findings(out: Path, name: str) -> Document | None:
-    """What was found about an experiment, None where it was not run.
+    """The findings of an experiment, None where it was not run.
 
     Raises SessionError for a file that cannot be read.
     """
@@ -110,10 +110,10 @@ def number_in_words(number: Document) -> str:
 
 
 def figures(number: Document) -> tuple[str, str, str, str]:
-    """Ours, the interval's ends and the paper's value in words, "–" for null.
+    """Ours, the interval's ends and the paper's value as text, "–" for null.
 
-    The first three have as many decimals as give the largest of them three figures, or more where an end that is not
-    the paper's value would look like it. `figures` of js/findings_options.js does the same.
+    The first three have as many decimals as give the largest of them three figures, or more where a different end would
+    look equal to the paper's value. `figures` of js/findings_options.js does the same.
     """
     own = (number["ours"], number["low"], number["high"])
     known = [value for value in own if value is not None]
@@ -132,7 +132,7 @@ def figures(number: Document) -> tuple[str, str, str, str]:
 
 
 def as_csv(rows: Rows) -> str:
-    """Rows as RFC 4180 has them; nothing for null."""
+    """Rows as RFC 4180 text; empty for null."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()

@@ -1,9 +1,9 @@
 """The figures and tables of section 3 and the claims of section 2: settings of the swarm and the filter on the walk.
 
-Frame rates: at 20 a second limbs are lost and found again, which Figs. 4 and 5 look at in the runs of Fig. 3. Fig. 6
-sets the swarm beside HumanEva's filter, whose noise follows a plan (Eq. 13 of Deutscher & Reid); of the improved one
-(Eq. 18 and 19) the paper makes no claim. Table 2: the paper says how 1000 evaluations are divided (Table 1) and not how
-2000 and 4000 are; here the iterations stay and the swarms grow. The best figure is none of the paper, but the question
+Frame rates: at 20 a second limbs are lost and found again, shown by Figs. 4 and 5 in the runs of Fig. 3. Fig. 6
+compares the swarm with HumanEva's filter, whose noise follows a plan (Eq. 13 of Deutscher & Reid); of the improved one
+(Eq. 18 and 19) the paper makes no claim. Table 2: the paper gives the division of 1000 evaluations (Table 1), not of
+2000 and 4000; here the iterations stay and the swarms grow. The best figure is not in the paper, but the question
 behind its Table 2 ("the minimal obtainable tracking error").
 """
 
@@ -51,12 +51,12 @@ from studio.weighting.catalogue import WEIGHTINGS
 from studio.weighting.outlines import OutlineProjector
 from studio.weighting.problem import WHOLE_BODY
 
-# What all experiments of Fleischmann et al. (2012), section 3, have in common.
+# Common parts of the experiments of Fleischmann et al. (2012), section 3.
 # The footage is the Lee-walk twin: the real dataset is not complete here, so a walk is rendered for its cameras with
 # a person of its subject's dimensions who is not the tracker's model. Frames 330 to 430 stand still, as in the paper.
-# At 20 frames a second the twin is rendered anew; σ0 is three times as large (after Eq. 1).
+# At 20 frames a second the twin is rendered again; σ0 is three times as large (after Eq. 1).
 # The tracker's body has the subject's dimensions and, unlike the paper's ten cones, hands and feet, for without them
-# forearms and shins slide over hands and feet (Table 2 shows what that costs).
+# forearms and shins slide over hands and feet (Table 2 shows the cost of that).
 
 
 SOURCE = "Fleischmann, Austvoll & Kwolek 2012"
@@ -70,7 +70,7 @@ EVALUATIONS = 1000
 FITNESS = "edge-silhouette"
 RATES = {60: TWIN, 20: TWIN_20}
 
-# The hard priors of section 2.3, for every tracker that is compared.
+# The hard priors of section 2.3, for every compared tracker.
 PRIORS = {"constraints": "redraw", "limbs_apart": True}
 
 SWARM = Contender("swarm", "swarm", FITNESS, PRIORS)
@@ -85,7 +85,7 @@ IMPROVED = Contender("annealed, improved", "annealed", FITNESS, PRIORS)
 
 
 def last_frame(fps: int, quick: bool) -> int:
-    """The end of the footage that is tracked, in frames of its own rate."""
+    """The end of the tracked footage, in frames of its own rate."""
     return (QUICK_FRAMES if quick else FRAMES) * fps // 60
 
 
@@ -110,7 +110,7 @@ def _on_the_twin(
 
 
 def _bars(title: str, x: str, names: Iterable[str], rows: Mapping[str, Iterable[Runs]]) -> Chart:
-    """Mean errors with the range over seeds. rows : by the words for a colour, the runs at every name."""
+    """Mean errors with the range over seeds. rows : by a colour's label, the runs at every name."""
     series = [
         seed_range(word, places(len(tuple(names))), map(mean_errors, runs), "" if len(rows) == 1 else word)
         for word, runs in rows.items()
@@ -308,7 +308,7 @@ CLAIMS = {
     "global": LOWER,
     "soft, three stages": EQUAL,
 }
-"""What the paper says of soft partitioning against each: better, or as good ("not significantly increased")."""
+"""The paper's claim on soft partitioning against each: better, or as good ("not significantly increased")."""
 
 
 def _partitions(quick: bool) -> Iterable[Line]:
@@ -389,7 +389,7 @@ PRIOR_EXPERIMENT = tracked_experiment(
     verdict=verdict_on(f"{SWARM.name},"),
 )
 
-# How accurately the twin can be tracked, and what it takes: one choice of ours after another.
+# Best accuracy on the twin: our choices added one by one.
 
 ALL_TERMS = "edge-region-silhouette"
 FINE = {"silhouette_resolution": "full", "silhouette_weight": 3.0, "occlusion_aware": True}
@@ -454,7 +454,7 @@ Array = NDArray[np.float64]
 # Section 3.2: where the time of a frame goes, the swarm with 1000 evaluations.
 # The paper's program spends 50 % on rendering the model and 39 % on evaluating the fitness, 20 s a frame. Here limbs
 # are drawn straight into rows of bits and counted in one pass, so rendering and fitness are compared together (89 %);
-# how they divide further is measured by repeating parts on the very poses that the swarm weighed.
+# their parts are measured by repeating them on the poses that the swarm weighed.
 
 PAPER_SECONDS, PAPER_RENDERING, PAPER_FITNESS = 20.0, 50.0, 39.0
 WARM_FRAMES, TIMED_FRAMES = 2, 12
@@ -470,7 +470,7 @@ WEIGHING = "rendering and fitness, share of a frame's time"
 
 
 class TimedProblem:
-    """A problem that keeps the time of its calls, and the poses that were weighed."""
+    """A problem that records the time of its calls, and the weighed poses."""
 
     def __init__(self, problem: FrameProblem) -> None:
         self.problem = problem
@@ -478,7 +478,7 @@ class TimedProblem:
         self.batches: list[Array] = []
 
     def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
-        """Log-weights, not timed: the swarm asks for the fitness."""
+        """Log-weights, not timed: the swarm uses the fitness."""
         return self.problem.weigh(poses, stage)
 
     def fitness(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
@@ -490,7 +490,7 @@ class TimedProblem:
         return found
 
     def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
-        """Whether the body can take the poses, timed."""
+        """Whether the poses are possible, timed."""
         began = time.perf_counter()
         found = self.problem.feasible(poses, limbs_apart)
         self.priors_seconds += time.perf_counter() - began
@@ -556,8 +556,8 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
 
 
 def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    """Shares of the frame's time beside the paper's. The verdict is on the claim, the division of the time; that a
-    frame is faster than in 2012 is no surprise.
+    """Shares of the frame's time beside the paper's. The verdict is on the claim, the division of the time, not
+    on the time of a frame.
     """
     times = np.array([[outcome.measured[name] for name in PARTS] for outcome in outcomes])
     shares = 100.0 * times / times.sum(axis=1, keepdims=True)

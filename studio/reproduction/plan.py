@@ -1,4 +1,4 @@
-"""What a command has to run: the trials of all asked experiments, each once, and the footage that they need."""
+"""The plan of a command: the trials of all requested experiments, each once, and the footage that they need."""
 
 import hashlib
 import json
@@ -29,7 +29,7 @@ class PlannedExperiment:
 
 
 def scale_of(seeds: int | None = None, quick: bool = False) -> Scale:
-    """How much is run: ten seeds, three for a quick look, or as many as are asked for.
+    """The scale: ten seeds, three for a preview, or `seeds`.
 
     Raises StudioError for fewer than one.
     """
@@ -40,7 +40,7 @@ def scale_of(seeds: int | None = None, quick: bool = False) -> Scale:
 
 
 def plan(experiment: Experiment, scale: Scale) -> PlannedExperiment:
-    """An experiment's jobs; where they cannot be told, the reason in words."""
+    """An experiment's jobs, or the reason why there are none."""
     try:
         recipes = {name: recipe_digest(name) for name in experiment.footage}
         trials = experiment.trials(scale)
@@ -63,7 +63,7 @@ def plan(experiment: Experiment, scale: Scale) -> PlannedExperiment:
 
 
 def trial_key(experiment: Experiment, trial: Trial, recipes: Mapping[str, str]) -> str:
-    """The name under which a trial's outcome is kept. recipes : digests of the experiment's footage, by name."""
+    """The key under which a trial's outcome is stored. recipes : digests of the experiment's footage, by name."""
     made_by = {
         "measure": measure_name(experiment.measure),
         "alone": experiment.alone,
@@ -74,7 +74,7 @@ def trial_key(experiment: Experiment, trial: Trial, recipes: Mapping[str, str]) 
 
 
 def footage_of(experiment: Experiment, trial: Trial) -> tuple[str, ...]:
-    """Which of the experiment's footage a trial's arguments name; all of it where they name none."""
+    """The experiment's footage named in a trial's arguments; all of it where they name none."""
     named = tuple(name for name in experiment.footage if name in _texts(trial.arguments))
     return named or experiment.footage
 
@@ -89,12 +89,12 @@ def each_once(planned: Iterable[PlannedExperiment]) -> dict[str, TrialJob]:
 
 
 def recipe_digest(name: str) -> str:
-    """What a recipe's footage is known by. Raises StudioError for an unknown recipe."""
+    """The digest of a recipe's footage. Raises StudioError for an unknown recipe."""
     return hashlib.sha256(find_recipe(name).read_bytes()).hexdigest()[:16]
 
 
 def footage_needed(jobs: Iterable[TrialJob]) -> dict[str, int | None]:
-    """The recipes that jobs look at, and how many frames of each from the first (None: all)."""
+    """The recipes that jobs use, and the number of frames of each from the first (None: all)."""
     needed: dict[str, int | None] = {}
     for job in jobs:
         for name in job.footage:
@@ -104,8 +104,8 @@ def footage_needed(jobs: Iterable[TrialJob]) -> dict[str, int | None]:
 
 
 def frames_of(arguments: Plain) -> int | None:
-    """The last frame that a trial's arguments name, as `Attempt` does ("last", half open); None where they do not.
-    Where there is an attempt among them, what names no last frame does not count.
+    """The last frame named in a trial's arguments, as in `Attempt` ("last", half open); None without one. If there is
+    an attempt among them, parts without a last frame do not count.
     """
     if not isinstance(arguments, Mapping):
         return None
@@ -122,7 +122,7 @@ def frames_of(arguments: Plain) -> int | None:
 
 
 def is_rendered(name: str, folder: Path, frames: int | None) -> bool:
-    """Whether so many frames of the footage (None: all) lie in `folder` as the recipe has it now.
+    """Whether `frames` frames of the footage (None: all) are in `folder`, rendered by the present recipe.
 
     Raises StudioError for an unknown recipe, SessionError for a session that cannot be read.
     """
@@ -134,7 +134,7 @@ def is_rendered(name: str, folder: Path, frames: int | None) -> bool:
 
 
 def _texts(value: Plain) -> set[str]:
-    """Every word in a plain value."""
+    """All strings in a plain value."""
     if isinstance(value, str):
         return {value}
     if isinstance(value, Mapping):

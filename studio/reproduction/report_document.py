@@ -1,4 +1,4 @@
-"""The report: one page that holds everything it needs, so that it opens from any folder without a server.
+"""The report: one self-contained page that opens from any folder without a server.
 
 It is drawn by the same module as in the studio's pages (`js/findings.js`), with the same colours; styles, scripts,
 type and data are inside.
@@ -13,7 +13,7 @@ from studio.comparison.findings_document import Document
 from studio.errors import StudioError
 from studio.runs.colour_tokens import tokens_file
 
-# Each may import those before it.
+# Modules; each may import those before it.
 MODULES = ("elements.js", "chart_looks.js", "findings_options.js", "findings_charts.js", "findings.js")
 ECHARTS = "vendor/echarts.esm.min.js"
 TYPE = "vendor/inter.woff2"
@@ -88,7 +88,7 @@ def _address(kind: str, content: bytes) -> str:
 
 
 def _inside_script(text: str) -> str:
-    """JSON that cannot end the script element that it stands in."""
+    """JSON that cannot end its script element."""
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 

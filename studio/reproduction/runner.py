@@ -1,6 +1,6 @@
 """A reproduction from the first picture to the report: footage, trials, conclusions, files.
 
-All that is done is kept at once: the same command goes on where a killed one stopped, and runs nothing twice.
+Every result is stored at once: the same command resumes a killed one, and runs nothing twice.
 """
 
 import time
@@ -31,10 +31,10 @@ SECONDS_BETWEEN_REPORTS = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Reproduction:
-    """What came of a command.
+    """The result of a command.
 
-    documents : of the experiments that were asked for, in their order. results : of all that were ever run in the
-    folder. measured, kept, failed : trials that were run now, found, and run in vain.
+    documents : of the requested experiments, in their order. results : of all experiments run in the folder.
+    measured, kept, failed : numbers of trials run now, found stored, and failed.
     """
 
     documents: tuple[Document, ...]
@@ -54,12 +54,12 @@ def reproduce(
     processes: int | None = None,
     executor: Executor | None = None,
 ) -> Reproduction:
-    """Run what is missing of some experiments and write the folder `out`.
+    """Run the missing trials of some experiments and write the folder `out`.
 
-    catalogue : whose findings the report shows, by default the experiments. processes, executor : see
+    catalogue : experiments whose findings the report shows, by default the experiments. processes, executor : see
     `worker.trials.run_jobs`. A trial or a conclusion that fails makes its experiment "failed" and no other. Raises
     SessionError for a folder that cannot be used, RunError while another process works in it, KeyboardInterrupt with
-    everything kept.
+    all results stored.
     """
     lock = _taken(out)
     try:
@@ -76,7 +76,7 @@ def reproduce(
 
 
 class _Work:
-    """The command's state: what is kept, what is concluded, what is still to be done."""
+    """The command's state: stored outcomes, conclusions, remaining jobs."""
 
     def __init__(
         self,
@@ -93,7 +93,7 @@ class _Work:
         self._kept: dict[str, KeptOutcome] = {}
         for key in self._jobs:
             outcome = self._folder.read(key)
-            # What failed is tried again: its cause may be gone.
+            # Failed trials are run again: the cause may have been removed.
             if outcome is not None and outcome.measured is not None:
                 self._kept[key] = outcome
         self.found, self.measured, self.failed = len(self._kept), 0, 0
@@ -113,7 +113,7 @@ class _Work:
                 runnable.append(job)
         self._conclude_what_is_done()
         if runnable:
-            self._tell("starting")
+            self._report_step("starting")
             run_jobs(runnable, self._out / FOOTAGE, self._done, processes, executor=executor)
 
     def write_overview(self) -> Document:
@@ -122,7 +122,7 @@ class _Work:
         return write_overview(self._out, self._catalogue, measured_by(), now())
 
     def _render(self, needed: dict[str, int | None]) -> dict[str, str]:
-        """Make the footage that is missing; what cannot be made, with the reason. needed : recipes to frames."""
+        """Render missing footage; returns the failures with their reasons. needed : recipes to frames."""
         problems = {}
         for left_by_a_killed_command in (self._out / FOOTAGE).glob(f"{PARTIAL_PREFIX}*"):
             discard(left_by_a_killed_command)
@@ -151,7 +151,7 @@ class _Work:
 
     def _done(self, job: TrialJob, result: TrialResult) -> None:
         self._keep(job, result)
-        self._tell(f"{job.experiment}: {job.label}")
+        self._report_step(f"{job.experiment}: {job.label}")
         self._conclude_what_is_done()
 
     def _keep(self, job: TrialJob, result: TrialResult) -> None:
@@ -172,7 +172,7 @@ class _Work:
             self.measured += 1
 
     def _conclude_what_is_done(self) -> None:
-        """Write the findings of every experiment whose last trial has come in."""
+        """Write the findings of every experiment whose trials are all done."""
         concluded = False
         for entry in self._planned:
             name = entry.experiment.name
@@ -183,7 +183,7 @@ class _Work:
         if concluded and time.monotonic() - self._written > SECONDS_BETWEEN_REPORTS:
             self.write_overview()
 
-    def _tell(self, step: str) -> None:
+    def _report_step(self, step: str) -> None:
         self._report(step, len(self._kept), len(self._jobs))
 
 
@@ -212,7 +212,7 @@ def conclude(planned: PlannedExperiment, kept: Mapping[str, KeptOutcome]) -> Doc
 
 
 def _findings(planned: PlannedExperiment, outcomes: list[KeptOutcome]) -> Findings:
-    """Raises what the experiment's conclusion raises, and StudioError for a verdict that is none."""
+    """The experiment's findings. Raises the errors of its conclusion, and StudioError for an unknown verdict."""
     found = planned.experiment.conclude(
         [
             Outcome(Trial(trial.label, job.arguments), outcome.measured or {})
@@ -221,7 +221,7 @@ def _findings(planned: PlannedExperiment, outcomes: list[KeptOutcome]) -> Findin
     )
     for verdict in (found.verdict, *(number.verdict for number in found.numbers)):
         if verdict not in VERDICTS:
-            raise StudioError(f"'{verdict}' is no verdict.", f"Use one of {', '.join(VERDICTS)}.")
+            raise StudioError(f"'{verdict}' is not a verdict.", f"Use one of {', '.join(VERDICTS)}.")
     return found
 
 

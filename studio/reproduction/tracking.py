@@ -1,7 +1,6 @@
-"""Experiments whose trials are tracked footage: contenders, lines of settings, and what is read from their runs.
+"""Experiments whose trials are tracked footage: contenders, lines of settings, and figures of their runs.
 
-Trials of the same attempt are the same trial whichever experiment asks for it, so figures that look at one set of
-runs from several sides share them.
+Trials of the same attempt are the same trial in every experiment, so figures on one set of runs share them.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -35,17 +34,18 @@ class Contender:
     changes: Mapping[str, Any] = field(default_factory=dict)
 
     def attempt(self, footage: str, seed: int, evaluations: int, **wanted: Any) -> Attempt:  # noqa: ANN401
-        """A run of so many evaluations a frame, 0 where the knobs say it. wanted : other fields of `Attempt`."""
+        """A run of `evaluations` evaluations a frame, 0 where the knobs give them. wanted : other fields of
+        `Attempt`."""
         knobs = knobs_for_evaluations(self.tracker, evaluations) if evaluations else {}
         return Attempt(footage, self.tracker, self.weighting, seed, {**knobs, **self.changes}, **wanted)
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line of an experiment's table of settings: what is tracked with every seed.
+    """A line of an experiment's table of settings, tracked with every seed.
 
-    evaluations : a frame, 0 where the contender's knobs say it. wanted : other fields of `Attempt`, of a seed's own
-    where it is a function.
+    evaluations : a frame, 0 where the contender's knobs give them. wanted : other fields of `Attempt`, by seed where it
+    is a function.
     """
 
     name: str
@@ -71,8 +71,8 @@ def tracked_experiment(
     shown: Callable[[dict[str, list[Tracked]]], Iterable[Part]],
     verdict: Verdict = ON_ALL,
 ) -> Experiment:
-    """An experiment of tracked footage. lines : the settings, for a quick look or in full. shown : what the runs by
-    line say.
+    """An experiment of tracked footage. lines : the settings, for a preview or in full. shown : the results of
+    the runs by line.
     """
 
     def trials(scale: Scale) -> tuple[Trial, ...]:
@@ -93,7 +93,7 @@ def tracked_experiment(
 
 
 def by_group(outcomes: Sequence[Outcome]) -> dict[str, list[Tracked]]:
-    """What was tracked, by line in the order of the trials, seeds in order."""
+    """The tracked runs by line in the order of the trials, seeds in order."""
     return grouped(outcomes, Tracked)
 
 
@@ -108,8 +108,8 @@ def lost_percent(run: Tracked) -> float:
 
 
 def named_percent(runs: Runs, *, lost: bool) -> float:
-    """Of all runs' frames in which a limb is lost (or, not `lost`, in which none is) the tracker named one in these per
-    cent; nan without such frames.
+    """Per cent of all runs' frames with a limb lost (or, not `lost`, with none) in which the tracker reported one; nan
+    without such frames.
     """
     named = [
         bool(ours)
@@ -189,7 +189,7 @@ COLUMNS: Mapping[str, Callable[[Runs], float]] = {
 
 @dataclass(frozen=True, slots=True)
 class Spell:
-    """A limb lost: which, for how many frames in a row, and whether it was found again before the end."""
+    """A spell of a lost limb: its name, length in frames, and whether it was found again before the end."""
 
     limb: str
     frames: int
@@ -197,7 +197,7 @@ class Spell:
 
 
 def spells(run: Tracked) -> Iterator[Spell]:
-    """All rows of frames in which a limb is lost (one of its markers is too far off), limb by limb."""
+    """All spells in which a limb is lost (one of its markers is too far off), limb by limb."""
     for limb in sorted({limb for limbs in run.lost for limb in limbs}):
         length = 0
         for limbs in run.lost:

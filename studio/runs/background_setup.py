@@ -7,7 +7,7 @@ which needs no ground truth (`runs.mask_quality`).
 """
 
 import dataclasses
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import msgspec
@@ -22,7 +22,7 @@ from studio.evidence.masks import PackedMask, reduced, uncleaned
 from studio.evidence.pipeline import EvidenceMaker, RawMask
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
-from studio.progress import Progress, watched
+from studio.progress import Progress, unheard
 from studio.runs.clean_plates import clean_plates
 from studio.runs.mask_quality import JUDGED_SIDE, ROUGH, MaskQuality, count_frame, spread_frames, summed
 from studio.runs.session_settings import session_settings
@@ -84,8 +84,7 @@ def set_up_background(
     knobs: Mapping[str, Knob] | None = None,
     tune: bool = True,
     exclude_unused: bool = False,
-    progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    progress: Progress = unheard,
 ) -> BackgroundSetup:
     """Set a session's background and store it. knobs : of the masks, fixed. tune : try values for the others.
 
@@ -99,7 +98,7 @@ def set_up_background(
     manifest, evidence = session.manifest, read_evidence(session)
     had_evidence = (session.path / EVIDENCE_NAME).exists()
     try:
-        return _set_up(session, source, chosen, tune, exclude_unused, progress, cancelled)
+        return _set_up(session, source, chosen, tune, exclude_unused, progress)
     except BaseException:
         described_anew(session, manifest)
         if had_evidence:
@@ -115,8 +114,7 @@ def _set_up(
     chosen: dict[str, Knob],
     tune: bool,
     exclude_unused: bool,
-    progress: Progress | None,
-    cancelled: Callable[[], bool] | None,
+    progress: Progress,
 ) -> BackgroundSetup:
     """`set_up_background` with checked arguments."""
     session = given_backgrounds(session)
@@ -124,7 +122,7 @@ def _set_up(
     model = MODEL_OF[source]
     if source == "combined" and len(session.manifest.footage.cameras) >= CLEANING_VIEWS:
         settings = _settings(session, {"background_model": "combined", **chosen})
-        plates = clean_plates(session, settings, progress=progress, cancelled=cancelled)
+        plates = clean_plates(session, settings, progress=progress)
         session = use_cleaned(session, {name: plate.picture for name, plate in plates.items()})
         model = "gaussian"
         for name, plate in plates.items():
@@ -134,7 +132,7 @@ def _set_up(
     own: dict[str, Knob] = {"background_model": model, **chosen}
     quality = None
     if tune and len(session.manifest.footage.cameras) > 1:
-        own, quality = _tuned(session, own, watched(progress, cancelled, "Making the background"))
+        own, quality = _tuned(session, own, progress)
     write_evidence(session, msgspec.structs.replace(read_evidence(session), knobs=own))
     return BackgroundSetup(source, own, tuple(notes), quality)
 

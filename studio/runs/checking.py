@@ -6,7 +6,7 @@ limbs (`jumps`), limbs contradicted by the masks (`tracking.agreement`), and the
 """
 
 import contextlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import msgspec
@@ -20,7 +20,7 @@ from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
 from studio.geometry.camera import Camera
-from studio.progress import Progress, watched
+from studio.progress import Progress, unheard
 from studio.runs.jumps import Jump, jumps_of
 from studio.runs.overlay_drawing import projected_silhouette
 from studio.runs.refining import jitter
@@ -140,12 +140,11 @@ def check_run(
     track: str = BEST,
     every: int = EVERY,
     *,
-    progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    progress: Progress = unheard,
 ) -> RunCheck:
     """Measure a track in every `every`-th of its frames and store the result.
 
-    Raises RunError for a run without frames, NotFoundError, FootageError; WorkCancelledError when stopped.
+    Raises RunError for a run without frames, NotFoundError, FootageError.
     """
     chosen = read_track(run, track or BEST)
     if not len(chosen.frames):
@@ -154,13 +153,12 @@ def check_run(
     rows = range(0, len(chosen.frames), max(1, every))
     settings = _settings(run)
 
-    report = watched(progress, cancelled, "The check")
     shares, denied, agreement = [], list[DeniedLimb](), Agreement(body, cameras)
     with contextlib.closing(footage_of(session, run)) as footage, run.results() as results:
         known = set(results.frames())
         maker = EvidenceMaker(cameras, footage, Backgrounds(footage), settings.evidence, "none")
         for done, row in enumerate(rows):
-            report("comparing with the masks", done, len(rows))
+            progress("comparing with the masks", done, len(rows))
             evidence = maker.evidence(int(chosen.frames[row]))
             frame, pose = evidence.frame, chosen.poses[row]
             shares.append(frame_shares(body, cameras, pose, evidence, settings))

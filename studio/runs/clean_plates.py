@@ -12,7 +12,7 @@ for the backgrounds, whose frames are spooled to disk.
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -31,7 +31,7 @@ from studio.evidence.masks import cleaned, reduced, reduced_cleaning
 from studio.evidence.settings import EvidenceSettings
 from studio.geometry.camera import Camera
 from studio.numba_in_threads import njit
-from studio.progress import Progress, watched
+from studio.progress import Progress, unheard
 from studio.sessions.session import Session
 from studio.volume.hull_settings import HullSettings
 from studio.volume.hull_silhouette import silhouette
@@ -81,13 +81,12 @@ def clean_plates(
     settings: EvidenceSettings,
     *,
     frames: int = FRAMES,
-    progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    progress: Progress = unheard,
 ) -> Mapping[str, CleanPlate]:
     """Clean backgrounds by camera, from the session's plates, clips or medians.
 
-    settings : of the masks. frames : number read from the footage, evenly spread. Raises RunError for fewer than three
-    cameras (too few for a hull without one of them) or where it was cancelled, FootageError.
+    settings : of the masks. frames : number read from the footage, evenly spread. Raises RunError for fewer than
+    three cameras (too few for a hull without one of them), FootageError.
     """
     cameras = session.cameras()
     if len(cameras) < 3:
@@ -97,8 +96,7 @@ def clean_plates(
         )
     footage = session.footage()
     try:
-        report = watched(progress, cancelled, "Making the background")
-        cleaning = _Cleaning(cameras, footage, dataclasses.replace(settings, **CLEARED), frames, report)
+        cleaning = _Cleaning(cameras, footage, dataclasses.replace(settings, **CLEARED), frames, progress)
         return cleaning.run(session.path)
     finally:
         footage.close()

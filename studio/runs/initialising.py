@@ -17,7 +17,7 @@ from studio.body.model import BodyModel
 from studio.errors import RunError
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.geometry.camera import Camera
-from studio.progress import Cancelled, Progress, watched
+from studio.progress import Progress, unheard
 from studio.runs.behaviour_models import fitting, model_folders, model_path
 from studio.runs.initial_limbs import limbs_put_right
 from studio.runs.problem_source import ProblemSource
@@ -62,7 +62,7 @@ class InitialPose:
     names : of the parameters. pose : (D,). body : its name. confidence : 0 to 1, that pose and heading are right.
     margin : log weight above the best pose that faces the other way, inf without one. rival : that pose.
     agreement : share of the last searches with this heading. overlap : f_s. hull_litres : volume of the hull, 0
-    without one. note : for the user, or "".
+    without one. note : for the user, or "". file : that it was written to.
     """
 
     frame: int
@@ -77,6 +77,7 @@ class InitialPose:
     hull_litres: float
     evaluations: int
     note: str
+    file: Path | None = None
 
     @property
     def source(self) -> str:
@@ -92,17 +93,14 @@ def initialise(
     behaviour: str = "",
     weighting: str = WEIGHTING,
     seed: int = 0,
-    progress: Progress | None = None,
-    cancelled: Cancelled | None = None,
+    progress: Progress = unheard,
 ) -> InitialPose:
     """The pose of the session's body in a frame.
 
-    body : the session's own by default. behaviour : name or path of a model whose prototypes are candidates. cancelled
-    : checked often; True ends the search with WorkCancelledError. Raises RunError where the frame shows no body,
-    NotFoundError for an unknown frame.
+    body : the session's own by default. behaviour : name or path of a model whose prototypes are candidates. Raises
+    RunError where the frame shows no body, NotFoundError for an unknown frame.
     """
     tree = body or session.body()
-    report = watched(progress, cancelled, "The search for a start pose")
     settings = session_settings(session, DEFAULT_TRACKER, weighting)
     prototypes = None
     if behaviour:
@@ -110,7 +108,7 @@ def initialise(
         prototypes = fitting(model, tree, session.manifest.fps).prototypes.poses
     problems = ProblemSource(session, tree)
     try:
-        report("reading the frame", 0, 1)
+        progress("reading the frame", 0, 1)
         evidence = problems.evidence(frame, settings)
         masks = problems.evidence(frame, session_settings(session, DEFAULT_TRACKER, WEIGHTING))
         cameras = problems.cameras_in(frame)
@@ -132,9 +130,9 @@ def initialise(
         cameras=len(cameras),
         seed=seed,
         prototypes=prototypes,
-        progress=lambda done, total: report("searching for the pose", done, total),
+        progress=lambda done, total: progress("searching for the pose", done, total),
     )
-    report("checking each limb", 0, 1)
+    progress("checking each limb", 0, 1)
     stands = limbs_put_right(tree, cameras, masks, found.pose, seed, draw=len(cameras) >= FEWEST_VIEWS)
     shares = stands.off.shares()
     denied = [limb for limb, share in shares.items() if share > LIMB_LOST_SHARE]

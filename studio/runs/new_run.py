@@ -4,31 +4,37 @@ Defaults come from the session (body, subject, start pose, σ0, tracker, likelih
 run's record has everything that its poses depend on.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from importlib import metadata, resources
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
 
 from studio.body.branches import within_limits
 from studio.body.model import BodyModel
-from studio.body.subject import Subject
+from studio.body.subject import Subject, read_subject
+from studio.declaring import Body, Despite, Knobs, Model, OneOf, Seed, Terminal, Values, Web, Whose
 from studio.errors import BodyError, RunError, StudioError
 from studio.geometry.reach import within_reach
+from studio.knobs import Knob
+from studio.progress import Progress, unheard
 from studio.runs.behaviour_models import chosen_model
-from studio.runs.initialising import InitialPose, Progress, initialise
+from studio.runs.initialising import InitialPose, initialise
 from studio.runs.live_request import check_live, live_changes
 from studio.runs.search_space import parameter_names, session_sigma
 from studio.runs.session_settings import session_settings
 from studio.runs.shape_on_the_way import session_shape
 from studio.runs.silhouette_doubts import accepted_doubts
+from studio.runs.start_pose_file import frame_of_file, start_pose_from_file
 from studio.sessions.manifest import now
 from studio.sessions.run_record import RunRecord
 from studio.sessions.session import Session, free_run_name
 from studio.sessions.stored_run import StoredRun
-from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, values
+from studio.settings import DEFAULT_TRACKER, DEFAULT_WEIGHTING, knob_table, values
+from studio.tracking.catalogue import TRACKERS
+from studio.weighting.catalogue import WEIGHTINGS
 
 Array = NDArray[np.float64]
 
@@ -37,115 +43,185 @@ DESPITE = "Tracked despite: "
 """Prefix of a run's note on an accepted fault of the calibration."""
 
 
-@dataclass(frozen=True, slots=True)
-class RunRequest:
-    """The parameters of a new run; all have defaults.
+OPTION_KNOBS = ("particles", "layers", "survival", "crossover")
 
-    tracker, weighting, body : names, "" for the session's own. subject : measures instead of the session's.
-    start_pose : (D,) radians and mm, instead of the session's; start_source : its origin, as text.
-    first, last : frames, half open; first None means the frame that the session's start pose is of (0 where none is
-    used, and live), last None all. changes : knobs by flat name. name : "" for run-1,
-    run-2, … behaviour : a behaviour model, by its name in the workspace's models or by path; "" for the only one that
-    fits where the settings need one. live : frames come on the footage's clock and are dropped where they come too
-    fast (`live_run`). to_and_fro : a live run plays the footage forwards and backwards; `last` may lie behind its end.
-    despite_findings : also where the footage contradicts the calibration. fit_shape : fit the body's radii, hands,
-    feet and head to the first frames (`shape_on_the_way`); not for live runs, which cannot look ahead.
-    """
 
-    tracker: str = ""
-    weighting: str = ""
-    body: str = ""
-    subject: Subject | None = None
-    start_pose: Array | None = None
-    start_source: str = ""
-    first: int | None = None
-    last: int | None = None
-    seed: int = 0
-    changes: Mapping[str, object] = field(default_factory=dict)
-    name: str = ""
-    behaviour: str = ""
-    live: bool = False
-    to_and_fro: bool = False
-    despite_findings: bool = False
-    fit_shape: bool = True
+def own_knobs() -> list[Knob]:
+    """The knobs of a search that have an option of their own on the command line."""
+    known = {entry.name: entry for entry in reversed(knob_table())}
+    return [known[name] for name in OPTION_KNOBS]
+
+
+Pose = ArrayLike | InitialPose | str | Path
+"""(D,) radians and mm in the body's order, what `initialise` found, or a file: a CSV row or a TRC."""
+Numbers = list[float] | None
 
 
 def prepare_run(
-    session: Session, request: RunRequest | None = None, progress: Progress | None = None
+    session: Annotated[Session, Whose("session")],
+    *,
+    tracker: Annotated[
+        str, Field(description="Default: the session's own, else annealed."), OneOf(TRACKERS)
+    ] = "",
+    weighting: Annotated[
+        str,
+        Field(description=f"The likelihood; default: the session's own, else {DEFAULT_WEIGHTING}."),
+        OneOf(WEIGHTINGS),
+    ] = "",
+    body: Body = "",
+    subject: Annotated[
+        Subject | str | Path | None,
+        Field(description="subject.toml to use instead of the session's."),
+        Terminal(kind=Path),
+    ] = None,
+    start_pose: Annotated[
+        Pose | None,
+        Field(
+            description="Radians and mm in the body's order, or a file: a CSV row, a TRC fitted by inverse kinematics."
+        ),
+        Terminal(kind=Path),
+        Web(kind=Numbers),
+    ] = None,
+    start_source: Annotated[
+        str,
+        Field(max_length=200, description="The origin of that pose, as text."),
+        Terminal(left_out=True),
+        Web(kind=str),
+    ] = "",
+    behaviour: Annotated[
+        Model,
+        Field(
+            description="Behaviour model, by name or file, for tracker behaviour or prediction=behaviour; default: the"
+            " only one that fits, where one is needed."
+        ),
+    ] = "",
+    first: Annotated[
+        int | None, Field(ge=0, description="Default: the frame that the start pose is of.")
+    ] = None,
+    last: Annotated[
+        int | None, Field(ge=1, description="The frame after the last one; default: all.")
+    ] = None,
+    seed: Seed = 0,
+    knobs: Annotated[
+        Values,
+        Field(description="Any other knob, by name; the guide lists them."),
+        Knobs(own_knobs, others=True, with_defaults=False),
+    ] = None,
+    name: Annotated[str, Field(description="Of the run (letters, digits, - and _); default: numbered.")] = "",
+    despite_findings: Despite = False,
+    fit_shape: Annotated[
+        bool,
+        Field(
+            description="Begin with the radii, hands, feet and head that the first frames show; bone lengths are kept."
+            " Not live."
+        ),
+        Terminal("--fit-shape/--keep-shape"),
+    ] = True,
+    live: Annotated[
+        bool,
+        Field(description="Track at the footage's rate, dropping frames rather than falling behind."),
+        Terminal(left_out=True),
+    ] = False,
+    to_and_fro: Annotated[
+        bool,
+        Field(
+            description="A live run plays the footage forwards and backwards; last may lie behind the end."
+        ),
+        Terminal(left_out=True),
+    ] = False,
+    progress: Progress = unheard,
 ) -> StoredRun:
-    """Make a run's folder, ready to be tracked. Raises StudioError; then nothing was made.
+    """A new run, ready to be tracked; what is left out is the session's own or the studio's default.
 
     Without a start pose in request and session, and limits of the body to start between, the first frame is searched
-    for one, which takes a while. progress : of that search.
+    for one, which takes a while.
+
+    Raises StudioError; then nothing was made.
     """
-    request = request or RunRequest()
-    doubts = accepted_doubts(session, request.despite_findings)
-    tracker = request.tracker or session.manifest.tracker or DEFAULT_TRACKER
-    weighting = request.weighting or session.manifest.weighting or DEFAULT_WEIGHTING
-    changes = live_changes(request.changes) if request.live else request.changes
-    settings = session_settings(session, tracker, weighting, changes)
-    check_live(settings, live=request.live, to_and_fro=request.to_and_fro)
-    own_start = request.start_pose is None and not request.live
-    first, last = checked_frames(
-        session, _first(session, request, own_start), request.last, endless=request.to_and_fro
-    )
-    if not 0 <= request.seed < 2**63:
-        raise RunError(f"The seed {request.seed} cannot be used.", "Give a whole number of 0 or more.")
-    body, notes = session.body_with_notes(request.body or None, request.subject)
+    doubts = accepted_doubts(session, despite_findings)
+    tracker = tracker or session.manifest.tracker or DEFAULT_TRACKER
+    weighting = weighting or session.manifest.weighting or DEFAULT_WEIGHTING
+    settings = session_settings(session, tracker, weighting, live_changes(knobs or {}) if live else knobs)
+    check_live(settings, live=live, to_and_fro=to_and_fro)
+    measures = subject if isinstance(subject, Subject) or subject is None else read_subject(Path(subject))
+    given: Array | None = None
+    if start_pose is not None:
+        tree, fps = session.body(body or None, measures), session.manifest.fps
+        given, start_source, first = given_pose(start_pose, start_source, tree, fps, first)
+    own_start = given is None and not live
+    first, last = checked_frames(session, _first(session, first, last, own_start), last, endless=to_and_fro)
+    if not 0 <= seed < 2**63:
+        raise RunError(f"The seed {seed} cannot be used.", "Give a whole number of 0 or more.")
+    tree, notes = session.body_with_notes(body or None, measures)
     notes = (*notes, *(f"{DESPITE}{doubt}" for doubt in doubts))
-    behaviour = chosen_model(session, body, settings, request.behaviour)
-    if behaviour is not None and behaviour.note:
-        notes = (*notes, behaviour.note)
-    start, source = start_pose(session, body, request.start_pose, request.start_source)
+    model = chosen_model(session, tree, settings, behaviour)
+    if model is not None and model.note:
+        notes = (*notes, model.note)
+    start, source = start_of(session, tree, given, start_source)
     if own_start and start is not None and first != session.start_pose_frame():
         of = session.start_pose_frame()
         notes = (*notes, f"The run begins in frame {first}, the session's start pose is of frame {of}.")
-    if start is None and not _limited(body):
-        model = str(behaviour.path) if behaviour else ""
-        found = _found(session, first, body, model, request.seed, progress)
-        start, source = within_limits(body, found.pose), found.source
+    if start is None and not _limited(tree):
+        path = str(model.path) if model else ""
+        found = _found(session, first, tree, path, seed, progress)
+        start, source = within_limits(tree, found.pose), found.source
         notes = (*notes, *([found.note] if found.note else []))
-    subject = dict(body.dimensions)
-    if request.fit_shape and not request.live and start is not None:
-        body, start, words = session_shape(session, body, settings, start, first, progress)
+    before = dict(tree.dimensions)
+    if fit_shape and not live and start is not None:
+        tree, start, words = session_shape(session, tree, settings, start, first, progress)
         notes = (*notes, *([words] if words else []))
     record = RunRecord(
-        name=request.name or free_run_name(session),
+        name=name or free_run_name(session),
         session=session.name,
         created=now(),
         tracker=tracker,
         weighting=weighting,
-        body=body.name,
-        dimensions=dict(body.dimensions),
-        parameters=parameter_names(body),
-        seed=request.seed,
+        body=tree.name,
+        dimensions=dict(tree.dimensions),
+        parameters=parameter_names(tree),
+        seed=seed,
         first=first,
         last=last,
         fps=session.manifest.fps,
         settings=dict(values(settings)),
-        sigma=tuple(float(value) for value in session_sigma(session, body, session.manifest.fps)),
+        sigma=tuple(float(value) for value in session_sigma(session, tree, session.manifest.fps)),
         start_pose=None if start is None else tuple(float(value) for value in start),
         start_source=source,
         software=software_version(),
         notes=tuple(notes),
-        behaviour=behaviour.name if behaviour else "",
-        live=request.live,
-        to_and_fro=request.to_and_fro,
-        subject_dimensions=subject if subject != body.dimensions else {},
+        behaviour=model.name if model else "",
+        live=live,
+        to_and_fro=to_and_fro,
+        subject_dimensions=before if before != tree.dimensions else {},
     )
-    text = _body_text(session, request.body or body.name)
-    return session.new_run(record, text, behaviour.path if behaviour else None)
+    text = _body_text(session, body or tree.name)
+    return session.new_run(record, text, model.path if model else None)
 
 
-def _first(session: Session, request: RunRequest, own_start: bool) -> int:
+def given_pose(
+    pose: Pose, source: str, body: BodyModel, fps: float, frame: int | None = None
+) -> tuple[Array, str, int | None]:
+    """A pose (D,) of a body, where it came from in words, and the frame that it is of. frame : as far as it is known,
+    of footage of so many frames a second. Raises BodyError, TruthError.
+    """
+    if isinstance(pose, InitialPose):
+        return pose.pose, pose.source, pose.frame if frame is None else frame
+    if isinstance(pose, str | Path):
+        path = Path(pose)
+        frame = frame_of_file(path) if frame is None else frame
+        return *start_pose_from_file(path, body, frame, fps), frame
+    return np.asarray(pose, dtype=np.float64), source or "given", frame
+
+
+def _first(session: Session, first: int | None, last: int | None, own_start: bool) -> int:
     """The frame that a run begins in. Raises RunError where it would end before its start pose."""
-    if request.first is not None:
-        return request.first
+    if first is not None:
+        return first
     first = session.start_pose_frame() if own_start else 0
-    if first and request.last is not None and request.last <= first:
+    if first and last is not None and last <= first:
         raise RunError(
             f"The start pose of session '{session.name}' is of frame {first}, after the last requested frame"
-            f" ({request.last - 1}).",
+            f" ({last - 1}).",
             "Give the first frame, too, or find a start pose in an earlier frame.",
         )
     return first
@@ -168,7 +244,7 @@ def checked_frames(
     return first, end
 
 
-def start_pose(
+def start_of(
     session: Session, body: BodyModel, given: Array | None, given_source: str = ""
 ) -> tuple[Array | None, str]:
     """The pose that the first frame starts from (its angles rewritten into the limits), and where it came from.
@@ -191,7 +267,7 @@ def start_pose(
 
 
 def _found(
-    session: Session, frame: int, body: BodyModel, model: str, seed: int, progress: Progress | None
+    session: Session, frame: int, body: BodyModel, model: str, seed: int, progress: Progress
 ) -> InitialPose:
     """The start pose found in a run's first frame. Raises RunError if there is none."""
     try:

@@ -12,7 +12,7 @@ from studio.body.branches import within_limits
 from studio.errors import RunError
 from studio.evidence.distance_maps import silhouette_distances
 from studio.geometry.reach import within_reach
-from studio.progress import Cancelled, Progress, watched
+from studio.progress import Progress, unheard
 from studio.runs.problem_source import ProblemSource
 from studio.runs.refined_frames import JUDGE
 from studio.runs.search_space import search_space, session_sigma
@@ -55,14 +55,13 @@ def better_pose(
     *,
     run: StoredRun | None = None,
     seed: int = 0,
-    progress: Progress | None = None,
-    cancelled: Cancelled | None = None,
+    progress: Progress = unheard,
 ) -> BetterPose:
     """The best pose near a given one (D,) in a frame. run : whose body, cameras and likelihood are used; None: the
     session's.
 
-    cancelled : checked before each layer; True ends it with WorkCancelledError. Raises RunError where the frame shows
-    no body or the pose does not fit it.
+    progress : told before each layer. Raises RunError where nothing is to be seen in the frame or the pose does not fit
+    the body.
     """
     body = run.body() if run else session.body()
     given = np.asarray(pose, dtype=np.float64)
@@ -84,14 +83,13 @@ def better_pose(
             "Choose a frame in which the person is in view, or check the masks.",
         )
     layers, done = int(SHORT["layers"]), 0
-    report = watched(progress, cancelled, "The search around the pose")
 
     def checked(_: object) -> None:
         nonlocal done
         done += 1
-        report(STEP, done, layers + 1)
+        progress(STEP, done, layers + 1)
 
-    report(STEP, done, layers + 1)
+    progress(STEP, done, layers + 1)
     space = search_space(body, session_sigma(session, body, min(HAND_FPS, session.manifest.fps)))
     found = search_frame(
         TRACKERS[TRACKER],
@@ -110,7 +108,7 @@ def better_pose(
     weights = problem.weigh(np.stack([given, begin, refined]))
     best = [given, begin, refined][int(np.argmax(weights))]
     onlooker = Onlooker(body, problems.cameras)
-    report(STEP, layers + 1, layers + 1)
+    progress(STEP, layers + 1, layers + 1)
     return BetterPose(
         pose=best,
         gain=float(weights.max() - weights[0]),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from studio.body.forward_kinematics import marker_points
 from studio.errors import RunError
-from studio.progress import Cancelled, Progress, watched
+from studio.progress import Progress, unheard
 from studio.runs.problem_source import ProblemSource
 from studio.runs.refined_frames import refined_frames
 from studio.runs.search_space import search_space
@@ -67,24 +67,23 @@ def refine_run(
     into: str = REFINED,
     settings: RefinementSettings | None = None,
     replace: bool = False,
-    progress: Progress | None = None,
-    cancelled: Cancelled | None = None,
+    progress: Progress = unheard,
 ) -> MadeTrack:
     """Refine every frame of a track and store the result as another (see `runs.refined_frames`).
 
-    source : "" for the tracked poses, with sides corrected first (`runs.sides`) if they are not yet. progress : called
-    after each frame. cancelled : checked before each; True ends it with WorkCancelledError, and nothing is stored.
-    Raises SessionError if `into` is taken, RunError for a run without frames, and the errors of reading the footage.
+    source : "" for what was tracked, with its sides put right first (`runs.sides`) where they are not yet. progress :
+    told after each frame; where it raises, nothing is kept. Raises
+    SessionError where `into` is taken, RunError for a run without frames, and what reading the footage raises.
     """
     knobs = settings or RefinementSettings()
     track = _begun(run, source or RAW, into, replace)
-    report, step, total = watched(progress, cancelled, "Refining"), f"refining {run.name}", len(track.frames)
-    report(step, 0, total)
+    step, total = f"refining {run.name}", len(track.frames)
+    progress(step, 0, total)
     if not source and into != SIDES:
         with closing(ProblemSource(session, run.body(), run.cameras())) as problems:
-            put_sides_right(run, problems, lambda _: report(step, 0, total))
+            put_sides_right(run, problems, lambda _: progress(step, 0, total))
         track = read_track(run, best_track(run, (SIDES,)).name)
-    found = refined_frames(session, run, track, knobs, lambda done: report(step, done, total))
+    found = refined_frames(session, run, track, knobs, lambda done: progress(step, done, total))
     moved = int(np.count_nonzero((found.poses != track.poses).any(axis=1)))
     made_by = {"verb": "refine", **_origin(track), **asdict(knobs), "moved": moved}
     made = Track(into, track.frames, found.poses, found.agreement, track.states, made_by)

@@ -24,7 +24,7 @@ from studio.evidence.backgrounds import Backgrounds
 from studio.evidence.distance_maps import silhouette_distances
 from studio.evidence.frame_evidence import FrameEvidence
 from studio.evidence.pipeline import EvidenceMaker
-from studio.progress import Cancelled, Progress, watched
+from studio.progress import Progress, unheard
 from studio.runs.initialising import initialise
 from studio.runs.search_space import parameter_names
 from studio.runs.session_settings import session_settings
@@ -85,7 +85,9 @@ class FittedSize:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FittedSubject:
-    """A fitted subject. frames, poses (F, D) : of the fit. overlap_before, overlap : (F,) f_s."""
+    """A subject that was found. frames, poses (F, D) : with it. overlap_before, overlap : (F,) f_s. file : that it was
+    written to.
+    """
 
     subject: Subject
     body: BodyModel
@@ -96,28 +98,27 @@ class FittedSubject:
     overlap: Array
     poses_from: str
     evaluations: int
+    file: Path | None = None
 
 
 def fit_session_subject(
     session: Session,
     request: FitRequest | None = None,
     *,
-    progress: Progress | None = None,
-    cancelled: Cancelled | None = None,
+    progress: Progress = unheard,
 ) -> FittedSubject:
     """The subject of a session, fitted to its silhouettes. Nothing is written: see `keep_subject`.
 
-    progress : the step, the number of parts done, and of all. Raises RunError where a frame shows no body or nothing
-    may change, NotFoundError for an unknown frame or run, WorkCancelledError.
+    progress : the step in words, how much of it is done, and how much there is. Raises RunError where nothing is to be
+    seen in a frame or nothing may change, NotFoundError for a frame or run that is not there.
     """
     request = request or FitRequest()
     if not request.lengths and not request.radii:
         raise RunError("Neither lengths nor radii are to be fitted.", "Choose at least one of them.")
-    report = watched(progress, cancelled, "Fitting the subject")
     body, subject = _first_body(session, request)
-    report("choosing frames", 0, 1)
-    frames, start, poses_from = _first_poses(session, body, request, report)
-    evidence = _evidence(session, frames, report)
+    progress("choosing frames", 0, 1)
+    frames, start, poses_from = _first_poses(session, body, request, progress)
+    evidence = _evidence(session, frames, progress)
     space = shape_space(body, symmetric=request.symmetric, lengths=request.lengths, radii=request.radii)
     space = levelled(space) if request.symmetric else space
     limbs = {name: number for number, name in enumerate(dict.fromkeys(p.limb for p in body.parameters))}
@@ -131,10 +132,10 @@ def fit_session_subject(
         prior,
         settings=ShapeSearchSettings(particles=request.particles, layers=request.layers),
         seed=request.seed,
-        progress=lambda done, total: report("fitting lengths and radii", done, total),
+        progress=lambda done, total: progress("fitting lengths and radii", done, total),
     )
     found = search.run(start)
-    report("refining lengths and radii", 0, 1)
+    progress("refining lengths and radii", 0, 1)
     borders = [silhouette_distances(one) for one in evidence]
     refiner = ShapeRefiner(silhouettes.programs, session.cameras(), borders, prior)
     refined = refiner.refine(found.shape, found.poses, request.seed, others=(start,))

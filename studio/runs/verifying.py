@@ -5,14 +5,13 @@ Files have theirs in `.checksums.json` (`sessions.file_checksums`), frames, laye
 """
 
 import contextlib
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from studio.errors import SessionError, StudioError
-from studio.progress import Progress, watched
+from studio.progress import Progress, unheard
 from studio.runs.problem_source import ProblemSource
 from studio.runs.run_footage import footage_of
 from studio.runs.tracking_run import TrackingRun
@@ -66,11 +65,8 @@ class Repair:
     problem: str = ""
 
 
-def verify(
-    session: Session, progress: Progress | None = None, cancelled: Callable[[], bool] | None = None
-) -> Verification:
-    """Verify all stored data. Raises WorkCancelledError."""
-    step = watched(progress, cancelled, "The verification")
+def verify(session: Session, progress: Progress = unheard) -> Verification:
+    """Read all that is stored."""
     runs = session.runs()
     faults: list[Fault] = []
     again: list[str] = []
@@ -78,13 +74,13 @@ def verify(
     for done, (folder, prefix) in enumerate(
         [(session.path, ""), *((run.folder, f"runs/{run.name}/") for run in runs)]
     ):
-        step(f"checking {prefix or session.name}", done, len(runs) + 1)
+        progress(f"checking {prefix or session.name}", done, len(runs) + 1)
         found = check_files(folder)
         files, new = files + found.count, new + len(found.new)
         again += [prefix + name for name in found.written_again]
         faults += [Fault(prefix + name, what, COPY) for name, what in sorted(found.damaged.items())]
     for done, run in enumerate(runs):
-        step(f"checking run {run.name}", done, len(runs))
+        progress(f"checking run {run.name}", done, len(runs))
         count, without, wrong = _verify_results(run)
         frames, unchecked, faults = frames + count, unchecked + without, faults + wrong
     return Verification(files, frames, unchecked, tuple(again), new, tuple(faults))
@@ -133,17 +129,13 @@ def _is_live(run: StoredRun) -> bool:
     return False
 
 
-def repair(
-    session: Session, faults: tuple[Fault, ...], progress: Progress | None = None
-) -> tuple[Repair, ...]:
+def repair(session: Session, faults: tuple[Fault, ...], progress: Progress = unheard) -> tuple[Repair, ...]:
     """Track the damaged frames of each run again from the stored frames before them. Other faults stay."""
     names = dict.fromkeys(fault.run for fault in faults if fault.run)
     return tuple(_repair_run(session, session.run(name), faults, progress) for name in names)
 
 
-def _repair_run(
-    session: Session, run: StoredRun, faults: tuple[Fault, ...], progress: Progress | None
-) -> Repair:
+def _repair_run(session: Session, run: StoredRun, faults: tuple[Fault, ...], progress: Progress) -> Repair:
     mine = [fault for fault in faults if fault.run == run.name]
     frames: list[int] = []
     before: dict[int, NDArray[np.float64]] = {}
@@ -189,7 +181,7 @@ def _mend_rest(run: StoredRun, writer: ResultsWriter) -> None:
         writer.mark_ended("")
 
 
-def _track_damaged(session: Session, run: StoredRun, progress: Progress | None) -> list[int]:
+def _track_damaged(session: Session, run: StoredRun, progress: Progress) -> list[int]:
     """Track only the damaged frames; returns them in the order of tracking."""
     with run.results() as results:
         if not results.damaged():
@@ -202,6 +194,5 @@ def _track_damaged(session: Session, run: StoredRun, progress: Progress | None) 
             stepped = tracking.step_layer()
             if stepped.result is not None:
                 frames.append(stepped.result.frame)
-                if progress is not None:
-                    progress(f"tracking damaged frames of {run.name} again", len(frames), total)
+                progress(f"tracking damaged frames of {run.name} again", len(frames), total)
     return frames

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from numpy import float64
 from numpy.typing import NDArray
 
-from studio.errors import StudioError
+from studio.errors import StudioError, WorkCancelledError
 from studio.runs.pose_search import BetterPose, better_pose
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -33,6 +33,11 @@ class PoseRefining:
     ) -> None:
         self._stopping = threading.Event()
 
+        def told(_: str, step: int, total: int) -> None:
+            if self._stopping.is_set():
+                raise WorkCancelledError("The search around the pose was stopped.")
+            progress(step / total)
+
         def search() -> None:
             try:
                 found = better_pose(
@@ -40,8 +45,7 @@ class PoseRefining:
                     frame,
                     pose,
                     run=run,
-                    progress=lambda _, step, total: progress(step / total),
-                    cancelled=self._stopping.is_set,
+                    progress=told,
                 )
             except StudioError as problem:
                 found = problem

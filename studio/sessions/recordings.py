@@ -13,7 +13,7 @@ from studio.capture.live_cameras import APART, SpreadFigures, furthest, spread_f
 from studio.capture.stream_files import mend_recording
 from studio.capture.timestamps import read_timestamps
 from studio.errors import FootageError
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 from studio.sessions.importers.importing import ImportReport, import_source
 from studio.sessions.manifest import FILE_NAME as MANIFEST_NAME
 from studio.sessions.names import is_name
@@ -62,7 +62,7 @@ def import_recording(
     into: Path,
     calibration: Path,
     notes: Sequence[str] = (),
-    progress: Progress | None = None,
+    progress: Progress = unheard,
 ) -> tuple[ImportReport, SpreadFigures]:
     """Make a session at `into` from a recording, which is then removed; an interrupted recording is repaired first.
 

@@ -1,7 +1,7 @@
-"""Footage of planar arms: one camera facing the plane, the picture being the tracker's own body, moving smoothly.
+"""Footage of planar arms: one camera facing the plane shows the tracker's own body, moving smoothly.
 
-Deutscher & Reid 6.1 and 6.2.2: the arms are the model itself, and what is studied is the search, not the fit of a model
-to a person. The mask is exact: a pixel is arm when its centre lies in the outline of a drawn limb.
+Deutscher & Reid 6.1 and 6.2.2: the arms are the model itself, so that the search is studied, not the fit of a model to
+a person. The mask is exact: a pixel is arm when its centre lies in the outline of a drawn limb.
 """
 
 from pathlib import Path
@@ -86,7 +86,7 @@ def filled(outlines: Array, width: int, height: int) -> Bytes:
     return np.where(coverage(finite, width, height, 1) > 0.0, 255, 0).astype(np.uint8)
 
 
-def render_arm(recipe: Recipe, camera: Camera, source: Path, progress: Progress | None) -> MarkerMotion:
+def render_arm(recipe: Recipe, camera: Camera, source: Path, progress: Progress) -> MarkerMotion:
     """Write videos/ and masks/ of the recipe's body and truth/poses.csv; returns the markers' motion."""
     body = load_body(recipe.body)
     poses = arm_motion(body, recipe.frames, recipe.fps, np.random.default_rng(recipe.seed))
@@ -102,8 +102,7 @@ def render_arm(recipe: Recipe, camera: Camera, source: Path, progress: Progress 
             stream = recipe.seed * 1_000_003 + frame
             footage.add(_picture(share, recipe.picture.noise, stream))
             masks.add(filled(outlines[frame], *size))
-            if progress is not None:
-                progress("rendering", frame + 1, recipe.frames)
+            progress("rendering", frame + 1, recipe.frames)
     names = tuple(entry.name for entry in body.parameters)
     write_text(source / "truth" / "poses.csv", poses_csv(names, np.arange(recipe.frames), poses))
     markers = tuple(marker.name for marker in body.markers)

@@ -1,6 +1,5 @@
-"""Cameras for made-up footage: rigs in the corners of the room or around it, cameras put down by hand, rays for the
-renderer.
-"""
+"""Cameras for synthetic footage: rigs in the room's corners or around it, cameras placed by hand, rays for the
+renderer."""
 
 from collections.abc import Callable
 

@@ -1,8 +1,8 @@
 """Walking in a circle, standing still for a while, walking on: the Lee walk's motion, written.
 
-The pelvis follows the circle at a speed that ends before the halt and begins again after it; the feet follow a
-plan of steps whose last two before the halt come side by side. Sway, bob and arms fade out into the halt, where
-only the breath is left.
+The pelvis follows the circle at a speed that falls to zero at the halt and rises after it; the feet follow a
+plan of steps whose last two before the halt are side by side. Sway, bob and arm swing fade out into the halt, in
+which only breathing remains.
 """
 
 from dataclasses import dataclass
@@ -102,7 +102,7 @@ class _Bearing:
         before = times < 0.5 * (halt.begin + halt.end)
         self.phase = 2.0 * np.pi * (times - np.where(before, last_left, first_left)) / gait.cycle
         self.vigour = _vigour(times, halt)
-        place, heading = path(walked(times, gait.speed, halt))
+        place, heading = path(path_length(times, gait.speed, halt))
         sideways = SWAY_SHARE * skeleton.height * np.sin(self.phase - 0.4) * self.vigour
         breath = np.sin(2.0 * np.pi * 0.26 * times)
         across = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
@@ -134,7 +134,7 @@ class _Bearing:
 
     def smooth_height(self) -> Array:
         """(F,) heights of the pelvis that both legs reach at all times: the lowest that is allowed nearby, smoothed,
-        and the bob; in the halt one height that is allowed all the while. Times must be those of the grid.
+        and the bob; in the halt one height that is allowed throughout. Times must be those of the grid.
         """
         room = allowed_height(self.skeleton, self.root, self.turns["pelvis"], self.feet) - self.bob
         lowest = minimum_filter1d(room, 2 * WINDOW + 1, mode="nearest")
@@ -161,9 +161,9 @@ class _Bearing:
         return PersonMotion(bones, frame_rate(self.times), root, turns)
 
 
-def walked(times: Array, speed: float, halt: Halt) -> Array:
-    """(F,) mm along the path: even walking that ends at the halt's begin and starts again at its end, SLOWING seconds
-    being spent on each change.
+def path_length(times: Array, speed: float, halt: Halt) -> Array:
+    """(F,) mm along the path: steady walking that ends at the halt's begin and restarts at its end, each change taking
+    SLOWING seconds.
     """
 
     def ramp(share: Array) -> Array:
@@ -177,17 +177,17 @@ def walked(times: Array, speed: float, halt: Halt) -> Array:
 
 
 def footfalls(gait: Gait, halt: Halt, *, left: bool, until: float) -> Footfalls:
-    """One foot's stances from before time 0 to after `until`. The right foot comes last to the halt, the left goes
-    first.
+    """One foot's stances from before time 0 to after `until`. The right foot lands last before the halt, the left lifts
+    first after it.
     """
     stand, swing = gait.duty * gait.cycle, (1.0 - gait.duty) * gait.cycle
     arrive = halt.begin - SETTLING - (0.5 * gait.cycle if left else 0.0)
     leave = halt.end + GOING + (0.0 if left else 0.5 * gait.cycle)
     before = arrive - gait.cycle * np.arange(int(np.ceil((arrive + 2.0) / gait.cycle)) + 1, 0.0, -1.0)
     after = leave + swing + gait.cycle * np.arange(max(int(np.ceil((until - leave) / gait.cycle)), 0) + 3)
-    along = [walked(np.add(down, UNDER_HIP * stand), gait.speed, halt) for down in (before, after)]
+    along = [path_length(np.add(down, UNDER_HIP * stand), gait.speed, halt) for down in (before, after)]
     rise = ROLL_UP * stand
-    rest = walked(np.array([halt.begin]), gait.speed, halt) + (STAGGER if left else -STAGGER)
+    rest = path_length(np.array([halt.begin]), gait.speed, halt) + (STAGGER if left else -STAGGER)
     return Footfalls(
         np.concatenate([before, [arrive], after]),
         np.concatenate([before + stand, [leave], after + stand]),
@@ -199,7 +199,7 @@ def footfalls(gait: Gait, halt: Halt, *, left: bool, until: float) -> Footfalls:
 
 
 def _levelling(skeleton: Skeleton) -> float:
-    """How far the pelvis leans to the right for legs of different lengths to reach the floor alike, radians."""
+    """Lean of the pelvis to the right with which legs of different lengths both reach the floor, radians."""
     left, right = (thigh + shin for thigh, shin in zip(skeleton.thigh, skeleton.shin, strict=True))
     return (left - right) / sum(skeleton.hip_half_width)
 
@@ -225,7 +225,7 @@ def _circle(options: Options) -> Path:
 
 
 def _halt(options: Options, gait: Gait) -> Halt:
-    """The halt that is wished for, else one that is never reached."""
+    """The halt of the options, else one that is never reached."""
     begin, end = options.get("still_from_s"), options.get("still_until_s")
     if begin is None or end is None:
         return Halt(NEVER, 2.0 * NEVER)

@@ -1,6 +1,5 @@
-"""What goes wrong with footage in practice, as recipes ask for it: things in front of the person, moved cameras,
-exposures during which the person moves, a camera that failed.
-"""
+"""Practical faults of footage, for recipes: objects in front of the person, moved cameras, motion blur, missing
+cameras."""
 
 from dataclasses import replace
 
@@ -17,18 +16,17 @@ from studio.synthesis.room import CHECKS, GRAIN, PLAIN, Block
 Array = NDArray[np.float64]
 
 FREE_MM = 260.0
-"""Between the joints, wherever they go, and a thing that stands in front of them."""
+"""mm: clearance between the joints' paths and an object in front of them."""
 TRIES = 400
 POST_HALF, POST_HIDES = (25.0, 55.0), (700.0, 1500.0)
 BOX_HALF, BOX_HIDES = (110.0, 240.0), (250.0, 700.0)
-"""Half sizes, and up to which height of the person a thing reaches in its camera's view, mm."""
+"""Half sizes of an object, and the height of the person that it covers in its camera's view, mm."""
 
 
 class Damage(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """clutter : how many things stand between person and cameras, in the empty room as well. calibration_px : by how
-    many pixels the stored calibration misplaces the middle of each picture, each in a direction of its own. shutter :
-    how long a picture is exposed, as a share of the time from frame to frame. missing : cameras that are calibrated
-    but have no footage.
+    """clutter : number of objects between person and cameras, in the empty room as well. calibration_px : error of the
+    stored calibration at the middle of each picture, in a separate direction for each camera. shutter : exposure time
+    as a share of the time from frame to frame. missing : cameras that are calibrated but have no footage.
     """
 
     clutter: int = 0
@@ -38,7 +36,7 @@ class Damage(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def turned_camera(camera: Camera, pixels: float, direction: float) -> Camera:
-    """The camera turned about its own centre so that the middle of the picture moves by so many pixels.
+    """The camera turned about its own centre so that the middle of the picture moves by `pixels`.
 
     direction : radians.
     """
@@ -49,13 +47,13 @@ def turned_camera(camera: Camera, pixels: float, direction: float) -> Camera:
 
 
 def misplaced(cameras: tuple[Camera, ...], pixels: float, seed: int) -> tuple[Camera, ...]:
-    """Every camera turned by so many pixels, in a direction that follows from the seed."""
+    """Every camera turned by `pixels`, in a direction that follows from the seed."""
     rng = np.random.default_rng((seed, 7))
     return tuple(turned_camera(camera, pixels, float(rng.uniform(0.0, 2.0 * np.pi))) for camera in cameras)
 
 
 def cameras_left(cameras: tuple[Camera, ...], missing: tuple[str, ...]) -> tuple[Camera, ...]:
-    """The cameras that have footage. Raises StudioError for a missing one that is not there, and where none is left."""
+    """The cameras that have footage. Raises StudioError for an unknown name, and where none is left."""
     names = [camera.name for camera in cameras]
     unknown = sorted(set(missing) - set(names))
     if unknown:
@@ -70,7 +68,7 @@ def cameras_left(cameras: tuple[Camera, ...], missing: tuple[str, ...]) -> tuple
 def clutter_in_front(
     count: int, cameras: tuple[Camera, ...], motion: PersonMotion, seed: int
 ) -> tuple[Block, ...]:
-    """Posts and boxes between the person's way and the cameras, one camera after the other, clear of the person.
+    """Posts and boxes between the person's path and the cameras, one camera after the other, clear of the person.
 
     Raises StudioError where the person leaves no room for them.
     """
@@ -87,7 +85,7 @@ def clutter_in_front(
         else:
             raise StudioError(
                 f"There is no room for {count} things in front of the person.",
-                "Ask for fewer in damage.clutter, or for a motion that needs less room.",
+                "Give fewer in damage.clutter, or choose a motion that needs less room.",
             )
     return tuple(found)
 

@@ -1,4 +1,4 @@
-"""The person as a signed distance field: swept spheres, melted within a group, folded where they are cloth.
+"""The person as a signed distance field: swept spheres, blended within a group, folded where they are cloth.
 
 Distances (mm) are lower bounds of the true ones up to the folds' depth, so marching at SAFETY × distance never passes
 through. Smooth union: I. Quilez, "Smooth minimum" (quadratic polynomial). Piece columns: see `flesh.py`.
@@ -72,7 +72,7 @@ def piece_distance(px, py, pz, piece):
 
 @njit(cache=True, error_model="numpy", fastmath=True, inline="always")
 def beyond(px, py, pz, piece, limit):
-    """Whether a point is further than `limit` from the ball around a piece: then the piece does not matter."""
+    """Whether a point is further than `limit` from the ball around a piece, which can then be skipped."""
     x, y, z = px - piece[BOUND], py - piece[BOUND + 1], pz - piece[BOUND + 2]
     reach = limit + piece[BOUND_RADIUS]
     return reach > 0.0 and x * x + y * y + z * z > reach * reach
@@ -97,7 +97,7 @@ def body_distance(px, py, pz, pieces, labels, active, count):
 
 @njit(cache=True, error_model="numpy", fastmath=True)
 def nearest_piece(px, py, pz, pieces, active, count):
-    """The piece whose own surface is closest: it lends its material."""
+    """The piece whose own surface is closest: its material is used."""
     best, found = FAR, -1
     for index in range(count):
         if beyond(px, py, pz, pieces[active[index]], best):
@@ -134,7 +134,7 @@ def gather_beam(origin, dx, dy, dz, spread, pieces, margin, active):
         x, y = pieces[piece, BOUND] - origin[0], pieces[piece, BOUND + 1] - origin[1]
         z = pieces[piece, BOUND + 2] - origin[2]
         along = x * dx + y * dy + z * dz
-        # The piece is met, if at all, within its own reach of `along`; there the beam is this wide.
+        # The piece is hit, if at all, within its own reach of `along`; there the beam is this wide.
         reach = pieces[piece, BOUND_RADIUS] + margin
         reach += spread * (abs(along) + reach)
         left = reach * reach - (x * x + y * y + z * z - along * along)
@@ -182,7 +182,7 @@ def body_normal(px, py, pz, pieces, labels, active, count):
 
 @njit(cache=True, error_model="numpy", fastmath=True)
 def light_share(px, py, pz, light, light_radius, pieces, labels, active):
-    """How much of a round lamp a point sees past the person: 0 in full shadow, 1 in the open.
+    """Share of a round lamp that a point sees past the person: 0 in full shadow, 1 in the open.
 
     Distance over distance marched, against the lamp's angular size: I. Quilez, "Soft shadows in raymarched SDFs".
     """
@@ -207,5 +207,5 @@ def light_share(px, py, pz, light, light_radius, pieces, labels, active):
 
 @njit(cache=True, error_model="numpy", fastmath=True)
 def no_pieces(pieces):
-    """Room for the indices that `gather` writes."""
+    """An array for the indices that `gather` writes."""
     return np.zeros(len(pieces), np.int64)

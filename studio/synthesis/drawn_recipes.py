@@ -1,7 +1,7 @@
 """The suite against tuning: recipes whose person, clothes, room, cameras and stretch of motion are drawn from a seed.
 
 Two halves hold the same kinds of difficulty with other draws: trackers are chosen by the first and reported on the
-second. The drawn recipes come along as files; a test draws them again.
+second. The drawn recipes are installed as files; a test draws them again.
 """
 
 from collections.abc import Mapping
@@ -49,23 +49,23 @@ TURNED_ASIDE, PERSON_PX = 0.22, (195.0, 250.0)
 LENS = (-0.24, -0.02)
 AROUND_JOINTS_MM, MARGIN_PX = 120.0, 6.0
 HARD_NOISE, HARD_CLUTTER, HARD_PX = 7.0, 6, 2.0
-# Clothes are drawn again until they stand out from floor and walls, by colours alone: background subtraction, on which
-# all trackers depend, drops what is near the background's colour and what might be its shadow.
+# Clothes are redrawn until their colours stand out from floor and walls: background subtraction, on which all trackers
+# depend, drops pixels near the background's colour or that of its shadow.
 DRAWS, ROOMS_TRIED = 400, 40
 DIFFERENT_LEVELS, NOISE_TIMES = 21.0, 5.5
 SHADOW_SHARE, SHADOW_COLOUR = (0.42, 1.06), 0.085
 EXPOSED = 1.8
 SURFACE_LIGHT = (0.55, 0.85)
-"""Shares of the lamp's light and of the light from all around that floor and walls get."""
+"""Shares of the lamp's and of the ambient light on floor and walls."""
 CLOTH_LIGHTS = ((0.0, 0.5), (0.2, 0.65), (0.5, 0.75), (0.85, 0.85))
-"""The same of cloth, from its dark side to its bright one."""
+"""The same for cloth, from its dark side to its bright one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """What is shown, drawn a little differently every time. file : recorded motion, "" where it is written. start_s,
-    jitter_s : first moment, and by how much at most a draw begins earlier or later. bends : degrees by which the way
-    bends at most. options : of the motion, each a number or two to draw between.
+    """A stretch of motion with random variation. file : recorded motion, "" for written motion. start_s, jitter_s :
+    first moment, and its largest change by a draw. bends : greatest bend of the path, degrees. options : of the motion,
+    each a number or two to draw between.
     """
 
     motion: str = JOINED
@@ -78,8 +78,8 @@ class Stretch:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of difficulty: `frames` frames at `fps` of a stretch a half, seen by so many cameras (a half). damage : as
-    in a recipe, a half; `missing` names the last camera where it is not empty. noise : of the sensor, 0 for a draw.
+    """A kind of difficulty: `frames` frames at `fps` of a stretch a half, seen by `cameras` cameras (by half). damage :
+    as in a recipe, a half; `missing` names the last camera where it is not empty. noise : of the sensor, 0 for a draw.
     like : a kind whose draw this one shares at another rate.
     """
 
@@ -250,33 +250,33 @@ def clip_names(half: str) -> tuple[str, ...]:
 
 
 def drawn_recipe(half: str, kind: str) -> Recipe:
-    """The recipe of a kind in one of the HALVES. Reads the recorded motions; raises StudioError where they are not."""
-    wanted = KINDS[kind]
-    if wanted.like:
-        shared = drawn_recipe(half, wanted.like)
+    """The recipe of a kind in one of the HALVES. Raises StudioError where recorded motions are missing."""
+    chosen = KINDS[kind]
+    if chosen.like:
+        shared = drawn_recipe(half, chosen.like)
         return msgspec.structs.replace(
-            shared, title=_title(half, wanted), fps=wanted.fps, frames=wanted.frames
+            shared, title=_title(half, chosen), fps=chosen.fps, frames=chosen.frames
         )
     index, seed = HALVES.index(half), SEEDS[half] + list(KINDS).index(kind)
     rng = np.random.default_rng(seed)
-    recipe = _with_motion(_person(half, wanted, index, seed, rng), wanted.stretches[index], rng)
+    recipe = _with_motion(_person(half, chosen, index, seed, rng), chosen.stretches[index], rng)
     skeleton, _ = recipe_person(recipe, RECIPES, np.random.default_rng(seed))
     motion = recipe_motion(recipe, RECIPES, skeleton)
-    cameras = _cameras(recipe, motion, wanted.cameras[index], rng)
-    damage = wanted.damage[index]
+    cameras = _cameras(recipe, motion, chosen.cameras[index], rng)
+    damage = chosen.damage[index]
     if damage.missing:
         damage = msgspec.structs.replace(damage, missing=(cameras[-1].name,))
     return msgspec.structs.replace(recipe, cameras=Cameras(placed=cameras), damage=damage)
 
 
 def recipe_text(half: str, kind: str) -> str:
-    """The recipe's file (TOML), entries that are as usual left out."""
+    """The recipe's file (TOML), without entries at their defaults."""
     entries = _unusual(msgspec.to_builtins(drawn_recipe(half, kind)), _USUAL)
     return f"# Drawn by drawn_recipes.py, the half for {half}.\n{tomli_w.dumps(entries)}"
 
 
 def write_recipes() -> None:
-    """Write the files of all drawn recipes, in the place of those that come along."""
+    """Write the files of all drawn recipes over the installed ones."""
     for half in HALVES:
         for kind in KINDS:
             (RECIPES / f"{clip_name(half, kind)}.toml").write_text(recipe_text(half, kind), encoding="utf-8")
@@ -287,7 +287,7 @@ def _title(half: str, kind: Kind) -> str:
 
 
 def _person(half: str, kind: Kind, index: int, seed: int, rng: np.random.Generator) -> Recipe:
-    """Somebody in some clothes in some room; the motion and the cameras are not theirs yet."""
+    """A recipe with a drawn person, clothes and room; motion and cameras are not drawn yet."""
     factors = np.exp(rng.normal(0.0, PROPORTION, len(Proportions.__struct_fields__)))
     names = Proportions.__struct_fields__
     noise = kind.noise or round(float(rng.uniform(*NOISE)), 1)
@@ -329,7 +329,7 @@ def _room_and_clothes(seed: int, noise: float, rng: np.random.Generator) -> tupl
 
 def stands_out(colour: Array, room: Room, noise: float) -> bool:
     """Whether cloth of a colour differs from a drawn room's floor and walls in any light by more than the sensor's
-    noise hides, and not as a shadow does.
+    noise, and not only as a shadow.
     """
     lamp, around = room.lights[2], room.lights[3]
     for block in room.blocks[:FLOOR_AND_WALLS]:
@@ -352,7 +352,7 @@ def _pixel(light: Array) -> Array:
 
 
 def _clothes(rng: np.random.Generator) -> dict[str, Colour]:
-    """Colours of all that is worn; stripes of the shirt's own colour, or of another."""
+    """Colours of all clothes; stripes of the shirt's own colour, or of another."""
     skin = rng.uniform(0.3, 0.85) * np.array([1.0, rng.uniform(0.60, 0.74), rng.uniform(0.44, 0.60)])
     shirt, trousers = _colour(rng, 0.10, 0.75, 0.14), _colour(rng, 0.05, 0.45, 0.10)
     shoes, hair = _colour(rng, 0.05, 0.6, 0.05), rng.uniform(0.05, 0.5) * np.array([1.0, 0.75, 0.5])
@@ -388,7 +388,7 @@ def _with_motion(recipe: Recipe, stretch: Stretch, rng: np.random.Generator) -> 
 def _cameras(
     recipe: Recipe, motion: PersonMotion, count: int, rng: np.random.Generator
 ) -> tuple[Placed, ...]:
-    """So many cameras along the walls around the person's way, all of which they see."""
+    """`count` cameras along the walls around the person's path, each seeing the whole path."""
     room = room_called(recipe.room)
     inside = np.array(room.half) - OFF_WALL_MM
     middle = 0.5 * (motion.root.min(axis=0) + motion.root.max(axis=0))
@@ -397,7 +397,7 @@ def _cameras(
     for number in range(count):
         angle = start + 2.0 * np.pi * number / count + float(rng.uniform(-TURNED_ASIDE, TURNED_ASIDE))
         towards = np.array([np.cos(angle), np.sin(angle)])
-        # From the middle of the way to the wall.
+        # From the middle of the path to the wall.
         free = np.where(towards > 0.0, inside - middle[:2], inside + middle[:2]) / np.maximum(
             np.abs(towards), 1e-6
         )
@@ -439,7 +439,7 @@ def _wide_enough(recipe: Recipe, motion: PersonMotion, camera: Placed) -> Placed
 
 
 def _unusual(entries: dict[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
-    """The entries that are not as usual."""
+    """The entries that differ from the defaults."""
     found = {}
     for name, value in entries.items():
         known = usual.get(name)

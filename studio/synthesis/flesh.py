@@ -2,8 +2,8 @@
 
 Each piece is a sphere swept along a line in one segment's frame, its radius running from one end to the other with a
 muscle's bulge between, its cross-section elliptical, its surface folded where it is cloth. The pieces of a group (trunk
-and head, each arm, each leg) melt into each other; groups barely do, so that an arm beside the trunk stays apart.
-Nothing here is a truncated cone, and no number comes from a tracker's body file.
+and head, each arm, each leg) are blended; groups hardly are, so that an arm beside the trunk stays apart.
+No piece is a truncated cone, and no number comes from a tracker's body file.
 """
 
 from dataclasses import dataclass, replace
@@ -52,7 +52,7 @@ class Piece:
 def clothed_pieces(bones: Skeleton, girth: float = 1.0) -> tuple[Piece, ...]:
     """All pieces of a person in a short-sleeved shirt, long trousers and shoes.
 
-    Girths grow with the height; girth : how much stouter than usual the person is.
+    Girths grow with the height; girth : factor on the usual ones.
     """
     pieces = [*_trunk(bones), *_head(bones)]
     for index, side in enumerate(SIDES):
@@ -62,7 +62,7 @@ def clothed_pieces(bones: Skeleton, girth: float = 1.0) -> tuple[Piece, ...]:
 
 
 def piece_tables(motion: PersonMotion, pieces: tuple[Piece, ...]) -> tuple[Array, IntArray]:
-    """The pieces in the world: (F, P, COLUMNS) floats as the column names above say, and (P, 2) material and group."""
+    """The pieces in the world: (F, P, COLUMNS) floats in the columns above, and (P, 2) material and group."""
     joints = joint_points(motion)
     tables = np.zeros((motion.frame_count, len(pieces), COLUMNS))
     for index, piece in enumerate(pieces):

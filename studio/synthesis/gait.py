@@ -1,4 +1,4 @@
-"""Steps along a path: where the feet stand, how they swing, and legs that reach them.
+"""Steps along a path: footprints, swings, and legs that reach them.
 
 A gait is written as smooth parametric curves: the pelvis follows a path at its speed and bobs; each foot stands still
 for a share of the step cycle (`duty`) and travels to its next footprint along an eased arc for the rest, the ankle
@@ -21,12 +21,12 @@ Path = Callable[[Array], tuple[Array, Array]]
 Obstacle = Callable[[Array, Array, Array], Array]
 
 BALL, HEEL = 0.66, -0.20
-"""Where a foot rolls, as shares of its length before the ankle."""
+"""Points about which a foot rolls, as shares of its length in front of the ankle."""
 
 
 @dataclass(frozen=True, slots=True)
 class Gait:
-    """The numbers of a way of walking or running.
+    """The parameters of a gait, walking or running.
 
     speed : mm/s. cadence : steps per second (of both feet together). duty : share of a foot's cycle on the floor (> 0.5
     walking, < 0.5 running). foot_spacing : lateral distance between footprints, mm. lift : height of the ankle's arc in
@@ -53,7 +53,7 @@ def eased(share: Array) -> Array:
 
 
 def swung(share: Array) -> Array:
-    """Progress of a foot in the air: 0 to 1, at rest at both ends, without the haste of a minimum-jerk curve."""
+    """Progress of a foot in the air: 0 to 1, at rest at both ends, slower than a minimum-jerk curve."""
     s = np.clip(share, 0.0, 1.0)
     return s * s * (3.0 - 2.0 * s)
 
@@ -118,15 +118,15 @@ def foot_track(
 ) -> FootTrack:
     """The foot's journey over footprints laid beside the path.
 
-    times : (F,) seconds. obstacle : extra height (F,) mm that the ankle must keep above points (F, 2) on its way from
+    times : (F,) seconds. obstacle : extra height (F,) mm that the ankle must keep above points (F, 2) between
     one footprint (F, 2) to the next (F, 2).
     """
     phase = times / gait.cycle + (0.0 if left else 0.5)
     count, share = np.floor(phase), phase - np.floor(phase)
     swing = np.clip((share - gait.duty) / (1.0 - gait.duty), 0.0, 1.0)
     flat, heading = _footprint(gait, path, count + swung(swing), left)
-    # Push-off turns the foot about its ball in the last third of the stance; the swing brings it back and
-    # ends with the toes raised a little, for the heel to land first.
+    # Push-off turns the foot about its ball in the last third of the stance; the swing turns it back and
+    # ends with the toes raised a little, so that the heel lands first.
     push = eased((share / gait.duty - 0.62) / 0.38) * np.where(swing > 0.0, 1.0 - eased(swing / 0.7), 1.0)
     land = eased((swing - 0.6) / 0.4) * (swing > 0.0) + (1.0 - eased(share / (0.18 * gait.duty))) * (
         swing == 0.0
@@ -142,7 +142,7 @@ def foot_track(
 
 def rolled(ground: Array, heading: Array, pitch: Array, skeleton: Skeleton) -> tuple[Array, Array]:
     """Ankle (F, 3) and world_from_foot (F, 3, 3) of a foot over `ground` (F, 2) that is turned by `pitch` about its
-    ball (up) or heel (down), which stay where they are.
+    ball (up) or heel (down), which stay in place.
     """
     ball = np.array([BALL * skeleton.foot, 0.0, -skeleton.ankle_height])
     heel = np.array([HEEL * skeleton.foot, 0.0, -skeleton.ankle_height])
@@ -154,7 +154,7 @@ def rolled(ground: Array, heading: Array, pitch: Array, skeleton: Skeleton) -> t
 
 
 def _footprint(gait: Gait, path: Path, count: Array, left: bool) -> tuple[Array, Array]:
-    """Where the foot stands in its `count`-th stance: under the hip in the middle of that stance. Fractions
+    """Position of the foot in its `count`-th stance: under the hip in the middle of that stance. Fractions
     lie between two footprints along the path.
     """
     middle = (count + 0.5 * gait.duty - (0.0 if left else 0.5)) * gait.cycle
@@ -164,7 +164,7 @@ def _footprint(gait: Gait, path: Path, count: Array, left: bool) -> tuple[Array,
 
 
 def leg_to_ankle(hip: Array, ankle: Array, forward: Array, thigh: float, shin: float) -> tuple[Array, Array]:
-    """Rotations of thigh and shin, (F, 3, 3) each, that put the ankle where it is wanted, the knee pointing forward.
+    """Rotations of thigh and shin, (F, 3, 3) each, that reach the ankle, the knee pointing forward.
 
     hip, ankle : (F, 3) mm. forward : (F, 3) the direction in which the knee bends. An ankle out of reach (0.2 % of the
     leg is always kept bent) is approached as far as the leg goes.
@@ -190,7 +190,7 @@ def _hanging_frame(down: Array, lateral: Array) -> Array:
     return np.stack([x, np.cross(z, x), z], axis=-1)
 
 
-# Ways that change direction: straight stretches, bends and turns on the spot, one after the other.
+# Paths that change direction: straight stretches, bends and turns on the spot, one after the other.
 
 
 GRID_MM = 5.0
@@ -199,8 +199,8 @@ LONG_ENOUGH_MM = 3000.0
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """A part of a way. length : mm that would be walked at full speed in its time. turn : radians to the left while
-    it lasts. onward : share of the speed that is left, 0 while turning on the spot.
+    """A part of a path. length : mm at full speed in its time. turn : radians to the left during it. onward : share of
+    the full speed, 0 while turning on the spot.
     """
 
     length: float
@@ -209,10 +209,10 @@ class Stretch:
 
 
 class Journey:
-    """A way made of stretches, straight on before the first and after the last: a `gait.Path` with a pace.
+    """A path made of stretches, straight before the first and after the last: a `gait.Path` with a pace.
 
-    start : mm; heading : radians, both where the first stretch begins. ease : mm over which one stretch goes over
-    into the next (standard deviation of the smoothing).
+    start : mm; heading : radians, both where the first stretch begins. ease : mm over which stretches are
+    blended (standard deviation of the smoothing).
     """
 
     def __init__(
@@ -225,7 +225,7 @@ class Journey:
         for stretch in stretches:
             inside = (middles >= begin) & (middles < begin + stretch.length)
             onward[inside] = stretch.onward
-            # Spread over the cells that there are, so that the turn is whole whatever the grid.
+            # Spread over the cells, so that the whole turn is made on any grid.
             rate[inside] = stretch.turn / (GRID_MM * max(np.count_nonzero(inside), 1))
             begin += stretch.length
         self._onward: Array = gaussian_filter1d(onward, ease / GRID_MM, mode="nearest")
@@ -243,7 +243,7 @@ class Journey:
         self._place: Array = place - place[zero] + np.array(start)
 
     def __call__(self, distance: Array) -> tuple[Array, Array]:
-        """Position (F, 2) and heading (F,) after a distance (F,) that full speed would have covered, mm."""
+        """Position (F, 2) and heading (F,) after a distance (F,) at full speed, mm."""
         return (
             np.stack([np.interp(distance, self._grid, self._place[:, axis]) for axis in (0, 1)], axis=-1),
             np.interp(distance, self._grid, self._heading),
@@ -254,15 +254,15 @@ class Journey:
         return np.interp(distance, self._grid, self._onward)
 
 
-# How the rendered person carries themselves: trunk, arms, and how high the pelvis may be over the feet.
+# Posture of the rendered person: trunk, arms, and the pelvis' height over the feet.
 
 
 NEARLY_STRAIGHT = 0.994
 
 
 def allowed_height(skeleton: Skeleton, root: Array, pelvis: Array, feet: list[FootTrack]) -> Array:
-    """(F,) the height above `root` at which the pelvis still lets both ankles be reached without quite
-    straightening a knee."""
+    """(F,) greatest height above `root` of a pelvis from which both ankles are reached with slightly bent
+    knees."""
     allowed = np.full(len(root), np.inf)
     for sign, index, track in ((1.0, 0, feet[0]), (-1.0, 1, feet[1])):
         leg = NEARLY_STRAIGHT * (skeleton.thigh[index] + skeleton.shin[index])
@@ -276,7 +276,7 @@ def allowed_height(skeleton: Skeleton, root: Array, pelvis: Array, feet: list[Fo
 def trunk(
     heading: Array, pitch: Array | float, twist: Array | float, roll: Array | float
 ) -> dict[str, Array]:
-    """Pelvis, thorax (twisted against the pelvis about its own axis) and head, which looks where the person goes."""
+    """Pelvis, thorax (twisted against the pelvis about its own axis) and head, which faces along the path."""
     level = np.zeros_like(heading)
     pelvis = yaw_pitch_roll(heading, level + 0.6 * pitch, level + roll)
     thorax = pelvis @ axis_turn(1, level + 0.4 * pitch) @ axis_turn(2, level + twist)
@@ -285,8 +285,8 @@ def trunk(
 
 
 def add_arm(turns: dict[str, Array], side: str, forward: Array, outward: Array, bend: Array) -> None:
-    """An arm swung `forward`, held `outward` and bent by `bend` at the elbow, radians; the clavicle gives
-    way to it a little. Adds clavicle, upper arm, forearm and hand.
+    """An arm swung `forward`, held `outward` and bent by `bend` at the elbow, radians; the clavicle follows
+    a little. Adds clavicle, upper arm, forearm and hand.
     """
     sign = 1.0 if side == "left" else -1.0
     clavicle = turns["thorax"] @ axis_turn(2, -sign * 0.08 * forward) @ axis_turn(0, sign * 0.06 * outward)

@@ -1,4 +1,4 @@
-"""The motions that footage can be made of, each a set of smooth curves on the synthetic skeleton.
+"""The written motions for footage, each a set of smooth curves on the synthetic skeleton.
 
 A motion takes the skeleton, the frame times (F,) in seconds and its options, and returns a `PersonMotion`.
 All were written for this project; none is recorded from a person.
@@ -57,7 +57,7 @@ KEYS = np.array(
 
 
 def handstand(skeleton: Skeleton, times: Array, options: dict[str, float]) -> PersonMotion:
-    """Kick-up to a handstand: options heading_degrees, hands_apart_mm. The wrists stay where they stand."""
+    """Kick-up to a handstand: options heading_degrees, hands_apart_mm. The wrists stay in place."""
     length = times[-1] if len(times) > 1 and times[-1] > 0.0 else 1.0
     shares = times / length
     angles = np.radians(PchipInterpolator(KEYS[:, 0], KEYS[:, 1:])(shares))
@@ -89,7 +89,7 @@ def handstand(skeleton: Skeleton, times: Array, options: dict[str, float]) -> Pe
 def _add_supporting_arm(
     turns: dict[str, Array], skeleton: Skeleton, side: str, heading: Array, lean: Array, half_apart: float
 ) -> None:
-    """An arm that stands on its palm: nearly straight, spread so that the wrists are `half_apart` from the middle."""
+    """A supporting arm on its palm: nearly straight, spread so that the wrists are `half_apart` from the middle."""
     sign, index = (1.0, 0) if side == "left" else (-1.0, 1)
     turns[f"{side}_clavicle"] = turns["thorax"] @ axis_turn(0, np.full(len(lean), sign * 0.25))
     length = skeleton.upper_arm[index] + skeleton.forearm[index]
@@ -104,24 +104,24 @@ def _add_supporting_arm(
 
 # Written exercises on both feet that no recording has: going down into a crouch and up again, sitting down on a
 # stool.
-# The feet stay where they stand; the pelvis goes down and back along eased curves and the legs reach from it to the
+# The feet stay in place; the pelvis goes down and back along eased curves and the legs reach from it to the
 # ankles.
 
 
 Options = dict[str, float]
 
 STANDING_BENT = 12.0
-"""mm that the hips of somebody who stands are lower than straight legs would have them."""
+"""mm by which a standing person's hips are lower than with straight legs."""
 SEAT_MM, SEAT_HALF = 430.0, 165.0
 PELVIS_ABOVE_SEAT = 0.066
-"""Height of the pelvis centre above what one sits on, of the person's height: the seat's flesh."""
+"""Height of a sitting person's pelvis centre above the seat, as a share of the person's height."""
 SEAT_BEHIND = 0.235
-"""How far behind the ankles the pelvis of somebody who sits is, of the height."""
+"""Distance of a sitting person's pelvis behind the ankles, as a share of the height."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Carriage:
-    """How the person is held in every frame, (F,) each. down, back : mm of the pelvis from where it stands. lean :
+    """The posture in every frame, (F,) each. down, back : mm of the pelvis from standing. lean :
     of the trunk, radians. arm, out, bend : of both arms as `add_arm` takes them; arms are two (left, right).
     """
 
@@ -155,7 +155,7 @@ def crouch(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
 
 
 def sit(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
-    """Sitting down on a stool that stands there (`stool`), hands to the thighs: options seat_mm (its height), down_s,
+    """Sitting down on a stool (`stool`), hands to the thighs: options seat_mm (its height), down_s,
     start_s, heading_degrees, stance, at_x_mm, at_y_mm.
     """
     share = eased((times - options.get("start_s", 0.15)) / options.get("down_s", 0.9))
@@ -163,7 +163,7 @@ def sit(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
     bow = 4.0 * share * (1.0 - share)
     held = _Carriage(
         down=(skeleton.standing_hip_height - STANDING_BENT - seated) * share,
-        # The pelvis goes back before it goes down: one reaches for the seat, bowed.
+        # The pelvis moves back before it moves down, with the trunk bowed.
         back=SEAT_BEHIND * skeleton.height * eased(np.sqrt(share)),
         lean=0.75 * bow + 0.10 * share,
         arm=(0.05 + 0.45 * share + 0.5 * bow, 0.05 + 0.40 * share + 0.4 * bow),
@@ -174,7 +174,7 @@ def sit(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
 
 
 def stool(skeleton: Skeleton, options: Options) -> Block:
-    """What `sit` sits down on."""
+    """The stool of `sit`."""
     heading, half = np.radians(options.get("heading_degrees", 0.0)), 0.5 * options.get("seat_mm", SEAT_MM)
     back = SEAT_BEHIND * skeleton.height
     x, y = _place(options) - back * np.array([np.cos(heading), np.sin(heading)])
@@ -214,7 +214,7 @@ MotionMaker = Callable[[Skeleton, Array, Options], PersonMotion]
 
 
 def walk(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
-    """A walk in a circle with turns: options radius_mm, sway_mm (how far the path leaves the circle),
+    """A walk in a circle with turns: options radius_mm, sway_mm (deviation of the path from the circle),
     speed_mm_s, cadence, start_degrees.
     """
     radius = options.get("radius_mm", 950.0)
@@ -243,8 +243,8 @@ def box(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
     """Walking straight and stepping over a box at the origin: options height_mm of the box, speed_mm_s, cadence.
 
     With turn_after_mm above 0 the person turns 180 degrees on the spot that far behind the box and steps over it
-    again (Deutscher & Reid 2005, Fig. 10); turn_steps is how many whole steps more than the way takes they turn in,
-    before_mm how far before the box the footage begins.
+    again (Deutscher & Reid 2005, Fig. 10); turn_steps is the number of whole steps added for the turn, before_mm
+    the distance before the box at which the footage begins.
     """
     speed = options.get("speed_mm_s", 900.0)
     gait = Gait(speed, options.get("cadence", 1.6), 0.60, 0.11 * skeleton.height, 50.0, 0.45)
@@ -261,7 +261,7 @@ def box(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
     path, after = line_path((start, 0.0), 0.0), options.get("turn_after_mm", 0.0)
     if after > 0.0:
         step = speed / gait.cadence
-        # Whole steps between the two crossings, so that the feet stand about the box alike.
+        # Whole steps between the two crossings, so that the feet stand about the box in the same way.
         turning = (np.ceil(2.0 * after / step) + options.get("turn_steps", 3.0)) * step - 2.0 * after
         on_the_spot = Stretch(turning, turn=np.pi, onward=0.0)
         path = Journey((start, 0.0), 0.0, (Stretch(after - start), on_the_spot), ease=0.18 * step)
@@ -270,9 +270,9 @@ def box(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
 
 
 def turning_walk(skeleton: Skeleton, times: Array, options: Options) -> PersonMotion:
-    """A walk to and fro with bends and two quick turns on the spot (as in Deutscher & Reid 2005, Fig. 21): options
-    speed_mm_s, cadence, start_degrees of the first heading, start_x_mm, start_y_mm, start_s (how much of the beginning
-    is left out).
+    """A walk back and forth with bends and two quick turns on the spot (as in Deutscher & Reid 2005, Fig. 21): options
+    speed_mm_s, cadence, start_degrees of the first heading, start_x_mm, start_y_mm, start_s (length of the beginning
+    that is left out).
     """
     times = times + options.get("start_s", 0.0)
     speed = options.get("speed_mm_s", 950.0)
@@ -321,7 +321,7 @@ MOTIONS: dict[str, MotionMaker] = {
 
 
 def make_motion(name: str, skeleton: Skeleton, frames: int, fps: float, options: Options) -> PersonMotion:
-    """The motion called `name`, `frames` long. Raises StudioError naming the motions there are."""
+    """The motion called `name`, `frames` long. Raises StudioError listing the known motions."""
     if name not in MOTIONS:
         raise StudioError(f"There is no motion called '{name}'.", f"Choose one of {', '.join(MOTIONS)}.")
     return MOTIONS[name](skeleton, np.arange(frames) / fps, options)
@@ -368,10 +368,10 @@ def _along(
 
 
 def _pelvis_height(skeleton: Skeleton, gait: Gait, phase: Array, allowed: Array) -> Array:
-    """Height of the pelvis (F,), mm, as high as `allowed` (F,) lets it be throughout.
+    """Height of the pelvis (F,), mm, at most `allowed` (F,) throughout.
 
-    A walker follows the first two harmonics of the step cycle in what the legs allow, softened to BOB of
-    their size (bent knees smooth the way); a runner is lowest over the standing leg. The whole is then
+    A walker follows the first two harmonics of the step cycle in the allowed height, reduced to BOB of
+    their size (bent knees damp the motion); a runner is lowest over the standing leg. The whole is then
     lowered until it is allowed everywhere.
     """
     waves = np.stack([np.cos(phase), np.sin(phase), np.cos(2.0 * phase), np.sin(2.0 * phase)], axis=1)
@@ -384,8 +384,8 @@ def _pelvis_height(skeleton: Skeleton, gait: Gait, phase: Array, allowed: Array)
 
 
 def _risen(height: Array, allowed: Array, fps: float) -> Array:
-    """(F,) the height raised where turning and stepping ask for bent knees elsewhere only: as high as is `allowed`,
-    the room above it evened out over RISE_S seconds on both sides.
+    """(F,) the height raised where bent knees are needed elsewhere only: up to `allowed`, the margin smoothed over
+    RISE_S seconds on both sides.
     """
     reach = max(1, round(RISE_S * fps))
     room = minimum_filter1d(allowed - height, 2 * reach + 1, mode="nearest")

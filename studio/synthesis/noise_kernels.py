@@ -1,4 +1,4 @@
-"""Noise as a pure function of where and when: the same on any number of threads, in any order."""
+"""Noise as a pure function of place and time: the same on any number of threads, in any order."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The skeletons of rendered people: published proportions of a height, others, lengths by tape measure."""
+"""The skeletons of rendered people: published or other proportions of a height, or taped lengths."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -67,7 +67,7 @@ class Proportions(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def proportioned(bones: Skeleton, factors: Proportions) -> Skeleton:
-    """The skeleton with other proportions and the same standing height: all is scaled alike until it is that again."""
+    """The skeleton with other proportions and the same standing height: all lengths are scaled alike to keep it."""
     if factors == Proportions():
         return bones
     legs = float(np.mean(bones.thigh)) * factors.thighs + float(np.mean(bones.shin)) * factors.shins
@@ -98,7 +98,7 @@ def proportioned(bones: Skeleton, factors: Proportions) -> Skeleton:
 
 
 def marker_lengths(motion: PersonMotion) -> dict[str, float]:
-    """The subject's limb lengths as a tape measure gives them: marker pair to mm (they do not change over time)."""
+    """The subject's limb lengths as taped: marker pair to mm (constant over time)."""
     markers = marker_motion(motion)
     index = {name: position for position, name in enumerate(markers.names)}
     pairs = [("Hip", "Neck"), ("Neck", "Head")]
@@ -118,17 +118,17 @@ def yaw_pitch_roll(yaw: Array, pitch: Array, roll: Array) -> Array:
     return axis_turn(2, yaw) @ axis_turn(1, pitch) @ axis_turn(0, roll)
 
 
-# A person with the limb lengths of a tracker's shape file: joints where that body has them, flesh as a person's.
-# Of the file only lengths are taken; radii stay the tracker's business. Hands and feet, which the Lee walk's file
+# A person with the limb lengths of a tracker's shape file: joints of that body, flesh of a person.
+# Only lengths are taken from the file; radii belong to the tracker. Hands and feet, which the Lee walk's file
 # leaves out, have published proportions.
 
 
-# How far in front of and above the neck's base the shoulders are, mm: rounded means of both sides in the Lee walk's
-# start pose. Sideways they are as far as the clavicle's length then leaves.
+# Offsets of the shoulders in front of and above the neck's base, mm: rounded means of both sides in the Lee walk's
+# start pose. The sideways offset follows from the clavicle's length.
 SHOULDER_FORWARD, SHOULDER_UP = -40.0, -70.0
 # The Lee walk's shins end this high above the floor, mm (28 and 10 in the start pose).
 ANKLE_HEIGHT = 24.0
-# Length of a shoe, of the height: the silhouettes of the Lee walk show it.
+# Length of a shoe, as a share of the height, from the Lee walk's silhouettes.
 SHOE = 0.168
 # The rendered shoe begins this far behind the ankle and reaches this far past the toes' joint, mm.
 SHOE_BEHIND, SHOE_BEYOND, FINGERTIPS = 70.0, 27.0, 15.0
@@ -144,7 +144,7 @@ def subject_of_file(path: Path, body: str) -> Subject:
 
 
 def skeleton_of_subject(subject: Subject) -> Skeleton:
-    """The skeleton whose neighbouring markers are as far apart as the subject's dimensions say.
+    """The skeleton with the distances of neighbouring markers given by the subject's dimensions.
 
     Raises BodyError for a subject that does not give all of them.
     """
@@ -174,7 +174,7 @@ def skeleton_of_subject(subject: Subject) -> Skeleton:
 
 
 def with_hands_and_feet(subject: Subject, bones: Skeleton) -> Subject:
-    """The subject with the lengths of the rendered hands and shoes, for body human31 (which draws them then)."""
+    """The subject with the lengths of the rendered hands and shoes, for body human31 (which then draws them)."""
     extra = {f"{side}_foot_length": SHOE_BEHIND + TOES * bones.foot + SHOE_BEYOND for side in SIDES}
     extra |= {f"{side}_hand_length": KNUCKLES * bones.hand + FINGERTIPS for side in SIDES}
     extra |= {"foot_heel": SHOE_BEHIND, "foot_drop": 0.0}

@@ -8,7 +8,7 @@ import cv2
 
 from studio.body.person import PersonMotion
 from studio.geometry.camera import Camera
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 from studio.synthesis.clips import ClipWriter
 from studio.synthesis.damage import cameras_left, clutter_in_front
 from studio.synthesis.motions import stool
@@ -23,10 +23,14 @@ SAT_ON = "sit"
 
 
 def render_person(
-    recipe: Recipe, motion: PersonMotion, cameras: tuple[Camera, ...], source: Path, progress: Progress | None
+    recipe: Recipe,
+    motion: PersonMotion,
+    cameras: tuple[Camera, ...],
+    source: Path,
+    progress: Progress = unheard,
 ) -> None:
-    """Write videos/, and background/ and masks/ as the recipe includes them, into `source`; nothing of cameras that
-    are missing.
+    """Write videos/, and background/ and masks/ as the recipe includes them, into `source`; nothing for missing
+    cameras.
     """
     cameras = cameras_left(cameras, recipe.damage.missing)
     picture, renderer = recipe.picture, recipe_renderer(recipe, motion, cameras)
@@ -42,8 +46,7 @@ def render_person(
                 footage[index].add(seen)
                 if masks:
                     masks[index].add(mask)
-            if progress is not None:
-                progress("rendering", frame + 1, motion.frame_count)
+            progress("rendering", frame + 1, motion.frame_count)
     if recipe.include.background != "none":
         (source / "background").mkdir()
         for index, camera in enumerate(cameras):
@@ -53,7 +56,7 @@ def render_person(
 
 
 def recipe_renderer(recipe: Recipe, motion: PersonMotion, cameras: tuple[Camera, ...]) -> Renderer:
-    """The renderer of a recipe's room and person: the very pictures of its footage, and their exact masks."""
+    """The renderer of a recipe's room and person: the pictures of its footage, and their exact masks."""
     height = recipe.options.get("height_mm", STEPPED_OVER_HEIGHT) if recipe.motion == STEPPED_OVER else 0.0
     room = room_called(recipe.room, height)
     things: tuple[Block, ...] = (stool(motion.skeleton, recipe.options),) if recipe.motion == SAT_ON else ()

@@ -1,6 +1,6 @@
-"""Real data that recipes build on (calibrations, body shapes, recorded motion); it is never part of the project.
+"""Real data used by recipes (calibrations, body shapes, recorded motion); never part of the project.
 
-It lies in the folder that the environment variable STUDIO_REAL_DATA names, by default ../shared/data beside the
+Its folder is given by the environment variable STUDIO_REAL_DATA, by default ../shared/data beside the
 working folder. A recipe names a file in it as "data:lee-walk/CALIB".
 """
 
@@ -22,11 +22,11 @@ def real_data_folder() -> Path:
 def located(reference: str, recipe_folder: Path) -> Path:
     """The path of a file that a recipe names: in the real data after "data:", else relative to the recipe.
 
-    Raises StudioError where nothing is there.
+    Raises StudioError where it does not exist.
     """
     if not reference.startswith(PREFIX):
         path = recipe_folder / reference
-        hint = "Check the recipe's path; it counts from the recipe's own folder."
+        hint = "Check the recipe's path; it is relative to the recipe's own folder."
     else:
         path = real_data_folder() / reference.removeprefix(PREFIX)
         hint = f"Set {VARIABLE} to the folder that holds the real data; see the README."

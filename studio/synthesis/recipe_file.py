@@ -1,4 +1,4 @@
-"""What footage is to be made: the entries of a recipe file (TOML), checked, and the recipes that come along."""
+"""Recipe files (TOML) of footage: their checked entries, and the bundled recipes."""
 
 import tomllib
 from collections.abc import Iterable, Mapping
@@ -40,7 +40,7 @@ class Picture(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Placed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A camera put down by hand: mm, degrees, pixels."""
+    """A camera placed by hand: mm, degrees, pixels."""
 
     name: str
     position: tuple[float, float, float]
@@ -51,7 +51,7 @@ class Placed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Cameras(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which cameras: a made-up rig ("corners": four; "five", around a hall), a calibration file or folder (in the real
+    """The cameras: a synthetic rig ("corners": four; "five", around a hall), a calibration file or folder (in the real
     data after "data:"), or `placed` ones."""
 
     rig: str = ""
@@ -60,10 +60,10 @@ class Cameras(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Include(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What goes into the session beside footage and calibration.
+    """Contents of the session besides footage and calibration.
 
-    background : "clip", "picture" or "none". start_pose_noise_mm : how far the markers are moved (normal,
-    each coordinate) before the start pose is fitted.
+    background : "clip", "picture" or "none". start_pose_noise_mm : standard deviation of the markers' noise (each
+    coordinate) before the start pose is fitted.
     """
 
     background: str = "clip"
@@ -75,23 +75,23 @@ class Include(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Footage to be made.
+    """A recipe of footage.
 
     motion : "walk", "run", "box", "handstand", "stand", "circuit" and others (`motions.py`); or "arm", which shows
     `body` itself, seen by one camera, as in Deutscher & Reid 6.1; or "recorded", the motion of `motion_file` (.amc,
     .bvh, .npz; `skeleton_file` for an .amc whose ASF is not beside it); or "joined", several `clips` of such motion one
     after the other (`joined_clips.py`). options : numbers of the motion. weighting : what runs of the session use by
-    default. An entry `like` in the file names another recipe, bundled or beside it, whose entries count where this one
-    has none of its own.
+    default. An entry `like` in the file names another recipe, bundled or beside it, whose entries are the defaults of
+    this one.
 
     height_mm : of a person with published proportions. shape : instead, a file of `body`'s dimensions, whose lengths
     the person's bones have; the session's subject has these dimensions, radii included, and those of the rendered hands
-    and shoes; `subject_shape.toml` beside it has the file's dimensions alone. girth : how much stouter than usual the
-    flesh is. proportions : of the bones, where they differ from the published ones. wardrobe : "striped" or "plain"
-    clothes, which hardly stand out in the "office". colours : other ones for some of what is worn, RGB 0...1. room :
-    "office", "furnished", "hall", or "drawn-" and a number, which furnishes a room by chance. damage : what went wrong
-    with the take. sigma : a file whose first numbers are the session's σ0, one for each parameter of `body`, from frame
-    to frame at 60 Hz. Files count from the recipe's folder, or lie in the real data after "data:" (`real_data.py`).
+    and shoes; `subject_shape.toml` beside it has the file's dimensions alone. girth : factor on the usual girths of
+    the flesh. proportions : of the bones, where they differ from the published ones. wardrobe : "striped" or "plain"
+    clothes, which hardly stand out in the "office". colours : replacements for some clothes, RGB 0...1. room :
+    "office", "furnished", "hall", or "drawn-" and a number for a randomly furnished room. damage : faults of the
+    footage. sigma : a file whose first numbers are the session's σ0, one for each parameter of `body`, from frame
+    to frame at 60 Hz. Files are relative to the recipe's folder, or in the real data after "data:" (`real_data.py`).
     """
 
     title: str
@@ -120,7 +120,7 @@ class Recipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 
 def find_recipe(name_or_path: str | Path) -> Path:
-    """The recipe's file: a path, or the name of one that comes along. Raises StudioError listing those."""
+    """The recipe's file: a path, or the name of a bundled one. Raises StudioError listing those."""
     path = Path(name_or_path)
     if path.is_file():
         return path
@@ -134,7 +134,7 @@ def find_recipe(name_or_path: str | Path) -> Path:
 
 
 def recipe_names() -> tuple[str, ...]:
-    """The recipes that come along."""
+    """The names of the bundled recipes."""
     return tuple(sorted(path.stem for path in RECIPES.glob(f"*{SUFFIX}")))
 
 
@@ -156,7 +156,7 @@ def read_recipe(path: Path) -> Recipe:
 
 
 def _entries(path: Path, chain: int) -> dict[str, Any]:
-    """The entries of a file, those of the recipe that it is like included. Raises StudioError for an endless chain."""
+    """The entries of a file, with those of its `like` recipe. Raises StudioError for an endless chain."""
     own = tomllib.loads(path.read_text(encoding="utf-8"))
     base = own.pop(LIKE, None)
     if base is None:
@@ -167,7 +167,7 @@ def _entries(path: Path, chain: int) -> dict[str, Any]:
         )
     beside = path.with_name(base)
     whole = _entries(beside if beside.is_file() else find_recipe(base), chain - 1)
-    # Cameras are one choice of several: they are taken as a whole.
+    # Cameras are one choice of several: they are replaced as a whole.
     merged = {
         name: {**whole[name], **entry}
         if isinstance(entry, dict) and isinstance(whole.get(name), dict) and name != "cameras"
@@ -178,7 +178,7 @@ def _entries(path: Path, chain: int) -> dict[str, Any]:
 
 
 def recipe_cameras(recipe: Recipe, rng: np.random.Generator) -> tuple[Camera, ...]:
-    """The cameras that are made up or put down by hand (those of a calibration file are read by the caller)."""
+    """The synthetic or placed cameras (those of a calibration file are read by the caller)."""
     size = (recipe.picture.width, recipe.picture.height)
     if recipe.cameras.placed:
         return tuple(
@@ -218,7 +218,7 @@ CHOICES: Mapping[str, Iterable[str]] = {
 
 
 def _problem(recipe: Recipe) -> str:
-    """What is wrong with a recipe whose entries have the right types, "" when nothing is."""
+    """The fault of a recipe whose entries have the right types, "" without one."""
     for name, (low, high) in RANGES.items():
         value = attrgetter(name)(recipe)
         if not low <= value <= high:

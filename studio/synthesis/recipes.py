@@ -1,4 +1,4 @@
-"""From a recipe to a session: footage rendered, truth beside it, imported like anybody's footage."""
+"""From a recipe to a session: footage rendered with truth, and imported like any footage."""
 
 import tempfile
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from studio.geometry.camera import Camera
 from studio.motion_files.reading import read_recording
 from studio.motion_files.recorded_motion import RecordedMotion
 from studio.motion_files.trc import MarkerMotion, write_trc
-from studio.progress import Progress
+from studio.progress import Progress, unheard
 from studio.sessions.importers.bodytrack import RATE, read_numbers
 from studio.sessions.importers.importing import import_source
 from studio.sessions.manifest import read_manifest, write_manifest
@@ -44,30 +44,33 @@ SUBJECT_OF_SHAPE, SUBJECT_OF_HEIGHT, SIGMA_NAME = "subject_shape.toml", "subject
 
 
 def synthesize(
-    recipe: Path | str, into: Path, progress: Progress | None = None, frames: int | None = None
+    recipe: Path | str, into: Path, progress: Progress = unheard, frames: int | None = None
 ) -> Path:
     """Render a recipe's footage and make a session of it; returns the session's folder.
 
     recipe : a TOML file or the name of a bundled recipe. into : the session folder to be made. progress : called
-    with the step in words, what is done of it and how much it is. frames : only the first so many of a person's
-    motion, where they are enough. The same recipe gives the same pictures on any number of threads. Raises
-    StudioError for a recipe that cannot be followed and what `import_source` raises.
+    with (step, done, total). frames : only this many first frames of a person's
+    motion. The same recipe gives the same pictures on any number of threads. Raises
+    StudioError for an impossible recipe and the errors of `import_source`.
     """
     path = find_recipe(recipe)
-    wanted = read_recipe(path)
+    parsed = read_recipe(path)
     if into.exists():
-        raise SessionError(f"'{into}' exists already.", "Give the folder of a session that is to be made.")
+        raise SessionError(f"'{into}' exists already.", "Give the folder of a new session.")
     with tempfile.TemporaryDirectory(prefix="studio-synthesis-") as folder:
         source = Path(folder) / into.name
         source.mkdir()
-        render_source(wanted, path.parent, source, progress, frames)
-        import_source(source, into, fps=wanted.fps, progress=progress)
+        render_source(parsed, path.parent, source, progress, frames)
+        import_source(source, into, fps=parsed.fps, progress=progress)
         for other in (SUBJECT_OF_SHAPE, SUBJECT_OF_HEIGHT):
             if (source / other).exists():
                 (into / other).write_bytes((source / other).read_bytes())
     manifest = read_manifest(into)
     changed = msgspec.structs.replace(
-        manifest, title=wanted.title, weighting=wanted.weighting, imported_from=f"recipe {path.name}"
+        manifest,
+        title=parsed.title,
+        weighting=parsed.weighting,
+        imported_from=f"recipe {path.name}",
     )
     write_manifest(into, changed)
     (into / RECIPE_COPY).write_bytes(path.read_bytes())
@@ -82,11 +85,11 @@ def person_of_recipe(
     Raises StudioError, for a recipe without a person too.
     """
     path = find_recipe(recipe)
-    wanted = read_recipe(path)
-    if wanted.motion == ARM:
+    parsed = read_recipe(path)
+    if parsed.motion == ARM:
         raise StudioError(f"Recipe '{path.name}' moves no person.", "Choose a recipe of a person.")
     changed = msgspec.structs.replace(
-        wanted, options={**wanted.options, **(options or {})}, frames=frames or wanted.frames
+        parsed, options={**parsed.options, **(options or {})}, frames=frames or parsed.frames
     )
     return recipe_motion(changed, path.parent, skeleton)
 
@@ -95,10 +98,10 @@ def render_source(
     recipe: Recipe,
     recipe_folder: Path,
     source: Path,
-    progress: Progress | None = None,
+    progress: Progress = unheard,
     frames: int | None = None,
 ) -> None:
-    """Write the folder that `import` understands: videos, background, masks, calibration, truth, subject, start pose.
+    """Write a folder for `import`: videos, background, masks, calibration, truth, subject, start pose.
 
     recipe_folder : where a relative `cameras.calibration` starts. source : an empty folder. frames : as in
     `synthesize`.
@@ -135,7 +138,7 @@ def render_source(
 
 
 def recipe_motion(recipe: Recipe, recipe_folder: Path, skeleton: Skeleton) -> PersonMotion:
-    """The written or recorded motion that a recipe asks for. Raises StudioError, for files too."""
+    """The written or recorded motion of a recipe. Raises StudioError, also for files."""
     if recipe.motion == JOINED:
         clips = [(clip, _recording(clip.file, clip.skeleton_file, recipe_folder)) for clip in recipe.clips]
         return joined_person(clips, skeleton, recipe.frames, recipe.fps, recipe.options)
@@ -153,7 +156,7 @@ def _recording(motion_file: str, skeleton_file: str, recipe_folder: Path) -> Rec
 def recipe_person(
     recipe: Recipe, recipe_folder: Path, rng: np.random.Generator
 ) -> tuple[Skeleton, Subject | None]:
-    """The skeleton of the person that a recipe asks for, and the subject of its shape file where it names one.
+    """The skeleton of a recipe's person, and the subject of its shape file where it has one.
 
     Raises BodyError for a shape that does not fit the recipe's body.
     """
@@ -164,13 +167,13 @@ def recipe_person(
 
 
 def person_subject(recipe: Recipe, motion: PersonMotion) -> Subject:
-    """What a tape measure says of the rendered person: height and the distances between neighbouring markers."""
+    """The rendered person as taped: height and the distances between neighbouring markers."""
     lengths = {pair: round(length, 1) for pair, length in marker_lengths(motion).items()}
     return Subject(body=recipe.body, height_mm=recipe.height_mm, lengths_mm=lengths)
 
 
 def _cameras(recipe: Recipe, recipe_folder: Path, rng: np.random.Generator) -> tuple[Camera, ...]:
-    """Made-up cameras, or those of the calibration that the recipe names."""
+    """The synthetic cameras, or those of the recipe's calibration."""
     if recipe.cameras.calibration:
         return read_calibration(located(recipe.cameras.calibration, recipe_folder)).cameras
     return recipe_cameras(recipe, rng)
@@ -191,7 +194,7 @@ def _write_sigma(recipe: Recipe, given: Path, path: Path) -> None:
 def _write_start_pose(
     recipe: Recipe, subject: Subject, truth: MarkerMotion, rng: np.random.Generator, path: Path
 ) -> None:
-    """The subject's pose in frame 0 as a person would find it: inverse kinematics on the true markers, each coordinate
+    """The subject's pose in frame 0 with an annotator's error: inverse kinematics on the true markers, each coordinate
     moved by normal noise of `start_pose_noise_mm` (so it is close to the truth, not the truth).
     """
     body, _ = fit_subject(load_body(recipe.body), subject)

@@ -1,7 +1,7 @@
-"""Recorded motion as recipes ask for it: a stretch of it, several clips as one, another performance of a whole.
+"""Recorded motion for recipes: a stretch of it, several clips joined, another performance of a whole.
 
-Joined clips go on where the one before ends, facing the same way, with a blend in which both are seen; what one clip
-leaves out in speed and heading, the next takes up.
+A joined clip continues where the one before ends, with the same heading, and is blended with it in places, speeds and
+turns.
 """
 
 from dataclasses import dataclass
@@ -37,18 +37,18 @@ CARRIERS = {
     **{f"{side}_shin": f"{side}_thigh" for side in SIDES},
     **{f"{side}_foot": f"{side}_shin" for side in SIDES},
 }
-"""Which segment carries which, carriers first."""
+"""Each segment's parent segment, parents first."""
 HINGES = tuple(f"{side}_{part}" for side in SIDES for part in ("forearm", "shin"))
 LESS = {"pelvis": 0.4, "head": 0.5, **{f"{side}_{part}": 0.5 for side in SIDES for part in ("hand", "foot")}}
 TEMPO_PERIOD_S, TURN_PERIOD_S = 4.0, 3.0
 LASTING, STILL_SHARE, FULL_SPREAD = 0.5, 0.25, np.radians(30.0)
-STRAIGHT = 0.03  # a knee or elbow is not bent backwards: it keeps this angle, radians, or what it had
+STRAIGHT = 0.03  # a knee or elbow is not bent backwards: it keeps at least this angle, radians, or its own
 STANDING_MM = 20.0  # a foot this much higher than the other counts less by e
 
 
 @dataclass(frozen=True, slots=True)
 class Variation:
-    """How much performances differ, standard deviations. tempo : of the logarithm of the speed. degrees : of joints."""
+    """Variation between performances, standard deviations. tempo : of the log speed. degrees : of joints."""
 
     tempo: float = 0.1
     degrees: float = 4.0
@@ -65,7 +65,7 @@ def performance(
 
 
 def to_local(motion: PersonMotion) -> dict[str, Array]:
-    """Each segment's turn against the one that carries it, (F, 3, 3); the pelvis's in the world."""
+    """Each segment's rotation relative to its parent, (F, 3, 3); the pelvis's in the world."""
     turns = motion.turns
     return {
         name: np.swapaxes(turns[CARRIERS[name]], 1, 2) @ turn if name in CARRIERS else turn
@@ -74,7 +74,7 @@ def to_local(motion: PersonMotion) -> dict[str, Array]:
 
 
 def from_local(motion: PersonMotion, local: dict[str, Array]) -> PersonMotion:
-    """The motion with other turns, given as `to_local` gives them."""
+    """The motion with other rotations, in the form of `to_local`."""
     turns = {"pelvis": local["pelvis"]}
     for name, carrier in CARRIERS.items():
         turns[name] = turns[carrier] @ local[name]
@@ -107,7 +107,7 @@ def _bend_change(turn: Array, change: Array) -> Array:
 
 
 def _standing_as(motion: PersonMotion, before: PersonMotion) -> PersonMotion:
-    """The motion moved in every frame so that the foot that bears the person is where it was before."""
+    """The motion moved in every frame so that the supporting foot is where it was before."""
     heights = np.stack([lowest_of_sole(before, side) for side in SIDES], axis=1)
     weights = np.exp(-(heights - heights.min(axis=1, keepdims=True)) / STANDING_MM)
     weights /= weights.sum(axis=1, keepdims=True)
@@ -120,12 +120,11 @@ def _standing_as(motion: PersonMotion, before: PersonMotion) -> PersonMotion:
     return PersonMotion(motion.skeleton, motion.fps, motion.root + move, motion.turns)
 
 
-# A stretch of a recorded motion as a recipe asks for it: from when on, how fast, again and again, along a bend, and
-# where in the room.
+# A stretch of a recorded motion for a recipe: start, speed, repetition, bend, and place in the room.
 
 
 CLIP_OPTIONS = {
-    "start_s": 0.0,  # first moment of the recording that is shown
+    "start_s": 0.0,  # first moment of the recording
     "speed": 1.0,  # seconds of the recording a second of footage
     "cycle_s": 0.0,  # above 0: this much of the recording from start_s on is repeated, its ends joined
     "turn_degrees": 0.0,  # turns the way about the vertical, counter-clockwise
@@ -144,21 +143,21 @@ def recorded_person(
 
     Raises StudioError for an unknown option, and where the recording is too short.
     """
-    wanted = _checked_clip(options)
+    chosen = _checked_clip(options)
     whole = on_skeleton(recorded, skeleton)
-    times: Array = wanted["start_s"] + wanted["speed"] / fps * np.arange(frames, dtype=np.float64)
-    if wanted["cycle_s"] > 0.0:
-        motion = _repeated(_cycle(recorded, whole, wanted), times - wanted["start_s"], fps)
+    times: Array = chosen["start_s"] + chosen["speed"] / fps * np.arange(frames, dtype=np.float64)
+    if chosen["cycle_s"] > 0.0:
+        motion = _repeated(_cycle(recorded, whole, chosen), times - chosen["start_s"], fps)
     else:
-        _long_enough(recorded, times, wanted)
+        _long_enough(recorded, times, chosen)
         motion = sampled(whole, times, fps)
-    if wanted["radius_mm"] != 0.0:
-        motion = bent(motion, wanted["radius_mm"], wanted["bank"])
-    return placed(motion, np.radians(wanted["turn_degrees"]), (wanted["at_x_mm"], wanted["at_y_mm"]))
+    if chosen["radius_mm"] != 0.0:
+        motion = bent(motion, chosen["radius_mm"], chosen["bank"])
+    return placed(motion, np.radians(chosen["turn_degrees"]), (chosen["at_x_mm"], chosen["at_y_mm"]))
 
 
 def bent(motion: PersonMotion, radius: float, bank: float) -> PersonMotion:
-    """A motion that goes straight on the whole, bent to a circle of `radius` mm (below 0: to the right).
+    """A straight motion bent to a circle of `radius` mm (below 0: to the right).
 
     Every frame is moved and turned as a whole by its place along the way, and leans into the bend about the floor below
     the pelvis by `bank` times the angle whose tangent is v^2 / (r g).
@@ -180,7 +179,7 @@ def bent(motion: PersonMotion, radius: float, bank: float) -> PersonMotion:
 
 
 def placed(motion: PersonMotion, turn: float, middle: tuple[float, float]) -> PersonMotion:
-    """Turned about the vertical, then moved until the middle of the way's extent lies at `middle`."""
+    """The motion turned about the vertical, then moved so that the middle of its extent is at `middle`."""
     about = axis_turn(2, turn)
     root = motion.root @ about.T
     centre = 0.5 * (root[:, :2].min(axis=0) + root[:, :2].max(axis=0))
@@ -191,18 +190,18 @@ def placed(motion: PersonMotion, turn: float, middle: tuple[float, float]) -> Pe
 
 
 def with_defaults(options: dict[str, float], known: dict[str, float]) -> dict[str, float]:
-    """All known options, as asked for or as usual. Raises StudioError for one that is not known."""
+    """All known options, given or default. Raises StudioError for an unknown one."""
     unknown = sorted(set(options) - set(known))
     if unknown:
         raise StudioError(f"The motion has no option '{unknown[0]}'.", f"It has {', '.join(known)}.")
     return known | options
 
 
-def _cycle(recorded: RecordedMotion, whole: PersonMotion, wanted: dict[str, float]) -> PersonMotion:
-    """One cycle whose last frame has the pose of its first: what they differ by is spread over the cycle."""
-    count = max(2, round(wanted["cycle_s"] * whole.fps) + 1)
-    times: Array = wanted["start_s"] + np.arange(count, dtype=np.float64) / whole.fps
-    _long_enough(recorded, times, wanted)
+def _cycle(recorded: RecordedMotion, whole: PersonMotion, chosen: dict[str, float]) -> PersonMotion:
+    """One cycle whose last frame has the pose of its first: the difference is spread over the cycle."""
+    count = max(2, round(chosen["cycle_s"] * whole.fps) + 1)
+    times: Array = chosen["start_s"] + np.arange(count, dtype=np.float64) / whole.fps
+    _long_enough(recorded, times, chosen)
     cycle = sampled(whole, times, whole.fps)
     share = eased(np.linspace(0.0, 1.0, count))[:, None]
     turns = {}
@@ -215,7 +214,7 @@ def _cycle(recorded: RecordedMotion, whole: PersonMotion, wanted: dict[str, floa
 
 
 def _repeated(cycle: PersonMotion, times: Array, fps: float) -> PersonMotion:
-    """The cycle again and again, each time starting where it ended."""
+    """The cycle repeated, each time starting where it ended."""
     length = (cycle.frame_count - 1) / cycle.fps
     rounds = np.floor(times / length)
     motion = sampled(cycle, times - rounds * length, fps)
@@ -224,20 +223,20 @@ def _repeated(cycle: PersonMotion, times: Array, fps: float) -> PersonMotion:
 
 
 def _checked_clip(options: dict[str, float]) -> dict[str, float]:
-    wanted = with_defaults(options, CLIP_OPTIONS)
-    if not 0.01 <= wanted["speed"] <= 100.0:
-        raise StudioError(f"options.speed is {wanted['speed']:g}, not 0.01 to 100.", "Correct the entry.")
-    if wanted["start_s"] < 0.0 or not 0.0 <= wanted["bank"] <= 1.0:
+    chosen = with_defaults(options, CLIP_OPTIONS)
+    if not 0.01 <= chosen["speed"] <= 100.0:
+        raise StudioError(f"options.speed is {chosen['speed']:g}, not 0.01 to 100.", "Correct the entry.")
+    if chosen["start_s"] < 0.0 or not 0.0 <= chosen["bank"] <= 1.0:
         raise StudioError("options.start_s is below 0, or options.bank not 0 to 1.", "Correct the entry.")
-    return wanted
+    return chosen
 
 
-def _long_enough(recorded: RecordedMotion, times: Array, wanted: dict[str, float]) -> None:
+def _long_enough(recorded: RecordedMotion, times: Array, chosen: dict[str, float]) -> None:
     """Raises StudioError where the recording ends before the last of `times`."""
     if times[-1] > recorded.seconds + 0.5 / recorded.fps:
         raise StudioError(
             f"'{recorded.source}' lasts {recorded.seconds:.2f} s; the recipe shows it up to {times[-1]:.2f} s.",
-            "Ask for fewer frames, an earlier start_s, a lower speed, or a cycle_s that repeats it.",
+            "Give fewer frames, an earlier start_s, a lower speed, or a cycle_s that repeats it.",
         )
 
 
@@ -254,8 +253,8 @@ JOINED_OPTIONS = {
 
 
 class Clip(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A stretch of a recorded motion. file : as a recipe names files. seconds : 0: to its end. turn_degrees : the way
-    bends by this much, evenly along it. blend_s : how long this clip and the one before it are seen together.
+    """A stretch of a recorded motion. file : as a recipe names files. seconds : 0: to its end. turn_degrees : even
+    bend of the path. blend_s : length of the blend with the clip before.
     """
 
     file: str
@@ -275,24 +274,24 @@ def joined_person(
 ) -> PersonMotion:
     """`frames` frames at `fps` of the clips one after the other. options : of JOINED_OPTIONS.
 
-    Raises StudioError for an unknown option, clips that are too short, and fewer frames of motion than asked for.
+    Raises StudioError for an unknown option, clips that are too short, and fewer frames of motion than requested.
     """
-    wanted = _checked_joining(options)
+    chosen = _checked_joining(options)
     whole = joined([(clip, _stretch(clip, recorded, skeleton)) for clip, recorded in recordings])
     seconds = (whole.frame_count - 1) / RATE
-    if wanted["performance"] > 0.0:
-        variation = Variation(wanted["tempo_change"], wanted["angle_change_degrees"])
-        rng = np.random.default_rng(int(wanted["performance"]))
+    if chosen["performance"] > 0.0:
+        variation = Variation(chosen["tempo_change"], chosen["angle_change_degrees"])
+        rng = np.random.default_rng(int(chosen["performance"]))
         motion = performance(whole, frames, fps, variation, rng)
     elif (frames - 1) / fps > seconds + 0.5 / RATE:
         raise StudioError(
             f"The clips last {seconds:.2f} s together, the recipe shows {(frames - 1) / fps:.2f} s.",
-            f"Ask for at most {int(seconds * fps) + 1} frames, or give more clips.",
+            f"Give at most {int(seconds * fps) + 1} frames, or more clips.",
         )
     else:
         motion = sampled(whole, np.arange(frames) / fps, fps)
     motion = with_hands_above_floor(motion)
-    return placed(motion, np.radians(wanted["turn_degrees"]), (wanted["at_x_mm"], wanted["at_y_mm"]))
+    return placed(motion, np.radians(chosen["turn_degrees"]), (chosen["at_x_mm"], chosen["at_y_mm"]))
 
 
 def joined(clips: list[tuple[Clip, PersonMotion]]) -> PersonMotion:
@@ -310,10 +309,10 @@ def joined(clips: list[tuple[Clip, PersonMotion]]) -> PersonMotion:
 
 
 def wound(motion: PersonMotion, turn: float) -> PersonMotion:
-    """The way bent by `turn` radians in all, evenly along it; who stands does not turn."""
+    """The motion with its path bent evenly by `turn` radians in all; it does not turn while standing."""
     smooth = gaussian_filter1d(motion.root[:, :2], WAY_SMOOTHING_S * motion.fps, axis=0, mode="nearest")
-    gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(smooth, axis=0), axis=1))])
-    angle = turn * gone / max(float(gone[-1]), 1e-9)
+    covered = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(smooth, axis=0), axis=1))])
+    angle = turn * covered / max(float(covered[-1]), 1e-9)
     steps = np.diff(motion.root, axis=0)
     turned = (axis_turn(2, 0.5 * (angle[1:] + angle[:-1])) @ steps[..., None])[..., 0]
     root = motion.root[:1] + np.concatenate([np.zeros((1, 3)), np.cumsum(turned, axis=0)])
@@ -328,7 +327,7 @@ def _stretch(clip: Clip, recorded: RecordedMotion, skeleton: Skeleton) -> Person
     last = clip.start_s + clip.seconds if clip.seconds > 0.0 else recorded.seconds
     if clip.start_s < 0.0 or not clip.start_s < last <= recorded.seconds + 0.5 / recorded.fps:
         raise StudioError(
-            f"Clip '{clip.file}' lasts {recorded.seconds:.2f} s; {clip.start_s:g} to {last:g} s are asked for.",
+            f"Clip '{clip.file}' lasts {recorded.seconds:.2f} s; {clip.start_s:g} to {last:g} s are requested.",
             "Correct start_s or seconds of the clip.",
         )
     times = clip.start_s + np.arange(int((last - clip.start_s) * RATE + 1e-6) + 1) / RATE
@@ -337,7 +336,7 @@ def _stretch(clip: Clip, recorded: RecordedMotion, skeleton: Skeleton) -> Person
 
 
 def _facing_as(before: PersonMotion, after: PersonMotion, overlap: int) -> PersonMotion:
-    """`after` turned about the vertical until both face the same way in the middle of the overlap."""
+    """`after` turned about the vertical so that both headings agree in the middle of the overlap."""
     theirs = _heading(before.turns["pelvis"][before.frame_count - overlap + overlap // 2])
     turn = axis_turn(2, np.array(theirs - _heading(after.turns["pelvis"][overlap // 2])))
     return PersonMotion(
@@ -353,7 +352,7 @@ def _heading(pelvis: Array) -> float:
 
 
 def _blended(before: PersonMotion, after: PersonMotion, overlap: int) -> PersonMotion:
-    """Both motions as one: places by blended speeds, heights and the joints' turns blended themselves."""
+    """Both motions as one: places from blended speeds; heights and joint rotations blended directly."""
     share = eased(np.linspace(0.0, 1.0, overlap))
     at = before.frame_count - overlap
     steps = [np.diff(motion.root[part, :2], axis=0) for motion, part in _parts(before, after, overlap)]
@@ -381,15 +380,15 @@ def _parts(
 
 
 def _checked_joining(options: dict[str, float]) -> dict[str, float]:
-    wanted = with_defaults(options, JOINED_OPTIONS)
-    if wanted["performance"] < 0.0 or wanted["performance"] != int(wanted["performance"]):
+    chosen = with_defaults(options, JOINED_OPTIONS)
+    if chosen["performance"] < 0.0 or chosen["performance"] != int(chosen["performance"]):
         raise StudioError(
-            f"options.performance is {wanted['performance']:g}, not a whole number from 0 on.",
+            f"options.performance is {chosen['performance']:g}, not a whole number from 0 on.",
             "Correct the entry.",
         )
-    if not (0.0 <= wanted["tempo_change"] <= 1.0 and 0.0 <= wanted["angle_change_degrees"] <= 45.0):
+    if not (0.0 <= chosen["tempo_change"] <= 1.0 and 0.0 <= chosen["angle_change_degrees"] <= 45.0):
         raise StudioError(
             "options.tempo_change is not 0 to 1, or options.angle_change_degrees not 0 to 45.",
             "Correct the entry.",
         )
-    return wanted
+    return chosen

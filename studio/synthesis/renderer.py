@@ -1,7 +1,7 @@
 """Pictures of the person in the room, with their exact masks.
 
 The room is traced once a camera; in each frame the person's shadow on the floor is computed once for all cameras and
-the person is traced inside the window that can hold them. A picture is then the room, darkened by the shadow, under the
+the person is traced inside a bounding window. A picture is then the room, darkened by the shadow, under the
 person, softened as by a lens, with sensor noise that depends only on seed, camera and frame.
 """
 
@@ -30,12 +30,12 @@ SHADOW_REACH, SHADOW_CELL = 2600.0, 26.0
 EXPOSURE, LENS_BLUR = 1.8, 0.55
 STREAMS_PER_FRAME = 64
 MOMENTS = 5
-"""Of an exposure: pictures of these many moments are averaged. The shadow is that of the middle one."""
+"""Number of moments averaged over an exposure. The shadow is that of the middle one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _View:
-    """One camera's fixed things. shadow_place : (H, W, 2) float32 column and row in the shadow's grid."""
+    """One camera's constant data. shadow_place : (H, W, 2) float32 column and row in the shadow's grid."""
 
     camera: Camera
     rays: Floats
@@ -61,9 +61,7 @@ class Renderer:
         wardrobe: Array = STRIPED,
         shutter: float = 0.0,
     ) -> None:
-        """shutter : how long a picture is exposed, as a share of the time from frame to frame, about the frame's
-        moment.
-        """
+        """shutter : exposure time, centred on the frame, as a share of the time from frame to frame."""
         self._room, self._noise, self._samples, self._seed = room, noise, samples, seed
         self._wardrobe = wardrobe
         self._moments = MOMENTS if shutter > 0.0 else 1
@@ -74,7 +72,7 @@ class Renderer:
         self._views = tuple(_view(room, camera, samples) for camera in cameras)
 
     def empty(self, camera: int, frame: int) -> Bytes:
-        """(H, W, 3) BGR picture of the room alone; its noise is that of frame -1 - `frame`, which no other has."""
+        """(H, W, 3) BGR picture of the room alone; its noise is that of frame -1 - `frame`, unlike any other's."""
         view = self._views[camera]
         return self._developed(view.key + view.ambient, camera, -1 - frame)
 
@@ -136,7 +134,7 @@ class Renderer:
         return light, coverage
 
     def _developed(self, light: NDArray[np.floating], camera: int, frame: int) -> Bytes:
-        """What the sensor makes of linear light: lens blur, exposure, noise, BGR bytes."""
+        """The sensor's picture of linear light: lens blur, exposure, noise, BGR bytes."""
         soft = cv2.GaussianBlur(np.ascontiguousarray(light[..., ::-1], np.float32), (0, 0), LENS_BLUR)
         exposed = np.asarray(255.0 * (1.0 - np.exp(-EXPOSURE * soft)), np.float32)
         out = np.zeros(exposed.shape, np.uint8)
@@ -184,7 +182,7 @@ def _at_places(grid: Floats, places: Floats) -> Floats:
 
 
 def _window(camera: Camera, table: Array) -> tuple[slice, slice] | None:
-    """Rows and columns that can hold the person, None when they are out of the picture."""
+    """Rows and columns around the person, None when out of the picture."""
     pixels, depth = project(camera, table[:, BOUND : BOUND + 3])
     ahead = depth > 100.0
     if not ahead.any():

@@ -1,4 +1,4 @@
-"""The room that footage is made in: floor, walls and furniture as textured boxes under one round lamp.
+"""The room of the footage: floor, walls and furniture as textured boxes under one round lamp.
 
 World: mm, z up, floor at z = 0, the middle of the floor at the origin.
 """
@@ -43,7 +43,7 @@ class Room:
 
 
 def obstacle(height: float) -> tuple[Block, ...]:
-    """A box of the given height (mm) at the origin to be stepped over; none for height 0."""
+    """A box of the given height (mm) at the origin as an obstacle; none for height 0."""
     half = (50.0, 340.0, 0.5 * height)
     box = Block((0.0, 0.0, half[2]), half, (0.62, 0.50, 0.34), GRAIN, (0.54, 0.42, 0.28))
     return (box,) if height > 0.0 else ()

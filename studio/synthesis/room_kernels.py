@@ -1,4 +1,4 @@
-"""Rays through the empty room: light from the lamp, light from all around, distance."""
+"""Rays through the empty room: light of the lamp, ambient light, distance."""
 
 import math
 
@@ -61,7 +61,7 @@ def first_surface(ox, oy, oz, dx, dy, dz, half_x, half_y, height, blocks):
 
 @njit(cache=True, error_model="numpy", fastmath=True)
 def pattern_share(pattern, u, v):
-    """How much of the second colour a pattern shows at (u, v) mm of a face, and a factor for its brightness."""
+    """Share of the second colour in a pattern at (u, v) mm of a face, and a factor for its brightness."""
     grain = value_noise(u / 14.0, v / 14.0, 3.0) - 0.5
     if pattern == PLANKS:
         plank = math.floor(v / 140.0)
@@ -118,7 +118,7 @@ def surface_colour(what, face, px, py, pz, blocks, patterns, colour):
 
 @njit(cache=True, error_model="numpy", fastmath=True)
 def lamp_share(px, py, pz, lights, blocks, salt):
-    """How much of the round lamp a point of the room sees past the furniture, 0...1."""
+    """Share of the round lamp that a point of the room sees past the furniture, 0...1."""
     seen = 0
     turn = 2.0 * math.pi * hashed(int(px * 8.0), int(py * 8.0), int(pz * 8.0) + salt)
     for sample in range(LAMP_SAMPLES):

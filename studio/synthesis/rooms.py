@@ -1,4 +1,4 @@
-"""The rooms that footage can be made in, by name: three that are furnished by hand, and others by chance."""
+"""The rooms of footage by name: three furnished by hand, others at random."""
 
 from dataclasses import replace
 
@@ -50,8 +50,8 @@ FURNITURE = (
 )
 
 # A room like the Lee walk's: grey carpet, white desks with dark things on them, cabinets and partitions. Dark clothes
-# hardly stand out from it, and one hard lamp throws shadows that background subtraction does not take for shadows
-# everywhere: masks get holes and remnants, as real ones have.
+# hardly stand out from it, and one hard lamp throws shadows that background subtraction does not always detect:
+# masks get holes and remnants, as real ones have.
 
 OFFICE_LIGHTS = np.array(
     [[900.0, 250.0, 2860.0], [240.0, 0.0, 0.0], [0.50, 0.49, 0.47], [0.44, 0.445, 0.455]]
@@ -115,7 +115,7 @@ ROOMS = {
     "hall": Room((4300.0, 4300.0), 3400.0, HALL, HALL_LIGHTS),
 }
 
-# Rooms furnished by chance.
+# Randomly furnished rooms.
 
 DRAWN = "drawn-"
 HALF_MM, HEIGHT_MM = (2800.0, 3700.0), (2700.0, 3300.0)
@@ -128,12 +128,12 @@ FLOOR_AND_WALLS = 5
 
 
 def is_room(name: str) -> bool:
-    """Whether a room is called that: one of ROOMS, or "drawn-" and a whole number."""
+    """Whether a name is a room's: one of ROOMS, or "drawn-" and a whole number."""
     return name in ROOMS or (name.startswith(DRAWN) and name.removeprefix(DRAWN).isdecimal())
 
 
 def room_called(name: str, obstacle_height: float = 0.0) -> Room:
-    """The room of that name; with a box of the given height (mm) at the origin where one is stepped over."""
+    """The room of that name; with an obstacle of the given height (mm) at the origin, if above 0."""
     room = ROOMS[name] if name in ROOMS else drawn_room(int(name.removeprefix(DRAWN)))
     return replace(room, blocks=room.blocks + obstacle(obstacle_height))
 

@@ -22,9 +22,10 @@ from studio.synthesis.noise_kernels import value_noise
 
 SAFETY, TOUCH, STEPS = 0.85, 0.8, 72
 OCCLUSION_REACH = 70.0
-# Pieces this far from a ray (mm) may still melt into what it meets. Pixels are traced in square tiles of this side.
+# Pieces this far from a ray (mm) may still be blended with the surface that it hits. Pixels are traced in square tiles
+# of this side.
 NEAR, TILE = 12.0, 8
-# Samples of one pixel this close in depth (mm) share one shading: it changes little inside a pixel.
+# Samples of one pixel this close in depth (mm) share one shading, which changes little inside a pixel.
 SAME_SURFACE = 12.0
 
 
@@ -93,7 +94,7 @@ def shaded(px, py, pz, dx, dy, dz, person, active, count, shadow_active, out):
 
 @njit(cache=True, error_model="numpy", fastmath=True)
 def tile_beam(rays, top, bottom, left, right):
-    """The middle direction of a tile's rays and how far, per mm of distance, any of them strays from it."""
+    """The middle direction of a tile's rays and their greatest deviation from it per mm of distance."""
     ray = rays[(top + bottom) // 2, (left + right) // 2]
     dx, dy, dz = np.float64(ray[0]), np.float64(ray[1]), np.float64(ray[2])
     spread = 0.0
@@ -106,8 +107,8 @@ def tile_beam(rays, top, bottom, left, right):
 
 @njit(cache=True, error_model="numpy", fastmath=True)
 def beam_start(origin, dx, dy, dz, spread, pieces, labels, active):
-    """How far all rays of a beam run free of the person, and the number of pieces that any of them may touch (in
-    `active`); (-1, n) when none touches the person.
+    """Distance that all rays of a beam run free of the person, and the number of pieces that any of them may hit (in
+    `active`); (-1, n) when none hits the person.
     """
     count, t, last = gather_beam(origin, dx, dy, dz, spread, pieces, NEAR, active)
     if count == 0:
@@ -153,8 +154,8 @@ def trace_pixel(
 ):
     """Share of a pixel that the person covers; adds the light of its samples to light[row, column].
 
-    start, nearby, near_count : as `first_touch` takes them. scratch : two rows of room for pieces' indices. person : as
-    `shaded` takes it.
+    start, nearby, near_count : as in `first_touch`. scratch : two rows for pieces' indices. person : as in
+    `shaded`.
     """
     pieces, labels = person[0], person[1]
     hits, shaded_at, each, colour = 0, -FAR, 1.0 / (samples * samples), np.zeros(3)
@@ -179,7 +180,7 @@ def trace_person(origin, rays, samples, room_depth, pieces, labels, lights, ward
     """The person as seen through a window of the picture, tile by tile.
 
     origin : (3,) camera centre. rays : (h * samples, w * samples, 3) unit directions. room_depth : (h, w)
-    distance to what stands in the room, mm. Fills light (h, w, 3), premultiplied by coverage (h, w), both
+    distance to the room's surfaces, mm. Fills light (h, w, 3), premultiplied by coverage (h, w), both
     0...1.
     """
     height, width = coverage.shape
@@ -213,9 +214,9 @@ def trace_person(origin, rays, samples, room_depth, pieces, labels, lights, ward
 
 @njit(cache=True, error_model="numpy", fastmath=True, parallel=True)
 def floor_shadow(left, near, cell, pieces, labels, lights, key, ambient):
-    """What the person leaves of the lamp and of the room's light on the floor.
+    """Shares of the lamp's and of the ambient light that the person leaves on the floor.
 
-    Cell (j, i) of the (n, n) outputs lies at x = left + i * cell, y = near + j * cell, mm; 1 = nothing taken away.
+    Cell (j, i) of the (n, n) outputs lies at x = left + i * cell, y = near + j * cell, mm; 1 = no shadow.
     """
     rows, columns = key.shape
     for row in prange(rows):

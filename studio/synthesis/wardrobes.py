@@ -1,4 +1,4 @@
-"""What the rendered person wears: colours of skin, shirt, trousers, shoes, hair and of the shirt's stripes.
+"""Wardrobes of the rendered person: colours of skin, shirt, trousers, shoes, hair and of the shirt's stripes.
 
 Each wardrobe is (6, 3) RGB, 0...1, in the order of the materials in `flesh.py`.
 """

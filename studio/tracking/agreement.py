@@ -1,9 +1,9 @@
-"""How well a pose explains all views, both ways and limb by limb: model that no silhouette bears out, and silhouette
-that no limb explains.
+"""How well a pose explains all views, per limb and in both directions: model outside the silhouettes, and silhouette
+that no limb covers.
 
-A limb that lies on another one costs nothing in what the model covers; what gives it away is the silhouette that it
-left bare. So both are counted, in every view, beyond a distance that clothes and rough masks do not reach, and given to
-the limb that is nearest. Everything is in mm² at the body, so that cameras and rates do not matter.
+A limb that lies on another one covers nothing wrong; only the silhouette that it leaves uncovered shows the error. So
+both are counted in every view, beyond a distance that allows for clothes and rough masks, and assigned to the nearest
+limb. Everything is in mm² at the body, so that cameras and rates do not matter.
 """
 
 from collections.abc import Sequence
@@ -21,20 +21,20 @@ from studio.weighting.outlines import OutlineProjector
 Array = NDArray[np.float64]
 
 FAR_MM = 45.0
-"""Clothes, hair and rough masks reach less far."""
+"""mm: larger than what clothes, hair and rough masks make."""
 LEAST_AREA = 1000.0
-"""mm²: a limb that no view shows."""
+"""mm²: a limb with less area than this is seen by no view."""
 GRID_MM = 14.0
-"""Between points that are counted, about; at least a pixel."""
+"""mm, about: spacing of the points that are counted; at least a pixel."""
 COARSE_GRID_MM = 25.0
-"""The same where many places of a limb are compared."""
+"""mm: the same where many positions of a limb are compared."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Disagreement:
     """Of V views and L drawn limbs, mm² at the body. area : (V, L) that a limb covers. outside : (V, L) of it farther
     than FAR_MM from the silhouette. bare : (V, L) silhouette farther than FAR_MM from every limb, given to the nearest.
-    limbs : (L,) the limb that each drawn one belongs to, as the body's parameters name them.
+    limbs : (L,) name of the limb that each drawn one belongs to, from the body's parameters.
     """
 
     area: Array
@@ -43,7 +43,7 @@ class Disagreement:
     limbs: tuple[str, ...]
 
     def shares(self) -> dict[str, float]:
-        """Of each of the body's limbs (as its parameters name them), what disagrees as a share of its area."""
+        """Disagreeing area by limb (named as in the body's parameters), as a share of the limb's area."""
         area = np.maximum(self.area.sum(axis=0), LEAST_AREA)
         off = (self.outside + self.bare).sum(axis=0)
         groups = np.array(self.limbs)
@@ -66,7 +66,7 @@ class Agreement:
         return self._projector.corners(pose[None])[0][0]
 
     def mm_per_pixel(self, pose: Array) -> list[float]:
-        """mm that a pixel of each view spans at the body."""
+        """Size of a pixel of each view at the body, mm."""
         return mm_at(self.body, self.cameras, pose)
 
     def of(self, pose: Array, silhouettes: Sequence[Distances]) -> Disagreement:
@@ -81,8 +81,8 @@ class Agreement:
 
     def of_places(self, poses: Array, silhouettes: Sequence[Distances], without: str | None = None) -> Array:
         """(N,) mm² by which poses (N, D) that differ in a limb or two disagree with a frame's silhouettes there, on a
-        coarse grid: what these limbs cover outside, and silhouette far from all limbs. without : a limb that counts as
-        not there.
+        coarse grid: what these limbs cover outside, and silhouette far from all limbs. without : a limb to leave
+        out.
         """
         corners, _ = self._projector.corners(poses)
         corners[:, :, [limb == without for limb in self._limbs]] = np.nan
@@ -98,7 +98,7 @@ class Agreement:
 
 
 def limb_names(body: BodyModel) -> tuple[str, ...]:
-    """(L,) the limb that each drawn one belongs to: that of the nearest parameter on the way to the root."""
+    """(L,) limb that each drawn one belongs to: that of the nearest parameter towards the root."""
     found = []
     for limb in body.drawn:
         joint, moved = limb.joint, list[int]()

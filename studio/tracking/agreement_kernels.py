@@ -11,7 +11,7 @@ FIELDS = 3
 
 @njit(**EXACT)
 def distance_to(x, y, quad, turn):
-    """Pixels from a point to a quadrilateral (4, 2) that runs round as `turn` says; 0 inside."""
+    """Distance in pixels from a point to a quadrilateral (4, 2) with orientation `turn`; 0 inside."""
     inside, nearest = True, np.inf
     for corner in range(4):
         following = (corner + 1) & 3
@@ -28,7 +28,7 @@ def distance_to(x, y, quad, turn):
 
 @njit(**EXACT)
 def is_inside(x, y, quad, turn):
-    """Whether a point lies in a quadrilateral (4, 2) that runs round as `turn` says."""
+    """Whether a point lies in a quadrilateral (4, 2) with orientation `turn`."""
     for corner in range(4):
         following = (corner + 1) & 3
         ex, ey = quad[following, 0] - quad[corner, 0], quad[following, 1] - quad[corner, 1]
@@ -64,7 +64,7 @@ def count_limbs(quads, turns, signed, corner, size, step, far, counts):
 
 @njit(**EXACT)
 def count_uncovered(quads, turns, signed, corner, step, far, counts):
-    """Fill the last column of counts (L, 3) of one view: silhouette that is far from every limb, at its nearest."""
+    """Fill the last column of counts (L, 3) of one view: silhouette far from every limb, at the nearest limb."""
     left, top = corner
     height, width = signed.shape
     for row in range(-(-top // step), (top + height - 1) // step + 1):
@@ -159,8 +159,8 @@ def view_counts(quads, signed, corner, size, step, far, counts):
 
 @njit(**EXACT)
 def count_cells(quads, signed, corner, cell, far, counts):
-    """Of one view's cells: one more in counts (H, W) where a limb of quads covers the middle farther than `far` pixels
-    from the silhouette, none where that shows something.
+    """Update one view's counts (H, W): add 1 to cells whose middle a limb of quads covers farther than `far` pixels
+    from the silhouette, set cells that show silhouette to 0.
     """
     left, top = corner
     height, width = signed.shape

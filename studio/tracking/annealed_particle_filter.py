@@ -1,7 +1,7 @@
 """The annealed particle filter of Deutscher & Reid (2005), sections 3 and 6.
 
 Idea: one frame is searched in M layers. Each weighs the particles, flattens the weights by an exponent β so
-that a wanted share α of them survives, draws the survivors and spreads them with less and less noise, so that
+that a chosen share α of them survives, draws the survivors and spreads them with less and less noise, so that
 the cloud moves over local maxima towards the best pose. Two additions make the paper's improved filter:
 adaptive diffusion (noise in proportion to what is still uncertain, Eq. 18) and crossover (children of two
 survivors, Eq. 19).
@@ -12,7 +12,7 @@ run; π, normalised weights; β, α, D see `annealing`; P, B, σ0 see `diffusion
 Beyond the paper, a frame's first set may be predicted by a behaviour model instead of Eq. 9 and 10 (Caillette et al.
 2007; see `guided_start`). Particles carry their automaton's state from frame to frame. Within a frame, where layers
 draw, cross and spread them, a particle follows its first parent; at the frame's end its state is the one that follows
-from its ancestor's at the end of the last frame by the cluster of its pose and of the way that it went.
+from its ancestor's at the end of the last frame by the cluster of its pose and movement.
 
 Reference: J. Deutscher, I. Reid, Articulated Body Motion Capture by Stochastic Search, IJCV 61(2), 185-205.
 """
@@ -71,7 +71,6 @@ class AnnealedParticleFilter(Tracker):
     presets = PRESETS
 
     def layer_count(self, settings: AnnealedSettings) -> int:
-        """M."""
         return settings.layers
 
     def evaluation_knobs(self, evaluations: int, layers: int) -> dict[str, int]:
@@ -130,7 +129,7 @@ class AnnealedParticleFilter(Tracker):
         return unweighted(poses, descended(extra, parents) if guided else extra), record
 
     def expectations(self, particles: ParticleSet, space: SearchSpace, settings: AnnealedSettings) -> Array:
-        """(S, D) where the first layer's set expects the body: one place unless a model guides it (`foreseen`)."""
+        """(S, D) poses that the first layer's set expects: one unless a behaviour model guides it (`foreseen`)."""
         return foreseen(particles, space)
 
     def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: AnnealedSettings) -> Estimate:
@@ -139,9 +138,7 @@ class AnnealedParticleFilter(Tracker):
 
 
 def _carried(rng: np.random.Generator, last: ParticleSet, settings: AnnealedSettings) -> Indices:
-    """(N,) what the last frame hands on: all particles as they are (Eq. 9), survivors drawn by π, or the
-    mode.
-    """
+    """(N,) indices of the particles that start this frame: all (Eq. 9), survivors drawn by π, or the mode."""
     weights = np.exp(last.log_weights)
     drawn = draw(rng, weights, settings.particles, settings.resampling)
     if settings.carry == "weighted":
@@ -160,7 +157,7 @@ def _survivors(
     weights, count = np.exp(weighted.log_weights), len(weighted.poses)
     parents = draw(rng, weights, count, settings.resampling)
     first = weighted.poses[parents]
-    # A systematic draw is in order: shuffled, the two parents of a child are independent.
+    # A systematic draw is sorted; shuffling makes the two parents of a child independent.
     second = weighted.poses[rng.permutation(draw(rng, weights, count, settings.resampling))]
     crossed = cross(rng, first, second, space, share=settings.crossover, by=settings.crossover_by)
     return crossed, parents

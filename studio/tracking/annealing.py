@@ -3,7 +3,7 @@
 Symbols: w, a particle's weight; β, the exponent of a layer, w_m = w^β (Eq. 3); π, the weights normalised to
 sum 1 (Eq. 6); D = 1 / Σ π², the survival diagnostic (Eq. 11); α = D / N, the survival rate (Eq. 12). D falls
 monotonically with β from N (β = 0) to the number of particles that share the best weight (β → ∞), so that the
-β of a wanted α is a root of one monotone function; it is sought in log β, where that function is smooth.
+β of a target α is the root of one monotone function; it is solved for in log β, where that function is smooth.
 """
 
 import math
@@ -16,9 +16,9 @@ from scipy.optimize import brentq
 
 Array = NDArray[np.float64]
 
-# Of log β, absolute and relative.
+# Tolerance of log β, absolute and relative.
 ROOT_TOLERANCE = 1e-12
-# exp(-FAR) is nothing beside 1 in double precision.
+# exp(-FAR) is below double precision relative to 1.
 FAR = 40.0
 LOG_BETA_BOUND = 690.0
 
@@ -86,7 +86,7 @@ def _root(below: Array, smallest_gap: float, effective: float, start: float | No
 
 
 def _first_guess(below: Array, start: float | None) -> float:
-    """log β to begin with: the given start, or the one that spreads the weights over about one e-fold."""
+    """Initial log β: the given start, or the value that spreads the weights over about one e-fold."""
     if start is not None and math.isfinite(start) and start > 0.0:
         return math.log(start)
     spread = float(np.std(below / np.max(below)))

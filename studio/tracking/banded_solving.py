@@ -1,8 +1,8 @@
 """Symmetric banded equations, solved in one order on one thread.
 
-LAPACK's answer depends in its last bits on how many threads the BLAS has, and a descent with decisions in it (accept a
-step or not) makes millimetres of them; the same run must come out on any number of threads. Nor do narrow bands gain by
-threads (30 s instead of 0.05 s for 30 frames on two busy cores).
+LAPACK's result depends in its last bits on the number of BLAS threads, and a descent with decisions (accept a step or
+not) amplifies these to millimetres; a run must be the same on any number of threads. Narrow bands do not gain from
+threads either (30 s instead of 0.05 s for 30 frames on two busy cores).
 """
 
 import numpy as np
@@ -16,8 +16,8 @@ Array = NDArray[np.float64]
 def solve_banded(rows: Array, right: Array, least: float = 0.0) -> Array:
     """x of A x = right, A symmetric and positive definite, by Cholesky's method.
 
-    rows : (N, W), A's lower half: rows[i, W - 1 - k] is A[i, i - k]; it is written over. right : (N,). least : a pivot
-    below it, where it is above 0, counts as it. Raises FloatingPointError where A is not positive definite.
+    rows : (N, W), A's lower half: rows[i, W - 1 - k] is A[i, i - k]; it is overwritten. right : (N,). least : if above
+    0, smaller pivots are raised to it. Raises FloatingPointError where A is not positive definite.
     """
     found = np.array(right, dtype=np.float64)
     if not _solved(rows, found, least):
@@ -27,7 +27,7 @@ def solve_banded(rows: Array, right: Array, least: float = 0.0) -> Array:
 
 @njit(**KERNEL)
 def _solved(rows, right, least):
-    """Factor in place, then solve in place; whether the matrix is positive definite.
+    """Factor and solve in place; return whether the matrix is positive definite.
 
     A column's products are taken from all entries behind it at once, which vectorises without changing the order in
     which any entry's are.

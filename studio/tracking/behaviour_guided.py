@@ -1,14 +1,14 @@
-"""The tracker that is guided by a learnt model of behaviour (Caillette, Galata & Howard 2007, sections 3.3 and 5).
+"""Particle filter guided by a learnt behaviour model (Caillette, Galata & Howard 2007, sections 3.3 and 5).
 
-Idea: a particle filter whose particles know what they are doing. Each carries the state of a probabilistic
+Idea: a particle filter whose particles have a motion state. Each carries the state of a probabilistic
 automaton over clusters of elementary movements. A frame draws survivors by weight (SIR); each goes to a cluster that
-the automaton, its pose and its movement make likely (Eq. 3); where that is a new one its joint angles are drawn from
-it anew, where it is the same one they move on with the cluster's own uncertainty (Eq. 4). The root's six parameters
+the automaton, its pose and its movement make likely (Eq. 3); in a new cluster its joint angles are resampled
+from it, in the same one they move on with the cluster's own uncertainty (Eq. 4). The root's six parameters
 get Gaussian noise. Every particle is weighed once, and the best of them is the pose. What particles carry:
 `guided_particles`; those that no model moves, beyond the paper: `model_free`.
 
 Weights: the paper normalises w as it is (section 6.4). Most weightings are no likelihoods and nearly flat as they are,
-so by default w^β is used, with β such that a wanted share of the particles survives the next draw (Deutscher & Reid
+so by default w^β is used, with β such that a chosen share of the particles survives the next draw (Deutscher & Reid
 2005, Eq. 3 and 12); β stands in the record.
 
 Without a model in the search space the tracker is a particle filter with noise of σ0; runs are not made so
@@ -57,7 +57,6 @@ class BehaviourGuided(Tracker):
     needs_behaviour = True
 
     def layer_count(self, settings: BehaviourSettings) -> int:
-        """One."""
         return 1
 
     def begin_frame(
@@ -81,7 +80,7 @@ class BehaviourGuided(Tracker):
         return first_draw(spread, spread.draw(rng), space, settings)
 
     def expectations(self, particles: ParticleSet, space: SearchSpace, settings: BehaviourSettings) -> Array:
-        """(S, D) the means of the clusters that hold enough particles, at their mean root (section 6.3)."""
+        """(S, D) means of the clusters that hold enough particles, at their mean root (section 6.3)."""
         return foreseen(particles, space, settings.expected_support, settings.expected_most)
 
     def step_layer(
@@ -93,7 +92,6 @@ class BehaviourGuided(Tracker):
         space: SearchSpace,
         settings: BehaviourSettings,
     ) -> tuple[ParticleSet, LayerRecord]:
-        """Weigh every particle."""
         if STATES in particles.extra:
             particles = settled_walkers(rng, particles, problem, space, settings)
         else:
@@ -116,7 +114,7 @@ class BehaviourGuided(Tracker):
 
 
 def _selected(eligible: Array, settings: BehaviourSettings) -> Annealed:
-    """Normalised weights, as peaked as the settings want them."""
+    """Normalised weights at the peakedness that the settings select."""
     if settings.selection == "survival":
         return anneal(eligible, settings.survival)
     weights = normalised(eligible, 1.0)

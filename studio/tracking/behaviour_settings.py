@@ -8,7 +8,7 @@ from studio.tracking import shared_knobs
 
 @dataclass(frozen=True, slots=True)
 class BehaviourSettings:
-    """Knobs of the tracker by behaviour (sections 3.3, 5.1, 5.2 and 6.3; what is beyond the paper is said)."""
+    """Knobs of the tracker by behaviour (sections 3.3, 5.1, 5.2 and 6.3; what is beyond the paper is marked)."""
 
     title = "Guided by behaviour"
 
@@ -21,7 +21,7 @@ class BehaviourSettings:
     model_free_grows: bool = shared_knobs.model_free_grows()
     selection: str = knob(
         "survival", choices=("survival", "weights"), takes_effect="next layer",
-        help="How peaked the weights are: so that a wanted share survives, or as the weighting gives them (3.3).",
+        help="How peaked the weights are: so that a chosen share survives, or as the likelihood gives them (3.3).",
     )  # fmt: skip
     survival: float = knob(
         0.4, 0.005, 0.98, 0.005, label="survival rate",

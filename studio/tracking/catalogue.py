@@ -15,7 +15,7 @@ NEEDED_KNOBS = ("start_repeats",)
 
 
 def _check(tracker: Tracker) -> None:
-    """Raise SettingsError where a knob is lacking."""
+    """Raise SettingsError where a required knob is missing."""
     has = {entry.name for entry in knobs_of(tracker.settings_type)}
     for knob in (*NEEDED_KNOBS, *(one for names in tracker.size_knobs for one in names)):
         if knob not in has:
@@ -32,9 +32,9 @@ TRACKERS: Registry[Tracker] = Registry(
 
 
 def knobs_for_evaluations(tracker: str, evaluations: int, layers: int = 10) -> dict[str, int]:
-    """Knobs by flat name with which a tracker weighs about `evaluations` poses a frame.
+    """Knobs by flat name with which a tracker evaluates about `evaluations` poses a frame.
 
-    Evaluations are what trackers are compared by: they cost nearly all of a frame's time (Fleischmann et al. 2012,
+    Trackers are compared at equal evaluations, which take nearly all of a frame's time (Fleischmann et al. 2012,
     section 3). Raises SettingsError where the number is too small or too large, NotFoundError for an unknown tracker.
     """
     chosen = TRACKERS[tracker]
@@ -50,7 +50,8 @@ def knobs_for_evaluations(tracker: str, evaluations: int, layers: int = 10) -> d
 
 
 def size_in_words(tracker: str, values: Mapping[str, Value]) -> str:
-    """How much a tracker searches, like "10×200" (layers × particles), stages added; "" for one that is not installed.
+    """Search size in words, like "10×200" (layers × particles), stages joined by "+"; "" if the tracker is not
+    installed.
 
     values : knobs by name.
     """

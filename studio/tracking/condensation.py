@@ -4,8 +4,8 @@ A frame is one layer: survivors of the last frame are drawn by weight, moved, sp
 
 The weighting of Eq. 17 is no likelihood: with its bare exponent the weights are nearly flat and nothing is
 selected. So that the comparison is fair, log w is multiplied by a scale that is chosen on the first frames:
-in each of them the β is found with which a wanted share of the particles survives (Eq. 12), and their
-geometric mean is used ever after. The scale in use stands in every record as `beta`, and travels with the
+in each of them the β is found with which a chosen share of the particles survives (Eq. 12), and their
+geometric mean is used from then on. The scale in use stands in every record as `beta`, and travels with the
 particles as `extra["log_scales"]`.
 """
 
@@ -51,7 +51,6 @@ class Condensation(Tracker):
     scales_likelihood = True
 
     def layer_count(self, settings: CondensationSettings) -> int:
-        """One."""
         return 1
 
     def begin_frame(
@@ -76,7 +75,7 @@ class Condensation(Tracker):
         space: SearchSpace,
         settings: CondensationSettings,
     ) -> tuple[ParticleSet, LayerRecord]:
-        """Weigh every particle (section 2.1, step 3), with the scale chosen or still being chosen."""
+        """Weigh every particle (section 2.1, step 3) with the likelihood's scale, or choose that scale."""
         sigma = space.sigma * settings.diffusion_scale
         particles = settled_first(rng, particles, problem, space, sigma, settings)
         raw, eligible = weigh(problem, particles.poses, settings)
@@ -100,6 +99,6 @@ class Condensation(Tracker):
 
 
 def _scaled(log_weights: Array, scale: float) -> Annealed:
-    """Normalised weights w^scale, with the survival rate that they happen to have."""
+    """Normalised weights w^scale and their survival rate."""
     weights = normalised(log_weights, scale)
     return Annealed(scale, survival_rate(weights), weights)

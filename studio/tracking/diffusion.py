@@ -9,8 +9,7 @@ Eq. 13 plans the noise ahead: P_m = α_M ··· α_{m-1} P_0. Eq. 18 takes it fr
 proportional to the covariance V of the survivors before noise. The factor decides: noise on top of survivors
 makes the variance (1 + c) V, and the cloud grows whenever a layer's selection takes away less than that. The
 form "shrink" (the smoothed kernel of Liu & West 2001) first draws the survivors towards their mean by √(1 -
-h²) and then adds noise of h times their standard deviation: the variance before and after is V, so nothing
-gained is lost.
+h²) and then adds noise of h times their standard deviation, so that the variance stays V.
 """
 
 from collections.abc import Sequence
@@ -35,11 +34,11 @@ def planned_sigma(sigma: Array, survivals: Sequence[float], decay: str) -> Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spread:
-    """Gaussian noise about N places, which may be drawn again for some of them.
+    """Gaussian noise about N poses, which may be redrawn for some of them.
 
-    centres : (N, D). scale : a factor of all noise. deviation : (D,) standard deviations. turn : (D, D) makes
-    independent normals (in its rows' space) correlated before they are multiplied by `deviation`; None: they
-    stay independent.
+    centres : (N, D). scale : a factor of all noise. deviation : (D,) standard deviations. turn : (D, D) correlates
+    independent normals (in its rows' space) before they are multiplied by `deviation`; None: they stay
+    independent.
     """
 
     centres: Array
@@ -62,7 +61,7 @@ def noise_about(poses: Array, sigma: Array) -> Spread:
 
 
 def shrunk_noise(poses: Array, fraction: float, covariance: str) -> Spread:
-    """Poses (N, D) spread anew without changing their mean and covariance in expectation.
+    """Poses (N, D) perturbed without changing their mean and covariance in expectation.
 
     fraction : h, noise as a share of the sample's standard deviation. covariance : "diagonal" or "full".
     """
@@ -77,7 +76,7 @@ def proportional_noise(poses: Array, constant: float, covariance: str) -> Spread
 
 
 def _sample_noise(poses: Array, covariance: str) -> tuple[Array, Array | None]:
-    """Deviation and turn of noise with the sample's variances, or its whole covariance (Eq. 18's sum over N)."""
+    """Deviation and turn of noise with the sample's variances, or its full covariance (Eq. 18's sum over N)."""
     deviation = poses.std(axis=0)
     if covariance == "diagonal":
         return deviation, None

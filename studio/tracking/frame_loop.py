@@ -1,4 +1,4 @@
-"""One frame, a layer at a time, so that it can be stopped between layers, saved, and gone on with.
+"""The search of one frame, a layer at a time: it can be stopped between layers, saved and resumed.
 
 A frame is searched `repeats` times over (more than once only where a run starts): each search begins with
 what the one before ended with. Layers are numbered through: layer i of search r is record r M + i. Random
@@ -31,20 +31,20 @@ from studio.tracking.tracker import (
 )
 from studio.weighting.problem import Expectant
 
-# The version of the settings and the tracker's own settings, as they are at this moment.
+# The current version of the settings and the tracker's own settings.
 SettingsSource = Callable[[], tuple[int, Any]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SearchState:
-    """A frame half done: all that is needed, beside what the frame started from, to go on with it.
+    """State of an unfinished frame: all that is needed to resume it, besides what the frame started from.
 
     layers_done : over all repeats. layer_count : M, layers of one search (0 before the first layer).
     particles : the set that the next layer weighs (None before the first; the last search's weighted set
     where a repeat begins, or at the end). settings : read when the search began; its "next frame" knobs hold
     until the search ends. settings_version : of the settings used last. evaluations : poses weighed.
-    milliseconds : time of the layers. expected : (S, D) where this search expected the body before it began (None
-    before the first layer). memory : what the weighting learnt in this frame, once all layers are done.
+    milliseconds : time of the layers. expected : (S, D) poses that this search expected before it began (None
+    before the first layer). memory : the likelihood's state after this frame, once all layers are done.
     """
 
     layers_done: int = 0
@@ -83,7 +83,7 @@ class FrameSearch:
 
     @property
     def problem(self) -> FrameProblem | None:
-        """What the last layer done by this object was weighed with, told what the search expected; None before."""
+        """Likelihood of the last layer done here, given the expected poses; None before the first."""
         return None if self._prepared is None else self._prepared[2]
 
     @property
@@ -98,7 +98,7 @@ class FrameSearch:
         Knobs that take effect with the next frame keep the value they had when the search began.
         """
         if self.finished:
-            raise RunError(f"Frame {self.frame} has no layer left.", "Go on with the next frame.")
+            raise RunError(f"Frame {self.frame} has no layer left.", "Continue with the next frame.")
         began = time.perf_counter()
         state = self.state
         held = state.settings if state.layers_done else settings
@@ -110,11 +110,11 @@ class FrameSearch:
             particles = self._beginning(repeat, in_use)
             expected = self._expected(particles, in_use)
         assert particles is not None
-        told = problem if expected is None else self._told(problem, repeat, expected)
+        informed = problem if expected is None else self._with_expectations(problem, repeat, expected)
         rng = generator(self.seed, self.frame, state.layers_done)
-        following, record = self.tracker.step_layer(rng, particles, layer, told, self.space, in_use)
+        following, record = self.tracker.step_layer(rng, particles, layer, informed, self.space, in_use)
         is_last = state.layers_done + 1 == self.repeats * count
-        memory = self._remembered(told, following, in_use) if is_last else {}
+        memory = self._remembered(informed, following, in_use) if is_last else {}
         milliseconds = 1000.0 * (time.perf_counter() - began)
         self.state = SearchState(
             layers_done=state.layers_done + 1,
@@ -138,11 +138,11 @@ class FrameSearch:
     def result(self, settings: Any = None) -> FrameResult:  # noqa: ANN401
         """The frame's result; settings : of the tracker's type, those held since the beginning if None.
 
-        Raises RunError while layers are left.
+        Raises RunError while layers remain.
         """
         state = self.state
         if not self.finished or state.particles is None:
-            raise RunError(f"Frame {self.frame} is not searched to its end.", "Do the layers that are left.")
+            raise RunError(f"Frame {self.frame} is not searched to its end.", "Do the remaining layers.")
         in_use = state.settings if settings is None else held_over(settings, state.settings)
         estimate = self.tracker.end_frame(state.particles, self.space, in_use)
         return FrameResult(
@@ -162,9 +162,9 @@ class FrameSearch:
         return self.tracker.begin_frame(rng, start, self.space, settings)
 
     def _expected(self, particles: ParticleSet, settings: Any) -> Array:  # noqa: ANN401
-        """(S, D) where a search that begins with these particles expects the body: what the tracker says, else their
-        mean; behind the first of these the last movement going on, and the pose that was reported last, as far as
-        they are known.
+        """(S, D) poses expected by a search that starts from these particles: the tracker's own, else their mean; after
+        the first come the last pose moved on at constant velocity and the last reported pose, as far as they are
+        known.
         """
         if isinstance(self.tracker, Foreseeing):
             poses = self.tracker.expectations(particles, self.space, settings)
@@ -176,22 +176,27 @@ class FrameSearch:
         known = last[None] if before is None else np.stack([2.0 * last - before, last])
         return np.concatenate([poses[:1], known, poses[1:]])
 
-    def _told(self, problem: FrameProblem, repeat: int, expected: Array) -> FrameProblem:
-        """The problem, told once a search what is expected, if it wants to know."""
+    def _with_expectations(self, problem: FrameProblem, repeat: int, expected: Array) -> FrameProblem:
+        """The frame's likelihood given the expected poses, made once a search, if it uses them."""
         kept = self._prepared
         if kept is None or kept[0] is not problem or kept[1] != repeat:
-            told = problem
+            informed = problem
             if isinstance(problem, Expectant):
-                told = problem.expecting(expected, self.previous.memory)
-            kept = self._prepared = (problem, repeat, told)
+                informed = problem.expecting(expected, self.previous.memory)
+            kept = self._prepared = (problem, repeat, informed)
         return kept[2]
 
-    def _remembered(self, told: FrameProblem, particles: ParticleSet, settings: Any) -> Mapping[str, Array]:  # noqa: ANN401
-        """What the weighting hands to the next frame, having seen this one's estimate, and what is none of it."""
+    def _remembered(
+        self,
+        informed: FrameProblem,
+        particles: ParticleSet,
+        settings: Any,  # noqa: ANN401
+    ) -> Mapping[str, Array]:
+        """Memory for the next frame: the likelihood's, updated with this frame's estimate, and the hidden areas."""
         before = self.previous.memory
-        if not isinstance(told, Expectant):
+        if not isinstance(informed, Expectant):
             return before
-        found = told.remembered(self.tracker.end_frame(particles, self.space, settings).pose)
+        found = informed.remembered(self.tracker.end_frame(particles, self.space, settings).pose)
         return {**{name: values for name, values in before.items() if name.startswith(HIDDEN)}, **found}
 
 
@@ -210,7 +215,7 @@ def search_frame(
 ) -> FrameResult:
     """Search a frame to its end.
 
-    settings_source : asked before every layer for (version, tracker settings). on_layer : gets each record.
+    settings_source : called before every layer, gives (version, tracker settings). on_layer : gets each record.
     checkpoint : called after each layer with the state; it may wait, or raise to leave the frame (whose state
     can then be given to a `FrameSearch`).
     """
@@ -227,7 +232,7 @@ def search_frame(
 
 
 def held_over(settings: Any, held: Any) -> Any:  # noqa: ANN401
-    """`settings`, but knobs that do not take effect with the next layer as they are in `held`."""
+    """`settings`, except that knobs which do not take effect with the next layer keep their values in `held`."""
     if settings == held:
         return settings
     slow = [entry.name for entry in knobs_of(type(settings)) if entry.takes_effect != "next layer"]

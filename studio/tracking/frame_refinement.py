@@ -1,11 +1,10 @@
 """Refinement inside the loop: each frame's pose is moved onto the silhouettes, and the next frame starts from there.
 
-The search finds the valley, the local descent (`refinement`) its floor; neither does without the other. Where the
-frame's own silhouettes say that a limb is off (`agreement`), that limb alone is drawn anew over all its range. What the
-silhouettes deny of the places drawn, within the reach of clothes, ranks them: weights do not, as a limb that is folded
-into the trunk weighs more than one that is nearly right. The best are refined, and one of them is taken where the
-silhouettes agree with it clearly better. Where something stands in front of the body, silhouettes count for nothing
-(`hidden_areas`).
+The search finds the valley, the local descent (`refinement`) its minimum. Where the silhouettes show that a limb is off
+(`agreement`), that limb alone is resampled over its whole range. The samples are ranked by their disagreement with the
+silhouettes beyond what clothes explain, not by weight: a limb folded into the trunk weighs more than one that is nearly
+right. The best are refined, and one is taken where the silhouettes agree with it clearly better. Areas where something
+stands in front of the body are left out (`hidden_areas`).
 """
 
 import dataclasses
@@ -28,23 +27,26 @@ Array = NDArray[np.float64]
 
 POSE, CLOUD = "pose", "cloud"
 DOUBTFUL_SHARE = 0.03
-"""Of a limb's area in all views, outside the silhouettes or left bare: 97 of 100 sound limbs have less."""
+"""Share of a limb's area over all views that is outside the silhouettes or left uncovered: 97 of 100 sound limbs have
+less."""
 DRAWS, REFINED_DRAWS, PAIRED_DRAWS, APART = 1024, 3, 4, 0.4
-"""Poses drawn of a doubtful limb; how many are refined; beside how many its twin is drawn where both may be wrong;
-radians by which these differ at least in some joint."""
+"""Poses drawn of a doubtful limb; how many of them are refined; to how many of them poses of its twin are drawn where
+both may be wrong; radians by which these differ at least in some joint."""
 REDRAWN_STEPS = 10
-"""A place drawn is farther from the silhouettes' floor than where a search ended: at least so many steps."""
+"""Least descent steps from a drawn pose, which is farther from the minimum than where a search ended."""
 SPREADS = (0.1, 0.3)
-"""Half of the draws lie about where the limb is, by shares of its range; the others anywhere in it."""
+"""Half of the draws lie about the limb's pose, with these shares of its range as deviation; the others anywhere in
+it."""
 BETTER = 0.85
-"""Share of the loss below which another pose is taken. Masks that end at a box say so by a tenth (a drawn walk behind
-boxes: with 0.95, 117 mm instead of 40); where a limb was lost, its place has a third to four fifths of the loss."""
+"""Share of the loss below which another pose is taken. Masks cut off by a box lower it by a tenth (a rendered walk
+behind boxes: with 0.95, 117 mm instead of 40); for a lost limb the right place has a third to four fifths of the
+loss."""
 REDRAWN = 0x11A6
 
 
 @dataclass(frozen=True, slots=True)
 class FrameRefinementSettings:
-    """The knobs of refining each frame where the search ended, the same for every tracker."""
+    """The knobs of refining each frame after its search, the same for every tracker."""
 
     title = "Refinement of each frame"
 
@@ -52,18 +54,18 @@ class FrameRefinementSettings:
         True, label="refine each frame", takes_effect="next frame",
         help="Move each frame's pose onto the silhouettes after its search, and start the next frame from there.",
     )  # fmt: skip
-    # Drawn clips of the choosing half, two seeds: as near with 6 as with 10 (within 0.3 mm, both ways).
+    # Rendered clips of the validation half, two seeds: 6 steps are as accurate as 10 (within 0.3 mm, both ways).
     refine_frame_steps: int = knob(
         6, 1, 100, 1, label="refinement steps", unit="steps", takes_effect="next frame",
         help="Most steps of the local descent of a frame.",
     )  # fmt: skip
     refine_frame_points: int = knob(
         150, 20, 1000, 10, label="border points", takes_effect="next frame",
-        help="Points of each view's silhouette border that the descent looks at.",
+        help="Points of each view's silhouette border that the descent uses.",
     )  # fmt: skip
     redraw_limbs: bool = knob(
-        True, label="draw lost limbs anew", takes_effect="next frame",
-        help="Where the silhouettes say that a limb is off, look for that limb in all its range and refine the best.",
+        True, label="resample lost limbs", takes_effect="next frame",
+        help="Where the silhouettes show that a limb is off, sample it over its whole range and refine the best.",
     )  # fmt: skip
     refined_spread: float = knob(
         0.5, 0.05, 3.0, 0.05, label="spread after refinement", takes_effect="next frame",
@@ -97,8 +99,8 @@ class FrameRefiner:
         problem: FrameProblem,
         settings: FrameRefinementSettings,
     ) -> FrameResult:
-        """The result with its pose refined, and what the next frame starts from; as it is where it shall not be refined
-        or no mask shows anything.
+        """The result with its pose refined, and the next frame's start; unchanged where refinement is off or no mask
+        shows anything.
 
         silhouettes_of : the frame's silhouettes by camera, with at most so many border points each.
         """
@@ -155,31 +157,31 @@ class Hypothesis:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeenFrame:
-    """A frame's silhouettes, one a camera, with what compares poses with them."""
+    """A frame's silhouettes, one a camera, with the tools that compare poses with them."""
 
     refiner: Refiner
     agreement: Agreement
     silhouettes: Sequence[Distances]
 
     def hypothesis(self, pose: Array) -> Hypothesis:
-        """A pose (D,) as it is."""
+        """Loss and disagreement of a pose (D,), not refined."""
         loss = self.refiner.settled_loss(pose, self.silhouettes)
         return Hypothesis(pose, loss, self.agreement.of(pose, self.silhouettes))
 
     def settled(self, found: Hypothesis) -> Hypothesis:
-        """What was found, descended further."""
+        """The hypothesis refined further."""
         return self.hypothesis(self.refiner.refine(found.pose, self.silhouettes).pose)
 
     def better(self, than: Hypothesis, start: Array) -> Hypothesis:
-        """Where the descent from a start (D,) ends, if that is clearly better than what there is."""
+        """The hypothesis refined from a start (D,), if that is clearly better than `than`; else `than`."""
         pose = self.refiner.refine(start, self.silhouettes).pose
         if self.refiner.settled_loss(pose, self.silhouettes) >= BETTER * than.loss:
             return than
         return self.hypothesis(pose)
 
     def best_of(self, than: Hypothesis, drawn: Array, own: Sequence[int]) -> Hypothesis:
-        """The best of what there is and where descents end from those of the poses drawn (N, D) that the silhouettes
-        deny least; own : the angles that were drawn.
+        """The best of `than` and of the refined poses among those drawn (N, D) that disagree least with the
+        silhouettes. own : the angles that were drawn.
         """
         off = self.agreement.of_places(drawn, self.silhouettes)
         for start in _best_apart(drawn, off, own, REFINED_DRAWS):
@@ -190,8 +192,8 @@ class SeenFrame:
 def redrawn(
     rng: np.random.Generator, found: Hypothesis, frame: SeenFrame, last: Array | None = None
 ) -> tuple[Hypothesis, int]:
-    """What is found with the doubtful limbs where the silhouettes agree with them best, and how many places were
-    compared. last : (D,) the pose of the last frame, which is tried as well.
+    """The hypothesis with its doubtful limbs resampled, and the number of poses compared. last : (D,) pose of the last
+    frame, which is tried as well.
     """
     evaluations, tried, began_with = 0, set[str](), found
     if last is not None:
@@ -219,9 +221,9 @@ def redrawn(
 def _both_redrawn(
     rng: np.random.Generator, found: Hypothesis, frame: SeenFrame, limb: str
 ) -> tuple[Hypothesis, int]:
-    """The same with a lost limb and its twin drawn anew together: where an arm has taken the other's place, neither
-    finds its own as long as the other stays. The limb first, as if the twin were not there, then the twin beside each
-    of its best places.
+    """The same with a lost limb and its twin resampled together: where an arm has taken the other's place, neither can
+    move while the other stays. First the limb, leaving out the twin, then the twin for each of the limb's best
+    poses.
     """
     refiner, agreement = frame.refiner, frame.agreement
     names = list(found.off.shares())
@@ -241,7 +243,9 @@ def _bent_by(refiner: Refiner, limb: str) -> list[int]:
 
 
 def _drawn(rng: np.random.Generator, refiner: Refiner, poses: Array, own: Sequence[int]) -> Array:
-    """(K · DRAWS, D) poses (K, D) with angles drawn: one part about where they are, one anywhere in their range."""
+    """(K · DRAWS, D) poses from poses (K, D) with angles `own` drawn: one part about their values, one over their
+    range.
+    """
     lower, upper = refiner.lower[own], refiner.upper[own]
     reach, part = upper - lower, DRAWS // (2 * len(SPREADS))
     drawn = np.repeat(poses[:, None], DRAWS, axis=1)
@@ -253,7 +257,7 @@ def _drawn(rng: np.random.Generator, refiner: Refiner, poses: Array, own: Sequen
 
 
 def _best_apart(drawn: Array, off: Array, own: Sequence[int], most: int) -> list[Array]:
-    """Those of the poses drawn (N, D) that disagree least, by off (N,), and differ from one another."""
+    """At most `most` of the poses drawn (N, D) that disagree least, by off (N,), and differ from one another."""
     found: list[Array] = []
     for row in np.argsort(off, kind="stable"):
         if all(np.abs(drawn[row, own] - other[own]).max() > APART for other in found):
@@ -264,7 +268,7 @@ def _best_apart(drawn: Array, off: Array, own: Sequence[int], most: int) -> list
 
 
 def _carried(result: FrameResult, pose: Array, start: str, refiner: Refiner) -> Carried:
-    """What the next frame starts from: the set at the frame's end, moved to the refined pose."""
+    """State for the next frame: the set at the frame's end, moved to the refined pose."""
     particles = result.carried.particles
     if particles is not None and start == POSE:
         particles = dataclasses.replace(particles, poses=np.repeat(pose[None], len(particles.poses), axis=0))

@@ -4,14 +4,14 @@
 A guided set carries with each particle the state of the automaton that its path has reached, and its joint angles'
 movement in the last frame. The model moves the joint angles. The parameters of the root get Gaussian noise of σ0 (5.2)
 and, by choice, the movement that roots had in the particle's cluster (`behaviour.root_motion`). A particle that is
-moved without the model gets noise in every parameter. It keeps the movement that it had, as noise is none (taken for
-one it would be added again in the next frame, and no such particle would survive that). Its state is found again: the
-model's label of where it is and how it moves, taken as the automaton's next symbol, exactly as training sequences are
-read (`followed`).
+moved without the model gets noise in every parameter. It keeps its previous movement, because noise is not movement
+(counted as movement it would be added again in the next frame, and no such particle would survive). Its state is
+recomputed: the model's label of its pose and movement is taken as the automaton's next symbol, as training sequences
+are read (`followed`).
 
 In the first frame of a run nothing has moved yet: there is noise only, and a particle's state and movement are drawn
 from the clusters near its pose (`near`): the probability of each cluster given the angles, its movement unknown, then
-the movement given cluster and angles. What a state can remember of a particle's past is then only that cluster.
+the movement given cluster and angles. The state's history is then only that cluster.
 """
 
 from dataclasses import dataclass
@@ -36,12 +36,12 @@ Arrays = dict[str, NDArray[Any]]
 STATES, VELOCITY = "automaton_state", "velocity"
 """Arrays of a guided set: (N,) int, state of the automaton; (N, d) movement of the modelled angles, rad a frame."""
 
-# Standard deviations beyond √d: where a pose lies far outside a cluster, the regression from it is not believed.
+# Standard deviations beyond √d: the regression from a pose that lies farther outside a cluster is not used.
 NOT_BELIEVED = 3.0
-# Of what a cluster's roots did in training, standard deviations: others perform it otherwise. Of 1, 1.5 and 2 on two
-# dances of other people the last one lost them least.
+# Factor on the standard deviations of a cluster's root movement in training, as other people move differently. Of 1,
+# 1.5 and 2 on two dances of other people the last one lost the body least.
 ROOT_SPREAD = 2.0
-# Particles whose states are sought at once: the automaton has thousands, and each particle a chance of each.
+# Particles per block when states are sampled: the automaton has thousands of states, each with a probability.
 AT_ONCE = 4096
 
 
@@ -60,12 +60,12 @@ class GuidedRules(Rules, Protocol):
 
     @property
     def model_free_share(self) -> float:
-        """Of the particles, at least."""
+        """Least share of the particles that no model moves."""
         ...
 
     @property
     def model_free_grows(self) -> bool:
-        """Whether it grows while the model is beaten."""
+        """Whether that share grows while the model's particles weigh less."""
         ...
 
     @property
@@ -75,7 +75,7 @@ class GuidedRules(Rules, Protocol):
 
     @property
     def global_scale(self) -> float:
-        """Multiplies σ0 once more, of what the model does not know of particles that it moves."""
+        """Multiplies σ0 once more, for parameters that the model does not cover, of particles that it moves."""
         ...
 
     @property
@@ -85,14 +85,14 @@ class GuidedRules(Rules, Protocol):
 
     @property
     def automaton_share(self) -> float:
-        """Of the particles, those that change cluster by the automaton alone."""
+        """Share of the particles that change cluster by the automaton's probabilities alone."""
         ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Walkers:
-    """Particles with a past. poses : (N, D). states : (N,) int. velocity : (N, d). free : (N,) bool, those that are
-    moved without the model.
+    """Particles with state and movement. poses : (N, D). states : (N,) int. velocity : (N, d). free : (N,) bool, those
+    that are moved without the model.
     """
 
     poses: Array
@@ -101,12 +101,12 @@ class Walkers:
     free: Mask
 
     def at(self, rows: Indices) -> "Walkers":
-        """Some of them."""
+        """The particles of these rows."""
         return Walkers(self.poses[rows], self.states[rows], self.velocity[rows], self.free[rows])
 
 
 class Guidable(Protocol):
-    """The knob of trackers that may go without a model though there is one."""
+    """The knob of trackers that can ignore the run's behaviour model."""
 
     @property
     def prediction(self) -> str:
@@ -115,33 +115,33 @@ class Guidable(Protocol):
 
 
 def is_guided(space: SearchSpace, settings: Guidable) -> bool:
-    """Whether a model is there and wanted."""
+    """Whether there is a model and the settings use it."""
     return space.behaviour is not None and settings.prediction == BEHAVIOUR
 
 
 def model_of(space: SearchSpace) -> BehaviourModel:
-    """The space's model. To be asked only where there is one."""
+    """The space's behaviour model; it must have one."""
     assert space.behaviour is not None
     return space.behaviour
 
 
 def columns_of(space: SearchSpace) -> Indices:
-    """(d,) the columns of the pose vector that the space's model knows."""
+    """(d,) columns of the pose vector that the space's model covers."""
     return model_of(space).space.columns
 
 
 def known_of(particles: ParticleSet) -> Arrays:
-    """A set's arrays by name, of whatever type each is."""
+    """A set's extra arrays by name, of any type."""
     return {**particles.extra}
 
 
 def walkers_from(
     rng: np.random.Generator, previous: Carried, rows: Indices, free: Mask, space: SearchSpace
 ) -> Walkers:
-    """The particles `rows` of the set that a frame starts from, with what they carry.
+    """The particles `rows` of the set that a frame starts from, with state and movement.
 
-    Where they carry nothing yet (the model came in on the way), it is drawn from the clusters near their poses, as
-    the last movement of the reported pose lets them be.
+    Where they have none yet (the model was added during the run), these are drawn from the clusters near their poses,
+    given the last movement of the reported pose.
     """
     last = previous.particles
     assert last is not None
@@ -159,8 +159,8 @@ def walkers_from(
 def walked(
     rng: np.random.Generator, walkers: Walkers, space: SearchSpace, rules: GuidedRules, sigma: Array
 ) -> Walkers:
-    """One frame further (Eq. 3 and 4), or as many as the space has `steps`. sigma : (D,) noise of what the model does
-    not know, or does not move, over all of them.
+    """The particles propagated one frame (Eq. 3 and 4), or `steps` of the space. sigma : (D,) noise, over all of these,
+    of what the model does not cover or move.
     """
     model, columns = model_of(space), columns_of(space)
     free = walkers.free
@@ -189,8 +189,8 @@ def followed(
     velocity: Array,
     frames: int = 1,
 ) -> Indices:
-    """(N,) the states that particles are in after they went to angles (N, d) by velocity (N, d): the cluster of both
-    is the next symbol, taken as often as `frames` have steps of the automaton (`steps_per_frame`, in the mean).
+    """(N,) states of particles that moved to angles (N, d) by velocity (N, d): the cluster of both is the next symbol,
+    taken as often as `frames` have steps of the automaton (`steps_per_frame`, in the mean).
     """
     labels = _labelled(model, angles, velocity)
     whole = int(frames * model.steps_per_frame)
@@ -238,9 +238,9 @@ def spread_over_clusters(
 
 
 def foreseen(particles: ParticleSet, space: SearchSpace, support: float = 0.05, most: int = 4) -> Array:
-    """(S, D) where a set expects the body: the means of the clusters that hold at least a share `support` of its
-    particles, the fullest first, `most` at most, at the particles' mean root (section 6.3). Never empty: where no
-    cluster has so many the fullest is taken, and the set's own mean where nothing guides it.
+    """(S, D) poses that a set expects: the means of the clusters that hold at least a share `support` of its particles,
+    the fullest first, `most` at most, at the particles' mean root (section 6.3). Never empty: where no cluster has so
+    many the fullest is taken, and without a model the set's own mean.
     """
     mean = particles.poses.mean(axis=0)
     if space.behaviour is None or STATES not in particles.extra:
@@ -257,8 +257,8 @@ def foreseen(particles: ParticleSet, space: SearchSpace, support: float = 0.05, 
 
 
 def _labels_of(model: BehaviourModel, particles: ParticleSet) -> Indices:
-    """(N,) the cluster that each particle is in: the last symbol of its state, and where a state remembers nothing
-    the label of its pose and movement.
+    """(N,) cluster of each particle: the last symbol of its state, or the label of its pose and movement where the
+    state has no history.
     """
     labels = model.automaton.last_symbols[known_of(particles)[STATES]]
     unknown = np.flatnonzero(labels < 0)

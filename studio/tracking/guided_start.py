@@ -1,8 +1,8 @@
-"""A frame's first set, made by a behaviour model, with a share of particles that it does not move.
+"""A frame's first set, predicted by a behaviour model, with a share of model-free particles.
 
-Whether the body can take a particle is not known before the frame's problem is. So the set carries what its particles
-came from, and `settled_walkers` draws those that are impossible again from the same past once the problem is there,
-each in its own way: by the model, or by noise.
+Whether a pose is possible for the body is known only with the frame's problem. So the set keeps what its particles
+came from, and `settled_walkers` then redraws impossible ones from the same past, each by its own rule: by the model, or
+by noise.
 """
 
 import numpy as np
@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 CAME_FROM_STATES, CAME_FROM_VELOCITY = "came_from_state", "came_from_velocity"
-"""Arrays of a first set, beside CAME_FROM (N, D): (N,) int, (N, d), what its particles came from."""
+"""Arrays of a first set, beside CAME_FROM (N, D): (N,) int and (N, d), state and movement before the frame."""
 PAST = (CAME_FROM, CAME_FROM_STATES, CAME_FROM_VELOCITY)
 
 
@@ -41,7 +41,7 @@ def guided_set(
 ) -> ParticleSet:
     """The unweighted set of a frame that starts from the particles `rows` (N,) of the last one's.
 
-    In a run's first frame (nothing was reported yet) particles are spread by noise alone, as nothing has moved.
+    In a run's first frame (nothing was reported yet) particles are spread by noise alone.
     """
     assert previous.particles is not None
     sigma = space.sigma * rules.diffusion_scale
@@ -63,9 +63,9 @@ def settled_walkers(
     space: SearchSpace,
     rules: GuidedRules,
 ) -> ParticleSet:
-    """A guided first set with what is impossible drawn again; what the particles came from stays with it.
+    """A guided first set with its impossible particles redrawn; what they came from stays with it.
 
-    A particle for which nothing possible is found stays where it came from, at rest.
+    A particle for which no possible pose is found stays where it came from, at rest.
     """
     if rules.constraints != "redraw":
         return particles
@@ -92,8 +92,8 @@ def without_past(extra: Arrays) -> Arrays:
 
 
 def descended(extra: Arrays, ancestors: Indices) -> Arrays:
-    """A guided set's arrays for particles that descend from `ancestors` (N,) of it; what is known of all of them
-    together stays.
+    """A guided set's arrays for particles that descend from `ancestors` (N,) of it; arrays of the set as a whole stay
+    unchanged.
     """
     return {
         name: values[ancestors] if name in (*PAST, STATES, VELOCITY) else values
@@ -103,10 +103,10 @@ def descended(extra: Arrays, ancestors: Indices) -> Arrays:
 
 
 def arrived(rng: np.random.Generator, poses: Array, extra: Arrays, space: SearchSpace) -> Arrays:
-    """The arrays that a set of poses (N, D), moved on since it was made, ends its frame with.
+    """A set's arrays at the end of its frame, for poses (N, D) that have moved since it was made.
 
-    A particle's movement is the way from what its first ancestor came from to where it is now; its state is the one
-    that follows from that ancestor's by the cluster of pose and movement. In a run's first frame both are drawn from
+    A particle's movement is the difference between what its first ancestor came from and its pose now; its state
+    follows from that ancestor's by the cluster of pose and movement. In a run's first frame both are drawn from
     the clusters near the pose.
     """
     if CAME_FROM_STATES not in extra:
@@ -120,7 +120,7 @@ def arrived(rng: np.random.Generator, poses: Array, extra: Arrays, space: Search
 def _standing_set(
     rng: np.random.Generator, poses: Array, space: SearchSpace, sigma: Array, rules: GuidedRules
 ) -> ParticleSet:
-    """Poses (N, D) spread by noise; states and movements from the clusters near to where they are then."""
+    """Poses (N, D) spread by noise; states and movements from the clusters near the result."""
     spread = noise_about(poses, sigma)
     first = first_draw(spread, spread.draw(rng), space, rules)
     return unweighted(first.poses, first.extra | _found_near(rng, first.poses, space))

@@ -1,10 +1,10 @@
 """A swarm's first places, predicted by a behaviour model (Caillette et al. 2007, section 5).
 
-A swarm reports one pose and starts its next frame from that. So it has one past: the automaton's state and the
-movement of its last leader, from which every particle of the first stage draws a prediction of its own; Σ is sampled
-around that. A share of the particles starts from the last pose itself, as all do without a model (`model_free`). When
-the frame ends, the leader's state is the one that follows from the last leader's by the cluster of its pose and of the
-way that it went.
+A swarm reports one pose and starts its next frame from that. So it has one history: the automaton's state and the
+movement of its last leader, from which every particle of the first stage draws its own prediction; Σ is sampled around
+that. A share of the particles starts from the last pose itself, as all do without a model (`model_free`). When
+the frame ends, the leader's state is the one that follows from the last leader's by the cluster of its pose and
+movement.
 """
 
 import numpy as np
@@ -42,7 +42,7 @@ def predicted_starts(
     space: SearchSpace,
     rules: GuidedRules,
 ) -> tuple[Array, Arrays]:
-    """(count, D) where a swarm's particles are expected, seen from the last pose (D,), and the swarm's arrays."""
+    """(count, D) predicted poses of a swarm's particles from the last pose (D,), and the swarm's arrays."""
     assert previous.particles is not None
     carried = known_of(previous.particles)
     past = (
@@ -65,7 +65,7 @@ def predicted_starts(
 
 
 def handed_on(extra: Arrays) -> Arrays:
-    """What goes from a stage's swarm to the next one's."""
+    """The arrays that a stage's swarm passes to the next stage."""
     return {name: extra[name] for name in HANDED_ON if name in extra}
 
 

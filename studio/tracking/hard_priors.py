@@ -1,18 +1,18 @@
-"""What becomes of particles that the body cannot take: hard priors, the same for every tracker.
+"""Hard priors: how particles in impossible poses are handled, the same for every tracker.
 
-A body cannot pass its joint limits and, if that is asked for, no limb can be inside another (the two
+A body cannot pass its joint limits and, optionally, no limb can be inside another (the two
 constraints of Fleischmann et al. 2012, 2.3; the hard priors of Balan et al. 2005). Four ways to keep them:
 
 - redraw: the random numbers of a particle's step are drawn again, from the same starting point, up to 10
-  times; if that does not help either, the particle stays where it came from (a swarm's without velocity). The
-  paper says no more than that the velocity is drawn again at most 10 times; the rest is our choice.
-- reject: the particle is weighed and counts for nothing.
-- clamp: a parameter beyond a limit is set on it, and its velocity to zero; where limbs are inside one another
-  there is nothing to clamp, so such a particle is rejected.
-- ignore: nothing is looked at.
+  times; after that, the particle stays where it came from (a swarm's without velocity). The
+    paper gives only the redrawn velocity and the limit of 10; the rest is our choice.
+- reject: the particle is weighed, but has no weight.
+- clamp: a parameter beyond a limit is set on it, and its velocity to zero; a particle with limbs inside one
+  another cannot be clamped and is rejected.
+- ignore: nothing is checked.
 
-Where the body can take none of a set's particles, nor any place that they came from, the constraint cannot be
-kept and the set stands as it was first drawn: a search goes on, whatever happens.
+Where all of a set's particles and all the poses that they came from are impossible, the constraint cannot be kept
+and the set stays as it was first drawn, so that the search can continue.
 """
 
 from collections.abc import Callable
@@ -36,18 +36,18 @@ class Rules(Protocol):
 
     @property
     def constraints(self) -> str:
-        """redraw, reject, clamp or ignore."""
+        """One of "redraw", "reject", "clamp", "ignore"."""
         ...
 
     @property
     def limbs_apart(self) -> bool:
-        """Whether limbs inside one another are impossible too."""
+        """Whether poses with limbs inside one another count as impossible."""
         ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proposals:
-    """Where N particles would go. poses : (N, D). velocities : (N, D), or (N, 0) for particles that have none."""
+    """Proposed moves of N particles. poses : (N, D). velocities : (N, D), or (N, 0) for particles that have none."""
 
     poses: Array
     velocities: Array = field(default_factory=lambda: np.zeros((0, 0)))
@@ -66,7 +66,7 @@ def settled(
     came_from: Array,
     again: Callable[[Indices], Proposals],
 ) -> Proposals:
-    """The proposals as the rules let them stand; those to be rejected are still among them (see `possible`).
+    """The proposals after the rules were applied; those to be rejected are still among them (see `possible`).
 
     came_from : (N, D) where each particle started. again : new proposals for some rows, from the same starting
     points with new random numbers.

@@ -1,10 +1,9 @@
-"""Where something stands in front of the body: parts of a view in which the body projects frame after frame and no mask
-ever shows it.
+"""Occluded areas: parts of a view into which the body projects frame after frame, but where no mask ever shows it.
 
-Masks are silent there, and a silhouette that ends at a box is no border of the body. What tells such a place from a
-limb that is lost: nothing of the masks is left bare. A lost limb would be seen elsewhere, a hidden one is nowhere.
-Counts of frames are kept on a grid of cells a view and handed on with the frame's state, so that a run that is resumed,
-or a frame that is searched again, knows what was known.
+Masks carry no information there, and a silhouette cut off by a box does not end at the body's border. An occluded limb
+differs from a lost one in that no part of the masks is left uncovered: a lost limb is seen elsewhere, an occluded one
+is not seen at all. Frames are counted on a grid of cells in each view; the counts are part of the frame's state, so
+that a resumed run, or a frame that is searched again, has them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,17 +25,17 @@ Counts = NDArray[np.float64]
 CELLS = 160
 """Cells along the longer side of a picture."""
 FRAMES = 6.0
-"""So many frames in which the body was expected in a cell, and none that showed it, make it hidden."""
+"""A cell is hidden once the body was expected in it, and never seen there, in so many frames."""
 MOST_BARE = 0.01
-"""Of the body's area: where more of the masks is left bare, the pose is in doubt and nothing is learnt."""
+"""Share of the body's area: where more of the masks is uncovered, the pose is doubtful and no cell is counted."""
 ROUGH = 1.5
-"""Times the reach of clothes: so far about what is hidden a border is not the body's."""
+"""Times the reach of clothes: up to this distance from a hidden area a border is not taken for the body's."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Uncovered:
-    """A view's silhouette without what is hidden: see `Distances`. There `signed` is 0, neither in nor out, and the
-    border that it makes is none.
+    """A view's silhouette without its hidden areas: see `Distances`. In these `signed` is 0, neither inside nor
+    outside, and they have no border.
     """
 
     size: tuple[int, int]
@@ -47,7 +46,7 @@ class Uncovered:
 
 
 def counts_of(memory: Mapping[str, Array], camera: Camera) -> Counts:
-    """(H, W) frames by cell, so far."""
+    """(H, W) frames counted so far, by cell."""
     known = memory.get(HIDDEN + camera.name)
     if known is not None:
         return known
@@ -56,15 +55,15 @@ def counts_of(memory: Mapping[str, Array], camera: Camera) -> Counts:
 
 
 def cell_size(camera: Camera) -> int:
-    """Pixels of a cell."""
+    """Side of a cell, pixels."""
     return max(1, round(max(camera.width, camera.height) / CELLS))
 
 
 def without_hidden(
     masks: Sequence[Distances], cameras: Sequence[Camera], mm: Sequence[float], memory: Mapping[str, Array]
 ) -> list[Distances]:
-    """The silhouettes of a frame's masks, one a camera, without what is hidden. mm : of a pixel of each view at the
-    body. memory : what came into the frame.
+    """The silhouettes of a frame's masks, one a camera, without hidden areas. mm : size of a pixel of each view at the
+    body. memory : at the frame's start.
     """
     return [
         _without_hidden(view, camera, memory, scale)
@@ -73,7 +72,7 @@ def without_hidden(
 
 
 def _without_hidden(view: Distances, camera: Camera, memory: Mapping[str, Array], mm: float) -> Distances:
-    """The same of one view, as far about what is hidden as masks may be rough. mm : of a pixel."""
+    """The same for one view, with a margin for rough masks. mm : size of a pixel."""
     counts = memory.get(HIDDEN + camera.name)
     if counts is None or not view.signed.size:
         return view
@@ -113,7 +112,7 @@ def learnt(
     agreement: Agreement,
     masks: Sequence[Distances],
 ) -> Mapping[str, Array]:
-    """The memory after a frame of pose (D,), which disagrees so with its masks, one a camera."""
+    """The memory after a frame with pose (D,). masks : one a camera."""
     if disagreement.bare.sum() > MOST_BARE * disagreement.area.sum():
         return memory
     found = dict(memory)

@@ -1,16 +1,16 @@
-"""The search for a start pose: nothing is known but the body, and perhaps where its hull is.
+"""The search for a start pose: only the body is known, and perhaps its hull.
 
 From coarse to fine, with the annealed particle filter (Deutscher & Reid 2005) as the tool of every step. The best
 candidates of each family (headings all around, so both facings) are annealed together; what a family found is a *line*.
 In rounds with fewer lines and less noise a line is improved limb by limb, each limb searched over its joints' whole
-ranges and offered those of the other lines, then two like limbs together, then as a whole (`start_lines`).
+ranges and tried with those of the other lines, then two like limbs together, then as a whole (`start_lines`).
 
-What decides, measured on 20 people in random poses (four cameras, masks by subtraction; found: mean marker error of 80
-mm or less): annealed as a whole only, none was found; limb by limb 4; with limbs that must not enter one another 14 at
-the same cost (else arms hide in the trunk); with a body that would rather be at ease 15; with pairs of limbs 16.
+Measured on 20 people in random poses (four cameras, masks by subtraction; found: mean marker error of 80 mm or less):
+annealed as a whole only, none was found; limb by limb 4; with limbs kept apart 14 at the same cost (else arms hide in
+the trunk); with a prior towards the rest pose 15; with pairs of limbs 16.
 
-Front and back of a silhouette look alike, so lines that face the other way than the best one are carried to the end
-even where they rank low. The confidence is made of their best weight.
+Front and back of a silhouette look alike, so lines that face the other way than the best one are kept to the end
+even where they rank low. The confidence is computed from their best weight.
 """
 
 import math
@@ -34,12 +34,12 @@ SURVIVING = 20
 """Candidates of a family that are annealed together."""
 FAMILY_LAYERS, FAMILY_PARTICLES, FAMILY_SPREAD = 8, 100, 0.6
 RANGE_SHARE, MOVE, TURN = 0.15, 80.0, 0.25
-"""Noise before it shrinks: a share of a joint's range; mm and radians of the root."""
+"""Initial noise: a share of a joint's range; mm and radians of the root."""
 MARGIN_SCALE = 0.03
 """Log weight a camera by which the right facing usually wins (see `confidence`)."""
 THREADS = 2
 KEY = 0x57A27
-"""Of this search's random numbers."""
+"""Key of this search's random numbers."""
 
 Facing = Callable[[Array], Array]
 Progress = Callable[[int, int], None]
@@ -66,7 +66,7 @@ THOROUGH = Effort(
     ),
 )
 QUICK = Effort(1, (Round(6, 60, 150, 0.4), Round(4, 100, 200, 0.3), Round(2, 150, 200, 0.2)))
-"""For a tracker that is lost: a wrong pose is noticed and sought again."""
+"""For a lost tracker: if the pose is wrong, that is detected and the search repeated."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,11 +113,9 @@ class StartSearch:
         self._done = self._total = 0
 
     def run(self, candidates: StartCandidates, known: Array | None = None) -> FoundStart:
-        """The best pose that was found. known : (K, D) poses that are candidates as they are. Raises RunError for no
-        candidates.
-        """
+        """The best pose found. known : (K, D) additional candidates. Raises RunError without candidates."""
         if not len(candidates.poses):
-            raise RunError("There is no pose to begin a search with.", "Give candidates.")
+            raise RunError("The search has no candidate pose to start from.", "Give at least one candidate.")
         groups = self._groups(candidates)
         self._total = len(groups) + sum(entry.most for entry in self._effort.rounds)
         with ThreadPoolExecutor(THREADS, thread_name_prefix="start-pose") as threads:
@@ -137,7 +135,7 @@ class StartSearch:
         return self._found(lines)
 
     def _groups(self, candidates: StartCandidates) -> list[Array]:
-        """The best poses of each family, in as many sets as the effort asks for."""
+        """The best poses of each family, in `Effort.sets` sets."""
         values, groups = self._steps.values(candidates.poses), []
         for family in np.unique(candidates.family):
             rows = np.flatnonzero(candidates.family == family)
@@ -163,9 +161,7 @@ class StartSearch:
         step: Callable[[np.random.Generator, Given], Line],
         number: int,
     ) -> list[Line]:
-        """A step for all lines of a round, on the threads that there are, in their order; each has random numbers of
-        its own.
-        """
+        """One step for all lines of a round, in parallel, results in order; each has its own random numbers."""
         keys = [np.random.SeedSequence((self._seed, KEY, number, place)) for place in range(len(given))]
         pending = [
             threads.submit(step, np.random.default_rng(key), one)
@@ -211,14 +207,14 @@ class StartSearch:
 
 
 def confidence(margin: float, cameras: int) -> float:
-    """How sure it is that a body faces as the best pose does, from 0.5 to 1. margin : log weight to the best pose of
+    """Confidence, 0.5 to 1, that the body faces as the best pose does. margin : log weight to the best pose of
     the other facing.
     """
     return 1.0 / (1.0 + math.exp(-min(margin / (cameras * MARGIN_SCALE), 700.0)))
 
 
 def first_noise(space: SearchSpace) -> Array:
-    """(D,) standard deviations of the noise about a pose of which little is known."""
+    """(D,) standard deviations of the noise about an uncertain pose."""
     bounded = limited(space)
     ranges = np.where(bounded, space.upper - space.lower, 0.0)
     root = space.hierarchy.depth == 0

@@ -22,8 +22,8 @@ def layer_record(
     diffused: Array,
     free: float = math.nan,
 ) -> LayerRecord:
-    """What a person may want to see of a layer; the frame loop fills in frame, version and time. free : the share of
-    the particles that no behaviour model moved.
+    """The record of a layer; the frame loop fills in frame, version and time. free : share of the particles that no
+    behaviour model moved.
     """
     best = int(np.argmax(weighted.log_weights))
     return LayerRecord(

@@ -1,6 +1,6 @@
 """Whether a tracked frame is on the body at all, and whether there is anything to track.
 
-Three answers, of which only the first moves the tracker:
+Three answers:
 
 - *No evidence*: nothing of a body's size is in any mask, or every picture is blank (a covered lens, a dead signal,
   where background subtraction sees foreground everywhere). The pose is held.
@@ -11,7 +11,7 @@ Three answers, of which only the first moves the tracker:
 The weight of a pose depends on clothes, light and masks as much as on the pose, so it is compared with the run's own
 median over its last well tracked frames, in units of their own spread (1.4826 × the median distance from the median)
 but never of less than the weighting's usual one (`Weighting.loss`). Overlap is f_s (`weighting.silhouette_areas`): it
-means the same everywhere; it also speaks for the first frames, before there is a distribution.
+means the same for every weighting, and serves in the first frames, before there is a distribution.
 
 Measured with the annealed filter, 1000 evaluations, on rendered footage: the twin of the Lee walk at 20 Hz, a circle
 seen by three cameras at 20 Hz, the bundled walk; masks by subtraction. Tracked: frames with a mean marker error below
@@ -28,8 +28,8 @@ judged as one frame alone; a run believes three in a row.
     blobs                           211: 0             102: 3           24: 11               40: 5
 
 All that were missed are 150 to 187 mm off. The tracked frames' weights lie at most 3.3 spreads below the median, those
-of 99 of 100 lost frames 6 and more below. A body that is tracked back to front often is not noticed: from the outline
-alone it hardly can be.
+of 99 of 100 lost frames 6 and more below. A body that is tracked back to front often goes unnoticed: the outline
+alone hardly shows it.
 """
 
 from collections import deque
@@ -53,7 +53,7 @@ Array = NDArray[np.float64]
 REMEMBERED = 60
 """Well tracked frames that make the distribution."""
 FEWEST = 10
-"""Fewer make none."""
+"""Least frames for a distribution."""
 LEAST_OVERLAP = 0.5
 """f_s below which a pose is lost whatever its weight."""
 OVERLAP_SHARE = 0.85
@@ -66,8 +66,8 @@ BLANK_SPREAD, BLANK_STEP = 4.0, 8
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """What a frame's pose looks like in the evidence. overlap : mean f_s over the views, NaN where there are no masks.
-    seen : whether there is anything to track. judged_lost : what a weighting that judges itself says.
+    """Agreement of a frame's pose with the evidence. overlap : mean f_s over the views, NaN where there are no masks.
+    seen : whether there is anything to track. judged_lost : the weighting's own verdict, where it has one.
     """
 
     overlap: float
@@ -76,22 +76,20 @@ class Sight:
 
 
 class Onlooker:
-    """Compares poses with evidence, which may be of some of the cameras only."""
+    """Compares poses with evidence from all or some of the cameras."""
 
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...]) -> None:
         self._body, self._cameras = body, {camera.name: camera for camera in cameras}
         self._projectors = {tuple(self._cameras): OutlineProjector.of_body(body, cameras)}
 
     def sight(self, evidence: FrameEvidence, pose: Array, problem: FrameProblem | None = None) -> Sight:
-        """How a pose (D,) agrees with a frame's evidence. problem : the frame's, told what was expected."""
+        """How a pose (D,) agrees with a frame's evidence. problem : the frame's, given the expected poses."""
         return self.looking(evidence, problem)(pose)
 
     def looking(
         self, evidence: FrameEvidence, problem: FrameProblem | None = None
     ) -> Callable[[Array], Sight]:
-        """`sight` of one frame as a function of poses (D,). It keeps little of the evidence: its silhouettes, a bit a
-        pixel.
-        """
+        """`sight` of one frame as a function of poses (D,). Holds only the evidence's silhouettes, a bit a pixel."""
         lost = isinstance(problem, SelfJudging) and problem.lost_evidence
         blank = np.array([is_blank(view) for view in evidence.views])
         carved = all(view.background is not None for view in evidence.views)
@@ -121,17 +119,17 @@ class Onlooker:
 
 
 class WeightWatch:
-    """A run's distribution of well tracked frames, a function of what it was told in order."""
+    """Distribution of weight and overlap over a run's well tracked frames, which are given in order."""
 
-    def __init__(self, limit: LossLimit, told: Iterable[tuple[float, float]] = ()) -> None:
+    def __init__(self, limit: LossLimit, tracked: Iterable[tuple[float, float]] = ()) -> None:
         self._limit = limit
         self._weights: deque[float] = deque(maxlen=REMEMBERED)
         self._overlaps: deque[float] = deque(maxlen=REMEMBERED)
-        for log_weight, overlap in told:
+        for log_weight, overlap in tracked:
             self.well_tracked(log_weight, overlap)
 
     def well_tracked(self, log_weight: float, overlap: float) -> None:
-        """Tell it of a frame that was tracked."""
+        """Add a well tracked frame."""
         self._weights.append(log_weight)
         if np.isfinite(overlap):
             self._overlaps.append(overlap)
@@ -157,6 +155,6 @@ def anything_seen(evidence: FrameEvidence) -> bool:
 
 
 def is_blank(view: ViewEvidence) -> bool:
-    """Whether a picture shows nothing at all: one grey, black or white."""
+    """Whether a picture is blank: one grey, black or white."""
     seen = view.picture[::BLANK_STEP, ::BLANK_STEP]
     return seen.size > 0 and float(seen.std()) < BLANK_SPREAD

@@ -1,7 +1,7 @@
-"""Limbs that a first pose has in a wrong place, looked for in all their range, one after the other.
+"""Search for misplaced limbs of a first pose, one after the other, each over its whole range.
 
-A pose that was searched for as a whole often has an arm hidden in the trunk's silhouette, from where small steps lead
-nowhere. A limb alone has few parameters: some thousand places of it cover its range, and the best of them is refined.
+A pose from a search of the whole body often has an arm hidden in the trunk's silhouette, where small steps change
+nothing. A limb alone has few parameters: some thousand samples cover its range, and the best of them is refined.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,9 +14,9 @@ from studio.weighting.shape_silhouettes import POSES
 Array = NDArray[np.float64]
 
 ROUNDS, NEARER = 2, 0.01
-"""How often each limb is looked for, and what of the fitness a place a whole range away from rest must gain."""
+"""Passes over the limbs; fitness that a pose a whole range away from rest must gain."""
 SPREADS = ((1.0, 1.0), (0.3, 0.25), (0.1, 0.25))
-"""In which shares of its range, the first of which is all of it, and with which shares of the tries."""
+"""Widths of the search as shares of the limb's range, and the shares of the tries at each."""
 FEWEST_PARAMETERS = 3
 
 
@@ -29,10 +29,10 @@ def lost_limbs_found(
     rest: Array,
     tries: int,
 ) -> Array:
-    """(F, D) the poses with each limb where it fits best. Of places that fit alike the one nearer to rest is taken.
+    """(F, D) the poses with each limb where it fits best; among equal fits the one nearer to rest is taken.
 
     fitness : of (N, F, D) tried poses, (N, F), N a multiple of sixteen. limbs : each one's parameters; those with fewer
-    than three or without limits stay. limits : (2, D). rest : (D,). tries : places of a limb, 0 for none.
+    than three or without limits stay. limits : (2, D). rest : (D,). tries : samples of a limb, 0 for none.
     """
     found, reach = poses.copy(), limits[1] - limits[0]
     free = [own for own in limbs if len(own) >= FEWEST_PARAMETERS and np.isfinite(reach[own]).all()]

@@ -27,16 +27,16 @@ FREE, BEATEN = "model_free", "model_beaten"
 
 LARGEST = 0.9
 SURVIVING = 0.1
-# Of what a frame says, beside what all before said: half of a lasting change is seen within three frames.
+# Weight of the current frame in the smoothing: half of a lasting change takes effect within three frames.
 NEWEST = 0.25
 
 
-def share_of(wanted: float, grows: bool, extra: Arrays) -> float:
-    """The share of the next set. wanted : the knob's. extra : of the set that the last frame ended with."""
-    if not grows or BEATEN not in extra or wanted <= 0.0:
-        return wanted
+def share_of(least: float, grows: bool, extra: Arrays) -> float:
+    """Model-free share of the next set. least : the knob's value. extra : arrays of the last frame's final set."""
+    if not grows or BEATEN not in extra or least <= 0.0:
+        return least
     beaten = float(np.clip(4.0 * extra[BEATEN][0] - 2.0, 0.0, 1.0))
-    return wanted + max(LARGEST - wanted, 0.0) * beaten
+    return least + max(LARGEST - least, 0.0) * beaten
 
 
 def chosen_free(rng: np.random.Generator, count: int, share: float) -> Mask:
@@ -67,5 +67,5 @@ def judged(extra: Arrays, log_weights: Array) -> Arrays:
 
 
 def share_in(extra: Arrays) -> float:
-    """The share that a set has, for its record; NaN where no model guides it."""
+    """Model-free share of a set, for its record; NaN where no model guides it."""
     return float(extra[FREE].mean()) if FREE in extra else float("nan")

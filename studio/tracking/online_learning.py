@@ -1,16 +1,16 @@
-"""A run that teaches its behaviour model: what was tracked well is added to it (the second future work of Caillette et
-al. 2007, section 8, which the paper leaves open).
+"""Online learning: a run's well tracked frames are added to its behaviour model (named as future work in Caillette et
+al. 2007, section 8).
 
-A lesson is held every `interval` frames, with all that the run has tracked so far:
+Every `interval` frames the model is updated (a lesson) with all that the run has tracked so far:
 
 1. Frames are well tracked whose log-weight is not far below the run's median (`well_tracked`). Stretches of them are
-   smoothed over `SMOOTHING_S`, as training material is, since a tracker's jitter would pass for movement.
+   smoothed over `SMOOTHING_S`, as training material is, since a tracker's jitter would be taken for movement.
 2. Frames that no cluster explains (`novel`) are clustered by Figueiredo & Jain's EM in the model's own reduced space.
-   What is found is added behind the clusters there are: those keep their number, place and shape.
+   New clusters are appended; existing ones keep their number, mean and covariance.
 3. All stretches are labelled with the clusters now known, and the automaton is learnt again from these labels and those
-   of the training; so a run also teaches in which order movements that were known already follow each other.
+   of the training; so a run also updates the order in which known movements follow each other.
 
-A lesson is a function of the model before it, the run's poses so far and its seed, so a run that is taken up again has
+A lesson is a function of the model before it, the run's poses so far and its seed, so a resumed run has
 the same model. As clusters keep their numbers, a particle's state is the same history in the next automaton
 (`translated`).
 """
@@ -39,13 +39,13 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-# Poses (K, D) and log-weights (K,) of the first K frames of a run.
+# By K: poses (K, D) and log-weights (K,) of a run's first K frames.
 Tracked = Callable[[int], tuple[Array, Array]]
 
 SOURCE = "tracked"
 SMOOTHING_S = 0.06
 SHORTEST_S = 0.3
-# Robust standard deviations below the median at which a frame is not well tracked.
+# Robust standard deviations below the median from which on a frame is not well tracked.
 TOO_LOW = 3.0
 # Mean squared deviation, in a cluster's variances, above which it does not explain a frame.
 NOT_EXPLAINED = 6.0
@@ -89,17 +89,18 @@ def novel(model: BehaviourModel, features: Array) -> Mask:
     return least > NOT_EXPLAINED
 
 
-def taught(
+def updated_model(
     base: BehaviourModel,
     known: BehaviourModel,
     poses: Array,
     log_weights: Array,
     rng: np.random.Generator,
 ) -> BehaviourModel:
-    """What is known after another lesson.
+    """The model after one more lesson.
 
-    base : the model that the run began with. known : after the lesson before (`base` at the first). poses (K, D),
-    log_weights (K,) : of the run so far, in order, at the models' rate. Returns `known` where nothing was tracked well.
+    base : the model that the run began with. known : the model after the lesson before (`base` at the first). poses (K,
+    D), log_weights (K,) : of the run so far, in order, at the models' rate. Returns `known` where nothing was tracked
+    well.
     """
     recordings = stretches(poses, log_weights, known)
     if not recordings:
@@ -122,7 +123,7 @@ def taught(
 
 
 def translated(carried: Carried, before: Automaton, after: Automaton) -> Carried:
-    """What a frame hands on, its automaton's states said as states of the next automaton: the same histories."""
+    """A frame's state with its automaton states mapped to those of the next automaton that have the same histories."""
     particles = carried.particles
     if particles is None or before is after:
         return carried
@@ -135,10 +136,10 @@ def translated(carried: Carried, before: Automaton, after: Automaton) -> Carried
 
 @dataclass(eq=False)
 class OnlineLearner:
-    """The model in use in each frame of a run that teaches it.
+    """The behaviour model in use in each frame of a run with online learning.
 
-    base : the run's model. interval : frames between lessons. seed : the run's. Lessons are kept; they are held when a
-    frame is asked for that comes after them.
+    base : the run's model. interval : frames between lessons. seed : the run's. Lessons are computed when a later
+    frame's model is needed, and kept.
     """
 
     base: BehaviourModel
@@ -146,7 +147,6 @@ class OnlineLearner:
     seed: int
 
     def __post_init__(self) -> None:
-        """Nothing is learnt yet."""
         self._models = [self.base]
 
     def model_in(self, number: int, tracked: Tracked) -> BehaviourModel:
@@ -155,11 +155,13 @@ class OnlineLearner:
         while len(self._models) <= lesson:
             held = len(self._models)
             rng = np.random.Generator(np.random.Philox(np.random.SeedSequence((self.seed, held, LESSON_KEY))))
-            self._models.append(taught(self.base, self._models[-1], *tracked(held * self.interval), rng))
+            self._models.append(
+                updated_model(self.base, self._models[-1], *tracked(held * self.interval), rng)
+            )
         return self._models[lesson]
 
     def carried_into(self, number: int, carried: Carried, tracked: Tracked) -> Carried:
-        """What the frame before handed on, as the frame's own model understands it."""
+        """The state from the frame before, in terms of this frame's own model."""
         if number == 0 or number % self.interval:
             return carried
         before, after = (self.model_in(which, tracked) for which in (number - 1, number))
@@ -172,8 +174,8 @@ LESSON_KEY = 0x1E550
 def _with_new_clusters(
     model: BehaviourModel, recordings: Sequence[Array], features: Array, rng: np.random.Generator
 ) -> BehaviourModel:
-    """The model, at its learnt rate, with clusters of what it does not explain among the frames of recordings (F, D),
-    n in all, with features (n, 2 d).
+    """The model, at its learnt rate, with added clusters for the frames that it does not explain. recordings : (F, D)
+    each, n frames in all. features : (n, 2 d).
     """
     poses = np.concatenate(recordings)
     strange = np.flatnonzero(novel(model, features))
@@ -183,7 +185,7 @@ def _with_new_clusters(
         return model
     most = min(MOST_NEW_CLUSTERS, max(1, 2 * len(strange) // parameters))
     found, _ = fit_mixture(points[strange], rng, Search(most=most, patience=PATIENCE))
-    # A cluster that no frame belongs to for the most part is no label.
+    # A cluster that is no frame's likeliest one is not used as a label.
     found = found.chosen(np.unique(found.labels(points[strange])))
     shares = found.responsibilities(points[strange])
     floor = FLOOR * np.maximum(features.var(axis=0).mean(), 1e-6) * np.ones(features.shape[1])
@@ -212,7 +214,7 @@ def _with_new_clusters(
 def _root_joined(
     root: RootMotion, recordings: Sequence[Array], strange: Indices, shares: Array
 ) -> RootMotion:
-    """With the new clusters' movement of the root: of the frames `strange`, by their shares (n, K) in the clusters."""
+    """The root motion with that of the new clusters, from frames `strange` by their shares (n, K) in the clusters."""
     changes = np.concatenate([root.frame.changes(poses) for poses in recordings])
     return root.joined(gaussians_of(changes[strange], shares))
 
@@ -232,12 +234,12 @@ def _at_learnt_rate(poses: Array, model: BehaviourModel) -> Array:
     if rate == model.fps:
         return poses
     times = np.arange(len(poses)) / model.fps
-    wanted = np.arange(0.0, times[-1] + 1e-9, 1.0 / rate)
-    return np.column_stack([np.interp(wanted, times, column) for column in poses.T])
+    resampled = np.arange(0.0, times[-1] + 1e-9, 1.0 / rate)
+    return np.column_stack([np.interp(resampled, times, column) for column in poses.T])
 
 
 def _sources_of(model: BehaviourModel) -> Sequence[str]:
-    """A name for every recording of a model, where it has names."""
+    """The names of a model's recordings, where it has them."""
     return model.making.sources or tuple("" for _ in model.making.labels)
 
 

@@ -1,7 +1,7 @@
 """Particle swarm optimisation with soft search space partitioning (Fleischmann, Austvoll & Kwolek 2012).
 
-Idea: particles fly through the pose space, each drawn to the best pose p_i that it has met itself and to the best
-pose p_g that any has met; a constriction χ takes the speed out of them. A frame is divided into stages (see
+Idea: particles move through the pose space, each attracted to the best pose p_i that it has found and to the best
+pose p_g that any has found; a constriction χ damps their velocity. A frame is divided into stages (see
 `partitions`), each a swarm of its own that starts from the best pose of the one before.
 
 Symbols (Algorithm 1, Eq. 2 and 3): x_i, v_i, position and velocity of particle i; f, the fitness, which is
@@ -59,7 +59,7 @@ START, FREEDOM = "start", "freedom"
 
 # Table 1: 10 particles × 20 iterations, then 20 × 40.
 STAGE1_ITERATIONS, STAGE2_ITERATIONS = 20, 40
-# A particle alone has nobody to learn from.
+# A particle alone has no others to learn from.
 SMALLEST_SWARM = 2
 
 
@@ -75,22 +75,22 @@ class ParticleSwarm(Tracker):
     presets = PRESETS
 
     def layer_count(self, settings: SwarmSettings) -> int:
-        """N of all stages together."""
+        """Iterations N of all stages together."""
         return layer_count(settings)
 
     def evaluations(self, settings: SwarmSettings) -> int:
-        """Of all stages together."""
+        """Poses weighed in all stages together."""
         return evaluations(settings)
 
     def evaluation_knobs(self, evaluations: int, layers: int) -> dict[str, int]:
         """Table 1 in proportion: n1 and n2 with 20 n1 + 40 n2 as close to the total as can be, n2 as close to 2 n1.
 
-        The paper prints the table for 1000 evaluations only; our choice is that the iterations stay and the particles
-        of both stages scale, so that every total that is a multiple of 20 is met exactly.
+        The paper gives the table for 1000 evaluations only; our choice keeps the iterations and scales the particles
+        of both stages, so that every multiple of 20 is met exactly.
         """
         twenties = round(evaluations / STAGE1_ITERATIONS)
         first = max(round(twenties / 5), SMALLEST_SWARM)
-        # What is left over must be divisible by two, as the second stage has twice the iterations.
+        # The remainder must be divisible by two, as the second stage has twice the iterations.
         first += (twenties - first) % 2
         return {
             "stage1_particles": first,
@@ -160,7 +160,7 @@ class ParticleSwarm(Tracker):
         return following, record
 
     def expectations(self, particles: ParticleSet, space: SearchSpace, settings: SwarmSettings) -> Array:
-        """(S, D) where the first stage's swarm expects the body: one place unless a model guides it (`foreseen`)."""
+        """(S, D) poses that the first stage's swarm expects: one unless a behaviour model guides it (`foreseen`)."""
         return foreseen(particles, space)
 
     def end_frame(self, particles: ParticleSet, space: SearchSpace, settings: SwarmSettings) -> Estimate:
@@ -228,7 +228,7 @@ def _kept_possible(
     space: SearchSpace,
     settings: SwarmSettings,
 ) -> ParticleSet:
-    """A sampled swarm as the hard priors let it stand."""
+    """A sampled swarm after the hard priors."""
     starts = np.broadcast_to(swarm.extra[START], swarm.poses.shape)
     velocities = swarm.extra[VELOCITIES]
     sigma = space.sigma * settings.diffusion_scale * swarm.extra[FREEDOM]
@@ -238,7 +238,7 @@ def _kept_possible(
         return Proposals(starts[rows] + normal * sigma, velocities[rows])
 
     drawn = Proposals(swarm.poses, velocities)
-    # A prediction that the body cannot take is given up for where the swarm was before.
+    # An impossible prediction is replaced by where the swarm was before.
     before = np.broadcast_to(swarm.extra[BEFORE], starts.shape) if FREE in swarm.extra else starts
     done = settled(problem, space, settings, drawn, before, again)
     return unweighted(
@@ -264,7 +264,7 @@ def _start_velocities(
 def _new_swarm(
     drawn: Proposals, start: Array, freedom: Array, more: dict[str, Array] | None = None
 ) -> ParticleSet:
-    """A swarm that has met nothing yet. start : (D,) or (N, D). more : further arrays."""
+    """A swarm before its first evaluation. start : (D,) or (N, D). more : further arrays."""
     count = len(drawn.poses)
     return unweighted(
         drawn.poses,
@@ -284,7 +284,7 @@ def _new_swarm(
 
 
 def _with_bests(swarm: ParticleSet, values: Array, allowed: Mask) -> dict[str, Array]:
-    """The set's arrays with p_i and p_g brought up to date; what equals the best so far does not replace it."""
+    """The set's arrays with p_i and p_g updated; a value equal to the best so far does not replace it."""
     extra = swarm.extra
     known, was_allowed = extra[BEST_VALUES], extra[BEST_POSSIBLE]
     better = np.where(allowed == was_allowed, values > known, allowed)
@@ -313,7 +313,7 @@ def _last_pose(previous: Carried, last: ParticleSet) -> Array:
 def _record(
     layer: int, weighed: ParticleSet, allowed: Mask, following: ParticleSet, free: float
 ) -> LayerRecord:
-    """What a person may want to see; the frame loop fills in frame, version and time. free : `share_in`."""
+    """The record of a layer; the frame loop fills in frame, version and time. free : `share_in`."""
     values = weighed.raw_log_weights
     best = int(np.argmax(np.where(allowed, values, -np.inf) if allowed.any() else values))
     kept = weighed.extra[BEST_POSES].var(axis=0)

@@ -1,4 +1,4 @@
-"""What every tracker does with particles: start, predict, weigh and estimate."""
+"""Steps on particles that the trackers share: start, predict, weigh and estimate."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,14 +24,14 @@ def uniform_poses(rng: np.random.Generator, count: int, space: SearchSpace) -> A
     if not bounded.all():
         name = space.names[int(np.argmin(bounded))]
         raise RunError(
-            f"A search without a start pose begins between the limits, but '{name}' has none.",
+            f"A search without a start pose samples between the limits, but '{name}' has none.",
             "Give a start pose, or give every parameter of the body finite limits.",
         )
     return space.lower + rng.random((count, len(space.names))) * (space.upper - space.lower)
 
 
 def expected(poses: Array, previous: Carried, dynamics: str) -> Array:
-    """Poses (N, D) moved to where the next frame is expected: f of Eq. 10.
+    """Poses (N, D) predicted for the next frame: f of Eq. 10.
 
     dynamics : "none" leaves them; "constant_velocity" adds the last movement of the reported pose, once there
     is one.
@@ -55,7 +55,7 @@ def weigh(problem: FrameProblem, poses: Array, rules: Rules) -> tuple[Array, Arr
 
 
 def checked_values(values: Array, count: int) -> Array:
-    """What a weighting gave for `count` poses, as float64; raises RunError unless it is that many finite numbers."""
+    """A weighting's values for `count` poses as float64; raises RunError unless there are `count` finite numbers."""
     raw = np.asarray(values, dtype=np.float64)
     if raw.shape != (count,) or not np.isfinite(raw).all():
         wrong = raw[~np.isfinite(raw)]
@@ -69,8 +69,8 @@ def checked_values(values: Array, count: int) -> Array:
 def first_draw(spread: Spread, drawn: Array, space: SearchSpace, rules: Rules) -> ParticleSet:
     """The unweighted set that a filter's frame begins with, from the poses (N, D) `drawn` about predictions.
 
-    Whether limbs are apart is not known before the frame's problem is: with "redraw" the places that the
-    particles came from travel with the set, for `settled_first`.
+    Whether limbs are apart is known only with the frame's problem: with "redraw" the poses that the particles
+    came from are kept in the set, for `settled_first`.
     """
     if rules.constraints == "clamp":
         drawn = np.clip(drawn, space.lower, space.upper)
@@ -86,7 +86,7 @@ def settled_first(
     sigma: Array,
     rules: Rules,
 ) -> ParticleSet:
-    """A frame's first set with what is impossible drawn again; unchanged where nothing says whence it came."""
+    """A frame's first set with its impossible particles redrawn; unchanged where it does not keep their origins."""
     extra = {name: value for name, value in particles.extra.items() if name != CAME_FROM}
     if CAME_FROM not in particles.extra:
         return particles
@@ -104,7 +104,7 @@ def settle(
     space: SearchSpace,
     rules: Rules,
 ) -> Array:
-    """(N, D) poses `drawn` from a spread, as the rules let them stand."""
+    """(N, D) poses `drawn` from a spread, after the rules."""
     done = settled(
         problem,
         space,
@@ -122,7 +122,7 @@ def weighted_mean(particles: ParticleSet) -> Array:
 
 
 def weighted_variance(particles: ParticleSet) -> Array:
-    """(D,) Σ π (s - mean)²: what resampling would leave, without the noise of a draw."""
+    """(D,) Σ π (s - mean)²: the expected variance after resampling."""
     return np.exp(particles.log_weights) @ (particles.poses - weighted_mean(particles)) ** 2
 
 

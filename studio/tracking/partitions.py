@@ -5,17 +5,17 @@ n1, i1, n2, i2 are the knobs (Table 1: 10 × 20 and 20 × 40); every partition w
 
 - soft: the root (x1 … x6) with n1 × i1; then all, σ of the position divided, with n2 × i2.
 - soft-three: the root with n1 × i1; then what is nearest to it (trunk, head, hips, shoulders) as well, and then
-  all, σ of the position divided in both, with n2 × i2/2 each. The paper does not say how it divided: our choice.
+  all, σ of the position divided in both, with n2 × i2/2 each. The paper does not give the division: our choice.
 - hard-two: the root with n1 × i1; then all but the root with n2 × i2 (Fig. 2a).
 - hard-twelve: the 12 subspaces of John, Trucco & Ivekovic 2010 in the order of the tree, n1 particles each (they
   have 10 too), which share (n1 i1 + n2 i2) / n1 iterations. A body with more subspaces has its smallest
   neighbours joined, one with fewer has more iterations for each.
-- global-local: the whole pose with n2 × i2; then each kind of limb by itself (legs, arms; Krzeszowski, Kwolek &
+- global-local: the whole pose with n2 × i2; then each kind of limb alone (legs, arms; Krzeszowski, Kwolek &
   Wojciechowski 2011) with n1 particles, which share i1 iterations.
 - global: the whole pose at once with n2 particles in (n1 i1 + n2 i2) / n2 iterations.
 
 Only hard-twelve and global may round: their total is the nearest multiple of n1 or n2. Only torso edges are
-looked at while nothing but the root moves in the first stage of the soft and hard-two partitions (Table 1).
+used while only the root moves in the first stage of the soft and hard-two partitions (Table 1).
 """
 
 import functools
@@ -37,7 +37,7 @@ ROOT, NEAR = 0, 1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stage:
-    """One search. freedom : (D,) what σ is multiplied by, 0 where a parameter is fixed. looks_at : the problem's
+    """One search. freedom : (D,) factor on σ, 0 where a parameter is fixed. looks_at : the problem's
     stage, WHOLE_BODY or TRUNK_FIRST.
     """
 
@@ -49,7 +49,7 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """Where a layer stands. number : of its stage. iteration : k of Eq. 2, from 1."""
+    """Position of a layer. number : of its stage. iteration : k of Eq. 2, from 1."""
 
     number: int
     iteration: int
@@ -157,17 +157,17 @@ def _all(tree: Hierarchy) -> Mask:
 
 
 def _or_all(mask: Mask) -> Mask:
-    """The mask, or everything where it leaves nothing free (a body that is all root)."""
+    """The mask, or all parameters where it is empty (a body with only a root)."""
     return mask if mask.any() else np.ones_like(mask)
 
 
 def _calmed(tree: Hierarchy, knobs: SwarmSettings, free: Mask) -> Array:
-    """(D,) freedom of a later soft stage: what is free, the position less so."""
+    """(D,) freedom of a later soft stage: 1 for free parameters, less for the position."""
     return np.where(tree.position, 1.0 / knobs.position_divisor, 1.0) * free
 
 
 def _nearest(evaluations: int, particles: int) -> int:
-    """Iterations whose total comes nearest; halves are rounded up, as the page does."""
+    """Iterations whose total comes nearest; halves are rounded up, as on the page."""
     return (2 * evaluations + particles) // (2 * particles)
 
 
@@ -178,7 +178,7 @@ def _shared(iterations: int, stages: int) -> tuple[int, ...]:
 
 
 def _joined(masks: list[Mask], most: int) -> list[Mask]:
-    """At most `most` masks: neighbours that free the fewest parameters together are joined."""
+    """At most `most` masks: the neighbours with the fewest parameters together are joined."""
     masks = list(masks)
     while len(masks) > most:
         sizes = [int(one.sum() + other.sum()) for one, other in itertools.pairwise(masks)]

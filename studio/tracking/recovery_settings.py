@@ -1,4 +1,4 @@
-"""The knobs of noticing that a tracker is lost and of finding the body again, the same for every tracker."""
+"""The knobs of detecting a lost tracker and of finding the body again, the same for every tracker."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ OFF, SPREAD, INITIALISE = "off", "spread", "initialise"
 
 @dataclass(frozen=True, slots=True)
 class RecoverySettings:
-    """What a run does when it is lost (Caillette, Galata & Howard 2007, section 6.3, and a search of our own)."""
+    """Loss detection and recovery (Caillette, Galata & Howard 2007, section 6.3, and a search of our own)."""
 
     title = "Recovery"
 
@@ -19,11 +19,11 @@ class RecoverySettings:
         INITIALISE,
         choices=(INITIALISE, SPREAD, OFF),
         help="When lost: search as for a start pose, or spread the particles over the motion clusters (without a "
-        "behaviour model over the joints' ranges) at the hull. Off: losses are not looked for.",
+        "behaviour model over the joints' ranges) at the hull. Off: losses are not detected.",
     )
     lost_after: int = next_frame_knob(
         3, 1, 60, 1, label="lost after", unit="frames",
-        help="So many frames in a row must look lost before it is believed.",
+        help="Frames in a row that must look lost before the run counts as lost.",
     )  # fmt: skip
     recovery_interval: int = next_frame_knob(
         10, 1, 600, 1, label="search again after", unit="frames",

@@ -1,15 +1,15 @@
 """Local refinement after the search: Levenberg-Marquardt on distances between outlines and silhouettes.
 
-The further work that the papers name (a local search from where the stochastic one ended). Two kinds of residual, in
+Named as further work by the papers: a local search from where the stochastic one ended. Two kinds of residual, in
 mm at the body: from every point of a silhouette's border to the nearest outline that can explain it (its outward
-direction must agree), and, weakly, from outlines to the border, which keeps limbs in that no border explains. Both
-look only at the border of the limbs' union. A robust loss forgets what is not body. Joint limits hold by projection; a
-weak pull towards the start settles what no silhouette shows (twists).
+direction must agree), and, weakly, from outlines to the border, which holds limbs that no border explains. Both
+use only the border of the limbs' union. A robust loss discounts what is not body. Joint limits hold by projection; a
+weak pull towards the start determines what no silhouette shows (twists).
 
-Measured on rendered footage (`tests/runs/test_refinement_gain.py`): where a refinement from the truth ends ("floor") it
-is the model that is wrong. The border's points carry it: with outlines to border of the same weight the floor rises
-from 11 to 16 mm. Beginning with a wider loss and narrowing it gains nothing on a walk and loses 2 mm on another, as the
-body goes to a neighbouring valley; the search has brought it near enough.
+Measured on rendered footage (`tests/runs/test_refinement_gain.py`): the error of a refinement
+that starts from the truth ("floor") is that of the model. The border's points matter most: with outlines to border of
+the same weight the floor rises from 11 to 16 mm. Starting with a wider loss and narrowing it gains nothing on one walk
+and loses 2 mm on another, as the body moves to a neighbouring valley; the search ends near enough.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,7 +30,7 @@ from studio.weighting.outlines import OutlineProjector
 Array = NDArray[np.float64]
 
 OUTLINE_PART = 0.1
-"""Weight of an outline's sample beside a border point."""
+"""Weight of an outline's sample relative to a border point."""
 DIFFERENCE = 0.004
 """Step of the central differences, radians; outlines are projected in single precision."""
 MM_PER_RADIAN = 300.0
@@ -39,16 +39,16 @@ DAMPING, EASED, TIGHTENED, MOST_DAMPING = 1e-2, 0.3, 8.0, 1e4
 SETTLED = 2e-4
 """A step below this (radians, or mm / MM_PER_RADIAN) ends the search."""
 FEWEST_PIXELS = 3.0
-"""The robust loss is at least this wide: below, it is the mask's pixels that are rough."""
+"""Pixels: least width c of the robust loss, as masks are rough at this scale."""
 HIDDEN_PULL, REST_PULL = 100.0, 20.0
 """Pull towards the rest pose, mm per radian, of angles that move no limb of their own (collar-bones) and of the others.
-An arm's outline inside the trunk costs nothing, so that without it shoulders sink into the chest (a drawn dance: 36 mm
-and limbs lost in 23 of 100 frames without, 20 mm and 1 with it and limbs drawn anew)."""
+An arm's outline inside the trunk costs nothing, so that without it shoulders sink into the chest (a rendered dance:
+36 mm and limbs lost in 23 of 100 frames without, 20 mm and 1 with it and resampled limbs)."""
 HALFWAY = 0.5
 SLACK_MM = 50.0
-"""What a hand or foot that cannot turn (`rigid_limbs`) may be off at no cost: a wrist turns it by so much."""
+"""mm by which a hand or foot without a joint (`rigid_limbs`) may be off at no cost: a wrist turns it by so much."""
 REACH = 4.0
-"""Times c: farther than this from a silhouette's border its map is not kept, the loss has nearly reached its most."""
+"""Times c: a silhouette's distance map is kept up to here from its border; beyond, the loss is nearly its maximum."""
 
 
 class Distances(Protocol):
@@ -81,9 +81,9 @@ class Distances(Protocol):
 
 
 Equations = tuple[float, Array, Array]
-"""A loss, and of half of it gradient (D,) and matrix (D, D) per unit of each parameter."""
+"""A loss, and the gradient (D,) and matrix (D, D) of half of it per unit of each parameter."""
 FrameLoss = Callable[[Array], Equations]
-"""What a frame says of a pose (D,)."""
+"""Loss of a pose (D,) in a frame, with its equations."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,16 +95,16 @@ class RefinementSettings:
     refinement_steps: int = knob(20, 1, 100, 1, unit="steps", help="Most steps of the local search.")
     refinement_scale: float = knob(
         50.0, 5.0, 500.0, 5.0, unit="mm",
-        help="From this distance on a point of the silhouette's border counts less and less: it may be no body.",
+        help="From this distance on a point of the silhouette's border counts less and less: it may not be body.",
     )  # fmt: skip
     refinement_pull: float = knob(
         40.0, 0.0, 1000.0, 1.0, unit="mm per radian",
-        help="Pull towards the pose that the search found; it settles what no silhouette shows.",
+        help="Pull towards the pose that the search found; it determines what no silhouette shows.",
     )  # fmt: skip
 
     refinement_acceleration: float = knob(
         40.0, 0.0, 200.0, 1.0, unit="m/s²",
-        help="Usual acceleration of limbs; it holds neighbouring frames together. 0: every frame by itself.",
+        help="Usual acceleration of limbs; it couples neighbouring frames. 0: every frame on its own.",
     )  # fmt: skip
 
     # Walks and runs on subtracted masks: 0.84 to 0.95; masks that show a platform and its shadow as well: 0.57 to 0.64,
@@ -128,7 +128,7 @@ class Refined:
 
 
 class Refiner:
-    """Refines poses of one body in some cameras; holds nothing that changes."""
+    """Refines poses of one body in some cameras; immutable."""
 
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: RefinementSettings) -> None:
         self.body, self.cameras, self.settings = body, cameras, settings
@@ -146,8 +146,8 @@ class Refiner:
     def refine(
         self, pose: Array, silhouettes: Sequence[Distances], problem: FrameProblem | None = None
     ) -> Refined:
-        """The pose (D,) refined on a frame's silhouettes, one a camera. Never worse in the eyes of `problem`: half of
-        the way, or none, is gone where its log-weight would fall.
+        """The pose (D,) refined on a frame's silhouettes, one a camera. Its log-weight in `problem` never falls: where
+        it would, half of the step or none is taken.
         """
         start = np.asarray(pose, dtype=np.float64)
         if not any(len(view.border) for view in silhouettes):
@@ -167,12 +167,12 @@ class Refiner:
         return self._equations(pose, self._prepared(pose, silhouettes))
 
     def settled_loss(self, pose: Array, silhouettes: Sequence[Distances]) -> float:
-        """The loss at a pose with what keeps joints near rest, to compare poses found in different valleys."""
+        """The loss at a pose plus the pull towards rest, to compare poses found in different valleys."""
         bent = (pose - self.neutral) / self.unit
         return self.loss(pose, silhouettes)[0] + float(self.stiffness @ np.square(bent))
 
     def frame_loss(self, start: Array, silhouettes: Sequence[Distances]) -> "FrameLoss":
-        """A frame as a function of poses near `start` (D,); without silhouettes only the pull is left of it."""
+        """A frame's loss as a function of poses near `start` (D,); without silhouettes only the pull."""
         prepared = self._prepared(start, silhouettes) if silhouettes else None
 
         def equations(pose: Array) -> Equations:
@@ -279,8 +279,8 @@ class _Prepared:
 
 
 def free_ends(body: BodyModel) -> NDArray[np.bool_]:
-    """(L,) whether a drawn limb's far end is an end of the body (fingers, toes, crown): nothing hangs from it, nor
-    would if limbs of zero length were given one.
+    """(L,) whether a drawn limb's far end is an end of the body (fingers, toes, crown): no limb hangs from it, not even
+    one of zero length.
     """
     parents = [joint.parent for joint in body.joints]
 
@@ -317,11 +317,11 @@ def bounded_angles(body: BodyModel) -> NDArray[np.bool_]:
 def rigid_limbs(body: BodyModel) -> NDArray[np.bool_]:
     """(L,) whether a drawn limb ends the body at a joint that cannot turn (the papers' hands and feet).
 
-    A person's wrists and ankles do turn, so where such a limb and the silhouette disagree a little, neither the shin
-    nor the forearm is wrong: it explains what is seen, so that nothing else has to, but pulls the limbs above it only
-    by what is beyond SLACK_MM. Measured on a rendered walk with turns: rigid feet without slack pull the legs and the
-    trunk 20 to 30 mm down, rigid hands the arms 10 mm. But a hand before the trunk may be all that shows how far the
-    elbow is bent.
+    A person's wrists and ankles do turn, so where such a limb and the silhouette disagree a little, the shin or
+    forearm need not be wrong: it explains the border that it is near to, but pulls the limbs above it only by what is
+    beyond SLACK_MM. Measured on a rendered walk with turns: rigid feet without slack pull the legs and the
+    trunk 20 to 30 mm down, rigid hands the arms 10 mm. But a hand in front of the trunk may be all that shows how far
+    the elbow is bent.
     """
     ends = free_ends(body)
     still = [all(step.parameter < 0 for step in body.joints[limb.joint].steps) for limb in body.drawn]
@@ -340,12 +340,12 @@ def _about_the_border(view: Distances, margin: float) -> tuple[tuple[int, int], 
 
 
 def mm_at(body: BodyModel, cameras: Sequence[Camera], pose: Array) -> list[float]:
-    """How many mm a pixel of each view spans at a body of pose (D,)."""
+    """Size of a pixel of each view at a body of pose (D,), mm."""
     middle = limb_ends(body, pose[None])[0].reshape(-1, 3).mean(axis=0)
     return [mm_per_pixel(camera, middle) for camera in cameras]
 
 
 def mm_per_pixel(camera: Camera, point: Array) -> float:
-    """How many mm a pixel spans at a point (3,), at least at 100 mm from the camera."""
+    """Size of a pixel at a point (3,), mm; the point is taken at least 100 mm from the camera."""
     depth = float(camera.rotation[2] @ point + camera.translation[2])
     return max(depth, 100.0) / float(np.sqrt(camera.matrix[0, 0] * camera.matrix[1, 1]))

@@ -1,9 +1,9 @@
-"""Normal equations of outlines against silhouettes: what one step of `refinement` solves.
+"""Normal equations of outlines against silhouettes, solved by each step of `refinement`.
 
 Outlines are the quadrilaterals A0 A1 B1 B0 of the limbs in each view (`weighting.outlines`). Only what lies on the
-border of their union counts: a point of an outline inside another limb makes no border. Every distance is in mm at the
+border of their union counts: points of an outline inside another limb do not. Every distance is in mm at the
 body (pixels times the view's mm per pixel); its loss is that of Geman & McClure, ρ(d) = d² / (1 + d² / c²), so that
-what the body does not explain (hair, a shadow in the mask) pulls little.
+pixels that the body does not explain (hair, a shadow in the mask) pull little.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from studio.numba_in_threads import EXACT, njit
 MARGIN = 1.0
 """Pixels that a point may lie inside another limb and still count as border."""
 FIRST_CORNER, SECOND_CORNER = (0, 3, 1), (1, 2, 2)
-"""Corners from which to which an outline's edges run: side A, side B, far end."""
+"""First and last corners of an outline's edges: side A, side B, far end."""
 SAMPLES_A_SIDE = 12
 SAME_WAY = 0.3
 """Least cosine between the outward directions of a border point and of the edge that explains it."""
@@ -21,7 +21,7 @@ SAME_WAY = 0.3
 
 @njit(**EXACT)
 def turning(quad):
-    """+1 or -1: which way round a quadrilateral (4, 2) runs."""
+    """+1 or -1: the orientation of a quadrilateral (4, 2)."""
     ax, ay = quad[2, 0] - quad[0, 0], quad[2, 1] - quad[0, 1]
     bx, by = quad[3, 0] - quad[1, 0], quad[3, 1] - quad[1, 1]
     return 1.0 if ax * by - ay * bx > 0.0 else -1.0
@@ -76,7 +76,7 @@ def add_point(share, residual, nx, ny, first, second, u, normal, pull):
 
 @njit(**EXACT)
 def add_limbs(normals, pulls, slopes, usable, which, matrix, gradient):
-    """Add what the corners of one view's limbs ask for to the equations of the parameters, lower half.
+    """Add the equations of one view's limb corners to those of the parameters, lower half.
 
     normals : (L, 8, 8) lower halves, pulls : (L, 8). slopes : (L, 4, 2, D) of the corners. which : (D,) scratch.
     """
@@ -99,13 +99,13 @@ def add_limbs(normals, pulls, slopes, usable, which, matrix, gradient):
         for a in range(count):
             p = which[a]
             for j in range(8):
-                asked = 0.0
+                product = 0.0
                 for i in range(8):
-                    asked += mirrored[i, j] * own[i >> 1, i & 1, p]
+                    product += mirrored[i, j] * own[i >> 1, i & 1, p]
                 gradient[p] += pulls[limb, j] * own[j >> 1, j & 1, p]
-                if asked != 0.0:
+                if product != 0.0:
                     for b in range(a + 1):
-                        matrix[p, which[b]] += asked * own[j >> 1, j & 1, which[b]]
+                        matrix[p, which[b]] += product * own[j >> 1, j & 1, which[b]]
 
 
 @njit(**EXACT)
@@ -133,7 +133,7 @@ def nearest_edge(x, y, ox, oy, quads, usable, turns, boxes, ends, reach):
             distance = (x - px) ** 2 + (y - py) ** 2
             if distance >= nearest:
                 continue
-            # Side B runs against the way round, from B0 to B1.
+            # Side B runs against the orientation, from B0 to B1.
             sign = -turns[limb] if side == 1 else turns[limb]
             if sign * (ox * ey - oy * ex) < SAME_WAY * np.sqrt(squared):
                 continue
@@ -158,7 +158,7 @@ def read_map(x, y, values, start, width, height):
 
 @njit(**EXACT)
 def beyond(distance, slack):
-    """What of a signed distance lies beyond a slack."""
+    """The part of a signed distance beyond a slack."""
     return np.sign(distance) * max(0.0, abs(distance) - slack)
 
 
@@ -196,9 +196,9 @@ def add_border(border, quads, usable, turns, boxes, ends, slack, mm, scale, norm
 def add_outline(
     values, view, size, quads, usable, turns, boxes, ends, slack, mm, scale, part, normals, pulls
 ):
-    """Samples of one view's outlines to the silhouette's border; returns their loss. part : of a sample beside a
-    border point. view : start, width, height of its map in `values`, and in columns 5 and 6 where that begins in the
-    picture, of `size`: far from the silhouette there is no map, and the loss is its most.
+    """Samples of one view's outlines to the silhouette's border; returns their loss. part : weight of a sample relative
+    to a border point. view : start, width, height of its map in `values`, and in columns 5 and 6 where that begins in
+    the picture, of `size`: far from the silhouette there is no map, and the loss is its maximum.
     """
     loss = 0.0
     for limb in range(quads.shape[0]):
@@ -228,7 +228,7 @@ def add_outline(
 
 @njit(**EXACT)
 def look_at_limbs(quads, slopes, usable, turns, boxes):
-    """Fill, of one view's limbs, usable (L,), whether it is seen, turns (L,), which way round it runs, and boxes
+    """Fill, of one view's limbs, usable (L,), whether it is seen, turns (L,), its orientation, and boxes
     (L, 4): left, top, right, bottom.
     """
     for limb in range(quads.shape[0]):
@@ -240,7 +240,7 @@ def look_at_limbs(quads, slopes, usable, turns, boxes):
 
 @njit(**EXACT)
 def mirror_lower_half(matrix):
-    """Make a matrix symmetric whose lower half was filled."""
+    """Copy the lower half of a matrix to its upper half."""
     for p in range(matrix.shape[0]):
         for q in range(p):
             matrix[q, p] = matrix[p, q]
@@ -256,7 +256,8 @@ def normal_equations(
     ends : (L,) whether a limb's far end may be border. slack : (L,) mm by which a limb may be off at no cost.
     maps : flat signed distances. views : (V, 7) where each begins, its width and height, its first and last border
     point, its left and top in the picture, whose width and height are sizes (V, 2). border : (K, 4). mm : (V,) mm per
-    pixel. scales : (V,) c of the loss, mm. part : of an outline's sample beside a border point; at 0 there are no maps.
+    pixel. scales : (V,) c of the loss, mm. part : weight of an outline's sample relative to a border
+    point; at 0 there are no maps.
     """
     limbs = quads.shape[1]
     normals, pulls, boxes = np.zeros((limbs, 8, 8)), np.zeros((limbs, 8)), np.zeros((limbs, 4))

@@ -1,16 +1,16 @@
-"""Local refinement of many frames at once, held together by how fast bodies can change their movement.
+"""Local refinement of many frames at once, coupled by a penalty on accelerations.
 
 What one frame's silhouettes leave open (a shoulder beside the neck, how far the trunk leans towards a camera, the twist
-of a straight arm) the frames before and after often tell. So the losses of `refinement` are summed over the frames of a
+of a straight arm) the frames before and after often show. So the losses of `refinement` are summed over the frames of a
 stretch and the accelerations of the body's points are added:
 
     Σ_t loss(x_t) + w Σ_t Σ_j |p_j(x_t-1) - 2 p_j(x_t) + p_j(x_t+1)|²,    w = (σ_r / σ_a)²
 
-p_j are the two ends of every limb and a point at its side, which shows its twist; so it does not matter how a pose is
-spelled in angles. σ_a is a usual acceleration between three frames, σ_r what a border point's residual is worth.
+p_j are the two ends of every limb and a point at its side, which shows its twist; so it does not matter by which
+angles a pose is written. σ_a is a usual acceleration over three frames, σ_r the deviation of a border point's residual.
 Gauss-Newton on all poses together, damped as Levenberg and Marquardt do; its equations are banded, as a frame meets
 only two on each side. Long stretches are solved in windows, the last poses of one held still in the next. Each window
-begins with a stiffer movement, so that frames in neighbouring valleys agree on one before details count.
+begins with a stiffer movement, so that frames in neighbouring valleys settle in one before details count.
 
 The papers name a local search as further work; this is one for whole movements, in the manner of B. Triggs, P.
 McLauchlan, R. Hartley and A. Fitzgibbon, "Bundle adjustment - a modern synthesis" (1999).
@@ -40,13 +40,13 @@ Array = NDArray[np.float64]
 WINDOW, OVERLAP = 40, 12
 """Frames that are solved together, and how many of them are solved again in the next window."""
 HELD = 2
-"""Frames before a window that hold its beginning."""
+"""Frames before a window that fix its beginning."""
 RESIDUAL_MM = 150.0
-"""σ_r: neighbouring border points err alike (flesh is no cone), so one alone is worth little."""
+"""σ_r: errors of neighbouring border points are correlated (flesh is no cone), so a single one has little weight."""
 SIDE_MM = 100.0
-"""How far from its axis the point lies that shows a limb's twist."""
+"""mm from a limb's axis to the point that shows its twist."""
 STIFFER = (30.0, 5.0, 1.0)
-"""Factors of w, one after the other."""
+"""Factors of w in successive rounds."""
 ENOUGH = 1e-4
 """A share of the loss; a step that gains less ends a round."""
 CHANGE = np.array([1.0, -2.0, 1.0])
@@ -55,7 +55,7 @@ CHANGE = np.array([1.0, -2.0, 1.0])
 @dataclass(frozen=True, slots=True, eq=False)
 class Window:
     """Frames that follow each other. starts : (F, D) poses to begin with. losses : of the frames. held : (0 to 2, D)
-    poses of the frames before, which do not move.
+    poses of the frames before, kept fixed.
     """
 
     starts: Array
@@ -158,7 +158,7 @@ class MovementEquations:
 
 
 def windows(count: int) -> list[tuple[int, int, int]]:
-    """Windows of `count` frames: first frame, the one after the last, and the one after the last that is kept."""
+    """Windows of `count` frames: first frame, one past the last, one past the last that is kept."""
     found, first = [], 0
     while first < count:
         after = min(first + WINDOW, count)

@@ -2,9 +2,8 @@
 
 Both schemes return N' indices in which particle n is expected N' π_n times. `multinomial` draws one by one,
 as the paper writes it. `systematic` (Kitagawa 1996) lays N' evenly spaced marks with one common random offset
-on the cumulated weights: particle n is then drawn floor or ceil of N' π_n times, the least noise that a draw
-can have, and it needs no sorting. It is the default: on the toys of the tests it leaves more distinct
-survivors.
+on the cumulated weights: particle n is then drawn floor or ceil of N' π_n times, the least possible noise,
+and needs no sorting. It is the default: on the test problems it leaves more distinct survivors.
 """
 
 import numpy as np
@@ -24,7 +23,7 @@ def draw(rng: np.random.Generator, weights: Array, count: int, scheme: str) -> I
     marks = (np.arange(count) + offset) / count if scheme == "systematic" else singles
     cumulated = np.cumsum(weights)
     cumulated /= cumulated[-1]
-    # The last weight that is not zero takes what rounding leaves over.
+    # The last non-zero weight takes the rounding remainder.
     found = np.searchsorted(cumulated, marks, side="right")
     return np.minimum(found, np.flatnonzero(weights)[-1]).astype(np.int64)
 

@@ -1,6 +1,4 @@
-"""The knobs of the particle filters, one line each; sliders, options, checks and the guide are made from these
-lines.
-"""
+"""The knobs of the particle filters; sliders, options, checks and the guide are made from these declarations."""
 
 from dataclasses import dataclass
 
@@ -62,7 +60,7 @@ class AnnealedSettings:
     )  # fmt: skip
     carry: str = next_frame_knob(
         "weighted", choices=("weighted", "resampled", "mode"), label="carried over",
-        help="What the next frame starts from: every particle (Eq. 9), survivors by weight, or the best one.",
+        help="Start of the next frame: every particle (Eq. 9), survivors by weight, or the best one.",
     )  # fmt: skip
     dynamics: str = shared_knobs.dynamics()
     prediction: str = shared_knobs.prediction()
@@ -111,10 +109,10 @@ class CondensationSettings:
 
 
 def layer_survivals(settings: AnnealedSettings, layers: int) -> tuple[float, ...]:
-    """α wanted of each of the frame's layers, in the order they run.
+    """Target α of each of the frame's layers, in the order they run.
 
-    A list shorter than the frame goes on with its last rate. Raises SettingsError for a list that is none, or
-    for a rate outside 0.02 … 0.98.
+    A list shorter than the frame repeats its last rate. Raises SettingsError for text that is no list of numbers,
+    or for a rate outside 0.02 … 0.98.
     """
     words = [word for word in settings.survival_per_layer.replace(",", " ").split() if word]
     if not words:
@@ -131,7 +129,7 @@ def layer_survivals(settings: AnnealedSettings, layers: int) -> tuple[float, ...
     return tuple(rates[min(index, len(rates) - 1)] for index in range(layers))
 
 
-# What makes the improved filter is the tracker's own default.
+# The improved filter is the tracker's own default.
 _IMPROVED: dict[str, Value] = {
     name: getattr(AnnealedSettings(), name)
     for name in (

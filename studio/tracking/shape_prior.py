@@ -1,10 +1,10 @@
-"""What is known of a body's size before any picture: published proportions, and the height as somebody told it.
+"""Prior of a body's size: published proportions, and the height as reported.
 
 A shape (`body.shape_space`) is a few logarithms. Lengths vary by a common factor (tall and short people) and each on
-its own; radii each on its own. The height is believed as far as it was said to be known, but with Cauchy's law: a guess
-that is wrong by many times that costs little more than one wrong by a few, so that silhouettes overrule it. (A real man
-of 1.72 m, told as 1.80 m: 1.77 m with a Student's t of three degrees of freedom, 1.76 m with Cauchy's, 1.75 m from his
-silhouettes alone; people whose height was told within 3 cm come out the same.)
+its own; radii each on its own. The reported height has a Cauchy distribution of the reported deviation: a report that
+is off by many deviations costs little more than one off by a few, so that silhouettes overrule it. (A real man of 1.72
+m, reported as 1.80 m: 1.77 m with a Student's t of three degrees of freedom, 1.76 m with Cauchy's, 1.75 m from his
+silhouettes alone; for people whose height was reported within 3 cm both give the same.)
 """
 
 from dataclasses import dataclass
@@ -22,8 +22,8 @@ STEP = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class ShapeSpreads:
-    """Standard deviations: of each length and each radius as shares (±10 % evenly is 0.058), of the factor that all
-    lengths have in common, of the height in mm.
+    """Standard deviations: of each length and each radius as shares (uniform within ±10 % is 0.058), of the factor
+    common to all lengths, of the height in mm.
     """
 
     length: float = 0.06
@@ -38,7 +38,7 @@ class ShapePrior:
     def __init__(self, space: ShapeSpace, spreads: ShapeSpreads, height: float | None) -> None:
         is_length = np.array([group.kind == "length" for group in space.groups])
         self.sigma = np.where(is_length, spreads.length, spreads.radius)
-        """(S,) each by itself, without the common factor."""
+        """(S,) standard deviations without the common factor."""
         together = np.where(is_length, spreads.size, 0.0)
         self._precision = np.linalg.inv(np.diag(np.square(self.sigma)) + np.outer(together, together))
         self._height, self._spread = height, spreads.height
@@ -53,7 +53,7 @@ class ShapePrior:
         return found
 
     def equations(self, shape: Array) -> tuple[float, Array, Array]:
-        """-2 log of a shape (S,), and of half of it gradient (S,) and matrix (S, S), as Gauss-Newton has it."""
+        """-2 log of a shape (S,), and the Gauss-Newton gradient (S,) and matrix (S, S) of half of it."""
         pull, matrix = self._precision @ shape, self._precision.copy()
         loss = float(shape @ pull)
         if self._height is not None:
@@ -65,13 +65,13 @@ class ShapePrior:
         return loss, pull, matrix
 
     def height(self, shape: Array) -> float:
-        """mm: how tall a shape (S,) stands."""
+        """Standing height of a shape (S,), mm."""
         return float(self._own_height + shape @ self._slope)
 
     def _away(self, shapes: Array) -> Array:
-        """Standard deviations from the height as it was told."""
-        told = 0.0 if self._height is None else self._height
-        return (self._own_height + shapes @ self._slope - told) / self._spread
+        """(M,) deviations from the reported height, in its standard deviation."""
+        reported = 0.0 if self._height is None else self._height
+        return (self._own_height + shapes @ self._slope - reported) / self._spread
 
 
 def height_of(space: ShapeSpace) -> tuple[float, Array]:

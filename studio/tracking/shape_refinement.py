@@ -1,19 +1,19 @@
-"""A body's size and its poses in a few frames, descended to together: Gauss-Newton on the silhouettes' borders.
+"""Joint refinement of a body's size and its poses in a few frames: Gauss-Newton on the silhouettes' borders.
 
-The population of `shape_search` finds the valley and no more: areas barely tell a knee ten millimetres higher from
-one that is bent a little more. The border's points do: the sides of a bent limb's two cones are lines, and where they
-meet is the joint. So the residuals of `refinement` (points of the border to the outline that explains them, Geman &
-McClure's loss) are minimised over one shape and all poses by Levenberg-Marquardt. Given the shape frames are apart, so
-each frame's pose is eliminated first (Schur complement; B. Triggs et al., "Bundle adjustment - a modern synthesis",
-1999, section 6) and what is left is as large as the shape.
+The population of `shape_search` finds the valley only: areas barely distinguish a knee ten millimetres higher from one
+that is bent a little more. The border's points do: the sides of a bent limb's two cones are lines that meet at the
+joint. So the residuals of `refinement` (points of the border to the outline that explains them, Geman &
+McClure's loss) are minimised over one shape and all poses by Levenberg-Marquardt. Given the shape, frames are
+independent, so each frame's pose is eliminated first (Schur complement; B. Triggs et al., "Bundle adjustment - a modern
+synthesis", 1999, section 6) and the remaining system has the size of the shape.
 
-Neighbouring points of a border err alike (flesh is no cone), so that `ALIKE` of them are worth one, whose variance is
-read off the residuals themselves: where clothes hang loose or masks are rough, the prior counts for more. From the
-same equations comes the covariance of the shape, poses integrated out.
+Errors of neighbouring border points are correlated (flesh is no cone), so that `ALIKE` of them count as one, whose
+variance is estimated from the residuals: where clothes hang loose or masks are rough, the prior has more weight. From
+the same equations comes the covariance of the shape, poses integrated out.
 
-Measured on rendered people with lengths drawn ± 10 % (`tests/tracking/test_shape_search.py` says how well it does).
-Joints that bear no cone (collar-bones) move little, `HIDDEN_SPREAD`: left free, they take shoulders anywhere
-inside the trunk, and upper arms err by 18 mm instead of 5.
+Measured on rendered people with lengths drawn ± 10 % (`tests/tracking/test_shape_search.py` has the results).
+Joints that bear no cone (collar-bones) move little, `HIDDEN_SPREAD`: left free, they move shoulders anywhere
+inside the trunk, and upper arms are off by 18 mm instead of 5.
 """
 
 from collections.abc import Sequence
@@ -47,22 +47,23 @@ from studio.weighting.shape_silhouettes import ShapePrograms
 Array = NDArray[np.float64]
 
 SCALE_MM = 50.0
-"""c of the loss: from this distance on a point of the border may be no body."""
+"""c of the loss: from this distance on a point of the border may not be body."""
 ALIKE = 9.0
-"""Border points that are worth one: so chosen that the deviations cover what they should, see `ShapeRefiner.refine`."""
+"""Border points that count as one: chosen so that the deviations have their nominal coverage, see
+`ShapeRefiner.refine`."""
 FIRST_VARIANCE = 180.0
-"""mm²: of a border point's residual, until the residuals tell (flesh of rendered people against cones)."""
+"""mm²: initial variance of a border point's residual (flesh of rendered people against cones)."""
 LEAST_VARIANCE = 10.0
 ANGLE_SPREAD, HIDDEN_SPREAD = 1.0, 0.15
-"""rad: how far bounded angles are from the rest pose, of joints that bear a cone and of those that bear none."""
+"""rad: deviation of bounded angles from the rest pose, of joints that bear a cone and of those that bear none."""
 OUTSIDE = 0.5
 """Pixels from the centre of a border's pixel to the border."""
 STEPS, ENOUGH = 60, 1e-5
 """Most steps of a descent, and the share of the loss that a step must gain."""
 NO_MAP = np.zeros(1, dtype=np.float32)
 HOPS, SHAKEN_SHAPE, SHAKEN_POSE, SHAKEN_PLACE = 4, 0.04, 0.05, 6.0
-"""Descents from shaken answers, and how much they are shaken: share, rad, mm. Which edge explains a border point jumps,
-so the loss has small dents that a descent stays in."""
+"""Restarts of the descent from perturbed results, and the perturbation: share, rad, mm. The edge that explains a border
+point jumps, so the loss has small local minima."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,7 +81,7 @@ class RefinedShape:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Frame:
-    """A frame's border, as `normal_equations` has it. border : (K, 4). views : (V, 7). mm, scales : (V,)."""
+    """A frame's border, as `normal_equations` takes it. border : (K, 4). views : (V, 7). mm, scales : (V,)."""
 
     border: Array
     views: NDArray[np.int64]
@@ -132,12 +133,12 @@ class ShapeRefiner:
     def refine(
         self, shape: Array, poses: Array, seed: int = 0, *, others: Sequence[Array] = ()
     ) -> RefinedShape:
-        """The shape and the poses, from a shape (S,) and poses (F, D) that are in the right valley; `others` are poses
-        that may be so too, and each frame takes the better ones.
+        """The shape and the poses, from a shape (S,) and poses (F, D) in the right valley; `others` are alternative
+        poses, and each frame takes the better one.
 
         The deviations were checked on eleven rendered people (six whose first poses were off by 0.05 rad a joint, five
         of whom only pictures were known): 0.75 of their four limbs lay within one deviation of the truth (a normal law:
-        0.68), all within two. Forearms err more than they say (0.45 within one): nothing shows where a straight wrist
+        0.68), all within two. Forearms are off by more (0.45 within one): nothing shows where a straight wrist
         is, and what a forearm lacks the hand has.
         """
         rng = np.random.default_rng(np.random.SeedSequence((seed, 0x5AC)))
@@ -161,7 +162,7 @@ class ShapeRefiner:
         return RefinedShape(best.shape, deviation, best.poses, best.loss, residual)
 
     def _better(self, best: _State, other: _State, frames: Sequence[_Frame]) -> _State:
-        """The best of both, and of where a descent ends that begins with each frame's better pose."""
+        """The best of both states and of a descent from each frame's better pose."""
         taken = other.borders < best.borders
         first = other if other.loss < best.loss else best
         if taken.all() or not taken.any():
@@ -181,7 +182,7 @@ class ShapeRefiner:
         return _Frame(np.ascontiguousarray(np.concatenate(points)), parts, mm, scales)
 
     def _descended(self, shape: Array, poses: Array, frames: Sequence[_Frame]) -> _State:
-        """Where Levenberg-Marquardt ends."""
+        """The state after Levenberg-Marquardt."""
         here, damping = self._state(shape, poses, frames), DAMPING
         for _ in range(STEPS):
             if damping > MOST_DAMPING:
@@ -209,8 +210,8 @@ class ShapeRefiner:
     def _without_poses(
         self, here: _State, damping: float
     ) -> tuple[Array, Array, list[tuple[NDArray[np.int64], Array, Array]]]:
-        """Matrix (S, S) and gradient (S,) of the shape with the poses eliminated; and of each frame the parameters that
-        do not press against a limit, how they follow the shape, and their step where it stays.
+        """Matrix (S, S) and gradient (S,) of the shape with the poses eliminated; and for each frame the parameters
+        that do not press against a limit, their slopes over the shape, and their step at a fixed shape.
         """
         size = here.poses.shape[1]
         matrix, gradient, eliminated = here.matrix.copy(), here.own.copy(), []
@@ -262,7 +263,7 @@ class ShapeRefiner:
         return _State(shape, poses, loss, borders, gradients, matrices, pull, matrix)
 
     def _slopes_of_shape(self, shape: Array, poses: Array) -> Array:
-        """(S, F, V, L, 4, 2) how the corners follow the shape."""
+        """(S, F, V, L, 4, 2) slopes of the corners over the shape."""
 
         def corners(other: Array) -> Array:
             return self._projector.with_program(self._programs.program(other)).corners(poses)[0]

@@ -1,18 +1,18 @@
 """A body's size and its poses in a few frames, found together by annealing a population on the frames' silhouettes.
 
 A particle is a shape (a few logarithms, `body.shape_space`) and a pose in every frame. All frames together in one state
-would be hundreds of dimensions, but given the shape the frames do not depend on each other, so each layer
+would have hundreds of dimensions, but given the shape the frames are independent, so each layer
 
 1. moves the shapes (noise in proportion to the survivors' own spread, Deutscher & Reid 2005, Eq. 18, in full
-   covariance), and with each shape its poses, so that joints stay where they were as well as they can (`carried`):
+   covariance), and with each shape its poses, so that joints move as little as possible (`carried`):
    a longer thigh bends the knee instead of pushing the foot through the floor;
 2. tries in each frame fifteen changes of the pose, each of one limb's parameters or of all, and keeps the best of these
-   and the pose as it was; some are the same limb as another particle has it in that frame (crossover);
-3. weighs each particle by the sum over the frames, with the prior of the shapes, at a sharpness that leaves the wanted
-   share of particles alive (Eqs. 11, 12), and draws the next ones, the best one always among them.
+and the unchanged pose; some are the same limb taken from another particle in that frame (crossover);
+3. weighs each particle by the sum over the frames, with the prior of the shapes, at a β with which the chosen
+share of particles survives (Eqs. 11, 12), and draws the next ones, always keeping the best.
 
-The answer is the mean shape of the last layers' survivors. It finds the valley, limbs that were lost included;
-`shape_refinement` descends to its floor and tells how far the answer can be trusted.
+The answer is the mean shape of the last layers' survivors. It finds the valley, lost limbs included;
+`shape_refinement` descends to its minimum and gives the result's uncertainty.
 """
 
 from collections.abc import Callable
@@ -33,11 +33,11 @@ Progress = Callable[[int, int], None]
 
 SHARPNESS = 250.0
 """Log weight of one frame's f_s from 0 to 1. A person is no set of cones: a hundredth more in f_s may be a fold of
-cloth, so it may not outweigh what is known of people's proportions (in each of five frames: e^12.5)."""
+cloth, so it may not outweigh the prior of people's proportions (in each of five frames: e^12.5)."""
 RIDGE = 0.02
-"""How dear a move of a pose parameter is when poses are carried along, as a share of the Jacobian's size."""
+"""Cost of moving a pose parameter when poses follow the shape, as a share of the Jacobian's size."""
 KEPT = 0.25
-"""Share of the layers, the last ones, that make the answer."""
+"""Share of the layers, the last ones, that are averaged for the result."""
 STEP = 1e-4
 
 
@@ -45,8 +45,8 @@ STEP = 1e-4
 class ShapeSearchSettings:
     """How much is searched. particles : M. layers : in all. survival : share of particles that survive a layer.
 
-    pose_steps : how often the poses of a layer are improved. sought : places that are tried of each limb at first, 0
-    for none.
+    pose_steps : how often the poses of a layer are improved. sought : initial samples of each limb, 0 for
+    none.
     """
 
     particles: int = 24
@@ -150,7 +150,7 @@ class ShapeSearch:
         return moved
 
     def carried(self, shape: Array, pose: Array) -> Array:
-        """(D, S) how a pose follows a change of shape so that the ends of limbs stay as near as they can."""
+        """(D, S) change of a pose over the shape that moves the ends of limbs least."""
         body, scale = self._space.body_of(shape), self._spread
         nudged = pose + np.vstack([np.zeros(len(pose)), np.diag(STEP * scale)])
         ends = limb_ends(body, nudged).reshape(len(nudged), -1)
@@ -194,7 +194,7 @@ class ShapeSearch:
         now.fitness = np.take_along_axis(fitness, best[..., None], axis=2)[..., 0]
 
     def sought(self, poses: Array) -> Array:
-        """(F, D) the poses with each limb where it fits best among many places (`lost_limbs`)."""
+        """(F, D) the poses with each limb at its best of many samples (`lost_limbs`)."""
         shape = np.zeros((1, len(self._sigma)))
 
         def fitness(tried: Array) -> Array:
@@ -221,7 +221,7 @@ class ShapeSearch:
         return np.clip(poses, *self._limits)
 
     def _answer(self, now: _Population, kept: list[tuple[Array, Array]], before: Array) -> FoundShape:
-        """The mean of what survived the last layers, and poses that go with it."""
+        """The mean shape of the last layers' survivors, and poses for it."""
         weights = np.concatenate([one for one, _ in kept]) / len(kept)
         shapes = np.concatenate([one for _, one in kept])
         shape = weights @ shapes
@@ -243,5 +243,5 @@ class ShapeSearch:
 
 
 def tempered(log_weights: Array, survival: float) -> Array:
-    """(M,) normalised weights w^β with β at most 1, smaller where that leaves too few alive."""
+    """(M,) normalised weights w^β with β at most 1, smaller where too few would survive."""
     return np.exp(normalised(log_weights, min(1.0, anneal(log_weights, survival).beta)))

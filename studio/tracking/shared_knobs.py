@@ -11,7 +11,6 @@ LEARNT = "learnt"
 
 
 def diffusion_scale(default: float = 1.0) -> Any:  # noqa: ANN401 - a dataclass field, as `knob` returns it
-    """Multiplies σ0."""
     return knob(
         default, 0.1, 5.0, 0.05, label="diffusion scale", takes_effect="next layer",
         help="Multiplies σ0, the largest expected movement from one frame to the next (Eq. 9).",
@@ -19,15 +18,13 @@ def diffusion_scale(default: float = 1.0) -> Any:  # noqa: ANN401 - a dataclass 
 
 
 def dynamics() -> Any:  # noqa: ANN401
-    """What a frame expects."""
     return next_frame_knob(
         "none", choices=("none", "constant_velocity"),
-        help="What a frame expects before it looks (Eq. 10): the last pose, or the last movement going on.",
+        help="Prediction for the next frame (Eq. 10): the last pose, or the last movement continued.",
     )  # fmt: skip
 
 
 def estimate() -> Any:  # noqa: ANN401
-    """The reported pose of a filter."""
     return knob(
         "mean", choices=("mean", "mode"), takes_effect="next layer",
         help="The pose that is reported: the particles' weighted mean (Eq. 8) or the best of them (Eq. 2).",
@@ -35,15 +32,14 @@ def estimate() -> Any:  # noqa: ANN401
 
 
 def constraints(default: str) -> Any:  # noqa: ANN401
-    """What becomes of a pose that the body cannot take (`hard_priors`)."""
+    """How impossible poses are handled (`hard_priors`)."""
     return knob(
         default, choices=CONSTRAINTS, label="impossible poses", takes_effect="next layer",
-        help="A particle that the body cannot take: drawn again, weighs nothing, set on its limits, or let be.",
+        help="A particle that the body cannot take: drawn again, rejected, set to its limits, or kept.",
     )  # fmt: skip
 
 
 def limbs_apart(default: bool) -> Any:  # noqa: ANN401
-    """Whether limbs may be inside one another."""
     return knob(
         default, label="limbs apart", takes_effect="next layer",
         help="Whether a pose with one limb inside another counts as impossible, beside the joint limits.",
@@ -51,7 +47,6 @@ def limbs_apart(default: bool) -> Any:  # noqa: ANN401
 
 
 def resampling() -> Any:  # noqa: ANN401
-    """How survivors are drawn."""
     return knob(
         "systematic", choices=("systematic", "multinomial"), takes_effect="next layer",
         help="How survivors are drawn: evenly spaced (least noise) or one by one as the paper writes it.",
@@ -59,10 +54,9 @@ def resampling() -> Any:  # noqa: ANN401
 
 
 def start_repeats(default: int = 2) -> Any:  # noqa: ANN401
-    """Searches of a run's first frame."""
     return knob(
         default, 1, 20, 1, label="searches of the first frame", takes_effect="new run",
-        help="How often the first frame is searched over, each search starting where the one before ended.",
+        help="Searches of the first frame, each starting where the one before ended.",
     )  # fmt: skip
 
 
@@ -70,7 +64,7 @@ def prediction() -> Any:  # noqa: ANN401
     """Whether a frame's first set is made by noise or by a behaviour model."""
     return next_frame_knob(
         "noise", choices=PREDICTIONS,
-        help="How a frame's first set is made: noise about the last one, or what a behaviour model expects of it.",
+        help="How a frame's first set is made: noise about the last one, or predicted from it by a behaviour model.",
     )  # fmt: skip
 
 
@@ -83,7 +77,7 @@ def attenuation(default: float) -> Any:  # noqa: ANN401
 
 
 def entering() -> Any:  # noqa: ANN401
-    """What becomes of a particle that enters another cluster (`behaviour.prediction.propagate`)."""
+    """How a particle enters another cluster (`behaviour.prediction.propagate`)."""
     return next_frame_knob(
         "resample", choices=("resample", "blend"), label="entering a cluster",
         help="A particle that enters a motion cluster is drawn from it (5.1), or blended with where it was going.",
@@ -91,15 +85,13 @@ def entering() -> Any:  # noqa: ANN401
 
 
 def global_scale(default: float) -> Any:  # noqa: ANN401
-    """The root's noise beside a model."""
     return next_frame_knob(
         default, 0.02, 2.0, 0.02, label="root's noise",
-        help="Multiplies σ0 of position and orientation, which no model knows, of particles that a model moves (5.2).",
+        help="Multiplies σ0 of position and orientation, which no model covers, of particles that a model moves (5.2).",
     )  # fmt: skip
 
 
 def root_prediction() -> Any:  # noqa: ANN401
-    """What moves the root beside a model."""
     return next_frame_knob(
         LEARNT, choices=(LEARNT, NOISE), label="root's prediction",
         help="How position and orientation move beside a model: as they did in the particle's motion cluster when it "
@@ -108,16 +100,15 @@ def root_prediction() -> Any:  # noqa: ANN401
 
 
 def automaton_share() -> Any:  # noqa: ANN401
-    """Of the particles that a model moves (`behaviour.prediction`)."""
+    """See `behaviour.prediction`."""
     return next_frame_knob(
         0.8, 0.0, 1.0, 0.05, label="automaton's share",
-        help="Share of the particles that change cluster by the automaton's probabilities alone, whatever Eq. 3's "
-        "density says of them; 0 is the paper's Eq. 3.",
+        help="Share of the particles that change cluster by the automaton's probabilities alone, without Eq. 3's "
+        "density; 0 is the paper's Eq. 3.",
     )  # fmt: skip
 
 
 def model_free_share(default: float) -> Any:  # noqa: ANN401
-    """Particles that no model moves."""
     return next_frame_knob(
         default, 0.0, 1.0, 0.05, label="model-free share",
         help="Share of the particles that are spread by σ0 instead of the behaviour model, for motion never learnt.",
@@ -125,7 +116,6 @@ def model_free_share(default: float) -> Any:  # noqa: ANN401
 
 
 def model_free_grows() -> Any:  # noqa: ANN401
-    """Whether their share grows."""
     return next_frame_knob(
         True, label="model-free share grows",
         help="Whether the model-free share grows while its particles weigh more than those that the model moves.",
@@ -133,16 +123,14 @@ def model_free_grows() -> Any:  # noqa: ANN401
 
 
 def online_learning() -> Any:  # noqa: ANN401
-    """Whether a run teaches its model."""
     return knob(
         False, label="online learning", takes_effect="new run",
-        help="Whether the run adds to its behaviour model what it tracked well, every so many frames.",
+        help="Whether the run adds its well tracked frames to its behaviour model at regular intervals.",
     )  # fmt: skip
 
 
 def learning_interval() -> Any:  # noqa: ANN401
-    """How often."""
     return knob(
         60, 10, 2000, 10, label="frames between lessons", takes_effect="new run",
-        help="After how many frames each the model learns from what was tracked so far (online learning).",
+        help="Frames between two updates of the model from the poses tracked so far (online learning).",
     )  # fmt: skip

@@ -1,11 +1,11 @@
-"""Left and right, front and back put right over a whole clip.
+"""Correction of exchanged sides (left and right, front and back) over a whole clip.
 
-Where two limbs cross, or a body is followed from a wrong start, a tracker may go on with its sides exchanged: from the
-outlines of few cameras that hardly shows in a frame. It does in many: a thigh has to begin at the wrong hip, knees bend
-against their joints, feet point backwards. So a tracked clip is looked at once more as a whole. Hypotheses: a pair of
+Where two limbs cross, or a body is followed from a wrong start, a tracker may continue with its sides exchanged: in the
+outlines of few cameras that hardly shows in a single frame. It does in many: a thigh has to begin at the wrong hip,
+knees bend against their joints, feet point backwards. So a tracked clip is examined as a whole. Hypotheses: a pair of
 limbs exchanged (each where its twin is, as near as its joints allow), and the whole body facing the other way with all
-its limbs where their twins are. In a frame they are judged by the loss that is left after each was refined on the
-silhouettes; g = log(loss as tracked / loss exchanged), cut off at ±1, is above 0 where the exchange explains more.
+its limbs where their twins are. In a frame they are judged by the loss after refinement on the silhouettes; g =
+log(loss as tracked / loss exchanged), cut off at ±1, is above 0 where the exchange explains more.
 
 Over the frames the best path is found (A. Viterbi, "Error bounds for convolutional codes", 1967) that minimises
 
@@ -13,10 +13,11 @@ Over the frames the best path is found (A. Viterbi, "Error bounds for convolutio
 
 d : how far the pair's ends move from frame to frame along the path, σ : how far they usually do; so sides change where
 limbs meet, or where the tracker jumped. For the whole body g also counts whether it walks backwards. Not every frame is
-looked at: some a second, those where the track jumps, and, where an exchange is not clearly denied, all until it is.
+examined: some a second, those where the track jumps, and, where an exchange is not clearly ruled out, the frames around
+until it is.
 
 Measured on thirteen rendered clips, default tracker: legs of a sound pose exchanged have g below -0.03 in every frame
-looked at of twelve clips (-0.2 to -0.7 on the mean), in the one with clutter and a wrong calibration 0 at the most and
+examined of twelve clips (-0.2 to -0.7 on the mean), in the one with clutter and a wrong calibration 0 at the most and
 -0.09 on the mean; arms are below -0.06, the body turned below -0.13.
 """
 
@@ -43,23 +44,23 @@ SilhouettesOf = Callable[[int], Mapping[str, Distances]]
 """The silhouettes of a frame by camera."""
 
 GRID_S, BODY_GRID_S = 0.1, 0.5
-"""Seconds between frames that are looked at in any case: for pairs, for the body as a whole."""
+"""Seconds between frames that are always examined: for pairs, for the body as a whole."""
 CLEAR = 0.05
-"""An exchange with g below the negative of this is denied."""
+"""An exchange with g below the negative of this is ruled out."""
 MOST_GAIN = 1.0
 CHANGE, MOTION = 0.3, 0.1
 REFERENCE_FPS, MOST_SHARE = 30.0, 1.5
 STILL_MM_S = 1000.0
 """σ is at least what a limb moves at this speed."""
 JUMP = 4.0
-"""Times σ: a movement that is looked at."""
+"""Times σ: a movement that counts as a jump."""
 WALKED_MM, WALKING_MM_S, BACKWARDS, WINDOW_S = 300.0, 1000.0, 0.1, 0.25
-"""A body that went as far as this counts as going somewhere; g of one that walks backwards at that speed, which is
-taken over a window to either side."""
+"""Least distance of a body that walks; walking speed and its share of g when backwards; the speed is measured over this
+window to either side."""
 NEAR_MM = 40.0
-"""An exchanged pose that is nearer to the tracked one than to where its limbs were to be is none; by so much."""
+"""mm: a refined exchange that is nearer to the tracked pose than to the exchanged one, by this margin, is none."""
 BETTER = 0.02
-"""A neighbour whose g is higher by more than this offers its pose."""
+"""A pose is also tried in neighbouring frames whose g is lower by more than this."""
 NOTABLY = 0.999
 """A loss below this share of another is better."""
 MOST_ROUNDS = 10
@@ -68,7 +69,7 @@ KEPT_SILHOUETTES, SETTLED_TOGETHER = 96, 80
 
 @dataclass(frozen=True, slots=True)
 class Exchange:
-    """Frames first to last (inclusive) in which sides were exchanged. what : in words."""
+    """Frames first to last (inclusive) in which sides were exchanged. what : description."""
 
     first: int
     last: int
@@ -76,13 +77,15 @@ class Exchange:
 
     @property
     def words(self) -> str:
-        """A sentence's half for a run's notes."""
+        """Text for a run's notes."""
         return f"frames {self.first} to {self.last}: {self.what}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Kind:
-    """A way of exchanging sides. limbs : indices of the drawn limbs that it moves. offered : of a pose (D,)."""
+    """A way of exchanging sides. limbs : indices of the drawn limbs that it moves. offered : maps a pose (D,) to the
+    exchanged one.
+    """
 
     what: str
     limbs: Indices
@@ -91,10 +94,10 @@ class Kind:
 
 
 @dataclass(slots=True, eq=False)
-class _Looked:
-    """What is known of a kind. losses : (K,) of each row exchanged, NaN where nobody looked, inf where there is no such
-    pose or nothing is seen. poses : (K, D) exchanged. wanted : by row, where its limbs (P, 3) were to be. odd : (K,)
-    whether it was exchanged in this way and not back again.
+class _Examined:
+    """Results for a kind. losses : (K,) of each row exchanged, NaN where not examined, inf where there is no such pose
+    or nothing is seen. poses : (K, D) exchanged. wanted : by row, the limbs (P, 3) of the exchange before refinement.
+    odd : (K,) whether the row was exchanged an odd number of times.
     """
 
     losses: Array
@@ -150,7 +153,7 @@ def with_sides_right(
 
 
 class _Work:
-    """One clip, as far as it was put right."""
+    """State of the correction of one clip."""
 
     def __init__(
         self,
@@ -163,7 +166,7 @@ class _Work:
     ) -> None:
         self.body, self.frames, self.poses, self._fps = body, frames, poses.copy(), fps
         self._kinds = {
-            kind: _Looked(np.full(len(frames), np.nan), poses.copy(), np.zeros(len(frames), np.bool_))
+            kind: _Examined(np.full(len(frames), np.nan), poses.copy(), np.zeros(len(frames), np.bool_))
             for kind in kinds_of(body)
         }
         self._cameras = {camera.name: camera for camera in cameras}
@@ -174,14 +177,14 @@ class _Work:
         self._share = min(REFERENCE_FPS / fps, MOST_SHARE)
 
     def put_right(self) -> bool:
-        """Exchange what the best path of the kind exchanges that gains most; False where none gains."""
+        """Apply the best path of the kind with the largest gain; False where no kind gains."""
         kinds = list(self._kinds) if len(self.frames) else []
         for row, at in sorted((row, at) for at, kind in enumerate(kinds) for row in self._grid(kind)):
-            self._look(kinds[at], row)
+            self._examine(kinds[at], row)
         best, most = None, 0.0
         for kind in kinds:
             backwards = BACKWARDS * self._backwards() if kind.whole else np.zeros(len(self.frames))
-            self._look_about(kind, backwards)
+            self._examine_around(kind, backwards)
             gains = np.array([self._gain(kind, row) for row in range(len(self.frames))])
             gains = np.clip(np.where(np.isneginf(gains), np.nan, gains), -MOST_GAIN, MOST_GAIN)
             exchanged, gained = best_path(self._share * (gains + backwards), self._movements(kind))
@@ -198,10 +201,10 @@ class _Work:
         return True
 
     def changes(self, tracked: Array) -> tuple[Exchange, ...]:
-        """What was exchanged in the end. tracked : the poses (K, D) to begin with."""
-        anew = (self.poses != tracked).any(axis=1)
-        marked = {kind.what: looked.odd for kind, looked in self._kinds.items()}
-        marked["fitted anew"] = anew & ~np.any([*marked.values(), np.zeros_like(anew)], axis=0)
+        """The exchanges that were made. tracked : the original poses (K, D)."""
+        changed = (self.poses != tracked).any(axis=1)
+        marked = {kind.what: examined.odd for kind, examined in self._kinds.items()}
+        marked["refitted"] = changed & ~np.any([*marked.values(), np.zeros_like(changed)], axis=0)
         found = [
             Exchange(int(self.frames[rows[0]]), int(self.frames[rows[-1]]), what)
             for what, rows_marked in marked.items()
@@ -209,23 +212,23 @@ class _Work:
         ]
         return tuple(sorted(found, key=lambda change: change.first))
 
-    # ------------------------------------------------------------------ frames that are looked at
+    # ------------------------------------------------------------------ frames that are examined
 
     def _grid(self, kind: Kind) -> list[int]:
-        """Rows that are looked at in any case."""
+        """Rows that are always examined."""
         step = max(1, round((BODY_GRID_S if kind.whole else GRID_S) * self._fps))
         ends = self._ends(kind, self.poses)
         jumped = _moved(ends[1:], ends[:-1]) > JUMP * self._usual(ends)
         jumps = np.flatnonzero(jumped).tolist()
         return sorted({*range(0, len(ends), step), len(ends) - 1, *jumps, *(row + 1 for row in jumps)})
 
-    def _look_about(self, kind: Kind, backwards: Array) -> None:
-        """Look at all frames about those in which an exchange is not clearly denied, the likeliest first, and offer
-        each the poses of its neighbours that are better explained.
+    def _examine_around(self, kind: Kind, backwards: Array) -> None:
+        """Examine the neighbours of frames in which an exchange is not clearly ruled out, the likeliest first, and try
+        in each the poses of neighbours with a higher g.
         """
-        looked = self._kinds[kind]
+        examined = self._kinds[kind]
         waiting = [
-            (-self._gain(kind, int(row)), int(row)) for row in np.flatnonzero(np.isfinite(looked.losses))
+            (-self._gain(kind, int(row)), int(row)) for row in np.flatnonzero(np.isfinite(examined.losses))
         ]
         waiting = [(gain, row) for gain, row in waiting if backwards[row] - gain >= -CLEAR]
         heapq.heapify(waiting)
@@ -235,52 +238,52 @@ class _Work:
                 if not 0 <= near < len(self.frames):
                     continue
                 known = self._gain(kind, near)
-                self._look(kind, near)
-                if near in looked.wanted and self._gain(kind, near) < -gain - BETTER:
-                    self._offer(kind, near, looked.poses[row], row)
+                self._examine(kind, near)
+                if near in examined.wanted and self._gain(kind, near) < -gain - BETTER:
+                    self._offer(kind, near, examined.poses[row], row)
                 reached = self._gain(kind, near)
                 if reached != known and reached + backwards[near] >= -CLEAR:
                     heapq.heappush(waiting, (-reached, near))
 
     def _gain(self, kind: Kind, row: int) -> float:
-        """g of a row, NaN where nobody looked, -inf where there is no such pose."""
+        """g of a row, NaN where not examined, -inf where there is no such pose."""
         there = self._kinds[kind].losses[row]
         return float(np.log(self._tracked(row)[1] / there)) if there < np.inf else -there
 
-    def _look(self, kind: Kind, row: int) -> None:
-        looked = self._kinds[kind]
-        if not np.isnan(looked.losses[row]):
+    def _examine(self, kind: Kind, row: int) -> None:
+        examined = self._kinds[kind]
+        if not np.isnan(examined.losses[row]):
             return
-        looked.losses[row] = np.inf
+        examined.losses[row] = np.inf
         if self._tracked(row)[1] > 0.0:
             offered = kind.offered(self.poses[row])
-            looked.wanted[row] = self._ends(kind, offered[None])
+            examined.wanted[row] = self._ends(kind, offered[None])
             self._offer(kind, row, offered)
 
     def _offer(self, kind: Kind, row: int, offered: Array, beside: int = -1) -> None:
-        """Refine a pose that is offered, and keep it where it is better than what is known and did not slide back.
-        beside : the row that it comes from; what was tracked there is then offered to what is tracked here as well.
+        """Refine a proposed pose, and keep it where it is better than the known one and did not return to the tracked
+        pose. beside : the row that it comes from; the tracked pose there is then also tried as the tracked pose here.
         """
-        looked, tracked = self._kinds[kind], self._tracked(row)
+        examined, tracked = self._kinds[kind], self._tracked(row)
         if beside >= 0:
             other = self._refined(row, self._tracked(beside)[0])
             self._here[row] = other if other[1] < NOTABLY * tracked[1] else tracked
         pose, loss = self._refined(row, offered)
         before, after = self._ends(kind, np.stack([self.poses[row], pose]))[:, None]
         if (
-            loss < NOTABLY * looked.losses[row]
-            and _moved(after, looked.wanted[row]) < _moved(after, before) + NEAR_MM
+            loss < NOTABLY * examined.losses[row]
+            and _moved(after, examined.wanted[row]) < _moved(after, before) + NEAR_MM
         ):
-            looked.losses[row], looked.poses[row] = loss, pose
+            examined.losses[row], examined.poses[row] = loss, pose
 
     def _tracked(self, row: int) -> tuple[Array, float]:
-        """What is tracked in a row, refined, and its loss."""
+        """The tracked pose of a row, refined, and its loss."""
         if row not in self._here:
             self._here[row] = self._refined(row, self.poses[row])
         return self._here[row]
 
     def _refined(self, row: int, pose: Array) -> tuple[Array, float]:
-        """A pose on a row's silhouettes, and the loss that is left; 0 where nothing is seen."""
+        """A pose refined on a row's silhouettes, and its loss; 0 where nothing is seen."""
         refiner, silhouettes = self._sight(row)
         if not any(len(view.border) for view in silhouettes):
             return pose, 0.0
@@ -306,12 +309,12 @@ class _Work:
         return limb_ends(self.body, poses)[:, kind.limbs].reshape(len(poses), -1, 3)
 
     def _usual(self, ends: Array) -> float:
-        """σ, mm a frame."""
+        """σ, the usual movement, mm a frame."""
         moved = _moved(ends[1:], ends[:-1])
         return max(float(np.median(moved)) if len(moved) else 0.0, STILL_MM_S / self._fps)
 
     def _movements(self, kind: Kind) -> Array:
-        """(K - 1, 2, 2) what movements cost from as tracked, exchanged (before) to as tracked, exchanged (after)."""
+        """(K - 1, 2, 2) cost of moving from tracked, exchanged (before) to tracked, exchanged (after)."""
         both = [self._ends(kind, self.poses), self._ends(kind, self._kinds[kind].poses)]
         costs = np.zeros((len(self.frames) - 1, 2, 2))
         if not len(costs):
@@ -324,7 +327,7 @@ class _Work:
         return costs
 
     def _backwards(self) -> Array:
-        """(K,) -1 to 1: how fast the body goes backwards, 1 at a walk; 0 where it stays in place."""
+        """(K,) -1 to 1: backward speed of the body, 1 at walking speed; 0 where it stays in place."""
         mirror, places = Mirror(self.body), limb_ends(self.body, self.poses).mean(axis=(1, 2))[:, :2]
         count, reach = len(places), max(1, round(WINDOW_S * self._fps))
         if np.ptp(places, axis=0).max() < WALKED_MM:
@@ -339,12 +342,12 @@ class _Work:
 
     # ------------------------------------------------------------------ what is kept
 
-    def _settle(self, rows: Indices, looked: _Looked) -> None:
-        """Take the offered poses of some rows; each again from its neighbours' where that ends better."""
+    def _settle(self, rows: Indices, examined: _Examined) -> None:
+        """Take the exchanged poses of some rows, refined again from their neighbours' poses where that is better."""
         found: dict[int, tuple[Array, float]] = {}
         for first in range(0, len(rows), SETTLED_TOGETHER):
             part = rows[first : first + SETTLED_TOGETHER].tolist()
-            found.update({row: (looked.poses[row], self._loss(row, looked.poses[row])) for row in part})
+            found.update({row: (examined.poses[row], self._loss(row, examined.poses[row])) for row in part})
             known = [row - 1 for row in part[:1] if row - 1 in found]
             for order in (known + part, part[::-1]):
                 for before, row in itertools.pairwise(order):
@@ -360,7 +363,7 @@ class _Work:
 
 
 def best_path(gains: Array, movements: Array) -> tuple[NDArray[np.bool_], float]:
-    """(K,) whether each frame is exchanged on the best path, and how much less that costs than no exchange at all.
+    """(K,) whether each frame is exchanged on the best path, and its gain over no exchange.
 
     gains : (K,) of the exchange, NaN where there is none to be had. movements : (K - 1, 2, 2) costs of going from a
     frame to the next, by whether they are exchanged.

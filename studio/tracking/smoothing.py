@@ -1,15 +1,16 @@
 """Smoothing of found poses: the Rauch-Tung-Striebel smoother with a constant-acceleration model.
 
 Every parameter is a point whose jerk is white noise, seen with noise once a frame (H. E. Rauch, F. Tung and C. T.
-Striebel, "Maximum likelihood estimates of linear dynamic systems", AIAA Journal 3(8), 1965). What matters is only the
-ratio of the two noises, and that is said by a frequency: in the middle of a long track the smoother is the zero-phase
-low-pass filter 1 / (1 + (f / f_c)⁶), so f_c is where movement is halved, in Hz, the same for angles and lengths. Time
-is counted in frames and noise in units of a sure measurement's, so all parameters share one recursion of covariances.
+Striebel, "Maximum likelihood estimates of linear dynamic systems", AIAA Journal 3(8), 1965). Only the
+ratio of the two noises matters, and is given as a frequency: in the middle of a long track the smoother is the
+zero-phase low-pass filter 1 / (1 + (f / f_c)⁶), so f_c is where movement is halved, in Hz, the same for angles and
+lengths. Time is counted in frames and noise in units of a sure measurement's, so all parameters share one recursion of
+covariances.
 
-A frame's measurement is the less trusted the lower its confidence; lost frames and those below a least confidence are
-no measurements. What lies between is filled while it is short, with uncertainty that grows towards its middle; longer
+A measurement's variance grows as its confidence falls; lost frames and those below a least confidence are no
+measurements. Gaps are filled while they are short, with uncertainty that grows towards its middle; longer
 gaps stay gaps, and the track is smoothed in stretches on both sides of them. Nothing is smoothed across a jump of an
-angle either: that is another way to spell a pose, or a body found again.
+angle either: there the pose is written by other angles, or the body was found again.
 """
 
 import itertools
@@ -36,8 +37,8 @@ LEAST_TRUST = 0.1
 
 TRANSITION = np.array([[1.0, 1.0, 0.5], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0]])
 JERK = np.array([[1 / 20, 1 / 8, 1 / 6], [1 / 8, 1 / 3, 1 / 2], [1 / 6, 1 / 2, 1.0]])
-"""Place, velocity and acceleration from frame to frame, and what white jerk of unit density adds to their
-covariance."""
+"""Transition of place, velocity and acceleration from frame to frame, and the covariance of white jerk of unit
+density."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +64,7 @@ class SmoothingSettings:
 class Smoothed:
     """A smoothed track. frames : (K,), gaps left out. poses : (K, D). spread : (K, D) standard deviation of every
     parameter, rad and mm. filled : (K,) frames without a measurement of their own. left_out : frames that were
-    measured but not believed and lie in gaps too long to fill. rests : (D,) root mean square of what was taken away.
+    measured but rejected and lie in gaps too long to fill. rests : (D,) root mean square of the removed residual.
     """
 
     frames: IntArray
@@ -87,12 +88,12 @@ def smooth(
     """Smooth a track; see `Smoothed`.
 
     frames : (K,) ascending. poses : (K, D). confidence : (K,) 0 to 1 or NaN. states : K. angles : (D,) which
-    parameters are angles. Raises SettingsError where no frame may be believed.
+    parameters are angles. Raises SettingsError where no frame is trusted.
     """
-    believed = _believed(confidence, states, settings)
+    believed = _trusted(confidence, states, settings)
     if not believed.any():
         raise SettingsError(
-            f"None of the track's {len(frames)} frames is sure enough to be smoothed.",
+            f"None of the track's {len(frames)} frames is confident enough to be smoothed.",
             "Lower the least confidence, or track the run again.",
         )
     numbers, rows = frames[believed], poses[believed].copy()
@@ -107,7 +108,7 @@ def smooth(
     placed = np.clip(np.concatenate([part[1] for part in parts]), space.lower, space.upper)
     measured = np.isin(whole, numbers)
     rests = np.sqrt(np.mean((placed[measured] - rows) ** 2, axis=0))
-    # A smoothed place is off by less than a measurement by as much as its variance is smaller.
+    # The error of a smoothed place is smaller than a measurement's by the ratio of their deviations.
     spread = np.sqrt(np.concatenate([part[2] for part in parts]))[:, None] * rests
     return Smoothed(whole, placed, spread, ~measured, np.setdiff1d(frames, whole), rests)
 
@@ -122,13 +123,13 @@ def rms_second_difference(points: Array) -> float:
     return float(np.sqrt(np.mean(np.sum(second**2, axis=-1))))
 
 
-def _believed(confidence: Array, states: tuple[str, ...], settings: SmoothingSettings) -> Flags:
+def _trusted(confidence: Array, states: tuple[str, ...], settings: SmoothingSettings) -> Flags:
     lost = np.array([state in (LOST, NO_EVIDENCE) for state in states], dtype=np.bool_)
     return ~lost & ~(confidence < settings.least_confidence)
 
 
 def _noise(confidence: Array) -> Array:
-    """(K,) variance of each measurement in units of a usual one's: 1 at the median confidence, or where unknown."""
+    """(K,) variance of each measurement in units of the usual one: 1 at the median confidence, or where unknown."""
     known = np.isfinite(confidence)
     usual = float(np.median(confidence[known])) if known.any() else 1.0
     share = np.where(known, confidence, usual) / max(usual, 1e-9)

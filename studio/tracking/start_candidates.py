@@ -1,8 +1,8 @@
-"""Poses that the search for a start pose begins with: every heading, many attitudes of the limbs, laid on the hull.
+"""Initial poses of the search for a start pose: all headings, many attitudes of the limbs, placed on the hull.
 
 An attitude's own middle is laid on the hull's mean (Caillette, Galata & Howard 2007, section 6.2, Fig. 7). Headings are
 taken all around, evenly: the hull of a person who stands is about as deep as wide, and limbs turn its axes. Lying and
-upside down are among the candidates where the hull's longest axis asks for it.
+upside-down candidates are added where the hull's longest axis suggests them.
 """
 
 from dataclasses import dataclass
@@ -25,9 +25,9 @@ HEADINGS = 16
 NARROW, WIDE = 0.12, 0.25
 """Standard deviations of the attitudes drawn about the rest pose, as shares of the joints' ranges; half of each."""
 MIDDLE_SHARE = 0.5
-"""Of each side of the box, where there is no hull."""
+"""Share of each side of the box that is sampled where there is no hull."""
 UPRIGHT = 0.6
-"""A hull whose longest axis is at least so vertical (cosine) is of somebody who stands, on feet or hands."""
+"""A hull whose longest axis is at least so vertical (cosine) is of a person standing, on feet or hands."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,8 +51,8 @@ def start_candidates(
 ) -> StartCandidates:
     """Candidates of `per_family` poses for each of HEADINGS headings, and more where the hull lies.
 
-    hull : where the body is; None or empty: anywhere in the middle of the `box`. prototypes : (K, D) poses that the
-    body is known to take: half of each family's attitudes are drawn from them.
+    hull : where the body is; None or empty: anywhere in the middle of the `box`. prototypes : (K, D) known poses of
+    the body: half of each family's attitudes are drawn from them.
     """
     attitudes = _attitudes(rng, body, per_family * HEADINGS, prototypes)
     root = root_parameters(body)
@@ -70,13 +70,13 @@ def start_candidates(
 
 
 def facing(body: BodyModel, poses: Array) -> Array:
-    """(N, 3) where the root of poses (N, D) faces: its own x axis, unit vectors in the world."""
+    """(N, 3) facing direction of poses (N, D): the root's x axis as unit vectors in the world."""
     root = next(index for index, joint in enumerate(body.joints) if joint.parent < 0)
     return joint_frames(body, poses)[:, root, :, 0]
 
 
 def _attitudes(rng: np.random.Generator, body: BodyModel, count: int, prototypes: Array | None) -> Array:
-    """(count, D) attitudes of all joints; what has no limits stays at rest."""
+    """(count, D) attitudes of all joints; parameters without limits stay at rest."""
     lower, upper = (
         np.array([getattr(entry, end) for entry in body.parameters]) for end in ("lower", "upper")
     )
@@ -98,8 +98,8 @@ def _places(rng: np.random.Generator, body: BodyModel, box: Box, count: int) -> 
 
 
 def _roots(body: BodyModel, hull: Hull | None, root: IntArray) -> Array:
-    """(R, D) the rest pose turned about the vertical to every heading; then, where the hull lies or may be of somebody
-    upside down, laid on its principal axes.
+    """(R, D) the rest pose turned about the vertical to every heading; then, where the hull lies or may be upside
+    down, placed on its principal axes.
     """
     number = next(index for index, joint in enumerate(body.joints) if joint.parent < 0)
     frame = joint_frames(body, body.neutral)[0, number]

@@ -1,7 +1,7 @@
-"""The steps by which a search for a start pose improves one pose: whole, limb by limb, pair by pair.
+"""Improvement steps of the search for a start pose: whole, limb by limb, pair by pair.
 
-Every step takes its own random numbers and holds nothing that changes but a count, so that several poses can be
-improved at once.
+Every step takes its own random numbers and changes no state but a count, so that several poses can be improved in
+parallel.
 """
 
 import dataclasses
@@ -25,10 +25,10 @@ IntArray = NDArray[np.int64]
 FILTER = AnnealedParticleFilter()
 LIMB_LAYERS, WHOLE_LAYERS = 5, 10
 DRAWN = 6
-"""Poses of a limb that are weighed for each that is annealed; two thirds over its whole range, the others about it."""
+"""Poses of a limb weighed for each one annealed; two thirds over its whole range, the others about its pose."""
 NEAR = 0.12
 PLACED, COMBINED = 400, 20
-"""Places tried for each limb of a pair while the other rests, and how many of the best are tried together."""
+"""Poses tried for each limb of a pair while the other is fixed, and how many of the best are combined."""
 IMPOSSIBLE = 1e6
 OPPOSITE_LINES = 2
 """Lines that face the other way than the best one and are kept whatever they weigh."""
@@ -63,10 +63,10 @@ class Line:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AtEase:
-    """A problem in which bodies would rather be at ease: COMFORT × the mean over the joints of ((angle - at rest) ÷
-    range)² is taken from the log weight, a camera.
+    """A frame's likelihood with a prior towards the rest pose: COMFORT × the mean over the joints of ((angle - at rest)
+    ÷ range)² is subtracted from the log weight, per camera.
 
-    Without it arms are found twisted and legs crossed wherever that explains a flaw of a mask; the joints of people in
+    Without it arms are twisted and legs crossed wherever that explains a flaw of a mask; the joints of people in
     random poses lie 0.02 to 0.05 from rest in this measure, those of wrong poses of equal weight 0.05 to 0.1.
 
     rest : (D,). scale : (D,) 1 ÷ (joints × range²), 0 for what has no limits. strength : COMFORT × cameras.
@@ -79,13 +79,13 @@ class AtEase:
 
     @classmethod
     def of(cls, problem: FrameProblem, space: SearchSpace, rest: Array, cameras: int) -> "AtEase":
-        """The problem of a frame, with a body's limits."""
+        """A frame's likelihood with the prior for a body's limits."""
         bounded = limited(space) & (space.hierarchy.depth > 0)
         ranges = np.where(bounded, space.upper - space.lower, np.inf)
         return cls(problem, rest, ranges**-2.0 / max(1, np.count_nonzero(bounded)), cameras * COMFORT)
 
     def penalty(self, poses: Array) -> Array:
-        """(N,) what is taken from the log weights of poses (N, D)."""
+        """(N,) penalty on the log weights of poses (N, D)."""
         return self.strength * ((poses - self.rest) ** 2 @ self.scale)
 
     def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
@@ -114,8 +114,8 @@ class LineSteps:
     def improved(
         self, rng: np.random.Generator, line: Line, others: Sequence[Line], noise: Array, entry: Round
     ) -> Line:
-        """The line, or a better one near it: its limbs one by one, two by two, then all of it with noise (D,). others
-        : whose limbs are tried on it.
+        """The line, or a better one near it: its limbs one by one, two by two, then all of it with noise (D,). others :
+        lines whose limbs are tried on it.
         """
         for number in rng.permutation(len(self._limbs)):
             line = self._with_limb(rng, line, self._limbs[number], others, entry.limb_particles)
@@ -152,7 +152,7 @@ class LineSteps:
     def _with_limb(
         self, rng: np.random.Generator, line: Line, limb: IntArray, others: Sequence[Line], count: int
     ) -> Line:
-        """The line with one limb searched over all that it can do, or taken from another line."""
+        """The line with one limb searched over its whole range, or taken from another line."""
         drawn = np.repeat(line.pose[None], DRAWN * count, axis=0)
         lower, upper = self._space.lower[limb], self._space.upper[limb]
         far = len(drawn) * 2 // 3
@@ -172,8 +172,8 @@ class LineSteps:
         others: Sequence[Line],
         count: int,
     ) -> Line:
-        """The line with both arms, or both legs, placed anew: where one covers what belongs to the other, neither can
-        move alone.
+        """The line with both arms, or both legs, resampled: where one covers the other's silhouette, neither can move
+        alone.
         """
         places: list[Array] = []
         for limb, other in (pair, pair[::-1]):

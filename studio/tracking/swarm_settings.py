@@ -24,7 +24,7 @@ class SwarmSettings:
 
     stage1_particles: int = next_frame_knob(
         10, 2, 2000, 1, label="particles, stage 1",
-        help="Particles of the first stage, which seeks the root: where the body stands and how it is turned.",
+        help="Particles of the first stage, which searches for the root: position and orientation of the body.",
     )  # fmt: skip
     stage1_iterations: int = next_frame_knob(
         20, FEWEST_ITERATIONS, 400, 1, label="iterations, stage 1",
@@ -32,7 +32,7 @@ class SwarmSettings:
     )  # fmt: skip
     stage2_particles: int = next_frame_knob(
         20, 2, 2000, 1, label="particles, stage 2",
-        help="Particles of the stages after the first, which seek the whole pose.",
+        help="Particles of the stages after the first, which search for the whole pose.",
     )  # fmt: skip
     stage2_iterations: int = next_frame_knob(
         40, FEWEST_ITERATIONS, 400, 1, label="iterations, stage 2",
@@ -48,15 +48,15 @@ class SwarmSettings:
     )  # fmt: skip
     partition: str = next_frame_knob(
         "soft", choices=PARTITIONS,
-        help="What is sought first, and whether it may move later: each choice weighs as many poses.",
+        help="Which parameters are searched first, and whether they move later; every choice weighs as many poses.",
     )  # fmt: skip
     start_velocity: str = next_frame_knob(
         "uniform", choices=("uniform", "zero"), label="start velocity",
-        help="Velocities at a stage's start: drawn from -σ to σ as the paper has them, or zero.",
+        help="Velocities at a stage's start: drawn from -σ to σ as in the paper, or zero.",
     )  # fmt: skip
     position_divisor: float = next_frame_knob(
         10.0, 1.0, 100.0, 0.5, label="position divisor",
-        help="What σ of the root's position is divided by in the soft stages after the first (2.4).",
+        help="Divisor of the root position's σ in the soft stages after the first (2.4).",
     )  # fmt: skip
     diffusion_scale: float = shared_knobs.diffusion_scale()
     dynamics: str = shared_knobs.dynamics()
@@ -98,7 +98,7 @@ class SwarmSettings:
         return self.stage1_particles * self.stage1_iterations + self.stage2_particles * self.stage2_iterations
 
     def _stages_sharing(self, name: str) -> int:
-        """How many stages the iterations are shared out to."""
+        """Number of stages that share the iterations."""
         shared = {
             ("soft-three", "stage2_iterations"): 2,
             ("global-local", "stage1_iterations"): KINDS_OF_LIMBS,
@@ -112,7 +112,7 @@ def _check_iterations(name: str, iterations: int, stages: int) -> None:
         over = f" over {stages} stages" if stages > 1 else ""
         raise SettingsError(
             f"Setting '{name}' leaves {iterations} iterations{over}: Eq. 2 needs more than 2 in each.",
-            f"Ask for {FEWEST_ITERATIONS * stages} iterations or more.",
+            f"Give {FEWEST_ITERATIONS * stages} iterations or more.",
         )
 
 

@@ -1,6 +1,6 @@
 """The contract of every tracker, and the values that pass between its methods.
 
-A tracker holds nothing that changes in a run: all else is an argument, so moving a slider is calling the same
+A tracker is immutable: everything that changes in a run is an argument, so moving a slider is calling the same
 function with another argument. A swarm's iteration, a filter's annealing level and Condensation's single step
 are all "layers", counted from 0 in the order they are run (the paper's layer m of M is our layer M - m).
 """
@@ -23,19 +23,19 @@ Value = bool | int | float | str
 TRACKED, LOST, NO_EVIDENCE, RECOVERED = "tracked", "lost", "no evidence", "recovered"
 LIMB_LOST = "limb lost"
 TRACKING_STATES = (TRACKED, LOST, NO_EVIDENCE, RECOVERED, LIMB_LOST)
-"""How a frame went. Lost: its pose does not explain the pictures. No evidence: nothing is to be seen, the pose is held.
+"""State of a frame. Lost: its pose does not explain the pictures. No evidence: no body is visible, the pose is held.
 Recovered: tracked again by a search for the body, having been lost. Limb lost: the body is followed, but the
-silhouettes deny one of its limbs (`FrameResult.limbs_lost`)."""
+silhouettes contradict one of its limbs (`FrameResult.limbs_lost`)."""
 
 LIMB_LOST_SHARE = 0.06
-"""Of a limb's area: beyond this share it is lost. On the choosing half of the drawn suite (eleven clips, refined; lost:
-a marker of the limb more than 150 mm off) it names 18 of 18 lost frames of the default tracker and 85 of 92 of one
-crippled to twenty evaluations, and 2.2 and 1.6 % of the others."""
+"""Disagreeing share of a limb's area beyond which it is lost. On the validation half of the suite (eleven clips; lost:
+a marker of the limb more than 150 mm off) it finds 18 of 18 lost frames of the default tracker and 85 of 92 of one
+reduced to twenty evaluations, and flags 2.2 and 1.6 % of the others."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hierarchy:
-    """How the pose vector hangs together, for searches that take a part of it at a time; all arrays are (D,).
+    """Structure of the pose vector, for searches that take a part of it at a time; all arrays are (D,).
 
     depth : int, 0 for the root's parameters, 1 for what is nearest to it (trunk, head, hips, shoulders), 2 for
     the rest of each limb. position : bool, the root's lengths. subspace : int, 0, 1, … in the order of the tree:
@@ -51,12 +51,12 @@ class Hierarchy:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SearchSpace:
-    """What a tracker knows of the pose vector.
+    """The pose vector's limits, noise and structure, and the behaviour model.
 
     names : D parameter names. lower, upper : (D,) limits, ±inf where unbounded. sigma : (D,) σ0, the standard
     deviation of the diffusion from one frame to the next (mm, rad). limb : (D,) int, equal numbers belong to
     one limb and are neighbours (crossover by whole limbs). hierarchy : the body's tree (a swarm's partitions).
-    behaviour : what the body tends to do, at the footage's rate; None where a run has no model. steps : frames
+    behaviour : the behaviour model at the footage's rate; None where a run has none. steps : frames
     since the last one that was tracked (a live run drops some); sigma is for all of them, the model takes each.
     """
 
@@ -86,17 +86,17 @@ class ParticleSet:
 
 
 HIDDEN = "hidden "
-"""Begins the names under which a camera's hidden areas are handed on."""
+"""Prefix of the names of a camera's hidden areas in `Carried.memory`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Carried:
-    """What one frame hands to the next; also how a run starts.
+    """State that one frame passes to the next; also the start of a run.
 
     particles : the weighted set at the end of the frame; None = start uniformly over the space's limits.
     estimate, previous_estimate : (D,) the last two reported poses (dynamics, Eq. 10); None where there is
-    none yet. memory : what the weighting learnt so far (`weighting.problem.Expectant`), and under names that begin with
-    HIDDEN what stands before the body (`hidden_areas`); trackers hand both on unread.
+    none yet. memory : the likelihood's state (`weighting.problem.Expectant`), and under names that begin with HIDDEN
+    the occluded areas (`hidden_areas`); trackers pass both on unread.
     """
 
     particles: ParticleSet | None
@@ -106,7 +106,7 @@ class Carried:
 
 
 def start_of(pose: tuple[float, ...] | None) -> Carried:
-    """What a run starts from: one particle at the start pose, or (None) nothing, for a uniform start.
+    """Start state of a run: one particle at the start pose, or none (pose None) for a uniform start.
 
     A start pose is no estimate: the way from it to the first frame's result is no velocity (Eq. 10).
     """
@@ -130,7 +130,7 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LayerRecord:
-    """All that a person may want to look at of one layer.
+    """Diagnostics of one layer.
 
     frame, layer : layer counts from 0. settings_version : of the settings in use. beta : exponent of Eq. 3.
     alpha_wanted, alpha_reached : survival rate (Eq. 12). All three are NaN for trackers without them (a swarm).
@@ -164,8 +164,8 @@ class LayerRecord:
 class FrameResult:
     """The result of one frame. evaluations : poses weighed. carried : what the next frame starts from. tracking : one
     of TRACKING_STATES. overlap : how well the silhouettes of pose and masks agree (f_s, 0 to 1), NaN where unknown.
-    doubts : frames in a row, this one included, that looked lost. disagreement : of each limb the share of its area
-    that silhouettes and pose do not agree about (`agreement.Disagreement.shares`); empty where nothing was compared.
+    doubts : frames in a row, this one included, that looked lost. disagreement : by limb the share of its area in which
+    silhouettes and pose disagree (`agreement.Disagreement.shares`); empty where nothing was compared.
     """
 
     frame: int
@@ -182,13 +182,13 @@ class FrameResult:
 
     @property
     def limbs_lost(self) -> tuple[str, ...]:
-        """Limbs that the silhouettes deny."""
+        """Limbs that the silhouettes contradict."""
         return tuple(name for name, share in self.disagreement.items() if share > LIMB_LOST_SHARE)
 
 
 @dataclass(frozen=True, slots=True)
 class Preset:
-    """Ready-made settings. name : words on screen. help : what it is for, one sentence. values : knobs by flat name."""
+    """Ready-made settings. name : shown on screen. help : its purpose, one sentence. values : knobs by flat name."""
 
     name: str
     help: str
@@ -197,19 +197,19 @@ class Preset:
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """A tracker with knobs that have a name. help : what it is, one line. changes : knobs by flat name."""
+    """A named variant of a tracker. help : one line. changes : knobs by flat name."""
 
     help: str
     changes: Mapping[str, Value]
 
 
 class Tracker(ABC):
-    """A stochastic search of one frame, a layer at a time, with all that the studio asks of its kind.
+    """A stochastic search of one frame, a layer at a time, and its registry entry.
 
     name : its key in the catalogue. label : its name on screen. settings_type : the frozen dataclass of its knobs, with
     `start_repeats` among them. The rest has defaults. size_knobs : knobs that say how much is searched, of each stage
-    those that are multiplied. needs_behaviour : it cannot go without a behaviour model. scales_likelihood : it
-    multiplies log w by a scale of its own (`beta` of its records). score : what the best particle is reported by, and
+    those that are multiplied. needs_behaviour : it requires a behaviour model. scales_likelihood : it
+    multiplies log w by its own scale (`beta` of its records). score : name of the best particle's reported value, and
     its unit. variants : known changes, by label, for comparisons. presets : for the pages, offered where a run has all
     knobs that they set.
     """
@@ -229,16 +229,16 @@ class Tracker(ABC):
         return self.layer_count(settings) * settings.particles
 
     def evaluation_knobs(self, evaluations: int, layers: int) -> dict[str, int]:
-        """Knobs with which about so many poses are weighed a frame. layers : wanted, where they can be chosen."""
+        """Knobs with which about `evaluations` poses are weighed a frame. layers : used where they can be chosen."""
         return {"particles": round(evaluations / self.layer_count(self.settings_type()))}
 
     def least_evaluations(self, layers: int) -> int:
-        """The fewest evaluations a frame that it can be given. layers : as in `evaluation_knobs`."""
+        """Least possible evaluations a frame. layers : as in `evaluation_knobs`."""
         return 2 * self.layer_count(self.settings_type())
 
     @abstractmethod
     def layer_count(self, settings: Any) -> int:  # noqa: ANN401 - the tracker's own settings_type
-        """How many layers a frame takes."""
+        """Number of layers of a frame."""
 
     @abstractmethod
     def begin_frame(
@@ -272,7 +272,7 @@ class Tracker(ABC):
 
 @runtime_checkable
 class Foreseeing(Protocol):
-    """A tracker that can say where it expects the body in several places at once (motion clusters, say)."""
+    """A tracker that can expect several poses at once (of motion clusters, for example)."""
 
     def expectations(self, particles: ParticleSet, space: SearchSpace, settings: Any) -> Array:  # noqa: ANN401
         """(S, D) expected poses, the likeliest first, from the unweighted set that the first layer will weigh."""

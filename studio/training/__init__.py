@@ -1,1 +1,1 @@
-"""Behaviour models out of recorded motion: reading, retargeting, oversampling, learning."""
+"""Behaviour models from recorded motion: reading, retargeting, oversampling, learning."""

@@ -1,4 +1,4 @@
-"""From recordings to a behaviour model: training and test material, learning, and what came out in numbers."""
+"""From recordings to a behaviour model: training and test material, learning, and the result in numbers."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ FEWEST_FOR_A_TEST = 20
 
 @dataclass(frozen=True, slots=True)
 class Learnt:
-    """What was learnt. frames : of training, oversampled. recorded_frames, test_frames : as they were read.
+    """The result of learning. frames : of training, oversampled. recorded_frames, test_frames : as read.
 
     entropy_train, entropy_test : Eq. 2 of Caillette et al. in nats a frame; the test's is NaN without a test.
     """
@@ -49,24 +49,26 @@ def read_sources(
     workspace: Workspace | None = None,
     progress: Progress | None = None,
 ) -> tuple[Recording, ...]:
-    """All sources in order, folders taken apart. progress : given the source in words. Raises StudioError."""
+    """The recordings of all sources in order, folders expanded. progress : called with the source's name. Raises
+    StudioError.
+    """
     names = [name for source in sources for name in expand(source)]
     if not names:
-        raise StudioError("There is nothing to learn from.", "Name motion files or runs.")
+        raise StudioError("There is no recording to learn from.", "Name motion files or runs.")
     found = []
     for number, name in enumerate(names, start=1):
         words = f"{Path(name).name} ({number} of {len(names)})"
 
-        def tell(_step: str, done: int, total: int, words: str = words) -> None:
+        def report(_step: str, done: int, total: int, words: str = words) -> None:
             if progress is not None:
                 progress(words, done, total)
 
-        found.append(read_source(name, body, skeleton, fps=fps, workspace=workspace, progress=tell))
+        found.append(read_source(name, body, skeleton, fps=fps, workspace=workspace, progress=report))
     return tuple(found)
 
 
 def parted(recordings: Sequence[Recording]) -> tuple[tuple[Recording, ...], tuple[Recording, ...]]:
-    """Training and test: the last fifth of each recording is the test, where it is long enough to be parted."""
+    """Training and test: the last fifth of each recording is the test, where it is long enough."""
     training, test = [], []
     for recording in recordings:
         at = recording.frame_count - round(TEST_SHARE * recording.frame_count)
@@ -90,8 +92,8 @@ def learn(
 ) -> tuple[BehaviourModel, Learnt]:
     """The behaviour of recordings on one body, all at one rate.
 
-    test : recordings that the entropy is measured on, as they are; None takes the last fifth of each recording away
-    from the training for that. The same seed gives the same model. Raises BehaviourError as `learn_model` does.
+    test : recordings that the entropy is measured on; None takes the last fifth of each recording from the training
+    for that. The same seed gives the same model. Raises BehaviourError as `learn_model` does.
     """
     settings, material = settings or LearningSettings(), material or OversamplingSettings()
     training, tested = parted(recordings) if test is None else (tuple(recordings), tuple(test))

@@ -19,7 +19,7 @@ def place_points(
 ):
     """Fill places (N, P, 3) and slopes (N, D, P, 3) of poses (N, D).
 
-    joints (P,), offsets (P, 3) : what each point or direction is fixed to, and where in its frame. is_point (P,).
+    joints (P,), offsets (P, 3) : joint and position in its frame of each point or direction. is_point (P,).
     The rest as in `KinematicTables`. slopes with no parameters (D = 0) are left out.
     """
     count = parent.shape[0]

@@ -1,4 +1,4 @@
-"""Which of a file's labelled points are the markers at a person's joints.
+"""A person's joint markers among a file's labelled points.
 
 Labels differ between programs: case, spaces, hyphens and a subject's name before a colon do not count; joints have
 many names; and Vicon's Plug-in Gait puts markers on the skin, from which joints are estimated.
@@ -50,7 +50,7 @@ SKIN: dict[str, tuple[tuple[str, ...], ...]] = {
 
 
 def person_markers(labels: Sequence[str], points: Array, source: str) -> tuple[tuple[str, ...], Array]:
-    """Names of a person's markers and their places (F, M, 3) out of labelled points (F, P, 3), NaN where missing.
+    """Names and positions (F, M, 3) of a person's markers among labelled points (F, P, 3), NaN where missing.
 
     The twelve of arms and legs must be there; those of trunk and head may be missing. source : for messages. Raises
     StudioError naming the markers that are missing and the labels that the file has.
@@ -94,7 +94,7 @@ def _label_of(name: str, at: dict[str, int]) -> str | None:
 
 
 def _from_skin(at: dict[str, int], points: Array) -> dict[str, Array]:
-    """The joints that Plug-in Gait's markers tell."""
+    """The joints estimated from Plug-in Gait's markers."""
     found: dict[str, Array] = {}
     for name, choices in SKIN.items():
         whole = [choice for choice in choices if all(label in at for label in choice)]

@@ -1,4 +1,4 @@
-"""How far a body's markers and pointers are from recorded ones, and the slopes of that, for all frames at once."""
+"""Residuals of a body's markers and pointers against recorded ones, with slopes, for all frames at once."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,8 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-MM_PER_RADIAN = 400.0  # a length that weighs like one radian: about a person's limb
-POINTING_MM = 100.0  # a pointer weighs like a marker this far along its limb
+MM_PER_RADIAN = 400.0  # a length that counts like one radian: about a person's limb
+POINTING_MM = 100.0  # a pointer counts like a marker this far along its limb
 PULL = 4.0  # mm a radian off the pose before, frame by frame
 FRAME_STEPS, DAMPING, LARGEST_DAMPING, SETTLED = 12, 1e-3, 1e3, 1e-4
 HELD = 1e12
@@ -47,7 +47,7 @@ class MarkerProblem:
         self.usable: Flags = np.sum(self.present, axis=1) >= min(FEWEST_MARKERS, max(len(self.names), 1))
         if not self.usable.any():
             raise StudioError(
-                f"No frame has markers that body '{body.name}' has.", "Choose another recording or body."
+                f"No frame has markers of body '{body.name}'.", "Choose another recording or body."
             )
 
     def slopes(self, path: Array) -> tuple[Array, Array]:
@@ -65,7 +65,7 @@ class MarkerProblem:
         return (residuals**2).sum(axis=1)
 
     def rms(self, path: Array) -> Array:
-        """(F,) mm over the markers that are there; NaN where they are too few."""
+        """(F,) RMS in mm over the markers present; NaN where they are too few."""
         residuals, _ = self._measured(path, np.arange(len(path)), slopes=False)
         squares = (residuals[:, : 3 * len(self.names)] ** 2).sum(axis=1)
         mean = squares / np.maximum(self.present.sum(axis=1), 1)
@@ -114,7 +114,7 @@ class MarkerProblem:
         return slopes @ slopes.transpose(0, 2, 1), (slopes @ now[..., None])[..., 0]
 
     def _fix(self, markers: list[Marker], targets: Targets) -> None:
-        """Where markers and pointers are fixed on the body, and what they are to meet (F, P, 3)."""
+        """Set where markers and pointers are fixed on the body, and their targets (F, P, 3)."""
         pointers = [
             pointer for pointer in pointers_of(self.body, movable=True) if pointer.limb in targets.directions
         ]
@@ -124,14 +124,14 @@ class MarkerProblem:
         self._offsets = np.array(offsets, dtype=float).reshape(-1, 3)
         self._is_point = np.arange(len(self._joints)) < len(markers)
         along = [POINTING_MM * targets.directions[pointer.limb][:, None] for pointer in pointers]
-        self._wanted = np.concatenate([self.points, *along], axis=1)
-        self._seen: Flags = np.all(np.isfinite(self._wanted), axis=2)
-        self._wanted = np.where(self._seen[..., None], self._wanted, 0.0)
+        self._goals = np.concatenate([self.points, *along], axis=1)
+        self._seen: Flags = np.all(np.isfinite(self._goals), axis=2)
+        self._goals = np.where(self._seen[..., None], self._goals, 0.0)
 
     def _measured(self, poses: Array, rows: Rows, *, slopes: bool) -> tuple[Array, Array]:
-        """Residuals (N, R) in mm of poses (N, D) in the frames `rows`, and their slopes (N, D, R) where wanted.
+        """Residuals (N, R) in mm of poses (N, D) in the frames `rows`, and their slopes (N, D, R) if `slopes`.
 
-        What is missing counts as met.
+        Missing targets have residual 0.
         """
         tables, (count, width) = kinematic_tables(self.body), poses.shape
         places = np.zeros((count, len(self._joints), 3))
@@ -143,7 +143,7 @@ class MarkerProblem:
             *(self._joints, self._offsets, self._is_point, places, along),
         )
         seen = self._seen[rows][..., None]
-        apart = np.where(seen, places - self._wanted[rows], 0.0).reshape(count, -1)
+        apart = np.where(seen, places - self._goals[rows], 0.0).reshape(count, -1)
         if not slopes:
             return apart, along
         along *= self.scale[:, None, None] * seen[:, None]

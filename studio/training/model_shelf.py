@@ -1,4 +1,4 @@
-"""The workspace's models: where a new one goes, and what there is."""
+"""The behaviour models of the workspace."""
 
 import math
 import os
@@ -16,8 +16,8 @@ from studio.sessions.workspace import TRASH_NAME, Workspace
 
 @dataclass(frozen=True, slots=True)
 class ModelSummary:
-    """A model as a line of a list. fps : it was learnt at. sources : what it was learnt from, each once. problem : why
-    it cannot be read, "" if it can; then the rest is empty.
+    """A model as a line of a list. fps : of its learning. sources : its recordings, each once. problem : why it cannot
+    be read (the rest is empty then), else "".
     """
 
     name: str
@@ -36,27 +36,27 @@ class ModelSummary:
 
 
 def place_for_model(name_or_path: str, workspace: Workspace, *, replace: bool = False) -> Path:
-    """The file of a model that is to be made: a name means the workspace's models, a path itself.
+    """The file for a new model: of a name in the workspace's models, or a path itself.
 
-    Raises NameRefused, and BehaviourError where there is something already and it is not to be replaced.
+    Raises NameRefused, and BehaviourError where it exists and `replace` is not set.
     """
     if os.sep in name_or_path or "/" in name_or_path:
         path = Path(name_or_path).expanduser().absolute()
         path = path if path.suffix == SUFFIX else path.with_name(f"{path.name}{SUFFIX}")
         if not path.parent.is_dir():
-            raise BehaviourError(f"There is no folder '{path.parent}'.", "Make it first, or give a name.")
+            raise BehaviourError(f"There is no folder '{path.parent}'.", "Create it first, or give a name.")
     else:
         name = checked_name(name_or_path.removesuffix(SUFFIX), "model")
         path = models_folder(workspace.root) / f"{name}{SUFFIX}"
     if path.is_dir() or (path.exists() and not replace):
         raise BehaviourError(
-            f"There is a model at '{path}' already.", "Choose another name, or replace it with --force."
+            f"A model already exists at '{path}'.", "Choose another name, or replace it with --force."
         )
     return path
 
 
 def keep_model(model: BehaviourModel, path: Path) -> None:
-    """Write the model where `place_for_model` said, whole or not at all."""
+    """Write the model to a file of `place_for_model`, atomically."""
     write_model(model, path)
 
 
@@ -69,19 +69,19 @@ def stored_model(workspace: Workspace, name: str) -> Path:
 
 
 def rename_model(workspace: Workspace, name: str, new_name: str) -> Path:
-    """Give a model another name; runs keep the copy that they were made with. Raises BehaviourError if it is taken."""
+    """Rename a model; runs keep their own copy. Raises BehaviourError if the name is taken."""
     path = stored_model(workspace, name)
     place = path.with_name(f"{checked_name(new_name, 'model')}{SUFFIX}")
     taken = {entry.stem.lower() for entry in path.parent.glob(f"*{SUFFIX}") if entry != path}
     if new_name.lower() in taken:
-        raise BehaviourError(f"There is a model '{new_name}' already.", "Choose another name.")
+        raise BehaviourError(f"A model '{new_name}' already exists.", "Choose another name.")
     os.rename(path, place)
     atomic_files.sync_folder(place.parent)
     return place
 
 
 def throw_away_model(workspace: Workspace, name: str) -> Path:
-    """Move a model to the workspace's trash; the folder there that holds it."""
+    """Move a model to the workspace's trash; returns its folder there."""
     path = stored_model(workspace, name)
     folder = atomic_files.new_folder_beside(path)
     os.rename(path, folder / path.name)
@@ -89,19 +89,17 @@ def throw_away_model(workspace: Workspace, name: str) -> Path:
 
 
 def thrown_model(place: Path) -> str:
-    """The name of the model that lies in a folder of the trash, "" for anything else there."""
+    """The name of the model in a folder of the trash, "" if it holds none."""
     found = sorted(place.glob(f"*{SUFFIX}")) if place.is_dir() else []
     return found[0].stem if len(found) == 1 else ""
 
 
 def bring_back_model(workspace: Workspace, trashed_name: str) -> Path:
-    """Bring a model back under its own name, or one like it if that is taken. Raises NotFoundError."""
+    """Restore a model under its own name, or a similar one if that is taken. Raises NotFoundError."""
     place = inside(workspace.root / TRASH_NAME, trashed_name)
     name = thrown_model(place)
     if not name:
-        raise NotFoundError(
-            f"There is no model '{trashed_name}' in the trash.", "List what lies there first."
-        )
+        raise NotFoundError(f"There is no model '{trashed_name}' in the trash.", "List the trash first.")
     folder = models_folder(workspace.root)
     folder.mkdir(parents=True, exist_ok=True)
     free = free_name(name, {entry.stem for entry in folder.glob(f"*{SUFFIX}")})
@@ -111,7 +109,7 @@ def bring_back_model(workspace: Workspace, trashed_name: str) -> Path:
 
 
 def list_models(workspace: Workspace) -> tuple[ModelSummary, ...]:
-    """The workspace's models by name; those that cannot be read carry the reason."""
+    """The workspace's models by name; with the reason for those that cannot be read."""
     return tuple(
         ModelSummary(line.name, line.path, problem=line.problem) if line.problem else summary_of(line.path)
         for line in models_in((models_folder(workspace.root),))

@@ -1,10 +1,10 @@
-"""Paths written the other way: three turns in a row have two spellings, and a fit that follows a movement from frame
-to frame finds only the one it began with, pressed against a limit where the other goes on.
+"""Paths on the other branch: three rotations in a row can be written by two sets of angles, and a fit that follows a
+movement from frame to frame stays on the branch it began with, pressed against a limit where the other continues.
 
-About three different axes, turns by α, β, γ are the turns by α + π, π - β, γ + π. The second spelling has its middle
+About three different axes, turns by α, β, γ are the turns by α + π, π - β, γ + π. The second branch has its middle
 turn beyond a right angle where the first has not; an arm that goes overhead sideways changes from one to the other.
 The three may belong to one joint, or to a joint of two turns and the first turn of a joint straight behind it (a
-shoulder that swings and spreads, with the twist taken at the elbow).
+shoulder that swings and spreads, with the twist at the elbow).
 """
 
 import math
@@ -36,9 +36,9 @@ def triples(body: BodyModel) -> tuple[Triple, ...]:
     return tuple(found)
 
 
-def respelt(body: BodyModel, path: Array, beyond: bool) -> Array:
+def on_branch(body: BodyModel, path: Array, beyond: bool) -> Array:
     """The path (F, D), in radians, with every triple written so that its middle turn is beyond a right angle, or so
-    that it never is; within the limits, pressed to them where the other spelling lies outside.
+    that it never is; clamped to the limits where that branch lies outside.
     """
     lower = np.array([entry.lower for entry in body.parameters])
     upper = np.array([entry.upper for entry in body.parameters])
@@ -55,7 +55,7 @@ def respelt(body: BodyModel, path: Array, beyond: bool) -> Array:
 
 
 def _wound(angles: Array, lower: float, upper: float) -> Array:
-    """Angles by whole turns as near the middle of their limits as can be, and then within them."""
+    """Angles moved by whole turns nearest to the middle of their limits, then clamped to them."""
     if not (math.isfinite(lower) and math.isfinite(upper)):
         return np.arctan2(np.sin(angles), np.cos(angles))
     middle = 0.5 * (lower + upper)
@@ -63,7 +63,7 @@ def _wound(angles: Array, lower: float, upper: float) -> Array:
 
 
 def _straight_behind(joint: Joint) -> bool:
-    """Whether a joint is moved along nothing but its own first turn's axis before it turns."""
+    """Whether a joint is moved only along its own first turn's axis before it turns."""
     for place, step in enumerate(joint.steps):
         if step.kind == TURN:
             return all(before.kind == MOVE and before.axis == step.axis for before in joint.steps[:place])

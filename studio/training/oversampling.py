@@ -1,7 +1,7 @@
-"""More training material out of little: other performances of a recording, each smoothed by several amounts.
+"""Oversampling of training material: further performances of a recording, each smoothed by several amounts.
 
 Caillette et al. 2007, section 7.1: three repetitions of each exercise, oversampled with varied smoothing, made 13 000
-frames of training. A performance that nobody recorded is made of one that somebody did: its tempo and its angles
+frames of training. Further performances are made from recorded ones: tempo and angles
 change slowly by a little.
 """
 
@@ -25,17 +25,17 @@ LASTING, FULL_SPREAD = 0.5, np.radians(30.0)
 
 @dataclass(frozen=True, slots=True)
 class OversamplingSettings:
-    """What training material is made of a recording."""
+    """The training material made from a recording."""
 
     title = "Training material"
 
     performances: int = knob(
         1, 1, 100, 1, takes_effect="new run",
-        help="Performances of every recording: itself, and others whose tempo and angles change slowly by a little.",
+        help="Performances of every recording: the original, and others with slowly varied tempo and angles.",
     )  # fmt: skip
     smoothings: int = knob(
         5, 1, 50, 1, takes_effect="new run",
-        help="How often every performance is taken, each time smoothed more and seen a part of a frame later; "
+        help="Copies of every performance, each smoothed more and sampled a part of a frame later; "
         "the paper varied the smoothing to have enough frames.",
     )  # fmt: skip
     widest_smoothing: float = knob(
@@ -48,7 +48,7 @@ class OversamplingSettings:
     )  # fmt: skip
     angle_change: float = knob(
         4.0, 0.0, 45.0, 0.5, unit="degrees", label="angle change", takes_effect="new run",
-        help="How far the angles of other performances are off (standard deviation); joints that hardly move in the "
+        help="Change of the angles in other performances (standard deviation); joints that hardly move in the "
         "recording change less.",
     )  # fmt: skip
 
@@ -82,7 +82,7 @@ def performed(
 
 
 def smoothed_copies(body: BodyModel, poses: Array, fps: float, settings: OversamplingSettings) -> list[Array]:
-    """Sequences of poses (F, D), one a smoothing: each smoothed more, and seen a part of a frame later."""
+    """Sequences of poses (F, D), one a smoothing: each smoothed more, and sampled a part of a frame later."""
     found, count = [], settings.smoothings
     for number in range(count):
         width = settings.widest_smoothing * fps * number / max(count - 1, 1)
@@ -95,7 +95,7 @@ def smoothed_copies(body: BodyModel, poses: Array, fps: float, settings: Oversam
 
 
 def _within(body: BodyModel, allowed: Array, poses: Array) -> Array:
-    """The poses within the body's limits, or where `allowed` goes beyond them."""
+    """The poses clamped to the body's limits, widened where `allowed` goes beyond them."""
     lower = np.minimum([entry.lower for entry in body.parameters], allowed.min(axis=0))
     upper = np.maximum([entry.upper for entry in body.parameters], allowed.max(axis=0))
     return np.clip(poses, lower, upper)

@@ -1,7 +1,7 @@
-"""One path out of several: for every limb, the stretches of those that fit best, changed over where it costs least.
+"""One path joined from several: for every limb the best-fitting stretches, with changes where they cost least.
 
-Each joint's angles have more than one spelling, and a path that begins in one may meet the end of its range where
-another goes on; paths begun elsewhere know the other.
+A joint's angles have more than one branch, and a path that begins on one may reach the end of its range where another
+continues; paths begun elsewhere are on the other.
 """
 
 from collections.abc import Callable

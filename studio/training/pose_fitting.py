@@ -1,10 +1,10 @@
 """Poses of a body along a recorded motion: inverse kinematics on marker points, all frames together.
 
 First frame by frame, forwards and backwards, each from its neighbour; these paths are then fitted as wholes, where
-unsteady angles cost something (`smooth_path`): that settles what markers leave open (twists of straight limbs, joints
-near their singular positions). A path that is at first held very steady and let loose by and by finds the spelling of
-the joints that goes on without a jump, and paths begun in the joints' other spellings (`other_spellings`) find what
-limits keep from the first; the best stretches of all paths are joined (`path_splicing`) and fitted again.
+unsteady angles have a cost (`smooth_path`): that determines what markers leave open (twists of straight limbs, joints
+near their singular positions). A path that is at first held very steady and gradually released finds the branch of
+the joints' angles without a jump, and paths begun on the other branches (`other_spellings`) find what limits keep
+from the first; the best stretches of all paths are joined (`path_splicing`) and fitted again.
 Angles stay within the body's limits throughout.
 """
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from studio.body.model import BodyModel
 from studio.progress import Progress
 from studio.training.marker_problem import MarkerProblem
-from studio.training.other_spellings import respelt
+from studio.training.other_spellings import on_branch
 from studio.training.path_splicing import spliced
 from studio.training.smooth_path import SmoothPath, Steadiness
 from studio.training.targets import Targets
@@ -28,9 +28,9 @@ STEADY = Steadiness(acceleration=90.0, speed=8.0, rest=1.5)
 """mm a radian a frame, at STEADY_FPS frames a second."""
 STEADY_FPS = 30.0
 STRICTER = ((1.0,), (4.0, 2.0, 1.0), (16.0, 8.0, 4.0, 2.0, 1.0))
-"""How much steadier than that the paths are held on the way to it."""
+"""Factors on the steadiness in successive refinements."""
 OTHERS = (4.0, 2.0, 1.0)
-"""The same for paths that begin in the joints' other spellings."""
+"""The same for paths that begin on the other branches."""
 PATH_STEPS, LAST_STEPS = 10, 25
 BAD_SHARE, BAD_MM = 2.5, 60.0
 
@@ -46,30 +46,30 @@ class Fitted:
 def fit_poses(body: BodyModel, targets: Targets, fps: float, progress: Progress | None = None) -> Fitted:
     """The poses of `body` whose markers and pointers come closest to the targets, steady over time.
 
-    progress : called with a step in words, what is done and how much there is. Raises StudioError where no frame has
+    progress : called with (step, done, total). Raises StudioError where no frame has
     enough markers of the body.
     """
     problem, steady = MarkerProblem(body, targets), STEADY.at_rate(fps / STEADY_FPS)
-    frames, paths, told = targets.frame_count, [], 0
+    frames, paths, done = targets.frame_count, [], 0
     refinements = sum(map(len, STRICTER)) + 2 * len(OTHERS)
     total = 2 * frames + PATH_STEPS * frames * 2 * refinements + LAST_STEPS * frames
     for backwards in (False, True):
 
-        def tell(more: int) -> None:
-            nonlocal told
-            told += more
+        def report(more: int) -> None:
+            nonlocal done
+            done += more
             if progress is not None:
-                progress("fitting the body", min(told, total), total)
+                progress("fitting the body", min(done, total), total)
 
-        start = _followed(problem, backwards, tell)
-        others = [respelt(body, start * problem.scale, beyond) / problem.scale for beyond in (False, True)]
+        start = _followed(problem, backwards, report)
+        others = [on_branch(body, start * problem.scale, beyond) / problem.scale for beyond in (False, True)]
         for grades, path in (
             *((grades, start) for grades in STRICTER),
             *((OTHERS, other) for other in others),
         ):
             for times in grades:
                 path = _refined(problem, path, steady.times(times), PATH_STEPS)
-                tell(PATH_STEPS * frames)
+                report(PATH_STEPS * frames)
             paths.append(path)
     paths.sort(key=lambda path: float(problem.costs(path).sum()))
     path = spliced(paths, problem.groups, problem.costs, steady.acceleration)
@@ -80,7 +80,7 @@ def fit_poses(body: BodyModel, targets: Targets, fps: float, progress: Progress 
 
 
 def bad_frames(rms_mm: Array) -> NDArray[np.int64]:
-    """Numbers of the frames that fit far worse than the others, or had nothing to fit. rms_mm : (F,)."""
+    """Numbers of the frames that fit far worse than the others, or had no markers. rms_mm : (F,)."""
     limit = max(BAD_MM, BAD_SHARE * float(np.nanmedian(rms_mm)))
     return np.flatnonzero(~(rms_mm <= limit))
 
@@ -90,7 +90,7 @@ def _refined(problem: MarkerProblem, path: Array, steadiness: Steadiness, steps:
     return smooth.refined(path, steps)
 
 
-def _followed(problem: MarkerProblem, backwards: bool, tell: Callable[[int], None]) -> Array:
+def _followed(problem: MarkerProblem, backwards: bool, report: Callable[[int], None]) -> Array:
     """(F, D) each frame from its neighbour, beginning with the first (or last) frame that can be fitted."""
     frames = np.arange(len(problem.usable))[:: -1 if backwards else 1]
     first = int(np.argmax(problem.usable[frames]))
@@ -100,5 +100,5 @@ def _followed(problem: MarkerProblem, backwards: bool, tell: Callable[[int], Non
         if problem.usable[frame]:
             pose = problem.next(pose, int(frame))
         path[frame] = pose
-        tell(1)
+        report(1)
     return path

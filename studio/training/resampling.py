@@ -1,4 +1,4 @@
-"""Recordings at another frame rate: smooth curves through what was recorded."""
+"""Recordings at another frame rate: smooth curves through the recorded frames."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,34 +16,36 @@ def frame_times(seconds: float, fps: float) -> Array:
     return np.arange(int(np.floor(seconds * fps + 1e-6)) + 1) / fps
 
 
-def points_at(times: Array, points: Array, wanted: Array) -> Array:
-    """(W, M, 3) points (F, M, 3) at the times `wanted` (W,) seconds, on cubic splines; times (F,) rising.
+def points_at(times: Array, points: Array, new_times: Array) -> Array:
+    """(W, M, 3) points (F, M, 3) at the times `new_times` (W,) seconds, on cubic splines; times (F,) rising.
 
     A point that is missing (NaN) for longer than LONGEST_GAP_S is missing in that time.
     """
-    found = np.full((len(wanted), *points.shape[1:]), np.nan)
+    found = np.full((len(new_times), *points.shape[1:]), np.nan)
     for marker in range(points.shape[1]):
         seen = np.isfinite(points[:, marker]).all(axis=1)
         if seen.sum() < 4:
             continue
         known = times[seen]
-        after = np.clip(np.searchsorted(known, wanted - 1e-9), 0, len(known) - 1)
+        after = np.clip(np.searchsorted(known, new_times - 1e-9), 0, len(known) - 1)
         before = np.clip(after - 1, 0, len(known) - 1)
-        inside = (wanted >= known[0] - 1e-9) & (wanted <= known[-1] + 1e-9)
+        inside = (new_times >= known[0] - 1e-9) & (new_times <= known[-1] + 1e-9)
         near = inside & (
-            (known[after] - known[before] <= LONGEST_GAP_S) | (np.abs(known[after] - wanted) < 1e-6)
+            (known[after] - known[before] <= LONGEST_GAP_S) | (np.abs(known[after] - new_times) < 1e-6)
         )
-        found[near, marker] = CubicSpline(known, points[seen, marker])(wanted[near])
+        found[near, marker] = CubicSpline(known, points[seen, marker])(new_times[near])
     return found
 
 
-def poses_at(body: BodyModel, times: Array, poses: Array, wanted: Array) -> Array:
-    """(W, D) poses (F, D) at the times `wanted` on cubic splines, turns unwound, within the body's limits."""
+def poses_at(body: BodyModel, times: Array, poses: Array, new_times: Array) -> Array:
+    """(W, D) poses (F, D) at the times `new_times` on cubic splines, turns unwound, within the body's limits."""
     angles = np.array([entry.kind == "angle" for entry in body.parameters])
     unbounded = angles & ~np.isfinite([entry.upper - entry.lower for entry in body.parameters])
     steady = np.where(unbounded, np.unwrap(poses, axis=0), poses)
-    found = CubicSpline(times, steady)(wanted) if len(times) > 1 else np.repeat(steady, len(wanted), axis=0)
+    found = (
+        CubicSpline(times, steady)(new_times) if len(times) > 1 else np.repeat(steady, len(new_times), axis=0)
+    )
     lower = np.array([entry.lower for entry in body.parameters])
     upper = np.array([entry.upper for entry in body.parameters])
-    # A tracked pose may lie outside; it is not moved, only what the curve adds.
+    # A tracked pose may lie outside the limits: only the curve's overshoot is clamped.
     return np.clip(found, np.minimum(lower, steady.min(axis=0)), np.maximum(upper, steady.max(axis=0)))

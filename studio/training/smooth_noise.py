@@ -1,4 +1,4 @@
-"""Slow random changes: what differs between two performances of the same movement."""
+"""Slow random changes, as between two performances of the same movement."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -19,7 +19,7 @@ HELD, LEAST_PIVOT = 1e12, 1e-12
 
 @dataclass(frozen=True, slots=True)
 class Steadiness:
-    """What unsteadiness costs, in the residuals' unit (mm) for a unit (radian) from frame to frame.
+    """Costs of unsteadiness, in the residuals' unit (mm) for a unit (radian) from frame to frame.
 
     acceleration : of the second difference. speed : of the first. rest : of the distance from the rest pose.
     """
@@ -29,11 +29,11 @@ class Steadiness:
     rest: float
 
     def times(self, factor: float) -> "Steadiness":
-        """Changes cost so many times as much; the distance from the rest pose the same."""
+        """The costs of changes times a factor; that of the distance from rest unchanged."""
         return Steadiness(factor * self.acceleration, factor * self.speed, self.rest)
 
     def at_rate(self, ratio: float) -> "Steadiness":
-        """The same cost of an angle's speed and acceleration in time with `ratio` times as many frames a second."""
+        """The costs that give the same for an angle's motion in time at `ratio` times as many frames a second."""
         return Steadiness(ratio**2 * self.acceleration, ratio * self.speed, self.rest)
 
 
@@ -93,7 +93,7 @@ class SmoothPath:
         return slope
 
     def _bands(self, count: int) -> Array:
-        """(3, F): what couples frame t to frames t, t + 1, t + 2 in every parameter alike."""
+        """(3, F) coefficients that couple frame t to frames t, t + 1, t + 2, the same for every parameter."""
         weights, bands = self._steadiness, np.zeros((3, count))
         bands[0] += weights.rest**2
         for order, weight, stencil in (

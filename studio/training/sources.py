@@ -1,8 +1,8 @@
-"""Recorded motion as poses of a body, whatever it was recorded with.
+"""Recorded motion of any kind as poses of a body.
 
 Motion files (.amc with its .asf, .bvh, .npz, .c3d, .trc), earlier runs (SESSION/RUN), and recipes of footage, whose
-motion is made without rendering it. A skeleton is put on the synthetic one with the body's proportions; points are
-met by the body in the size that their distances tell; a run of the same body is taken as it is.
+motion is made without rendering it. A skeleton is retargeted to the synthetic one with the body's proportions; points
+are fitted by the body in the size given by their distances; a run of the same body is used unchanged.
 """
 
 from collections.abc import Mapping
@@ -40,7 +40,7 @@ FPS = 30.0
 FEWEST_FRAMES = 10
 SKELETON_FILES, POINT_FILES, RECIPE = (".amc", ".bvh", ".npz"), (".c3d", ".trc"), ".toml"
 MOTION_FILES = (*SKELETON_FILES, *POINT_FILES)
-# Pairs of markers whose distances say how large the person is.
+# Pairs of markers whose distances give the person's size.
 MEASURED = (
     *(("Hip", "Neck"), ("Neck", "Head")),
     *((f"{side}{one}", f"{side}{other}") for side in "LR" for one, other in (("Hip", "Knee"), ("Knee", "Ankle"))),
@@ -59,7 +59,7 @@ class Recording:
     """Motion of a body.
 
     poses : (F, D) at `fps`. rms_mm : distance of the body's markers from the recorded ones over all frames; 0 for
-    poses taken as they are. bad_frames : those that fit far worse than the rest (numbers at `fps`).
+    unchanged poses. bad_frames : those that fit far worse than the rest (numbers at `fps`).
     """
 
     name: str
@@ -86,8 +86,8 @@ def read_source(
     """The motion of a source on `body`, at `fps`.
 
     source : a motion file, a recipe's file or name, a run's folder, or SESSION/RUN of the workspace. skeleton : the
-    ASF of an .amc; by default NN.asf beside NN_MM.amc. Raises StudioError for what cannot be read, bodies that a
-    person's motion cannot be put on, and motion of fewer than FEWEST_FRAMES frames.
+    ASF of an .amc; by default NN.asf beside NN_MM.amc. Raises StudioError for what cannot be read, bodies without a
+    person's markers, and motion of fewer than FEWEST_FRAMES frames.
     """
     path = Path(source).expanduser()
     if path.is_file():
@@ -105,7 +105,7 @@ def read_source(
 
 
 def expand(source: str | Path) -> tuple[str, ...]:
-    """The sources that a name stands for: a folder's motion files in order, else the name itself.
+    """The sources of a name: a folder's motion files in order, else the name itself.
 
     Raises StudioError for a folder without motion, and a session's folder, naming its runs.
     """
@@ -169,7 +169,7 @@ def _read_file(
         motion = read_c3d(path) if ending == ".c3d" else read_trc(path)
         return _from_points(motion, body, path, fps, progress)
     raise StudioError(
-        f"'{path.name}' is no motion that can be read.",
+        f"'{path.name}' is not a motion that can be read.",
         f"Give files ending in {', '.join(MOTION_FILES)}, a recipe, or a run as SESSION/RUN.",
     )
 
@@ -177,7 +177,7 @@ def _read_file(
 def _from_recorded(
     recorded: RecordedMotion, body: BodyModel, name: str, fps: float, progress: Progress | None
 ) -> Recording:
-    """A recorded skeleton; one whose joints are named unusually by the places of its joints alone."""
+    """Motion of a recorded skeleton; one with unknown joint names is fitted to the joints' positions alone."""
     if recorded.positions.shape[0] < 2:
         return Recording(name, fps, np.repeat(body.neutral[None], len(recorded.positions), axis=0))
     try:
@@ -199,17 +199,17 @@ def _from_points(
     *,
     unit_known: bool = True,
 ) -> Recording:
-    """Points; where their unit is not known (BVH has none), the legs are taken to be as long as the body's."""
+    """Motion of points; where their unit is unknown (BVH has none), they are scaled to the body's leg length."""
     names, points = person_markers(motion.names, motion.positions, path.name)
     if not unit_known:
         theirs = _leg(names, points)
         mine = _leg(marker_names(body), marker_points(body, body.neutral))
         points = points * (mine / theirs if theirs > 0.0 else 1.0)
     times = motion.times - motion.times[0]
-    wanted = frame_times(float(times[-1]), fps)
-    if len(wanted) < FEWEST_FRAMES:
-        return Recording(path.stem, fps, np.repeat(body.neutral[None], len(wanted), axis=0))
-    targets = Targets(names, points_at(times, points, wanted), {})
+    new_times = frame_times(float(times[-1]), fps)
+    if len(new_times) < FEWEST_FRAMES:
+        return Recording(path.stem, fps, np.repeat(body.neutral[None], len(new_times), axis=0))
+    targets = Targets(names, points_at(times, points, new_times), {})
     return _fitted(targets, _sized(body, targets), path.stem, fps, progress)
 
 
@@ -225,7 +225,7 @@ def _leg(names: tuple[str, ...], points: Array) -> float:
 
 
 def _sized(body: BodyModel, targets: Targets) -> BodyModel:
-    """The body in the size that the distances of its markers tell, the median over the frames."""
+    """The body in the size given by its markers' distances, medians over the frames."""
     at = {name: place for place, name in enumerate(targets.names)}
     lengths = {}
     for one, other in MEASURED:
@@ -238,7 +238,7 @@ def _sized(body: BodyModel, targets: Targets) -> BodyModel:
 
 
 def _find_run(source: str, workspace: Workspace) -> StoredRun:
-    """A run by its folder, or as SESSION/RUN. Raises StudioError saying what a source can be."""
+    """A run by its folder, or as SESSION/RUN. Raises StudioError that lists the kinds of source."""
     folder = Path(source).expanduser()
     if (folder / RUN_FILE).is_file():
         return StoredRun(folder.absolute())
@@ -263,15 +263,15 @@ def _runs_of(folder: Path) -> StudioError:
 
 
 def _read_run(run: StoredRun, body: BodyModel, fps: float, progress: Progress | None) -> Recording:
-    """The stored poses; another body meets the markers of the one that was tracked."""
+    """The stored poses; another body is fitted to the markers of the tracked one."""
     name, own = f"{run.session_name}/{run.name}", run.body()
     with run.results() as results:
         frames, poses = results.poses()
     if len(frames) < 2:
         raise StudioError(f"Run '{name}' holds {len(frames)} frames.", "Track it first.")
     times = (np.asarray(frames, dtype=float) - frames[0]) / run.record.fps
-    wanted = frame_times(float(times[-1]), fps)
-    moved = poses_at(own, times, poses, wanted)
+    new_times = frame_times(float(times[-1]), fps)
+    moved = poses_at(own, times, poses, new_times)
     if own.name == body.name and len(own.parameters) == len(body.parameters):
         return Recording(name, fps, moved)
     marker_names(own)

@@ -1,6 +1,6 @@
-"""What a body's pose is to meet in every frame: places of its markers, and where its head, hands and feet point.
+"""Targets of a body's pose in every frame: positions of its markers, directions of its head, hands and feet.
 
-Fifteen markers at the joints leave open how the head is turned and how the feet stand; recorded skeletons know both.
+Fifteen markers at the joints leave open the rotation of head and feet; recorded skeletons have both.
 """
 
 from collections.abc import Mapping
@@ -22,15 +22,15 @@ POINTING: dict[str, tuple[float, float, float]] = {
     HEAD: (1.0, 0.0, 0.0),
     **{name: (0.0, 0.0, -1.0) if name.endswith("hand") else (1.0, 0.0, 0.0) for name in TIPS},
 }
-"""Where each limb points in the frame of the synthetic skeleton's segment."""
+"""Direction of each limb in the frame of the synthetic skeleton's segment."""
 
-# Shares of the height that a body lacks dimensions for, where the skeleton needs them.
+# Shares of the height, for the skeleton's dimensions that a body lacks.
 HAND_SHARE, FOOT_SHARE, ANKLE_SHARE = 0.108, 0.152, 0.045
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pointer:
-    """A limb that points somewhere: unit `axis` (3,) in the frame of joint number `joint`."""
+    """A limb's direction: unit `axis` (3,) in the frame of joint number `joint`."""
 
     limb: str
     joint: int
@@ -39,7 +39,7 @@ class Pointer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Targets:
-    """What is to be met over F frames, world z up.
+    """Targets over F frames, world z up.
 
     names : markers. points : (F, M, 3) mm, NaN where missing. directions : limb name to (F, 3) unit vectors.
     """
@@ -55,19 +55,19 @@ class Targets:
 
 
 def marker_names(body: BodyModel) -> tuple[str, ...]:
-    """The body's markers. Raises BodyError for one that lacks those of a person, which recordings are given by."""
+    """The body's markers. Raises BodyError for one without the markers of a person."""
     names = tuple(marker.name for marker in body.markers)
     missing = sorted(set(MARKERS) - set(names))
     if missing:
         raise BodyError(
-            f"Body '{body.name}' has no marker '{missing[0]}', so a person's motion cannot be put on it.",
-            f"Choose a body with the markers {', '.join(MARKERS)}, or learn from runs of this very body.",
+            f"Body '{body.name}' has no marker '{missing[0]}', so it cannot take a person's motion.",
+            f"Choose a body with the markers {', '.join(MARKERS)}, or learn from runs of this body.",
         )
     return names
 
 
 def pointers_of(body: BodyModel, *, movable: bool) -> tuple[Pointer, ...]:
-    """The pointers of a body's head, hands and feet; `movable`: of those alone that a parameter of their own turns."""
+    """The pointers of a body's head, hands and feet; `movable`: only of those with their own rotation parameter."""
     frames = joint_frames(body, body.neutral)[0]
     shapes, found = kinematic_tables(body).limb_shape, []
     for limb, shape in zip(body.drawn, shapes, strict=True):
@@ -83,14 +83,14 @@ def pointers_of(body: BodyModel, *, movable: bool) -> tuple[Pointer, ...]:
 
 
 def directions(pointers: tuple[Pointer, ...], frames: Array) -> Array:
-    """(N, P, 3) where the pointers point. frames : (N, F, 3, 4) world_from_joint."""
+    """(N, P, 3) directions of the pointers. frames : (N, F, 3, 4) world_from_joint."""
     joints = np.array([pointer.joint for pointer in pointers], dtype=np.int64)
     axes = np.array([pointer.axis for pointer in pointers]).reshape(-1, 3, 1)
     return (frames[:, joints, :, :3] @ axes)[..., 0]
 
 
 def of_person(motion: PersonMotion) -> Targets:
-    """The synthetic person's markers, and where their head, hands and feet point."""
+    """Targets of a synthetic person: markers, and directions of head, hands and feet."""
     pointing = {
         limb: motion.turns[limb.replace(" ", "_")] @ np.array(axis) for limb, axis in POINTING.items()
     }
@@ -99,7 +99,7 @@ def of_person(motion: PersonMotion) -> Targets:
 
 
 def of_poses(body: BodyModel, poses: Array) -> Targets:
-    """Another body's markers and pointers along poses (F, D)."""
+    """Targets of another body: markers and pointers along poses (F, D)."""
     pointers = pointers_of(body, movable=False)
     along = directions(pointers, joint_frames(body, poses))
     pointing = {pointer.limb: along[:, place] for place, pointer in enumerate(pointers)}
@@ -158,7 +158,7 @@ def _rest_left(points: Mapping[str, Array]) -> Array:
 
 
 def _rest_forward(body: BodyModel) -> Array:
-    """(3,) where the body faces in its rest pose; forward along x for one without a person's markers."""
+    """(3,) facing direction of the body in its rest pose; x for one without a person's markers."""
     names = tuple(marker.name for marker in body.markers)
     if not {"Neck", "Hip", "LShoulder", "RShoulder"} <= set(names):
         return np.array([1.0, 0.0, 0.0])

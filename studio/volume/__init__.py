@@ -1,1 +1,1 @@
-"""What is filled in space: the visual hull, and coloured Gaussian blobs fitted to it."""
+"""The visual hull, and coloured Gaussian blobs fitted to it."""

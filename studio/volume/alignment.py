@@ -1,9 +1,9 @@
-"""Where a body stands and which way it faces, from its hull alone (Caillette, Galata & Howard 2007, section 6.2, Fig.
+"""Position and orientation of a body from its hull alone (Caillette, Galata & Howard 2007, section 6.2, Fig.
 7: global position and orientation from the voxels' mean and principal axes).
 
-The hull's mean gives the position, its principal axes the turn: the mean and the axes of the body's own cones, in a
-pose that is given (the neutral one, a motion prototype), are laid on them. Axes have no sign and a person is about as
-deep as wide in a hull, so there are several candidates; which is right only the pictures can say.
+The hull's mean gives the position, its principal axes the orientation: the mean and axes of the body's own cones, in a
+given pose (the neutral one, a motion prototype), are aligned with them. Axes have no sign and a person is about as
+deep as wide in a hull, so there are several candidates; only the pictures can decide between them.
 """
 
 import itertools
@@ -22,10 +22,9 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 MM_OF_ROTATION = 1000.0
-"""A rotation matrix's entry off by 1 weighs like so many mm."""
+"""mm that an error of 1 in a rotation matrix's entry counts as."""
 NEARLY_ROUND = 0.6
-"""Where the lesser horizontal variance is more than this share of the greater one, the quarter turns come at once after
-the half turns would; below it they are left out."""
+"""Where the lesser horizontal variance is more than this share of the greater one, quarter turns are candidates too."""
 STARTS = 8
 
 
@@ -43,14 +42,14 @@ class Axes:
         return axes
 
     def heading(self) -> float:
-        """Angle of the longer horizontal axis from x, radians, within a half turn: this and its opposite are the
-        same axis.
+        """Angle of the longer horizontal axis from x, radians, within a half turn (opposite directions are the same
+        axis).
         """
         flat = self.covariance[:2, :2]
         return 0.5 * float(np.arctan2(2.0 * flat[0, 1], flat[0, 0] - flat[1, 1]))
 
     def roundness(self) -> float:
-        """The lesser horizontal variance as a share of the greater: 1 for what looks alike from all sides."""
+        """The lesser horizontal variance as a share of the greater: 1 for a round volume."""
         variances = np.linalg.eigvalsh(self.covariance[:2, :2])
         return float(variances[0] / variances[1])
 
@@ -77,8 +76,8 @@ def axes_of_pose(body: BodyModel, pose: Array) -> Axes:
 
 
 def root_parameters(body: BodyModel) -> IntArray:
-    """The parameters that place the whole body in the world: those of the one joint that hangs on the world and can
-    move there. None for a body that is fixed to the world.
+    """The parameters that place the whole body in the world: those of the joint that hangs on the world. Empty
+    for a body that is fixed to the world.
     """
     roots = [joint for joint in body.joints if joint.parent < 0]
     free = [
@@ -90,11 +89,11 @@ def root_parameters(body: BodyModel) -> IntArray:
 
 
 def root_candidates(body: BodyModel, hull: Hull, pose: Array, *, upright: bool = True) -> Array:
-    """(C, D) the pose (D,) with its root laid on the hull, other parameters as they are.
+    """(C, D) the pose (D,) with its root aligned to the hull, other parameters unchanged.
 
     upright : turn it about the vertical only: both facings along the hull's longer horizontal axis, then, where the
-    hull is nearly round, both across it. Else all three principal axes are laid on each other, in the four ways that
-    are turns. A body fixed to the world has one candidate, the pose. Raises ValueError for an empty hull.
+    hull is nearly round, both across it. Else all three principal axes are aligned, in the four ways that are
+    rotations. A body fixed to the world has one candidate, the pose. Raises ValueError for an empty hull.
     """
     parameters = root_parameters(body)
     if not len(parameters):
@@ -106,13 +105,13 @@ def root_candidates(body: BodyModel, hull: Hull, pose: Array, *, upright: bool =
     found = []
     for turn in turns:
         origin = turn @ (frame[:, 3] - own.mean) + seen.mean
-        wanted = np.column_stack([turn @ frame[:, :3], origin])
-        found.append(with_root_at(body, root, parameters, pose, wanted))
+        target = np.column_stack([turn @ frame[:, :3], origin])
+        found.append(with_root_at(body, root, parameters, pose, target))
     return np.stack(found)
 
 
 def _headings(seen: Axes, own: Axes) -> list[Array]:
-    """Turns about the vertical that lay the one's longer horizontal axis on the other's, or across it."""
+    """Turns about the vertical that align one's longer horizontal axis with the other's, or put it across."""
     between = seen.heading() - own.heading()
     quarters = (0, 2, 1, 3) if max(seen.roundness(), own.roundness()) > NEARLY_ROUND else (0, 2)
     turns = []
@@ -124,15 +123,15 @@ def _headings(seen: Axes, own: Axes) -> list[Array]:
 
 
 def _axis_turns(seen: Axes, own: Axes) -> list[Array]:
-    """The four turns that lay principal axes on principal axes."""
+    """The four rotations that align principal axes with principal axes."""
     to, of = seen.principal(), own.principal()
     signs = [np.array([a, b, a * b]) for a, b in itertools.product((1.0, -1.0), repeat=2)]
     return [(to * sign) @ of.T for sign in signs]
 
 
-def with_root_at(body: BodyModel, root: int, parameters: IntArray, pose: Array, wanted: Array) -> Array:
-    """The pose (D,) with the `parameters` of the root such that the frame of joint `root` comes as near as it can to
-    `wanted` (3, 4), mm.
+def with_root_at(body: BodyModel, root: int, parameters: IntArray, pose: Array, target: Array) -> Array:
+    """The pose (D,) with the `parameters` of the root such that the frame of joint `root` comes nearest to
+    `target` (3, 4), mm.
     """
     scale = np.array([[MM_OF_ROTATION] * 3 + [1.0]] * 3)
     angles = np.array([body.parameters[index].kind == "angle" for index in parameters])
@@ -140,7 +139,7 @@ def with_root_at(body: BodyModel, root: int, parameters: IntArray, pose: Array, 
 
     def apart(values: Array) -> Array:
         made[parameters] = values
-        return ((joint_frames(body, made)[0, root] - wanted) * scale).ravel()
+        return ((joint_frames(body, made)[0, root] - target) * scale).ravel()
 
     best, least = made[parameters].copy(), np.inf
     for start in range(STARTS):

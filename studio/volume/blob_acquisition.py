@@ -3,9 +3,9 @@
 The paper's blobs start as one a body part, are learnt incrementally while the tracker runs its first frames, and are
 split and merged by how colour changes along the bone. Here each frame's voxels, given to the limb whose blob they are
 nearest to in that frame's pose, are added to *profiles*: sums of volume, place and colour in BINS slices along every
-limb. Whatever blobs a limb may be cut into, their offset, eigenvalues, colours and shares follow from these sums alone,
-so blobs are cut anew after every frame, nothing depends on the order of earlier splits, and the profiles (a small
-array) are all that has to be kept.
+limb. For any division of a limb into blobs, their offset, eigenvalues, colours and shares follow from these sums alone,
+so blobs are cut again after every frame, the result does not depend on the order of earlier splits, and only the
+profiles (a small array) have to be kept.
 
 **Split and merge.** The criterion is the paper's: the 3×3 mixed covariance of space and colour projected on the bone's
 direction, that is the covariance of the place along the bone with each colour, and the norm of this vector. It is
@@ -14,8 +14,7 @@ such deviation, and one threshold fit for thighs and hands. A blob above it is c
 least in themselves; neighbours whose union would be below MERGE_SHARE of it become one (halves of different splits
 may). An even step of Δ levels in the middle of a limb reaches 0.43 Δ.
 
-Colours that do not change steadily along the bone (stripes) leave the criterion at zero: the paper's blobs do not see
-them and neither do ours.
+Colours that do not change steadily along the bone (stripes) leave the criterion at zero, in the paper as here.
 """
 
 import itertools
@@ -35,20 +34,21 @@ IntArray = NDArray[np.int64]
 
 BINS = 24
 BEYOND = 0.1
-"""The slices reach this share of the limb's length beyond both its ends; what lies further goes to the last ones."""
+"""The slices reach this share of the limb's length beyond both its ends; the last ones also hold what lies further."""
 SUMS = 16
 MERGE_SHARE = 0.5
 LEAST_PART = 0.15
-"""No part of a split limb is less than this share of the limb's volume."""
+"""Least share of the limb's volume in each part of a split limb."""
 MOST_PARTS = 4
 SEEN = 0.05
-"""A limb of which the hulls hold less than this share of its cone's volume is not learnt: it keeps its cone."""
+"""Least share of its cone's volume that the hulls must hold of a limb; below, it keeps its cone."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Profiles:
-    """What the first frames showed. sums : (L, BINS, SUMS) of each slice of each drawn limb, in mm³ times: 1; x, y, z;
-    x², y², z²; z times the three colours; the colours; their squares, all in the limb's axes. frames : how many.
+    """Statistics of the limbs over the first frames. sums : (L, BINS, SUMS) of each slice of each drawn limb, in mm³
+    times: 1; x, y, z; x², y², z²; z times the three colours; the colours; their squares, all in the limb's axes. frames
+    : their number.
     """
 
     sums: Array
@@ -56,11 +56,11 @@ class Profiles:
 
     @classmethod
     def none(cls, body: BodyModel) -> "Profiles":
-        """Of no frame."""
+        """Profiles of no frame."""
         return cls(np.zeros((len(body.drawn), BINS, SUMS)), 0)
 
     def with_frame(self, body: BodyModel, model: BlobModel, hull: Hull, pose: Array) -> "Profiles":
-        """With one frame more: its hull, not empty, and the pose (D,) that was found in it."""
+        """The profiles with one frame added: its hull, not empty, and its pose (D,)."""
         voxels = Voxels.of(hull)
         coloured = model.in_colour(voxels.colour, voxels.colour_variance)
         mixture = coloured.mixture(body, pose)
@@ -93,7 +93,7 @@ def _sums(body: BodyModel, limbs: IntArray, local: Array, voxels: Voxels, volume
 def learn_blobs(
     body: BodyModel, hulls: list[Hull], poses: Array, split: float = 12.0, most_parts: int = MOST_PARTS
 ) -> BlobModel:
-    """The blobs after all of these frames' hulls and poses (F, D), in this order; empty hulls teach nothing."""
+    """The blobs after all of these frames' hulls and poses (F, D), in this order; empty hulls add nothing."""
     profiles, model = Profiles.none(body), cone_blobs(body)
     for hull, pose in zip(hulls, poses, strict=True):
         if len(hull.centres):
@@ -103,7 +103,7 @@ def learn_blobs(
 
 
 def blobs_of(body: BodyModel, profiles: Profiles, split: float, most_parts: int = MOST_PARTS) -> BlobModel:
-    """The blobs that the profiles tell; the cones' own where nothing was seen.
+    """The blobs of the profiles; the cones' own where nothing was seen.
 
     split : levels of colour over a standard deviation along the bone beyond which a blob is cut.
     """

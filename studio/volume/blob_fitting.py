@@ -7,17 +7,17 @@ likelihood is that of each voxel from its own blob, ln β_j + ln N(x; μ_j, Σ_j
 
 Where the paper leaves things open or pure K-means breaks down:
 
-- A fit ends when next to no voxel changes hands, or when the likelihood falls: nearest by Mahalanobis distance is not
-  likeliest, and left alone a fit goes on to give the largest blobs ever more.
-- Every predicted pose is also tried moved as a whole, so that its mean is the hull's: a body that came faster than
-  expected is then mostly found at once, where K-means alone would give one leg's voxels to the other.
+- A fit ends when almost no voxel changes its blob, or when the likelihood falls: nearest by Mahalanobis distance is not
+  likeliest, and without this rule the largest blobs keep growing.
+- Every predicted pose is also tried translated so that its mean is the hull's: this mostly finds a body that moved
+  faster than expected, where K-means alone would assign one leg's voxels to the other.
 
-- A blob that is given little (a hand inside the trunk's hull) keeps to its prediction: the M-step counts the predicted
-  blob as PRIOR_SHARE of its usual volume. A blob given nothing stays where it was predicted.
+- A blob with few voxels (a hand inside the trunk's hull) stays near its prediction: the M-step counts the predicted
+  blob as PRIOR_SHARE of its usual volume. A blob without voxels stays where it was predicted.
 - Larger voxels of the octree count by their volume and add their own extent, edge² / 12, to the covariance.
-- The likelihood that starts are compared by, and by which a loss is seen, uses the learnt colours. With the colours
-  that the blobs take on in the fit, a mixture snapped to anything of even colour would look likely.
-- Before colours are learnt every blob has the hull's own mean colour, and colour decides nothing.
+- The likelihood by which starts are compared and a loss is detected uses the learnt colours. With the colours fitted to
+  the blobs, a mixture fitted to any object of even colour would look likely.
+- Before colours are learnt every blob has the hull's own mean colour, and colour has no effect.
 """
 
 from dataclasses import dataclass
@@ -36,11 +36,11 @@ Labels = NDArray[np.int32]
 
 PRIOR_SHARE = 0.05
 LEAST_COLOUR_VARIANCE = 36.0
-"""levels²: no blob is surer of its colour than 6 levels; light and camera are not."""
+"""levels²: least colour variance of a blob (6 levels), for changes of light and camera."""
 STILL = 0.002
-"""Share of voxels that may still change hands when the fit stops."""
+"""Share of voxels that may still change their blob when the fit stops."""
 NEAR_ENOUGH = 20.0
-"""mm: a prediction whose mean is this near the hull's is not tried moved."""
+"""mm: a prediction whose mean is this near the hull's is not tried translated."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +58,7 @@ class Voxels:
 
     @classmethod
     def of(cls, hull: Hull) -> "Voxels":
-        """The voxels of a hull that is not empty; one whose colour no view gave has the hull's mean colour."""
+        """The voxels of a hull that is not empty; those without colour get the hull's mean colour."""
         shares = np.asarray(hull.weights(), dtype=np.float64)
         centre = shares @ hull.centres
         colours = np.asarray(hull.colours, dtype=np.float64)
@@ -72,16 +72,16 @@ class Voxels:
         return cls(rows, shares, extents, centre, mean, np.maximum(variance, LEAST_COLOUR_VARIANCE))
 
     def no_labels(self) -> Labels:
-        """Room for a label of each voxel."""
+        """An array for a label of each voxel."""
         return np.empty(self.rows.shape[1], dtype=np.int32)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fitted:
     """The best fit. mixture : blob b is the model's blob b. labels : (K,) each voxel's nearest. log_likelihood : nats a
-    voxel, of the best fit; log_likelihoods : of every fit, the S from the poses as they are, then the S from the poses
-    moved to the hull that were tried. start : the pose (0...S - 1) of the best. margin : nats a voxel
-    that the likelihood lies above (positive) or below (negative) what the model gives of a body just like itself.
+    voxel, of the best fit; log_likelihoods : of every fit: S from the poses, then those tried
+    from the poses translated to the hull. start : the pose (0...S - 1) of the best. margin : the likelihood
+    less that of a body exactly like the model, nats a voxel.
     """
 
     mixture: BlobMixture
@@ -107,7 +107,7 @@ def fit_blobs(
     Raises BodyError for poses that are not the body's, ValueError for an empty hull.
     """
     if len(hull.centres) == 0:
-        raise ValueError("An empty hull has nothing to fit blobs to.")
+        raise ValueError("Blobs cannot be fitted to an empty hull.")
     voxels = Voxels.of(hull)
     coloured = model.in_colour(voxels.colour, voxels.colour_variance)
     predicted = coloured.mixture(body, starts)
@@ -145,7 +145,7 @@ def nearest_blobs(voxels: Voxels, mixture: BlobMixture) -> Labels:
 
 
 def self_likelihood(model: BlobModel) -> float:
-    """Nats a voxel of a body that is just as the model says, each voxel from its own blob:
+    """Expected likelihood of a body exactly like the model, nats a voxel, each voxel from its own blob:
     Σ α (ln α - ½ ln ((2πe)^6 |Σ| |C|)); all colours known.
     """
     logs = np.log(model.eigenvalues).sum(axis=1) + np.log(model.colour_variance).sum(axis=1)
@@ -153,7 +153,7 @@ def self_likelihood(model: BlobModel) -> float:
 
 
 def _state_of(mixture: BlobMixture, centre: Array) -> Array:
-    """A mixture of means (B, 3) as the kernels have it, (B, STATE), about `centre` (3,)."""
+    """A mixture of means (B, 3) in the kernels' layout (B, STATE), about `centre` (3,)."""
     upper = mixture.covariances[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
     return np.column_stack(
         [mixture.means - centre, upper, mixture.colours, mixture.colour_variances, mixture.weights]

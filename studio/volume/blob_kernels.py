@@ -1,4 +1,4 @@
-"""The inner loops of blob fitting: which blob a voxel is nearest to, what each blob then holds, and what it becomes.
+"""The inner loops of blob fitting: assignment of voxels to blobs, sums by blob, update of the blobs.
 
 Voxels come as six rows (x, y, z from the hull's mean, then the three colours), so that a loop over voxels with the
 blob held fixed runs on whole vector registers. Sums are made in the order of the voxels, in double precision: the same
@@ -20,7 +20,7 @@ SUMS = 17
 # Columns of a blob in `state`: mean, covariance xx xy xz yy yz zz, colour, variance of each colour, weight.
 STATE = 16
 LOG_TWO_PI = math.log(2.0 * math.pi)
-# Voxels at a time, so that their nearest distances stay in the first cache.
+# Voxels per block, so that their nearest distances stay in the first-level cache.
 CHUNK = 512
 
 
@@ -59,7 +59,7 @@ def assign(voxels, factors, labels, distances):
 
 @njit(**KERNEL)
 def gather(voxels, volumes, extents, labels, sums):
-    """What each blob holds of the voxels assigned to it: sums (B, SUMS) float64, made new.
+    """Sums over the voxels assigned to each blob, sums (B, SUMS) float64, overwritten.
 
     voxels : (6, K) float32. volumes : (K,) each voxel's share of all. extents : (K,) mm². labels : (K,) int32.
     """
@@ -87,7 +87,7 @@ def gather(voxels, volumes, extents, labels, sums):
 
 @njit(**KERNEL)
 def count_changes(labels, before):
-    """How many labels (K,) differ from those before, which become the same."""
+    """Number of labels (K,) that differ from those before; `before` is updated."""
     changed = 0
     for k in range(labels.shape[0]):
         if labels[k] != before[k]:
@@ -131,7 +131,7 @@ def fill_factors(state, factors):
 @njit(**KERNEL)
 def likelihood_of(state, sums, colours):
     """Nats a voxel: the mean over the volume of ln β + ln N(x; fitted) + ln N(colour; learnt) of each voxel's own blob,
-    from what the blobs hold. state : (B, STATE). colours : (B, 6) the learnt colours and their variances.
+    from the blobs' sums. state : (B, STATE). colours : (B, 6) the learnt colours and their variances.
     """
     inverse, total = np.empty(6), 0.0
     for b in range(state.shape[0]):
@@ -156,7 +156,7 @@ def likelihood_of(state, sums, colours):
 
 @njit(**KERNEL)
 def update(predicted, sums, prior_share, least_colour, state):
-    """The M-step: state (B, STATE) from what each blob holds, the prediction counting as `prior_share` of its volume.
+    """The M-step: state (B, STATE) from the blobs' sums, the prediction counting as `prior_share` of its volume.
 
     least_colour : levels², the least variance of a colour. The six entries of a covariance may make it too thin.
     """
@@ -187,7 +187,7 @@ def update(predicted, sums, prior_share, least_colour, state):
 
 @njit(**KERNEL)
 def thicken(state, least):
-    """Make no covariance's eigenvalue less than `least` mm², in place."""
+    """Raise the covariances' eigenvalues to at least `least` mm², in place."""
     for b in range(state.shape[0]):
         blob = state[b]
         x, y, z = blob[3] - least, blob[6] - least, blob[8] - least
@@ -211,11 +211,11 @@ def thicken(state, least):
 
 @njit(**KERNEL)
 def fit(voxels, volumes, extents, predicted, colours, rules, best, best_labels):
-    """K-means from the predicted blobs (B, STATE): the likeliest on the way into best (B, STATE), the voxels' nearest
-    blobs into best_labels (K,); returns their likelihood.
+    """K-means from the predicted blobs (B, STATE): writes the likeliest state to best (B, STATE), the voxels' nearest
+    blobs to best_labels (K,); returns their likelihood.
 
-    colours : (B, 6) learnt colours and variances. rules : most rounds, share of voxels that may still change hands,
-    share that the prediction counts, least colour variance, least variance.
+    colours : (B, 6) learnt colours and variances. rules : most rounds, share of voxels that may still change their
+    blob, weight of the prediction, least colour variance, least variance.
     """
     count = voxels.shape[1]
     labels, before = np.empty(count, np.int32), np.full(count, -1, np.int32)

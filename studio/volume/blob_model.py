@@ -2,7 +2,7 @@
 
 A blob keeps what does not change with the pose: the limb it sits on, its offset along that bone, three eigenvalues in
 the bone's own axes, a colour, and its share of the body's volume. Any pose then gives a mixture of Gaussians by forward
-kinematics. Colours are those of the pictures (blue, green, red, 0...255); NaN where nothing is known of them yet.
+kinematics. Colours are those of the pictures (blue, green, red, 0...255); NaN where unknown.
 
 Before anything is learnt the blobs are those of the cones: the mean and the second moments of a solid truncated cone of
 even density.
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 SMALLEST_VARIANCE = 25.0
-"""mm²: a blob is never thinner than 5 mm to either side, a sheet or a thread of voxels neither."""
+"""mm²: least variance of a blob (5 mm), also of a sheet or a thread of voxels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,7 +70,7 @@ class BlobModel:
         return BlobMixture(means, covariances, self.colour, self.colour_variance, self.weight)
 
     def in_colour(self, colour: Array, variance: Array) -> "BlobModel":
-        """The model with one colour (3,) and its variance (3,) where none is known."""
+        """The model with colour (3,) and its variance (3,) where they are unknown."""
         known = np.isfinite(self.colour).all(axis=1, keepdims=True)
         return BlobModel(
             self.limb,

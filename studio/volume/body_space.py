@@ -1,4 +1,4 @@
-"""The tracking space of a body: what the cameras watch together, or the reach of a body that is fixed to the world."""
+"""The tracking space of a body: the common view of the cameras, or the reach of a body that is fixed to the world."""
 
 from collections.abc import Sequence
 
@@ -11,12 +11,12 @@ from studio.volume.alignment import root_parameters
 from studio.volume.tracking_space import Box, box_of
 
 TRIED = 2000
-"""Poses between the limits whose limbs span a fixed body's reach."""
+"""Number of random poses whose limbs span a fixed body's reach."""
 MARGIN = 1.1
 
 
 def space_of(body: BodyModel, cameras: Sequence[Camera]) -> Box:
-    """The box in which the body's hull is sought. Raises CalibrationError where cameras watch no common place."""
+    """The box in which the body's hull is carved. Raises CalibrationError where the cameras' views do not overlap."""
     if len(root_parameters(body)):
         return box_of(cameras)
     lower = np.array([max(entry.lower, -np.pi) for entry in body.parameters])

@@ -1,4 +1,4 @@
-"""Eq. 5: how large a sum of squared Mahalanobis distances may be when all its pixels are background.
+"""Eq. 5: threshold of a sum of squared Mahalanobis distances of background pixels.
 
 Each of k background pixels contributes a χ² variable of 3 degrees of freedom (three colours), so their sum follows
 χ² with 3 k. Thresholds come from the inverse of that distribution and, as in the paper, from a polynomial of

@@ -1,4 +1,4 @@
-"""Kernels of the visual hull: what pictures say of voxels (Caillette et al. 2007, Eq. 6), and what becomes of these.
+"""Kernels of the visual hull: classification of voxels by pictures or masks (Caillette et al. 2007, Eq. 6).
 
 **Pixels.** A voxel needs scattered pixels, one of few in a cache line, each with nine numbers of background from
 memory. So when the first sample falls into a tile of 32 × 8 pixels the whole tile is computed, in rows, which takes
@@ -50,11 +50,11 @@ class Rules(NamedTuple):
 
 
 class Sights(NamedTuple):
-    """What is seen of a frame, all views one after another.
+    """A frame's pixels or masks, all views one after another.
 
-    by_pixels : not by masks. starts : (2, V + 1) where a view's pixels begin, and its sums. sums : summed areas of the
-    masks, (H + 1, W + 1) each. picture : (N, 3) uint8 BGR. gaussians : (9, N) `YuvBackground.packed`. distances : (N,)
-    from the background, NaN where they were not needed yet. heights : the radical inverse of each sample's number.
+    by_pixels : not by masks. starts : (2, V + 1) offsets of a view's pixels, and of its sums. sums : summed areas of
+    the masks, (H + 1, W + 1) each. picture : (N, 3) uint8 BGR. gaussians : (9, N) `YuvBackground.packed`. distances :
+    (N,) from the background, NaN where not computed yet. heights : the radical inverse of each sample's number.
     """
 
     by_pixels: bool
@@ -111,10 +111,10 @@ def look_at_tile(seen, view, x, y, rules):
 
 @njit(**EXACT_INLINED)
 def look_at_mask(seen, view, rules, place):
-    """What a mask says of a voxel.
+    """Classify a voxel by a mask.
 
-    Above the last depth every pixel of the rectangle around the voxel counts, so nothing is carved that covers a
-    mask pixel. At the last depth: of the rectangle of the voxel's own area.
+    Above the last depth every pixel of the rectangle around the voxel counts, so a voxel that covers a mask pixel is
+    not carved. At the last depth: of the rectangle of the voxel's own area.
     """
     width, height = int(seen.cameras[view].size[0]), int(seen.cameras[view].size[1])
     sums, across, down = seen.sums, place[BOUND_X], place[BOUND_Y]
@@ -144,7 +144,7 @@ def look_at_mask(seen, view, rules, place):
 @njit(**EXACT_INLINED)
 def look_at_pixels(seen, view, rules, place):
     """Eq. 6 for one voxel in one picture."""
-    # One way out, as functions with several count their array arguments in and out at each call.
+    # A single return: functions with several count references to their array arguments at each call.
     width, height = int(seen.cameras[view].size[0]), int(seen.cameras[view].size[1])
     start, distances = seen.starts[0, view], seen.distances
     last, single, (one, linear, square) = rules.last, np.float32(rules.single), rules.polynomial
@@ -187,11 +187,11 @@ def look_at_pixels(seen, view, rules, place):
 def judge(first, end, nodes, states, verdicts, corner, edge, seen, rules):
     """CARVED, KEPT or SPLIT for the voxels first to end - 1 of nodes (N, 3).
 
-    verdicts : (N,) filled. states : (N, 3) bits of the views in which each is foreground for good (masks only), bits of
-    those that do not see it, and the view to look at first: that in which its parent was the least foreground, the
-    likeliest to carve it. They are brought up to date; they change how much is looked at, never what comes out.
+    verdicts : (N,) filled. states : (N, 3) bits of the views in which each is certainly foreground (masks only), bits
+    of those that do not see it, and the view to test first: that in which its parent was least foreground, the
+    likeliest to carve it. They are updated; they change the amount of work, never the result.
     """
-    # One loop, not a function a voxel: array arguments of one with several exits are counted in and out at each call.
+    # One loop, not a function per voxel: with several returns references to array arguments are counted at each call.
     cameras, place, half = seen.cameras, np.empty(PLACE), 0.5 * edge
     views, by_pixels = cameras.shape[0], seen.by_pixels
     for index in range(first, end):

@@ -18,8 +18,8 @@ from studio.volume.hull_projection import (
 
 @njit(**EXACT)
 def first_look(nodes, corner, edge, cameras, sampling, states, samples):
-    """What no picture is needed for: the bits of the views that cannot see each voxel (N, 3), in states[:, 1], a view
-    that sees all of it to begin with, in states[:, 2], and the most samples it takes in a view.
+    """Initialise states without pictures: bits of the views that cannot see each voxel (N, 3) in states[:, 1], a view
+    that sees all of it in states[:, 2]; its most samples in a view in samples.
     """
     place, half = np.empty(PLACE), 0.5 * edge
     for index in range(len(nodes)):
@@ -56,7 +56,7 @@ def kept_nodes(nodes, verdicts):
 def children(nodes, states, verdicts, limits):
     """The octants (M, 3) of the voxels that are split, and their states (M, 3), in the order of their parents.
 
-    limits : (2, 3) least and greatest place in the children's grid that lies in the tracking space.
+    limits : (2, 3) least and greatest index in the children's grid that lies in the tracking space.
     """
     most = 8 * np.count_nonzero(verdicts == SPLIT)
     found, inherited = np.empty((most, 3), np.int32), np.empty((most, 3), np.uint32)

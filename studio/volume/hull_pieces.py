@@ -1,4 +1,4 @@
-"""The pieces of a hull: a body is one, ghosts (places that all views take for foreground by chance) are others."""
+"""Connected pieces of a hull: the body is one, ghosts (foreground in all views by chance) are others."""
 
 import dataclasses
 
@@ -10,7 +10,7 @@ from studio.volume.hull import Hull
 
 
 def piece_numbers(hull: Hull) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """(K,) which piece each voxel belongs to, the largest being 0, and (P,) the pieces' volumes, mm³, falling."""
+    """(K,) piece of each voxel, the largest being 0, and (P,) the pieces' volumes, mm³, descending."""
     if hull.empty:
         return np.zeros(0, dtype=np.int64), np.zeros(0)
     unit = hull.smallest_edge
@@ -40,7 +40,7 @@ def fill_cubes(lower, sides, filled):
 
 @njit(**KERNEL)
 def labels_of(filled):
-    """(X, Y, Z) int32, the number of each cell's piece from 1 on, 0 where nothing is; cells touch by faces, edges or
+    """(X, Y, Z) int32, the number of each cell's piece from 1 on, 0 for empty cells; cells touch by faces, edges or
     corners. filled : (X, Y, Z), its outermost cells empty.
 
     Runs of cells along Z are joined with those that they touch of the row before and of three in the slice before; of
@@ -99,7 +99,7 @@ def joined(parents, one, other):
 
 @njit(**KERNEL)
 def root_of(parents, run):
-    """The number that stands for a run's piece."""
+    """The number of a run's piece."""
     while parents[run] != run:
         parents[run] = parents[parents[run]]
         run = parents[run]
@@ -107,7 +107,7 @@ def root_of(parents, run):
 
 
 def largest_piece(hull: Hull) -> Hull:
-    """The hull without all pieces but the largest."""
+    """The hull's largest piece alone."""
     numbers, _ = piece_numbers(hull)
     return chosen_voxels(hull, numbers == 0)
 

@@ -3,8 +3,8 @@
 It is computed at the voxel's centre: with the derivative of the lens's projection there (distortion included) its three
 half axes become three vectors in the picture, its silhouette a hexagon that the projections of the three faces turned
 to the camera tile exactly. Seen by a pinhole a point at d from the centre lies at the derivative times d, scaled by
-depth / (depth + d's depth): samples use that factor, bounds its largest value, so both are exact for a pinhole; what
-distortion adds within one voxel is hundredths of a pixel.
+depth / (depth + d's depth): samples use that factor, bounds its largest value, so both are exact for a pinhole; the
+error by distortion within one voxel is hundredths of a pixel.
 """
 
 import math
@@ -13,11 +13,11 @@ from studio.geometry import projection
 from studio.numba_in_threads import EXACT_INLINED, njit
 
 U, V, DEPTH, AXES, SINKS, BOUND_X, BOUND_Y, AREA, FACES, SHARE, PLACE = 0, 1, 2, 3, 9, 12, 13, 14, 15, 18, 19
-"""Of a voxel's place in a picture: centre (pixels), depth (mm), x and y of the half axes towards the camera, their
+"""Entries of a voxel's projection: centre (pixels), depth (mm), x and y of the half axes towards the camera, their
 depths, half sides of the upright rectangle around the hexagon, area, area of the three faces (pixels²), and
 the share of foreground that was found there."""
 NEAR = 100.0
-"""mm: a voxel that comes nearer to a camera's plane than this is not seen by it."""
+"""mm: voxels nearer to a camera's plane than this are not seen by it."""
 
 distorted = njit(**EXACT_INLINED)(projection.distorted)
 
@@ -72,7 +72,7 @@ def place_voxel(cameras, view, x, y, z, half, place):
 
 @njit(**EXACT_INLINED)
 def sample_count(place, sampling):
-    """How many samples a voxel's area is worth: the square root of its pixels, at least one."""
+    """Number of samples for a voxel's area: the square root of its pixels, at least one."""
     return max(1, math.ceil(sampling * math.sqrt(place[AREA]) - 1e-9))
 
 

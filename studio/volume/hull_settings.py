@@ -1,4 +1,4 @@
-"""The knobs of the visual hull. What it is carved from is chosen by the evidence's knobs (`evidence.settings`)."""
+"""The knobs of the visual hull. Its evidence is chosen by the knobs of `evidence.settings`."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,7 @@ class HullSettings:
         0.99999,
         0.00001,
         label="confidence",
-        help="Eq. 5's α: the share of background areas that are taken for background.",
+        help="Eq. 5's α: the share of background areas that are classified as background.",
     )
     hull_shadow: float = next_frame_knob(
         SHADOW,

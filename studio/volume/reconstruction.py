@@ -4,15 +4,16 @@ A voxel is carved when one view shows only background where it projects to, kept
 foreground, and otherwise cut into eight, down to the last depth. Where the paper is silent:
 
 - A voxel still undecided at the last depth is kept when in every view that sees it at least `hull_edge_share` of its
-  samples are foreground. A half would be even but loses what sticks out, everything is a shell around the body.
-- A view carves only what it sees: what lies outside its picture (or partly outside, until the last depth, where the
-  centre decides) is left to the others. A voxel seen by fewer than `hull_least_views` views is carved.
+  samples are foreground. A half would be unbiased but loses thin parts; a small share gives a shell around the body.
+- A view carves only voxels inside its picture (entirely inside, until the last depth, where the centre decides); the
+  others are left to the other views. A voxel seen by fewer than `hull_least_views` views is carved.
 - With masks as evidence the share of mask pixels is counted over the whole rectangle around the voxel's projection
-  by summed areas, instead of at samples: no mask pixel at all carves, nothing but mask pixels is foreground.
+  by summed areas, instead of at samples: a voxel without mask pixels is carved, one with mask pixels only is
+  foreground.
 - With pixels, distances are found in small tiles when the first sample falls into one (`hull_kernels`). Samples
   miss the tips of limbs now and then: of a body of cones in five views a hull from pixels holds 98.7 %, one from masks
-  99.9 % (`tests/volume/test_reconstruction.py`); knob `hull_sampling` buys more.
-- Colours are of the samples that are not background, so that the rim of a body is not mixed with what is behind it.
+  99.9 % (`tests/volume/test_reconstruction.py`); more with knob `hull_sampling`.
+- Colours are of the samples that are not background, so that the rim of a body is not mixed with the background.
 
 Of the last depth's rule, volume kept of that body and its hull's volume over its own, from masks at depth 7 (8): share
 0.5: 97.7 %, 1.34 (99.2 %, 1.34); 0.35: 98.4 %, 1.39; 0.2: 99.9 %, 1.73 (99.9 %, 1.49); 0.05: 100 %, 1.83 (100 %, 1.51).
@@ -45,11 +46,11 @@ Bytes = NDArray[np.uint8]
 FIRST_DEPTH = 4
 MOST_VIEWS = 32
 VOXELS_A_THREAD = 512
-"""Fewer are not worth waking a thread for."""
+"""Least voxels for which another thread pays."""
 
 
 class Reconstructor:
-    """Carves hulls for some cameras, a tracking space and settings: build it once, use it for every frame."""
+    """Carves hulls for some cameras, a tracking space and settings; built once, used for every frame."""
 
     def __init__(self, cameras: tuple[Camera, ...], box: Box, settings: HullSettings) -> None:
         """Raises FootageError for no camera or more than 32."""
@@ -152,7 +153,7 @@ class Reconstructor:
         return kernels.Sights(True, *shared, sums, picture, gaussians, distances, self._heights)
 
     def _seen_masks(self, masks: Sequence[Bytes], picture: Bytes) -> kernels.Sights:
-        """Summed masks. picture : of all views one after the other, where colours are asked for."""
+        """Summed masks. picture : of all views one after the other, where colours are needed."""
         sums = np.empty(int(self._starts[1, -1]), dtype=np.int32)
         for mask, first, end in zip(masks, self._starts[1], self._starts[1, 1:], strict=False):
             octree.summed_areas(mask, sums[first:end])
@@ -226,7 +227,7 @@ def grid_within(box: Box, depth: int) -> Nodes:
 
 
 def radical_inverses(count: int) -> Array:
-    """(count,) the binary digits of 0, 1, 2 … mirrored behind the point: evenly spread however many are taken."""
+    """(count,) radical inverses of 0, 1, 2 … in base 2: evenly spread for any count."""
     numbers, found, digit = np.arange(count), np.zeros(count), 0.5
     while numbers.any():
         found += digit * (numbers & 1)
@@ -235,5 +236,5 @@ def radical_inverses(count: int) -> Array:
 
 
 def _starts(lengths: IntArray) -> IntArray:
-    """(V + 1,) where each of V pieces begins, and the end of the last."""
+    """(V + 1,) start of each of V pieces, and the end of the last."""
     return np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)

@@ -1,23 +1,21 @@
-"""How far one mixture of blobs is from another: relative entropy, the Kullback-Leibler divergence (Caillette, Galata &
+"""Relative entropy of one mixture of blobs to another, the Kullback-Leibler divergence (Caillette, Galata &
 Howard 2007, section 6.4, Eq. 7 to 10). F = Σ α_i f_i is the model's mixture, G = Σ β_j g_j the pictures'.
 
 **Eq. 10 as printed** is
 
     ½ (ln |Σf| / |Σg| - d + tr(Σf⁻¹ Σg) + (μg - μf)ᵀ Σf⁻¹ (μg - μf)),
 
-which is the divergence of f from g, D(g||f), and not the D(f||g) that stands on its left and that its own first line,
+which is the divergence of f from g, D(g||f), and not the D(f||g) on its left-hand side, which its own first line,
 ∫ P(x|f) ln P(x|f) / P(x|g) dx, defines: f and g are exchanged throughout. The textbook form, which a Monte-Carlo
-estimate of that integral bears out (tests), is
+estimate of that integral confirms (tests), is
 
     D(f||g) = ½ (ln |Σg| / |Σf| - d + tr(Σg⁻¹ Σf) + (μg - μf)ᵀ Σg⁻¹ (μg - μf)),
 
-and it is used here, so that Eq. 8 and 9 are what they say. It also costs less: Σg⁻¹ belongs to the pictures and is
-worked out once a frame.
+is used here, so that Eq. 8 and 9 hold. It also costs less: Σg⁻¹ belongs to the pictures and is computed once a frame.
 
-Eq. 8 seeks for each f_i the nearest g_j; Eq. 9 keeps the correspondence f_i ↔ g_i that fitting from the model's own
+Eq. 8 takes for each f_i the nearest g_j; Eq. 9 keeps the correspondence f_i ↔ g_i that fitting from the model's own
 blobs gives, and costs one divergence a blob. With weights that sum to 1 every term of Eq. 9 together is never negative.
-A colour that a blob has in any pose adds the same to every pose's divergence, so what is weighed is the divergence in
-space (d = 3).
+Colours add the same to every pose's divergence, so poses are weighed by the divergence in space (d = 3).
 """
 
 from dataclasses import dataclass
@@ -62,10 +60,10 @@ def kept_divergence(model: BlobMixture, image: BlobMixture) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DivergenceOfPoses:
-    """Eq. 9 of any pose against one image's mixture, with everything that does not depend on the pose worked out.
+    """Eq. 9 of any pose against one image's mixture, with all terms that do not depend on the pose precomputed.
 
     joint : (B,) joint each blob's limb is on. offset, spread : (B,), (B, 3) the model's. share : (B,) α. means (B, 3),
-    precisions (B, 3, 3) : the image's. constant : what every pose's divergence holds.
+    precisions (B, 3, 3) : the image's. constant : the part of the divergence common to all poses.
     """
 
     body: BodyModel
@@ -81,7 +79,7 @@ class DivergenceOfPoses:
     def against(
         cls, body: BodyModel, model: BlobModel, image: BlobMixture, blobs: NDArray[np.int64] | None = None
     ) -> "DivergenceOfPoses":
-        """The model's poses against `image`, whose blobs are the model's in the same order. blobs : look only at these;
+        """The model's poses against `image`, whose blobs are the model's in the same order. blobs : use only these;
         their shares are made to sum to 1 on both sides.
         """
         chosen = np.arange(len(model.limb)) if blobs is None else blobs

@@ -1,4 +1,4 @@
-"""The tracking space: the box of the world, standing on the floor, that the cameras watch."""
+"""The tracking space: the box on the floor that the cameras see."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,11 +16,11 @@ Array = NDArray[np.float64]
 HEIGHT = 2300.0
 """mm: a tall person with raised arms."""
 LEVELS = (300.0, 1000.0, 1700.0)
-"""mm above the floor: a place is watched when its knees, hips and head are."""
+"""mm above the floor of knees, hips and head: a place is seen when all of these are."""
 GRID = 96
 LEAST_SIDE, MOST_SIDE = 1200.0, 12000.0
 FEWEST_PLACES = 12
-"""Places of the grid that make a space: fewer are a sliver in which nobody stands."""
+"""Least grid places of a space: fewer are too narrow for a person."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,7 +28,7 @@ class Box:
     """An upright box of the world. lower, upper : (3,) mm.
 
     The octree's root is the cube that stands on the middle of the box's floor with `edge` as its side; voxels
-    outside the box are never looked at.
+    outside the box are never tested.
     """
 
     lower: Array
@@ -56,14 +56,14 @@ class Box:
 def box_of(
     cameras: Sequence[Camera], *, floor: float = 0.0, height: float = HEIGHT, margin: float = 0.0
 ) -> Box:
-    """The space that all cameras watch, or as many as watch the same places.
+    """The space that all cameras see, else the most cameras with a common view.
 
-    floor : height of the floor, mm: nothing below it is looked at. height : of the space, mm. margin : mm added on
-    the four sides. A place counts as watched when knees, hips and head of who stands there are in the picture.
-    Raises CalibrationError where fewer than two cameras (of several) watch a common place.
+    floor : height of the floor, mm: the box begins there. height : of the space, mm. margin : mm added on
+    the four sides. A place counts as seen when knees, hips and head of a person standing there are in the picture.
+    Raises CalibrationError where no two cameras (of several) see a common place.
     """
     if not cameras:
-        raise CalibrationError("There is no camera to watch a tracking space.", "Give a calibration.")
+        raise CalibrationError("A tracking space needs at least one camera.", "Give a calibration.")
     middle, reach = _surroundings(cameras, floor + 0.5 * height)
     steps = np.linspace(-reach, reach, GRID)
     x, y = np.meshgrid(middle[0] + steps, middle[1] + steps, indexing="ij")
@@ -77,7 +77,7 @@ def box_of(
             break
     else:
         raise CalibrationError(
-            "No two cameras watch a common place on the floor.",
+            "No two cameras see a common place on the floor.",
             "Check the calibration's unit and its upward direction, or give the tracking space.",
         )
     lower = np.array([x[watched].min(), y[watched].min()])
@@ -102,11 +102,11 @@ def sees(camera: Camera, points: Array) -> NDArray[np.bool_]:
 
 
 def _surroundings(cameras: Sequence[Camera], height: float) -> tuple[Array, float]:
-    """The point (2,) that the optical axes pass nearest to, and how far around it to look, mm."""
+    """The point (2,) that the optical axes pass nearest to, and the search radius around it, mm."""
     axes = np.stack([camera.rotation[2] for camera in cameras])
     centres = np.stack([camera.centre for camera in cameras])
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
-    # Parallel axes meet nowhere: a weak pull to the cameras' own middle at the space's height decides then.
+    # Parallel axes do not meet: a weak pull to the cameras' own middle at the space's height then decides.
     pull = 1e-3 * np.eye(3)
     at = np.array([*centres[:, :2].mean(axis=0), height])
     middle = np.linalg.solve(across.sum(axis=0) + pull, np.einsum("vij,vj->i", across, centres) + pull @ at)

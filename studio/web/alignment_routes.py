@@ -2,25 +2,26 @@
 
 import asyncio
 from collections.abc import Sequence
+from typing import Annotated
 
 from fastapi import APIRouter
 
 from studio.errors import NotFoundError, RunError
-from studio.runs.aligning import SessionAlignment, align_cameras
+from studio.operations.cameras import Alignment, align
+from studio.runs.aligning import SessionAlignment
 from studio.runs.overlay_pictures import forget_composers
 from studio.runs.turned_cameras import (
-    alignment_words,
     is_of,
-    remember_alignment,
     turn_back,
     turn_cameras,
     turned_from,
 )
 from studio.sessions.calibration_changes import CalibrationChange
 from studio.sessions.session import Session
-from studio.web.alignment_schemas import AlignmentAnswer, AlignmentJob, AlignmentLine, AlignmentWish
+from studio.web.alignment_schemas import AlignmentAnswer, AlignmentJob, AlignmentLine
 from studio.web.doors import Door, Doors, let_go
 from studio.web.job_kinds import ALIGNMENT
+from studio.web.requests import Asked, body_of
 from studio.web.session_routes import OpenSession
 from studio.worker.jobs import Job
 
@@ -34,7 +35,11 @@ def alignment(session: OpenSession, doors: Door) -> AlignmentAnswer:
 
 
 @router.post("", status_code=202)
-async def begin(session: OpenSession, wish: AlignmentWish, doors: Door) -> AlignmentJob:
+async def begin(
+    session: OpenSession,
+    asked: Annotated[Asked, body_of(align, "AlignmentWish", without=("keep",))],
+    doors: Door,
+) -> AlignmentJob:
     """Begin to measure; nothing is changed. Ask `GET …/alignment` how it stands, or wait for `alignment` events."""
     if doors.jobs.going(ALIGNMENT, session.name):
         raise RunError(
@@ -43,10 +48,9 @@ async def begin(session: OpenSession, wish: AlignmentWish, doors: Door) -> Align
     session.cameras()
 
     def work(job: Job) -> dict[str, object]:
-        found = align_cameras(session, wish.frames, progress=job.report_or_stop)
-        job.found = found
-        remember_alignment(session, found)
-        return _told(found)
+        aligned = align(session, **asked, keep=False, progress=job.report_or_stop)
+        job.found = aligned.found
+        return _told(aligned)
 
     return doors.jobs.begin(ALIGNMENT, AlignmentJob(session=session.name), work)
 
@@ -105,19 +109,16 @@ def _found(session: Session, doors: Doors) -> SessionAlignment | None:
     return found if isinstance(found, SessionAlignment) else None
 
 
-def _told(aligned: SessionAlignment) -> dict[str, object]:
-    found = aligned.found
+def _told(aligned: Alignment) -> dict[str, object]:
     return {
         "cameras": [
-            AlignmentLine.model_validate(
-                {"camera": name, "before_px": before, "after_px": after, "turn_degrees": turn}
+            AlignmentLine(
+                camera=name, before_px=before, after_px=aligned.after[name], turn_degrees=aligned.turns[name]
             )
-            for name, before, after, turn in zip(
-                aligned.names, found.before, found.after, found.turns, strict=True
-            )
+            for name, before in aligned.before.items()
         ],
-        "frames": list(found.frames),
+        "frames": list(aligned.found.found.frames),
         "needed": aligned.needed,
         "better": aligned.better,
-        "words": alignment_words(aligned),
+        "words": aligned.words,
     }

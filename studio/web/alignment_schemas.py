@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from studio.web.schemas import Answer, Number, Request
+from studio.web.schemas import Answer, Number
 from studio.worker.jobs import SessionJob
 
 
@@ -41,9 +41,3 @@ class AlignmentAnswer(Answer):
     job: AlignmentJob | None
     turned: bool
     notes: list[str] = Field(default_factory=list)
-
-
-class AlignmentWish(Request):
-    """frames: to look at; empty: sixteen, evenly spread."""
-
-    frames: list[int] = Field(default_factory=list, max_length=64)

@@ -78,17 +78,6 @@ class BackgroundAnswer(Answer):
     job: BackgroundJob | None
 
 
-class BackgroundWish(Request):
-    """What backgrounds shall be made of. knobs: of masks, as they shall be; tune: try others for the rest;
-    exclude_unused: what no hull comes near does not count.
-    """
-
-    source: Source
-    knobs: dict[str, Value] = Field(default_factory=dict, max_length=64)
-    tune: bool = True
-    exclude_unused: bool = False
-
-
 class PlatesWish(Request):
     """Uploaded pictures or clips of the empty room. files: camera to a name in the upload; empty: matched by name."""
 

@@ -4,7 +4,7 @@ events), with the masks' quality at its end.
 
 import asyncio
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from fastapi import APIRouter
 
@@ -12,7 +12,8 @@ from studio.capture.naming import match_names
 from studio.capture.pictures import is_picture
 from studio.errors import FootageError, RunError, StudioError
 from studio.knobs import knobs_of
-from studio.runs.background_setup import MODEL_OF, SOURCES, set_up_background
+from studio.operations.masks import background as set_background
+from studio.runs.background_setup import MODEL_OF, SOURCES
 from studio.runs.mask_quality import MaskQuality, measure_masks
 from studio.runs.overlay_pictures import forget_composers
 from studio.runs.session_settings import session_settings
@@ -26,11 +27,11 @@ from studio.web.background_schemas import (
     BackgroundAnswer,
     BackgroundCamera,
     BackgroundJob,
-    BackgroundWish,
     PlatesWish,
 )
 from studio.web.doors import Door, Doors
 from studio.web.job_kinds import BACKGROUND
+from studio.web.requests import Asked, body_of
 from studio.web.session_routes import OpenSession
 from studio.web.setting_views import knob_view
 from studio.web.upload_routes import forget, upload_folder
@@ -101,29 +102,23 @@ async def take_over(session: OpenSession, wish: PlatesWish, doors: Door) -> Back
 
 
 @router.post("/background", status_code=202)
-async def begin_setup(session: OpenSession, wish: BackgroundWish, doors: Door) -> BackgroundJob:
+async def begin_setup(
+    session: OpenSession, asked: Annotated[Asked, body_of(set_background, "BackgroundWish")], doors: Door
+) -> BackgroundJob:
     """Begin to set the background up. Ask `GET …/background` how it stands, or wait for `background` events."""
     _check_free(doors, session.name)
-    session_settings(session, changes=wish.knobs)
+    session_settings(session, changes=asked["knobs"])
 
     def work(job: Job) -> dict[str, object]:
         try:
-            made = set_up_background(
-                session,
-                wish.source,
-                knobs=wish.knobs,
-                tune=wish.tune,
-                exclude_unused=wish.exclude_unused,
-                progress=job.report_or_stop,
-                cancelled=job.cancelled,
-            )
+            made = set_background(session, **asked, progress=job.report_or_stop)
             quality = _measured(Session(session.path), job)
         finally:
             forget_composers()
         answer = quality_answer(quality) if quality is not None else None
         return {"notes": list(made.notes), "knobs": made.knobs, "quality": answer}
 
-    return doors.jobs.begin(BACKGROUND, BackgroundJob(session=session.name, source=wish.source), work)
+    return doors.jobs.begin(BACKGROUND, BackgroundJob(session=session.name, source=asked["source"]), work)
 
 
 @router.delete("/background", status_code=202)

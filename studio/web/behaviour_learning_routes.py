@@ -3,23 +3,27 @@
 import asyncio
 import math
 from pathlib import Path
+from typing import Annotated, Any
 
 from fastapi import APIRouter
+from pydantic import Field
 
 from studio.behaviour.settings import LearningSettings
 from studio.body.catalogue import list_bodies, load_body
 from studio.errors import BehaviourError, NotFoundError
 from studio.footage_recipes import recipe_names
 from studio.knobs import knobs_of
+from studio.operations.behaviours import learn
 from studio.runs.behaviour_models import SUFFIX, models_folder
 from studio.sessions.archives import ENDINGS, unpacked
 from studio.sessions.names import checked_name
 from studio.sessions.session import BODIES_NAME
 from studio.training.oversampling import OversamplingSettings
 from studio.training.sources import FPS, MOTION_FILES
-from studio.web.behaviour_learning_schemas import LearningChoices, LearningProgress, LearningRequest
+from studio.web.behaviour_learning_schemas import LearningChoices, LearningProgress
 from studio.web.doors import Door, Doors
 from studio.web.job_kinds import LEARNING
+from studio.web.requests import Asked, MaybeName, body_of
 from studio.web.setting_views import knob_view
 from studio.web.upload_routes import forget, upload_folder
 from studio.worker.jobs import Job
@@ -28,6 +32,13 @@ from studio.worker.learning_process import LearningOrder, learn_in_process
 router = APIRouter(prefix="/api/learning", tags=["behaviours"])
 
 SKELETON = ".asf"
+GIVEN: dict[str, Any] = {
+    "sources": (
+        Annotated[list[str], Field(max_length=500)],
+        Field([], description="Runs as SESSION/RUN, recipes."),
+    ),
+    "upload": (MaybeName, Field(None, description="Identifier of a finished upload of motion files.")),
+}
 
 
 @router.get("")
@@ -46,16 +57,18 @@ def choices(doors: Door) -> LearningChoices:
 
 
 @router.post("", status_code=202)
-async def begin(wish: LearningRequest, doors: Door) -> LearningProgress:
+async def begin(
+    asked: Annotated[Asked, body_of(learn, "LearningRequest", **GIVEN)], doors: Door
+) -> LearningProgress:
     """Begin to learn a model; its name must be free. 409 while another one is learnt."""
-    order = await asyncio.to_thread(_order, wish, doors)
+    order = await asyncio.to_thread(_order, asked, doors)
 
     def work(job: Job) -> dict[str, object]:
         try:
             learnt = learn_in_process(order, job.report, job.check)
         finally:
-            if wish.upload:
-                forget(doors, wish.upload)
+            if asked.more["upload"]:
+                forget(doors, asked.more["upload"])
         known = {
             name: None if isinstance(value, float) and math.isnan(value) else value
             for name, value in learnt.items()
@@ -75,30 +88,31 @@ def cancel(doors: Door) -> LearningProgress:
     return doors.jobs.state(LEARNING, state.key)
 
 
-def _order(wish: LearningRequest, doors: Doors) -> LearningOrder:
-    """The wish, checked. Raises StudioError for a name that is taken, sources that are not there, wrong knobs."""
+def _order(asked: Asked, doors: Doors) -> LearningOrder:
+    """What is asked for, checked. Raises StudioError: a name that is taken, no such source, wrong knobs."""
     doors.jobs.check_free(LEARNING)
-    workspace = doors.workspace
-    if (models_folder(workspace.root) / f"{checked_name(wish.name, 'model')}{SUFFIX}").exists():
+    workspace, name, upload = doors.workspace, asked["into"], asked.more["upload"]
+    body = asked.get("body") or workspace.usual_body()
+    if (models_folder(workspace.root) / f"{checked_name(name, 'model')}{SUFFIX}").exists():
         raise BehaviourError(
-            f"There is a model '{wish.name}' already.", "Choose another name, or delete that one first."
+            f"There is a model '{name}' already.", "Choose another name, or delete that one first."
         )
-    load_body(wish.body, (workspace.root / BODIES_NAME,))
-    for source in (*wish.sources, *wish.tests):
+    load_body(body, (workspace.root / BODIES_NAME,))
+    for source in (*asked.more["sources"], *asked["tests"]):
         _check(source, doors)
-    files = _motion_in(upload_folder(doors, wish.upload)) if wish.upload else ()
-    sources = (*wish.sources, *files)
+    files = _motion_in(upload_folder(doors, upload)) if upload else ()
+    sources = (*asked.more["sources"], *files)
     if not sources:
         raise BehaviourError("There is nothing to learn from.", "Choose runs, or motion files to upload.")
     order = LearningOrder(
         workspace.root,
-        wish.name,
-        wish.body,
+        name,
+        body,
         sources,
-        tuple(wish.tests),
-        wish.fps,
-        wish.seed,
-        dict(wish.settings),
+        tuple(asked["tests"]),
+        asked["fps"],
+        asked["seed"],
+        asked["knobs"],
     )
     order.settings()
     return order

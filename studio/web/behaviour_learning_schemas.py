@@ -2,28 +2,11 @@
 
 from pydantic import Field
 
-from studio.training.sources import FPS
-from studio.web.schemas import Answer, Request, RunName, Value
+from studio.web.schemas import Answer
 from studio.web.setting_schemas import KnobView
 from studio.worker.jobs import SessionJob
 
 Source = str
-
-
-class LearningRequest(Request):
-    """What a model is learnt from: runs as SESSION/RUN, bundled recipes by name, and the motion files of an upload
-    (.amc with its .asf, .bvh, .npz, .c3d, .trc, or one .zip of them). tests: sources that the entropy is measured on;
-    without any the last fifth of each source is. settings: knobs that are not to be as they are.
-    """
-
-    name: RunName
-    body: RunName
-    sources: list[Source] = Field(default_factory=list, max_length=500)
-    tests: list[Source] = Field(default_factory=list, max_length=500)
-    upload: RunName | None = None
-    fps: float = Field(FPS, ge=5.0, le=240.0)
-    seed: int = Field(0, ge=0, le=2**63 - 1)
-    settings: dict[str, Value] = Field(default_factory=dict)
 
 
 class LearningProgress(SessionJob):

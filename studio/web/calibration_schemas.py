@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from studio.operations.footage import Unit, Up
 from studio.web.schemas import Answer, CameraMatching, Number, Numbers, Request, RunName
 from studio.worker.jobs import NumberedJob
 
@@ -27,29 +28,8 @@ class CalibrationFileRequest(Request):
     upload: RunName | None = None
     file: Place = ""
     earlier: str = Field("", max_length=64)
-    unit: Literal["", "mm", "m"] = Field("", description="Empty: what the file says, or its distances tell.")
-    up: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"
-
-
-class BoardRequest(Request):
-    """Board footage to solve the cameras from. intrinsics, extrinsics: folders with one video or folder of pictures a
-    camera; neither: those that lie in `footage`, or in the session. floor: "frame:N", or "" for none.
-    """
-
-    board: str = Field(max_length=120, description="charuco:5x7,40,30 or chessboard:4x7,60")
-    thickness_mm: float = Field(0.0, ge=0, le=200)
-    footage: FootagePlace | None = None
-    intrinsics: FootagePlace | None = None
-    extrinsics: FootagePlace | None = None
-    floor: str = Field("", max_length=24, pattern=r"^(frame:\d{1,7})?$")
-    floor_footage: FootagePlace | None = Field(
-        None, description="Pictures of the board on the floor, one a camera."
-    )
-    offsets: dict[str, int] = Field(
-        default_factory=dict, max_length=64, description="By camera: frames of the common footage, if unlike."
-    )
-    distances: list["DistanceWish"] = Field(default_factory=list, max_length=64)
-    refine_lenses: bool = False
+    unit: Unit = ""
+    up: Up = "z"
 
 
 class DistanceWish(Request):

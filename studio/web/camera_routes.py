@@ -6,15 +6,16 @@ be taken from.
 
 import asyncio
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
+from pydantic import Field
 
 from studio.capture.camera_addresses import CameraAddress, camera_address, without_own
 from studio.capture.stream_files import preview_jpeg
 from studio.errors import NotFoundError
-from studio.runs.new_run import RunRequest
+from studio.operations.tracking import live
 from studio.sessions.names import PathRefused
 from studio.sessions.recordings import calibration_given
 from studio.sessions.session import Session
@@ -24,16 +25,28 @@ from studio.web.camera_schemas import (
     CameraWish,
     LiveCameraView,
     PreviewWish,
-    RecordingWish,
     SpreadView,
 )
 from studio.web.doors import Door, Doors
+from studio.web.requests import Asked, body_of
 from studio.web.safe_paths import folder_to_import
+from studio.web.schemas import RunName
 from studio.worker.camera_service import RecordingState
 from studio.worker.camera_tracking import TakeWish
 from studio.worker.commands import Start, about
 
 router = APIRouter(prefix="/api", tags=["cameras"])
+
+OF_RUN = ("tracker", "weighting", "body", "behaviour", "seed", "knobs")
+TRACKED = ("seconds", "keep_start", *OF_RUN)
+RECORDED: dict[str, Any] = {
+    "name": (RunName, Field(description="Of the session that is made.")),
+    "calibration": (str, Field(description="A session whose calibration is taken.")),
+    "track": (
+        bool,
+        Field(False, description="Follow the body at once, with that session's person and room."),
+    ),
+}
 
 
 @router.get("/cameras")
@@ -75,29 +88,22 @@ def recording(doors: Door) -> RecordingState:
 
 
 @router.post("/recordings", status_code=202)
-async def begin(wish: RecordingWish, doors: Door) -> RecordingState:
+async def begin(
+    asked: Annotated[Asked, body_of(live, "RecordingWish", only=TRACKED, **RECORDED)], doors: Door
+) -> RecordingState:
     """Record the open cameras into a new session; with `track` follow the body at once."""
-    base = doors.workspace.session(wish.calibration)
-    place = doors.workspace.place_for(wish.name)
-    if not wish.track:
+    base = doors.workspace.session(asked.more["calibration"])
+    place = doors.workspace.place_for(asked.more["name"])
+    if not asked.more["track"]:
         calibration = calibration_given(base.path)
-        begun = await asyncio.to_thread(doors.cameras.record, place, calibration, wish.seconds)
-        return begun
-    request = RunRequest(
-        tracker=wish.tracker,
-        weighting=wish.weighting,
-        body=wish.body,
-        behaviour=wish.behaviour,
-        seed=wish.seed,
-        changes=wish.settings,
-        live=True,
-    )
+        return await asyncio.to_thread(doors.cameras.record, place, calibration, asked.get("seconds"))
+    request = {name: asked[name] for name in asked if name in OF_RUN} | {"live": True}
 
     def track(session: Session, run: StoredRun) -> None:
         doors.control.send(Start(**about(run.folder)))
         doors.events.session_changed(session.name)
 
-    take = TakeWish(place, wish.seconds, keep_start=wish.keep_start)
+    take = TakeWish(place, asked.get("seconds"), keep_start=asked["keep_start"])
     begun = await asyncio.to_thread(doors.cameras.track, base, take, request, track)
     return begun
 

@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from studio.web.schemas import Answer, Number, Request, RunName
+from studio.web.schemas import Answer, Number, Request
 from studio.worker.camera_service import RecordingState
 
 Knob = bool | int | float | str
@@ -59,22 +59,3 @@ class CamerasView(Answer):
     spread: SpreadView
     fps: float
     recording: RecordingState | None
-
-
-class RecordingWish(Request):
-    """name: of the session that is made. calibration: a session whose calibration is taken. seconds: at most; empty:
-    until stopped. track: follow the body at once, with that session's person and empty room; then tracker, weighting,
-    body, behaviour and settings are the run's. keep_start: the person begins in the session's start pose.
-    """
-
-    name: RunName
-    calibration: str
-    seconds: float | None = Field(None, gt=0, le=86400)
-    track: bool = False
-    keep_start: bool = True
-    tracker: str = ""
-    weighting: str = ""
-    body: str = ""
-    behaviour: str = ""
-    seed: int = 0
-    settings: dict[str, Knob] = Field(default_factory=dict)

@@ -1,14 +1,17 @@
 """How well a run's track fits its pictures: measured in the background (`track` events, verb "check"), and kept."""
 
 import asyncio
+from typing import Annotated
 
 from fastapi import APIRouter
 
-from studio.runs.checking import RunCheck, check_run, kept_check
+from studio.operations.results import check as check_run
+from studio.runs.checking import RunCheck, kept_check
 from studio.runs.tracks import BEST, best_track, read_track, track_named
-from studio.web.check_schemas import CheckAnswer, CheckLine, CheckWish, JumpLine
+from studio.web.check_schemas import CheckAnswer, CheckLine, JumpLine
 from studio.web.doors import Door
 from studio.web.job_routes import begin_job
+from studio.web.requests import Asked, body_of
 from studio.web.run_routes import RUN, OpenRun
 from studio.web.session_routes import OpenSession
 from studio.web.track_schemas import TrackJobState
@@ -29,13 +32,15 @@ def check(run: OpenRun, track: str = "") -> CheckAnswer:
 
 
 @router.post(RUN + "/check", status_code=202)
-async def begin_check(session: OpenSession, run: OpenRun, wish: CheckWish, doors: Door) -> TrackJobState:
+async def begin_check(
+    session: OpenSession, run: OpenRun, asked: Annotated[Asked, body_of(check_run, "CheckWish")], doors: Door
+) -> TrackJobState:
     """Measure a track in every so-many-th frame."""
-    name = await asyncio.to_thread(track_named, run, wish.track or BEST)
+    name = await asyncio.to_thread(track_named, run, asked.get("track", BEST))
     await asyncio.to_thread(read_track, run, name)
 
     def work(job: Job) -> dict[str, object]:
-        check_run(session, run, name, wish.every, progress=job.report, cancelled=job.cancelled)
+        check_run(run, name, every=asked["every"], progress=job.report_or_stop)
         return {"track": name}
 
     return begin_job(doors, "check", session, run, work)

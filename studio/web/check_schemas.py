@@ -2,14 +2,7 @@
 
 from pydantic import Field
 
-from studio.web.schemas import Answer, Number, Request, RunName
-
-
-class CheckWish(Request):
-    """What is to be measured. track: null for the best; every: so-many-th."""
-
-    track: RunName | None = None
-    every: int = Field(10, ge=1, le=10_000)
+from studio.web.schemas import Answer, Number
 
 
 class JumpLine(Answer):

@@ -5,11 +5,12 @@ it is comes as `comparison` events and in every list.
 """
 
 from functools import lru_cache
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Response
+from pydantic import Field
 
-from studio.comparison.candidates import LINEUPS, VARIANTS, WEIGHTING, Lineup
+from studio.comparison.candidates import LINEUPS, VARIANTS, WEIGHTING
 from studio.comparison.folders import (
     kept_comparison,
     kept_comparisons,
@@ -18,8 +19,9 @@ from studio.comparison.folders import (
     throw_away,
 )
 from studio.comparison.kept_comparison import FRAMES_NAME, RESULT_NAME, KeptComparison
-from studio.comparison.plan import Plan, plan_comparison
+from studio.comparison.plan import Plan
 from studio.errors import NotFoundError, StudioError, WorkCancelledError
+from studio.operations.comparing import MOST_TRACKERS, compare, planned
 from studio.sessions.session import Session
 from studio.tracking.catalogue import TRACKERS
 from studio.web.comparison_schemas import (
@@ -27,15 +29,16 @@ from studio.web.comparison_schemas import (
     ComparisonDetail,
     ComparisonLine,
     ComparisonList,
-    ComparisonRequest,
     ComparisonState,
     EntrantChoice,
+    EntrantRequest,
     LineupChoice,
 )
 from studio.web.doors import Door, Doors
 from studio.web.error_responses import log
 from studio.web.job_kinds import COMPARISON
-from studio.web.schemas import TrashEntry
+from studio.web.requests import Asked, body_of
+from studio.web.schemas import RunName, TrashEntry, Value
 from studio.web.session_routes import OpenSession, trash_entry
 from studio.weighting.catalogue import WEIGHTINGS
 from studio.worker.comparison_run import done_before, run_comparison
@@ -44,6 +47,11 @@ from studio.worker.process_executor import cores
 
 router = APIRouter(prefix="/api/comparisons", tags=["comparisons"])
 
+WHO: dict[str, Any] = {
+    "session": (RunName, ...),
+    "trackers": (Annotated[list[EntrantRequest], Field(min_length=1, max_length=MOST_TRACKERS)], ...),
+    "settings": (dict[str, Value], Field({}, description="Knobs of all trackers that have them.")),
+}
 ONE = "/{session}/{comparison}"
 
 
@@ -90,12 +98,14 @@ def comparisons(doors: Door, session: str | None = None) -> ComparisonList:
 
 
 @router.post("", status_code=202)
-def begin(wish: ComparisonRequest, doors: Door) -> ComparisonLine:
+def begin(
+    asked: Annotated[Asked, body_of(compare, "ComparisonRequest", **WHO)], doors: Door
+) -> ComparisonLine:
     """Begin a comparison. 409 while another one runs; 422 for a session without a truth or for wrong knobs."""
-    session = doors.workspace.session(wish.session)
-    plan = _plan(session, wish)
+    session = doors.workspace.session(asked.more["session"])
+    plan = _plan(session, asked)
     doors.jobs.check_free(COMPARISON)
-    kept = new_comparison(place_of(session, wish.name or ""), plan)
+    kept = new_comparison(place_of(session, asked.get("name", "")), plan)
     return _start(doors, session, kept)
 
 
@@ -151,24 +161,15 @@ def frames_as_csv(session: OpenSession, kept: Kept) -> Response:
     return _file(session, kept, FRAMES_NAME, "text/csv; charset=utf-8", "csv")
 
 
-def _plan(session: Session, wish: ComparisonRequest) -> Plan:
-    """The wish, checked. Raises StudioError for what cannot be compared."""
-    changes: dict[str, dict] = {"": dict(wish.settings)} if wish.settings else {}
-    for candidate in wish.trackers:
+def _plan(session: Session, asked: Asked) -> Plan:
+    """What is asked for, checked. Raises StudioError for what cannot be compared."""
+    shared, entrants = asked.more["settings"], asked.more["trackers"]
+    changes: dict[str, dict] = {"": shared} if shared else {}
+    for candidate in entrants:
         own = dict(candidate.settings) | ({WEIGHTING: candidate.weighting} if candidate.weighting else {})
         if own:
             changes[candidate.name] = own
-    names = tuple(candidate.name for candidate in wish.trackers)
-    lineup = Lineup(names, wish.weighting or "", wish.evaluations, wish.layers, changes)
-    return plan_comparison(
-        session,
-        lineup,
-        range(wish.seeds),
-        first=wish.first,
-        last=wish.last,
-        body=wish.body or "",
-        behaviour=wish.behaviour or "",
-    )
+    return planned(session, [candidate.name for candidate in entrants], changes=changes, **asked)
 
 
 def _start(doors: Doors, session: Session, kept: KeptComparison) -> ComparisonLine:

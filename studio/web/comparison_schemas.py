@@ -7,8 +7,6 @@ from pydantic import Field
 from studio.web.schemas import Answer, Request, RunName, Value
 from studio.worker.jobs import SessionJob
 
-MOST_TRACKERS = 12
-
 
 class EntrantRequest(Request):
     """A tracker that takes part. name: a tracker, tracker:label, or a line-up; settings: its own knobs."""
@@ -16,25 +14,6 @@ class EntrantRequest(Request):
     name: str = Field(pattern=r"^[A-Za-z0-9_-]{1,64}(:[A-Za-z0-9_-]{1,40})?$")
     weighting: RunName | None = Field(None, description="Null: that of all.")
     settings: dict[str, Value] = Field(default_factory=dict)
-
-
-class ComparisonRequest(Request):
-    """What is compared; what is left out is the session's own or the studio's default."""
-
-    session: RunName
-    name: RunName | None = None
-    trackers: list[EntrantRequest] = Field(min_length=1, max_length=MOST_TRACKERS)
-    evaluations: int = Field(1000, ge=1, le=1_000_000, description="Poses weighed a frame, by each.")
-    seeds: int = Field(5, ge=1, le=1000, description="How many seeds each, from 0 on.")
-    weighting: RunName | None = Field(None, description="Of all; null: the session's own.")
-    body: RunName | None = None
-    behaviour: RunName | None = Field(None, description="Behaviour model of those that need one.")
-    first: int = Field(0, ge=0)
-    last: int | None = Field(None, ge=1, description="Frame after the last one; null: all.")
-    layers: int = Field(10, ge=1, le=60, description="Of trackers whose layers can be chosen.")
-    settings: dict[str, Value] = Field(
-        default_factory=dict, description="Knobs of all trackers that have them."
-    )
 
 
 class ComparisonState(SessionJob):

@@ -80,8 +80,7 @@ async def begin_export(session: OpenSession, run: OpenRun, wish: ExportRequest, 
             run,
             form,
             wish.options,
-            progress=job.report,
-            cancelled=job.cancelled,
+            progress=job.report_or_stop,
             record_scene=doors.scenes.record_scene,
         )
         return {"result": kept}

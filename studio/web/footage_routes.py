@@ -11,6 +11,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request, Response
 
 from studio.capture.timestamps import TIMESTAMP_NAMES
+from studio.operations.footage import synchronise
 from studio.runs.footage_pictures import bare_picture
 from studio.runs.overlay_drawing import encode_jpeg
 from studio.sessions.footage_changes import change_footage, recorded_offsets, stale_runs, synchrony_of
@@ -19,12 +20,11 @@ from studio.web.doors import Door, let_go
 from studio.web.footage_schemas import (
     FootageCamera,
     FootageState,
-    FootageWish,
     SynchronyState,
-    SynchronyWish,
     TimedAnswer,
 )
 from studio.web.job_kinds import SYNCHRONY
+from studio.web.requests import Asked, body_of
 from studio.web.session_routes import OpenSession
 from studio.worker.jobs import Job
 
@@ -38,10 +38,14 @@ def footage(session: OpenSession) -> FootageState:
 
 
 @router.patch("/sessions/{session}/footage")
-def change(session: OpenSession, wish: FootageWish, doors: Door) -> FootageState:
+def change(
+    session: OpenSession,
+    asked: Annotated[Asked, body_of(synchronise, "FootageWish", only=("offsets", "rotations"))],
+    doors: Door,
+) -> FootageState:
     """Change offsets and turns; says what that makes stale. Refused while a run of the session is being tracked."""
     let_go(doors, session.name)
-    changed = change_footage(session, wish.offsets, wish.rotations)
+    changed = change_footage(session, **asked)
     doors.events.session_changed(session.name)
     return _state(changed.session, list(changed.notes))
 
@@ -71,7 +75,9 @@ async def times(session: OpenSession, request: Request) -> TimedAnswer:
 
 @router.post("/sessions/{session}/synchrony", status_code=202)
 async def begin_synchrony(
-    session: OpenSession, doors: Door, wish: SynchronyWish | None = None
+    session: OpenSession,
+    doors: Door,
+    asked: Annotated[Asked, body_of(synchronise, "SynchronyWish", only=("within",))],
 ) -> SynchronyState:
     """Begin to estimate the offsets from what moves in the pictures. Ask for its state, or wait for `synchrony`
     events.
@@ -79,10 +85,9 @@ async def begin_synchrony(
     known = doors.jobs.known(SYNCHRONY, session.name)
     if known is not None and known.state.is_going:
         return known
-    within = (wish or SynchronyWish.model_validate({})).within
 
     def work(job: Job) -> dict[str, object]:
-        found = synchrony_of(session, job.report_or_stop, within)
+        found = synchrony_of(session, job.report_or_stop, asked["within"])
         return {
             "offsets": found.offsets,
             "confidence": found.confidence,

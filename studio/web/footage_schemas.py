@@ -1,10 +1,8 @@
 """A session's footage in step: offsets, turns and their estimate, as OpenAPI shows them."""
 
-from typing import Literal
-
 from pydantic import Field
 
-from studio.web.schemas import Answer, Request
+from studio.web.schemas import Answer
 from studio.worker.jobs import SessionJob
 
 MOST_OFFSET = 1_000_000
@@ -36,19 +34,6 @@ class FootageState(Answer):
     cameras: list[FootageCamera]
     stale_runs: list[str]
     notes: list[str] = Field(default_factory=list)
-
-
-class FootageWish(Request):
-    """Offsets and turns to change, by camera; cameras that are not named keep theirs."""
-
-    offsets: dict[str, int] = Field(default_factory=dict, max_length=64)
-    rotations: dict[str, Literal[0, 90, 180, 270]] = Field(default_factory=dict, max_length=64)
-
-
-class SynchronyWish(Request):
-    """How far apart the cameras may have begun, at most, seconds."""
-
-    within: float = Field(5.0, gt=0, le=600)
 
 
 class TimedAnswer(Answer):

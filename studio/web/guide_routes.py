@@ -8,7 +8,10 @@ from fastapi import APIRouter
 from markdown_it import MarkdownIt
 from starlette.responses import HTMLResponse
 
+import studio
 from studio.behaviour.settings import LearningSettings
+from studio.declaring import REQUIRED, Knobs, Operation, Parameter, declared
+from studio.errors import NotFoundError
 from studio.evidence.settings import EvidenceSettings
 from studio.knobs import Knob, allowed, knobs_of
 from studio.settings import RecordingSettings
@@ -24,25 +27,32 @@ router = APIRouter(tags=["page"], include_in_schema=False)
 PLACE_OF_KNOBS = "{{knobs}}"
 # The summary.md of a full `studio reproduce all`, as it was written.
 PLACE_OF_SUMMARY, SUMMARY = "{{reproduction}}", "reproduction.md"
+VERBS_WORDS = (
+    "What a person lets the studio do: each is a function of <code>studio</code>, most are a command, and the page asks"
+    " for them over HTTP. A keyword, an option and an entry of a body are one declaration."
+)
+VERB_COLUMNS = ("Keyword", "What it means", "Default", "Option", "HTTP")
+TEXTS = {
+    "": ("guide.md", "Guide"),
+    "python": ("python.md", "Python"),
+    "adding": ("adding.md", "Adding your own"),
+    "figures": ("figures.md", "How well, how fast"),
+}
+"""The packaged texts and their titles, by the addresses below /guide."""
+VERBS = "verbs"
+FRESH = {"cache-control": "no-cache"}
 COLUMNS = ("Name", "What it does", "Range", "Default", "Unit", "Takes effect")
 
 
 @router.get("/guide")
-def guide() -> HTMLResponse:
-    """The guide as a page."""
-    return HTMLResponse(rendered("guide.md", "Guide"), headers={"cache-control": "no-cache"})
-
-
-@router.get("/guide/python")
-def python_examples() -> HTMLResponse:
-    """The page of examples for scripts and notebooks."""
-    return HTMLResponse(rendered("python.md", "Python"), headers={"cache-control": "no-cache"})
-
-
-@router.get("/guide/adding")
-def adding() -> HTMLResponse:
-    """How to add a body, a tracker, a likelihood, a format."""
-    return HTMLResponse(rendered("adding.md", "Adding your own"), headers={"cache-control": "no-cache"})
+@router.get("/guide/{page}")
+def guide(page: str = "") -> HTMLResponse:
+    """The guide, and what it refers to: examples for Python, all verbs, how to add one's own, figures."""
+    if page == VERBS:
+        return HTMLResponse(verbs_page(), headers=FRESH)
+    if page not in TEXTS:
+        raise NotFoundError(f"The guide has no page '{page[:40]}'.", "Begin at /guide.")
+    return HTMLResponse(rendered(*TEXTS[page]), headers=FRESH)
 
 
 @cache
@@ -66,6 +76,42 @@ def rendered(name: str, title: str) -> str:
         content = content.replace(f"<p>{PLACE_OF_KNOBS}</p>", all_knob_tables())
     own = {"title": f"{title} · {NAME}", "contents": "".join(contents), "content": content}
     return page_text("guide.html", "/guide", own)
+
+
+@cache
+def verbs_page() -> str:
+    """What each verb does and takes, in Python, on the command line and over HTTP."""
+    found = {name: getattr(studio, name) for name in dir(studio) if name != "StudioError"}
+    contents = ['<a href="/guide">Guide</a>', '<a href="/guide/python">Examples</a>']
+    contents += [f'<a href="#{name}">{name}</a>' for name in found]
+    parts = [_verb(name, declared(function)) for name, function in found.items()]
+    content = "\n".join(["<h1>Verbs</h1>", f"<p>{VERBS_WORDS}</p>", *parts])
+    own = {"title": f"Verbs · {NAME}", "contents": "".join(contents), "content": content}
+    return page_text("guide.html", "/guide", own)
+
+
+def _verb(name: str, verb: Operation) -> str:
+    """One verb: what it does, and a table of what it takes."""
+    words = "".join(f"<p>{html.escape(part)}</p>" for part in verb.about.split("\n\n"))
+    head = "".join(f"<th>{column}</th>" for column in VERB_COLUMNS)
+    rows = "\n".join(
+        f"<tr>{''.join(f'<td>{cell}</td>' for cell in _entry(entry))}</tr>"
+        for entry in verb.parameters.values()
+    )
+    table = f'<div class="wide"><table><thead><tr>{head}</tr></thead>\n<tbody>{rows}</tbody></table></div>'
+    return f'<h2 id="{name}"><code>studio.{name}</code></h2>\n{words}\n{table if rows else ""}'
+
+
+def _entry(entry: Parameter) -> tuple[str, ...]:
+    """A row: the keyword, what it means, its default, its option, and its entry of a body."""
+    default = "" if entry.default in (REQUIRED, None, "", ()) else str(entry.default)
+    option = "" if entry.terminal.left_out or entry.mark(Knobs) else entry.option
+    body = "" if entry.web.left_out else entry.web.name or entry.name
+    meaning = "SESSION/RUN" if entry.whose == "run" else "Name or folder." if entry.whose else entry.help
+    if knobs := entry.mark(Knobs):
+        meaning = f"{meaning} {', '.join(knob.name for knob in knobs.listed())}".strip()
+    code = [f"<code>{html.escape(word)}</code>" if word else "" for word in (default, option, body)]
+    return f"<code>{entry.name}</code>", html.escape(meaning), *code
 
 
 def anchor_of(heading: str) -> str:

@@ -12,26 +12,27 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query
+from pydantic import Field
 
+from studio.operations.footage import add_footage, import_footage
 from studio.progress import Progress
 from studio.runs.overlay_pictures import forget_composers
 from studio.sessions.archives import FOOTAGE_PARTS, only_archive, unpacked, unwrapped
-from studio.sessions.importers.importing import ImportOptions, ImportReport, add_footage, import_source
+from studio.sessions.importers.importing import ImportReport
 from studio.sessions.names import PathRefused, relative_path
+from studio.sessions.session import Session
 from studio.web.doors import Door, Doors, let_go
 from studio.web.import_schemas import (
     FolderView,
-    FootageAddition,
-    ImportRequest,
     ImportState,
     SampleRequest,
-    SourceWish,
 )
 from studio.web.job_kinds import IMPORT
 from studio.web.job_routes import add_job_routes
+from studio.web.requests import Asked, MaybeName, body_of
 from studio.web.safe_paths import folder_to_import
 from studio.web.samples import install_sample
-from studio.web.schemas import NewName
+from studio.web.schemas import NewName, RunName
 from studio.web.session_routes import OpenSession
 from studio.web.upload_routes import forget, upload_folder
 from studio.worker.jobs import Job
@@ -39,59 +40,76 @@ from studio.worker.jobs import Job
 router = APIRouter(prefix="/api", tags=["importing"])
 
 
-Taker = Callable[[Path, Progress, Callable[[], bool]], ImportReport]
-"""take(folder, progress, cancelled) reads a source into the workspace."""
+Taker = Callable[[Path, Progress], ImportReport | Session]
+"""take(folder, progress) reads a source into the workspace."""
+FROM: dict[str, Any] = {
+    "source": (
+        Annotated[str | None, Field(max_length=4096)],
+        Field(None, description="Folder on the server's machine."),
+    ),
+    "upload": (MaybeName, Field(None, description="Identifier of a finished upload.")),
+}
+"""Where footage lies, for a body: a folder of this machine, or an upload."""
+NAMED = {"name": (RunName, Field(description="What the session will be called.")), **FROM}
 
 FOLDERS_SHOWN = 1000
 
 
 @router.post("/imports", status_code=202)
-async def begin_import(wish: ImportRequest, doors: Door) -> ImportState:
+async def begin_import(
+    asked: Annotated[Asked, body_of(import_footage, "ImportRequest", **NAMED)], doors: Door
+) -> ImportState:
     """Begin an import; the name must be free. Ask for its state, or wait for `import` events."""
-    into = await asyncio.to_thread(doors.workspace.place_for, wish.name)
+    name = asked.more["name"]
+    into = await asyncio.to_thread(doors.workspace.place_for, name)
 
-    def take(folder: Path, progress: Progress, cancelled: Callable[[], bool]) -> ImportReport:
-        return import_source(folder, into, **_reading(wish), progress=progress, cancelled=cancelled)
+    def take(folder: Path, progress: Progress) -> Session:
+        return import_footage(folder, into, **_reading(asked), progress=progress)
 
-    return await begin_taking(doors, wish.name, wish, take)
+    return await begin_taking(doors, name, asked, take)
 
 
 @router.post("/sessions/{session}/footage", status_code=202)
-async def begin_adding(session: OpenSession, wish: FootageAddition, doors: Door) -> ImportState:
+async def begin_adding(
+    session: OpenSession,
+    asked: Annotated[Asked, body_of(add_footage, "FootageAddition", **FROM)],
+    doors: Door,
+) -> ImportState:
     """Begin to add footage to a session that is there, like an import (`GET /api/imports/{identifier}`)."""
     let_go(doors, session.name)
-    asked = ImportOptions(**_reading(wish), replaced=wish.replace)
 
-    def take(folder: Path, progress: Progress, cancelled: Callable[[], bool]) -> ImportReport:
-        added = add_footage(session, folder, asked, progress=progress, cancelled=cancelled)
+    def take(folder: Path, progress: Progress) -> ImportReport:
+        added = add_footage(session, folder, **_reading(asked), progress=progress)
         forget_composers()
         return added
 
-    return await begin_taking(doors, session.name, wish, take)
+    return await begin_taking(doors, session.name, asked, take)
 
 
-async def begin_taking(doors: Doors, name: str, wish: SourceWish, take: Taker) -> ImportState:
+async def begin_taking(doors: Doors, name: str, asked: Asked, take: Taker) -> ImportState:
     """Take a source in the background; how far it is can be asked for by the identifier."""
-    if wish.calibration:
-        relative_path(wish.calibration)
-    if (wish.source is None) == (wish.upload is None):
+    source, upload = asked.more["source"], asked.more["upload"]
+    if asked.get("calibration"):
+        relative_path(asked["calibration"])
+    if (source is None) == (upload is None):
         raise PathRefused("An import needs either 'source' or 'upload'.", "Give a folder, or upload one.")
-    if wish.source is not None:
-        source = await asyncio.to_thread(folder_to_import, wish.source, doors.footage_roots)
+    if upload is None:
+        place = await asyncio.to_thread(folder_to_import, source, doors.footage_roots)
     else:
-        source = upload_folder(doors, wish.upload or "")
+        place = upload_folder(doors, upload)
 
     def work(job: Job) -> dict[str, object]:
-        folder = _unpacked(source, job) if wish.upload else source
-        report = take(folder, job.report, job.cancelled)
-        if wish.upload:
-            forget(doors, wish.upload)
+        folder = _unpacked(place, job) if upload else place
+        taken = take(folder, job.report_or_stop)
+        said = taken.manifest if isinstance(taken, Session) else taken
+        if upload:
+            forget(doors, upload)
         return {
             # An upload's folder is named by a number that nobody has seen.
-            "notes": [note.replace(f"'{wish.upload}'", "what was uploaded") for note in report.notes],
-            "warnings": list(report.warnings),
-            "layout": report.layout,
-            "matching": list(report.matching),
+            "notes": [note.replace(f"'{upload}'", "what was uploaded") for note in said.notes],
+            "warnings": list(said.warnings),
+            "layout": said.layout,
+            "matching": list(said.matching),
         }
 
     return doors.jobs.begin(IMPORT, ImportState(session=name, name=name, step="reading"), work)
@@ -133,7 +151,6 @@ def _unpacked(folder: Path, job: Job) -> Path:
     return unwrapped(unpacked(folder), FOOTAGE_PARTS)
 
 
-def _reading(wish: SourceWish) -> dict[str, Any]:
-    """How a source is to be read, as the importers take it."""
-    named = {"calibration", "fps", "trial", "offsets", "rotations", "unit", "up", "despite_findings"}
-    return {**wish.model_dump(include=named), "copy": wish.copy_footage or wish.upload is not None}
+def _reading(asked: Asked) -> dict[str, Any]:
+    """How a source is to be read; what was uploaded is removed afterwards, so it is always copied."""
+    return {**asked, "copy": asked["copy"] or asked.more["upload"] is not None}

@@ -4,46 +4,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from studio.web.schemas import Answer, CameraMatching, Request, RunName
+from studio.web.schemas import Answer, CameraMatching, Request
 from studio.worker.jobs import NumberedJob
-
-
-class SourceWish(Request):
-    """Footage of a folder of this machine or of an upload, and how it is to be read."""
-
-    source: str | None = Field(None, max_length=4096, description="Folder on the server's machine.")
-    upload: RunName | None = Field(None, description="Identifier of a finished upload.")
-    calibration: str | None = Field(None, max_length=4096, description="Which file, if there are several.")
-    fps: float | None = Field(None, gt=0, le=10_000)
-    trial: str | None = Field(None, max_length=4096, description="Which trial, where a folder holds several.")
-    offsets: dict[str, int] = Field(
-        default_factory=dict,
-        max_length=64,
-        description="By camera: its frame taken with the others' frame 0.",
-    )
-    rotations: dict[str, Literal[0, 90, 180, 270]] = Field(
-        default_factory=dict, max_length=64, description="By camera: degrees clockwise to turn its pictures."
-    )
-    unit: Literal["", "mm", "m"] = Field(
-        "", description="The calibration's; empty: what the file says or its size."
-    )
-    up: Literal["x", "y", "z", "-x", "-y", "-z"] = Field(
-        "z", description="The calibration's axis that points up."
-    )
-    despite_findings: bool = Field(False, description="Import a calibration that would make results wrong.")
-    copy_footage: bool = Field(True, alias="copy", description="False: refer to it where it lies.")
-
-
-class ImportRequest(SourceWish):
-    """What is to be imported."""
-
-    name: RunName = Field(description="What the session will be called.")
-
-
-class FootageAddition(SourceWish):
-    """What is to be added to a session."""
-
-    replace: bool = Field(False, description="Forget all cameras that the source does not name.")
 
 
 class ImportState(NumberedJob):

@@ -2,21 +2,8 @@
 
 from pydantic import Field
 
-from studio.web.schemas import Number, Numbers, Request, RunName
+from studio.web.schemas import Number, Numbers
 from studio.worker.jobs import NumberedJob
-
-
-class InitialisationRequest(Request):
-    """Where a start pose is sought. replace: make it the session's start pose (the old one stays beside it); a session
-    without one gets it anyway.
-    """
-
-    frame: int = Field(0, ge=0)
-    body: RunName | None = Field(None, description="Kinematic tree; null: the session's.")
-    behaviour: RunName | None = Field(None, description="A model whose prototypes are tried.")
-    weighting: RunName | None = Field(None, description="What tells poses apart.")
-    seed: int = Field(0, ge=0, le=2**63 - 1)
-    replace: bool = False
 
 
 class InitialisationState(NumberedJob):

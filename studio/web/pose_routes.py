@@ -89,8 +89,7 @@ async def begin_refining_pose(session: OpenSession, wish: BetterPoseRequest, doo
             pose,
             run=run,
             seed=wish.seed,
-            progress=job.report,
-            cancelled=job.cancelled,
+            progress=job.report_or_stop,
         )
         return {
             "pose": found.pose.tolist(),

@@ -6,12 +6,11 @@ event stream. Each names its run, which the process opens first if it is not ope
 
 from typing import Annotated
 
-import numpy as np
 from fastapi import APIRouter, Depends
 
 from studio.errors import RunError
-from studio.runs.new_run import RunRequest as NewRun
-from studio.runs.new_run import prepare_run
+from studio.operations.tracking import new_run
+from studio.progress import unheard
 from studio.runs.sides import notes_of
 from studio.sessions.run_log import read_log
 from studio.sessions.stored_run import StoredRun
@@ -19,6 +18,7 @@ from studio.web.doors import Door, Doors, let_go
 from studio.web.event_encoding import message_of, plain
 from studio.web.log_schemas import LogEntry, LogLines
 from studio.web.pace_schemas import PaceRequest, PaceView, SpeedView
+from studio.web.requests import Asked, body_of
 from studio.web.schemas import (
     Frame,
     NewName,
@@ -27,7 +27,6 @@ from studio.web.schemas import (
     RunDetail,
     RunLine,
     RunList,
-    RunRequest,
     SessionChange,
     TrashEntry,
 )
@@ -58,26 +57,12 @@ def runs(session: OpenSession) -> RunList:
 
 
 @router.post("/sessions/{session}/runs", status_code=201)
-def make_run(session: OpenSession, wish: RunRequest, doors: Door) -> RunLine:
+def make_run(
+    session: OpenSession, wish: Annotated[Asked, body_of(new_run, "RunRequest")], doors: Door
+) -> RunLine:
     """A new run, ready to be started; what is left out is the session's own or the studio's default."""
-    request = NewRun(
-        tracker=wish.tracker or "",
-        weighting=wish.weighting or "",
-        body=wish.body or "",
-        start_pose=None if wish.start_pose is None else np.array(wish.start_pose),
-        start_source="" if wish.start_pose is None else wish.start_source or "set in the studio",
-        first=wish.first,
-        last=wish.last,
-        seed=wish.seed,
-        changes=wish.settings,
-        name=wish.name or "",
-        behaviour=wish.behaviour or "",
-        live=wish.live,
-        to_and_fro=wish.to_and_fro,
-        despite_findings=wish.despite_findings,
-        fit_shape=wish.fit_shape,
-    )
-    made = prepare_run(session, request)
+    source = wish.get("start_source") or "set in the studio"
+    made = new_run(session, **{**wish, "start_source": source}, progress=unheard)
     doors.events.session_changed(session.name, made.name)
     return completed(RunLine.model_validate(made.summary()), session)
 

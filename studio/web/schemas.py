@@ -231,36 +231,6 @@ class TrashChoice(Request):
     entry: RunName
 
 
-class RunRequest(Request):
-    """A new run; what is left out is the session's own or the studio's default."""
-
-    name: RunName | None = None
-    tracker: RunName | None = None
-    weighting: RunName | None = None
-    body: RunName | None = None
-    first: int | None = Field(None, ge=0, description="null: the frame that the start pose is of.")
-    last: int | None = Field(None, ge=1, description="Frame after the last one; null: all.")
-    seed: int = Field(0, ge=0, le=2**63 - 1)
-    settings: dict[str, Value] = {}
-    start_pose: list[float] | None = Field(None, description="Radians and mm, in the body's order.")
-    start_source: str = Field("", max_length=200, description="Where that pose came from, in words.")
-    behaviour: RunName | None = Field(
-        None, description="A model of the workspace; null: the only one, if needed."
-    )
-    live: bool = Field(
-        False, description="Track at the footage's rate, dropping frames rather than falling behind."
-    )
-    to_and_fro: bool = Field(
-        False, description="A live run goes forth and back; last may lie behind the end."
-    )
-    despite_findings: bool = Field(
-        False, description="Also where the footage speaks against the calibration."
-    )
-    fit_shape: bool = Field(
-        True, description="Begin with the radii, hands, feet and head that the first frames show; not live."
-    )
-
-
 class Frame(Request):
     """A frame by its number."""
 

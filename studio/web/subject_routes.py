@@ -4,28 +4,31 @@ import asyncio
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
+from pydantic import Field
 
 from studio.body.forward_kinematics import limb_ends
 from studio.body.model import BodyModel
-from studio.body.subject import Subject
+from studio.body.subject import SHORTEST_MM, TALLEST_MM, Subject
 from studio.errors import NotFoundError
+from studio.operations.person import fit_subject
+from studio.operations.person import subject as write_subject
+from studio.progress import unheard
 from studio.runs.overlay_drawing import encode_jpeg
 from studio.runs.overlay_pictures import compose_view, forget_composers
-from studio.runs.subject_choice import body_of_choice, choose_subject, keep_fitted
-from studio.runs.subject_fitting import FitRequest, FittedSubject, fit_session_subject
+from studio.runs.subject_choice import body_of_choice, keep_fitted
+from studio.runs.subject_fitting import FittedSubject
 from studio.sessions.made_from import origin_of
-from studio.sessions.session import SUBJECT_NAME
+from studio.sessions.session import SUBJECT_NAME, Session
 from studio.web.doors import Door, Doors
 from studio.web.job_kinds import SUBJECT
 from studio.web.job_routes import add_job_routes
 from studio.web.picture_routes import Height
+from studio.web.requests import Asked, body_of
 from studio.web.session_routes import OpenSession
 from studio.web.subject_schemas import (
-    FitSubjectRequest,
     FitSubjectState,
     LimbDrawing,
     SubjectAnswer,
-    SubjectRequest,
 )
 from studio.worker.jobs import Job
 
@@ -60,41 +63,40 @@ def subject(
 
 
 @router.put("/sessions/{session}/subject")
-def set_subject(session: OpenSession, wish: SubjectRequest, doors: Door) -> SubjectAnswer:
+def set_subject(
+    session: OpenSession,
+    asked: Annotated[
+        Asked,
+        body_of(
+            write_subject,
+            "SubjectRequest",
+            without=("height_mm",),
+            height_mm=(float, Field(ge=SHORTEST_MM, le=TALLEST_MM)),
+        ),
+    ],
+    doors: Door,
+) -> SubjectAnswer:
     """Write down a height (and measured lengths); everything else follows by published proportions. A body that is
     named becomes the session's.
     """
-    wanted = Subject(
-        body=wish.body or session.manifest.body, height_mm=wish.height_mm, lengths_mm=wish.lengths_mm
-    )
-    changed = choose_subject(session, wanted)
+    write_subject(session, **asked, **asked.more, progress=unheard)
     forget_composers()
     doors.events.session_changed(session.name)
-    return subject(changed)
+    return subject(Session(session.path))
 
 
 @router.post("/sessions/{session}/fit-subject", status_code=202)
-async def begin_fit(session: OpenSession, wish: FitSubjectRequest, doors: Door) -> FitSubjectState:
+async def begin_fit(
+    session: OpenSession, asked: Annotated[Asked, body_of(fit_subject, "FitSubjectRequest")], doors: Door
+) -> FitSubjectState:
     """Begin to fit lengths and radii. Ask for its state, or wait for `subject` events."""
-    await asyncio.to_thread(session.body, wish.body)
-    request = FitRequest(
-        frames=tuple(wish.frames),
-        count=wish.count,
-        symmetric=wish.symmetric,
-        lengths=wish.lengths,
-        radii=wish.radii,
-        run=wish.run or "",
-        body=wish.body or "",
-        height_mm=wish.height_mm,
-        seed=wish.seed,
-    )
+    await asyncio.to_thread(session.body, asked.get("body"))
 
     def work(job: Job) -> dict[str, object]:
-        found = fit_session_subject(session, request, progress=job.report, cancelled=job.cancelled)
-        place = keep_fitted(session, found).name if wish.keep else ""
+        found = fit_subject(session, **asked, progress=job.report_or_stop)
         forget_composers()
         job.found = found
-        return {"file": place, **_answer(found)}
+        return {"file": found.file.name if found.file else "", **_answer(found)}
 
     return doors.jobs.begin(SUBJECT, FitSubjectState(session=session.name), work)
 

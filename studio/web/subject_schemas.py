@@ -4,19 +4,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from studio.body.subject import SHORTEST_MM, TALLEST_MM
-from studio.web.schemas import Answer, Number, Numbers, Request, RunName
+from studio.web.schemas import Answer, Number, Numbers
 from studio.worker.jobs import NumberedJob
-
-
-class SubjectRequest(Request):
-    """A person by height alone (mm), all lengths by published proportions, and measured lengths if there are any."""
-
-    height_mm: float = Field(ge=SHORTEST_MM, le=TALLEST_MM)
-    body: RunName | None = Field(None, description="Kinematic tree; null: the session's.")
-    lengths_mm: dict[str, float] = Field(
-        default_factory=dict, description="Pairs of markers: RHip_RKnee to mm."
-    )
 
 
 class LimbDrawing(Answer):
@@ -45,21 +34,6 @@ class SubjectAnswer(Answer):
     limbs: list[LimbDrawing]
     saved: bool = False
     fitted: bool = False
-
-
-class FitSubjectRequest(Request):
-    """What a fit looks at and may change. frames: empty chooses `count` of them. keep: as the session's own."""
-
-    frames: list[int] = Field(default_factory=list, max_length=24)
-    count: int = Field(5, ge=1, le=24)
-    symmetric: bool = True
-    lengths: bool = True
-    radii: bool = True
-    run: RunName | None = Field(None, description="Whose poses to begin with; null: the newest.")
-    body: RunName | None = None
-    height_mm: float | None = Field(None, ge=SHORTEST_MM, le=TALLEST_MM)
-    seed: int = Field(0, ge=0, le=2**63 - 1)
-    keep: bool = Field(True, description="Write it as the session's subject; the old one stays beside it.")
 
 
 class SizeLine(Answer):

@@ -1,26 +1,24 @@
 """Tracks of a run: listed, made in the background with progress as `track` events, downloaded; runs corrected."""
 
 import asyncio
-from typing import Any
+from typing import Annotated, Any
 
-import numpy as np
 from fastapi import APIRouter, Response
 
-from studio.errors import SettingsError
 from studio.evaluation.errors import evaluate
 from studio.knobs import changed, knobs_of
 from studio.motion_files.trc import read_trc
-from studio.runs.correcting import prepare_correction, track_backwards
+from studio.operations.results import refine, smooth
+from studio.operations.tracking import correct, corrected_run
+from studio.runs.correcting import track_backwards
 from studio.runs.refining import (
     REFINED,
     SMOOTHED,
     MadeTrack,
     check_making,
     jitter,
-    refine_run,
-    smooth_run,
 )
-from studio.runs.tracks import RAW, pose_in_track, read_track, track_names
+from studio.runs.tracks import read_track, track_names
 from studio.sessions.named_rows import poses_csv
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -29,12 +27,11 @@ from studio.tracking.smoothing import SmoothingSettings
 from studio.web.doors import Door
 from studio.web.job_kinds import TRACK
 from studio.web.job_routes import add_job_routes, begin_job
+from studio.web.requests import Asked, body_of
 from studio.web.run_routes import RUN, OpenRun
 from studio.web.session_routes import OpenSession
 from studio.web.setting_views import knob_view
 from studio.web.track_schemas import (
-    CorrectionRequest,
-    MakeTrackRequest,
     TrackJobState,
     TrackLine,
     TrackList,
@@ -71,60 +68,45 @@ def track_csv(session: OpenSession, run: OpenRun, track: str) -> Response:
 
 @router.post(RUN + "/refine", status_code=202)
 async def begin_refining(
-    session: OpenSession, run: OpenRun, wish: MakeTrackRequest, doors: Door
+    session: OpenSession, run: OpenRun, asked: Annotated[Asked, body_of(refine, "RefineRequest")], doors: Door
 ) -> TrackJobState:
     """Refine a track on the silhouettes. Ask for the state, or wait for `track` events."""
-    settings = changed(RefinementSettings(), wish.settings)
-    source, into = wish.source or "", wish.into or REFINED
-    check_making(run, source, into, wish.replace)
+    changed(RefinementSettings(), asked["knobs"])
+    check_making(run, asked.get("source", ""), asked.get("into", REFINED), asked["replace"])
 
     def work(job: Job) -> dict[str, Any]:
-        return _answer(
-            refine_run(
-                session,
-                run,
-                source=source,
-                into=into,
-                settings=settings,
-                replace=wish.replace,
-                progress=job.report,
-                cancelled=job.cancelled,
-            )
-        )
+        return _answer(refine(run, **asked, progress=job.report_or_stop))
 
     return begin_job(doors, "refine", session, run, work)
 
 
 @router.post(RUN + "/smooth", status_code=202)
 async def begin_smoothing(
-    session: OpenSession, run: OpenRun, wish: MakeTrackRequest, doors: Door
+    session: OpenSession, run: OpenRun, asked: Annotated[Asked, body_of(smooth, "SmoothRequest")], doors: Door
 ) -> TrackJobState:
     """Smooth a track in time."""
-    settings = changed(SmoothingSettings(), wish.settings)
-    source, into = wish.source or "", wish.into or SMOOTHED
-    check_making(run, source, into, wish.replace)
+    changed(SmoothingSettings(), asked["knobs"])
+    check_making(run, asked.get("source", ""), asked.get("into", SMOOTHED), asked["replace"])
 
     def work(_job: Job) -> dict[str, Any]:
-        return _answer(smooth_run(run, source=source, into=into, settings=settings, replace=wish.replace))
+        return _answer(smooth(run, **asked))
 
     return begin_job(doors, "smooth", session, run, work)
 
 
 @router.post(RUN + "/correct", status_code=202)
 async def begin_correction(
-    session: OpenSession, run: OpenRun, wish: CorrectionRequest, doors: Door
+    session: OpenSession,
+    run: OpenRun,
+    asked: Annotated[Asked, body_of(correct, "CorrectionRequest")],
+    doors: Door,
 ) -> TrackJobState:
     """Make a run that begins anew in a frame. Forwards it is ready to be started; backwards it is tracked here."""
-    pose, source = _corrected_pose(run, wish)
-    made = await asyncio.to_thread(
-        prepare_correction,
-        session, run, wish.frame, pose,
-        source=source, backwards_to=wish.back_to, name=wish.name or "",
-    )  # fmt: skip
+    made = await asyncio.to_thread(corrected_run, run, **asked, source="set in the studio")
     doors.events.session_changed(session.name, made.name)
 
     def work(job: Job) -> dict[str, Any]:
-        if wish.back_to is not None:
+        if "back_to" in asked:
             moved = track_backwards(session, made, job.report, job.cancelled)
             return {
                 "made_run": made.name,
@@ -151,16 +133,6 @@ def _line(session: Session, run: StoredRun, name: str) -> TrackLine:
         line.mean_mm, line.worst_mm = found.mean_mm, found.worst_mm
         line.mean_angle_deg, line.mean_direction_deg = found.mean_angle_deg, found.mean_direction_deg
     return line
-
-
-def _corrected_pose(run: StoredRun, wish: CorrectionRequest) -> tuple[Any, str]:
-    """The pose (D,), and in words where it came from. Raises SettingsError unless exactly one was named."""
-    if (wish.pose is None) == (wish.track is None):
-        raise SettingsError("A corrected frame needs a pose.", "Give a pose or the name of a track.")
-    if wish.pose is not None:
-        return np.array(wish.pose), "set in the studio"
-    track = wish.track or RAW
-    return pose_in_track(run, track, wish.frame), f"track {track}"
 
 
 def _answer(made: MadeTrack) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from studio.web.schemas import Answer, Number, Request, RunName, Value
+from studio.web.schemas import Answer, Number
 from studio.web.setting_schemas import KnobView
 from studio.worker.jobs import NumberedJob
 
@@ -35,32 +35,6 @@ class TrackList(Answer):
     running: list["TrackJobState"]
     refine_settings: list[KnobView]
     smooth_settings: list[KnobView]
-
-
-class MakeTrackRequest(Request):
-    """What a track is made from and how. source: null for the usual one (refine: as tracked, with sides put right;
-    smooth: refined if there is one).
-
-    into: null for refined or smoothed. replace: write over a derived track of that name.
-    """
-
-    source: RunName | None = None
-    into: RunName | None = None
-    settings: dict[str, Value] = Field(default_factory=dict)
-    replace: bool = False
-
-
-class CorrectionRequest(Request):
-    """The right pose of a frame: radians and mm in the order of the body's parameters, or taken from a track.
-
-    back_to: track backwards to that frame; null: forwards to the run's end, which begins when the new run is started.
-    """
-
-    frame: int = Field(ge=0)
-    pose: list[float] | None = None
-    track: RunName | None = None
-    back_to: int | None = Field(None, ge=0)
-    name: RunName | None = Field(None, description="Of the corrected run; null: numbered.")
 
 
 class TrackJobState(NumberedJob):

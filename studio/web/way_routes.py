@@ -7,17 +7,18 @@ from fastapi import APIRouter, Query
 from starlette.responses import Response
 
 from studio.export.kept_exports import exported_files
+from studio.operations.footage import new_session
 from studio.runs.way import Way, way_of
 from studio.runs.way_results import newest_run
 from studio.sessions.session import Session
-from studio.sessions.workspace import begin_session
 from studio.tracking.catalogue import knobs_for_evaluations
 from studio.web.doors import Door, Doors
 from studio.web.job_kinds import BACKGROUND, EXPORT, START_POSE, SUBJECT, TRACK
 from studio.web.pages import NAME, PLACES, html_page
-from studio.web.schemas import NewName
+from studio.web.requests import Asked, body_of
+from studio.web.schemas import NewName, RunName
 from studio.web.session_routes import OpenSession
-from studio.web.way_schemas import NewSession, WayAnswer
+from studio.web.way_schemas import WayAnswer
 
 router = APIRouter(tags=["way"])
 
@@ -29,9 +30,11 @@ def page() -> Response:
 
 
 @router.post("/api/sessions", status_code=201)
-def begin(wish: NewSession, doors: Door) -> NewName:
+def begin(
+    asked: Annotated[Asked, body_of(new_session, "NewSession", name=(RunName, ...))], doors: Door
+) -> NewName:
     """Make an empty session: footage and calibration are added later."""
-    session = begin_session(doors.workspace.place_for(wish.name), wish.title, wish.body)
+    session = new_session(doors.workspace.place_for(asked.more["name"]), **asked)
     doors.events.session_changed(session.name)
     return NewName(name=session.name)
 

@@ -2,19 +2,7 @@
 
 from typing import Literal
 
-from pydantic import Field
-
-from studio.web.schemas import NAME, Answer, Request
-
-
-class NewSession(Request):
-    """An empty session. name: its folder's; title: what people see, the name unless given; body: the studio's own
-    unless given.
-    """
-
-    name: str = Field(pattern=NAME)
-    title: str = Field("", max_length=200)
-    body: str = Field("", max_length=200)
+from studio.web.schemas import Answer
 
 
 class WayStep(Answer):

@@ -3,8 +3,8 @@
 A projected limb is a convex quadrilateral, so a row of pixel centres meets it in one span: the largest of its
 left edges' crossings to the smallest of its right ones'. Where the body lies in a picture, rows are kept as columns
 of 64-bit words, so that the spans of neighbouring rows are found, turned into bits and added to the union together.
-The silhouette lies there in the same way, once for every place where a body's window may begin (`window`), and set
-bits are counted: pixels of the union, and pixels of it that lie in the silhouette.
+The silhouette is stored in the same way, once for every possible start of a body's window (`window`), and set bits
+are counted: pixels of the union, and pixels of it that lie in the silhouette.
 
 Double precision, so that a pixel is in the union exactly where its centre lies in a limb. On this design single
 precision is no faster.
@@ -28,7 +28,7 @@ RIGHT, FIRST_ROW, LAST_ROW, FIRST_COLUMN, LAST_COLUMN, AREA, FIELDS = 8, 16, 17,
 
 @intrinsic
 def bit_count(typingctx, word):
-    """How many bits of a 64-bit word are set: one instruction where the processor has it."""
+    """Number of set bits of a 64-bit word: one instruction where the processor has it."""
     signature = types.int64(types.uint64)
 
     def generate(context, builder, signature, arguments):
@@ -94,7 +94,7 @@ def limb_edges(table, lane):
 
 @njit(**CONTRACTED_INLINED)
 def span(edges, row):
-    """First pixel and the one after the last of a row, counted from the limb's first."""
+    """First pixel and one past the last of a row, counted from the limb's first."""
     left = max(
         max(edges[1] + edges[0] * row, edges[3] + edges[2] * row),
         max(edges[5] + edges[4] * row, edges[7] + edges[6] * row),
@@ -133,7 +133,7 @@ def add_word(edges, begin, chunks, rows, base, most, words, offset):
 
 @njit(**CONTRACTED)
 def outside_area(table, lane, edges, width):
-    """What of a limb's area lies outside the picture: all of it less its pixels."""
+    """Part of a limb's area outside the picture: its whole area less its pixels."""
     inside = 0.0
     first, last = int(table[FIRST_ROW * LANES + lane]), int(table[LAST_ROW * LANES + lane])
     for row in range(last - first + 1):
@@ -177,7 +177,7 @@ def draw_union(tables, lane, top, window, width, height, words):
 
 @njit(**CONTRACTED_INLINED)
 def count_bits(words, begin, silhouette, base, rows):
-    """How many bits of `rows` words are set, and how many of them in the silhouette too."""
+    """Number of set bits in `rows` words, and of those that are also set in the silhouette."""
     drawn, shared = 0, 0
     first, second = np.uint64(begin), np.uint64(base)
     for row in range(np.uint64(rows)):

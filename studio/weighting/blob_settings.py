@@ -1,4 +1,4 @@
-"""The knobs of the blob weighting: how the hull is carved, how blobs are learnt and fitted."""
+"""The knobs of the blob weighting: carving of the hull, learning and fitting of blobs."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -35,7 +35,7 @@ class BlobSettings(HullSettings):
         50,
         1,
         label="K-means steps",
-        help="Most rounds of giving voxels to blobs and blobs to voxels; a fit that stands still ends earlier.",
+        help="Most iterations of assigning voxels to blobs and updating the blobs; a converged fit ends earlier.",
     )
     blob_learning: int = next_frame_knob(
         20,
@@ -44,7 +44,7 @@ class BlobSettings(HullSettings):
         1,
         label="learning frames",
         unit="frames",
-        help="Blobs are learnt from the first so many frames; 0 = keep the cones, without colours.",
+        help="Number of first frames from which blobs are learnt; 0 = keep the cones, without colours.",
     )
     blob_split: float = next_frame_knob(
         12.0,

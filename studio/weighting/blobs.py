@@ -7,16 +7,16 @@ pose weighs 1 / D, D the relative entropy between the mixture that its own blobs
 
 A pose costs its forward kinematics and a few products a blob, no picture is read.
 
-**Expectations and memory.** The fit depends on where it starts, so a search tells the frame its expectations before it
-weighs (`weighting.problem.Expectant`). What was learnt of the blobs passes from frame to frame as memory, with the
-particles, through the results store; a frame's problem is a function of evidence, expectations and memory. A run
-begins with the blobs of the body's cones and no colours. After each of the first `blob_learning` frames the found pose
-tells which voxels belong to which limb, and the blobs are learnt anew from all such frames (the paper's 20 frames);
-frames without a person, or lost, teach nothing. A pose that is weighed before anything was said (a warm-up, a sweep
-along one parameter) is taken for where the body is expected: the mean of the poses given.
+**Expectations and memory.** The fit depends on where it starts, so a search gives the frame its expected poses before
+it weighs (`weighting.problem.Expectant`). The learnt blobs pass from frame to frame as memory, with the particles,
+through the results store; a frame's problem is a function of evidence, expectations and memory. A run begins with the
+blobs of the body's cones and no colours. After each of the first `blob_learning` frames the found pose assigns voxels
+to limbs, and the blobs are relearnt from all such frames (the paper's 20 frames); frames without a person, or lost, are
+left out. Without expected poses (a warm-up, a sweep along one parameter) the body is expected at the mean of the poses
+weighed.
 
-**Loss.** `quality` is the likelihood of the voxels under the fit (nats a voxel) less what the learnt blobs would give
-of a body just like themselves.
+**Loss.** `quality` is the likelihood of the voxels under the fit (nats a voxel) less the learnt blobs' expected
+likelihood of a body like themselves.
 
 Root and trunk first (swarms): only the trunk's blobs count, if the body has a trunk.
 """
@@ -47,14 +47,14 @@ from studio.weighting.problem import TRUNK_FIRST, WHOLE_BODY, PreparedProblem
 Array = NDArray[np.float64]
 
 FLOOR = 1e-6
-"""Nats: no mixture is told apart from another that is nearer than this."""
+"""Nats: divergences below this count as equal."""
 NOTHING_SEEN = 1e4
 """Nats: the divergence of every pose from an empty hull."""
 TRUNK = "trunk"
 
 
 class BlobWeigher:
-    """Makes the problem of any frame; what is learnt travels in the frames' memory, not here."""
+    """Makes the problem of any frame; learnt blobs are in the frames' memory, not here."""
 
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: BlobSettings) -> None:
         self.body, self.cameras, self.settings = body, cameras, settings
@@ -70,7 +70,7 @@ class BlobWeigher:
         return BlobProblem(self, self.reconstructor.hull(evidence))
 
     def model(self, memory: Mapping[str, Array]) -> BlobModel:
-        """The blobs that a frame's memory holds, the cones' where it holds none; the last answer is kept."""
+        """The blobs in a frame's memory, else the cones'; the last result is cached."""
         if "blobs" in memory:
             return _model_of(memory["blobs"])
         profiles = self.profiles(memory)
@@ -83,14 +83,14 @@ class BlobWeigher:
         return kept[1]
 
     def profiles(self, memory: Mapping[str, Array]) -> Profiles:
-        """What the frames so far showed of the limbs."""
+        """The limbs' profiles from the frames so far."""
         if "blob_profiles" not in memory:
             return Profiles.none(self.body)
         return Profiles(memory["blob_profiles"], int(memory["blob_frames"][0]))
 
 
 class BlobProblem(PreparedProblem):
-    """One frame as a function of poses, before anything is known of where the body may be."""
+    """One frame as a function of poses, before expected poses are given."""
 
     def __init__(self, weigher: BlobWeigher, hull: Hull) -> None:
         self.weigher, self.hull, self.priors = weigher, hull, weigher.priors
@@ -102,7 +102,7 @@ class BlobProblem(PreparedProblem):
         return ExpectedBlobs(self.weigher, self.hull, _finite(self.weigher.body, poses), memory)
 
     def remembered(self, pose: Array) -> Mapping[str, Array]:
-        """What a run's first frame tells the second."""
+        """Memory that a run's first frame passes to the second."""
         return self.expecting(pose[None], {}).remembered(pose)
 
     def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
@@ -155,8 +155,8 @@ class ExpectedBlobs(BlobProblem):
         return -sharpness * np.log(np.maximum(self.divergences(poses, stage), FLOOR))
 
     def remembered(self, pose: Array) -> Mapping[str, Array]:
-        """The memory with this frame's hull added, if it is one to learn from; the finished blobs once enough frames
-        were seen.
+        """The memory with this frame's hull added, if it is usable for learning; the finished blobs once there are
+        enough frames.
         """
         weigher = self.weigher
         wanted = weigher.settings.blob_learning
@@ -168,22 +168,20 @@ class ExpectedBlobs(BlobProblem):
 
     @property
     def quality(self) -> float:
-        """Nats a voxel that the fit's likelihood lies above what the learnt blobs give of themselves; -inf where
-        nothing is seen.
-        """
+        """Fit's likelihood less the learnt blobs' expected one, nats a voxel; -inf where nothing is seen."""
         return -np.inf if self.fitted is None else self.fitted.margin
 
     @property
     def lost_evidence(self) -> bool:
-        """Whether the likelihood is poor (section 6.3). Before anything is learnt a poor one says as much of the cones
-        as of the pose; then only an empty hull is lost.
+        """Whether the likelihood is poor (section 6.3). Before blobs are learnt a poor one may be due to the cones as
+        well as the pose; then only an empty hull is lost.
         """
         if self.fitted is None or not self.memory:
             return self.fitted is None
         return self.quality < -self.weigher.settings.blob_lost
 
     def _counted(self, stage: int) -> NDArray[np.int64] | None:
-        """The blobs that a stage looks at; None for all."""
+        """The blobs that a stage uses; None for all."""
         if stage != TRUNK_FIRST:
             return None
         drawn = self.weigher.body.drawn

@@ -1,4 +1,4 @@
-"""The score of PARSEC's bodytrack benchmark, which the Lee-walk data comes with, as a weighting.
+"""The score of PARSEC's bodytrack benchmark, published with the Lee-walk data, as a weighting.
 
 E = E_edge + E_inside, lower is better; two plain averages over all samples pooled over limbs and cameras:
 
@@ -36,8 +36,8 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 FULL = 255 * 255
-# The buffer holds one side, or one column of the grid, at the least, however long; more than this many
-# samples of a kind in one view are those of a limb that fills many pictures, and are left out.
+# The buffer holds at least one side, or one column of the grid, of any length; more samples than this of a kind in
+# one view come from a limb that fills many pictures, and are left out.
 LEAST_CAPACITY = 1 << 14
 # About half a millisecond of a four-camera frame.
 BLOCKS_A_THREAD = 8

@@ -18,7 +18,7 @@ EDGE_STEP, INSIDE_STEP = np.float32(5.0), np.float32(10.0)
 
 @njit(**FAST_INLINED)
 def intervals(x, y, step):
-    """How many intervals of about `step` pixels a line is divided into, at least LEAST."""
+    """Number of intervals of about `step` pixels on a line, at least LEAST."""
     return max(LEAST, int(min(np.sqrt(x * x + y * y) / step, MOST) + HALF))
 
 

@@ -21,7 +21,7 @@ from studio.weighting.template import TemplateSettings, TemplateWeigher
 
 
 class Weigher(Protocol):
-    """A weighting made ready for one body, some cameras and some settings."""
+    """A weighting prepared for one body, some cameras and some settings."""
 
     def problem(self, evidence: FrameEvidence) -> FrameProblem:
         """One frame as a function of poses."""
@@ -32,8 +32,8 @@ class Weigher(Protocol):
 class LossLimit:
     """How far below a run's usual weight a frame is lost (`tracking.loss_detection`).
 
-    spread : usual standard deviation of the log weight over well tracked frames, as the weighting gives it. spreads :
-    how many of them below the median is lost. The defaults are for a weighting that nobody measured.
+    spread : usual standard deviation of the log weight over well tracked frames. spreads : how many of them below the
+    median is lost. The defaults are for a weighting that was not measured.
     """
 
     spread: float = 0.1
@@ -43,7 +43,7 @@ class LossLimit:
 @dataclass(frozen=True, slots=True)
 class Weighting:
     """One way of weighing poses. edge_kind : the edge map it reads, or "hull" where it carves one
-    (`evidence.pipeline`). reads_pictures : whether it looks at the pictures themselves, not only at masks and edges.
+    (`evidence.pipeline`). reads_pictures : whether it uses the pictures themselves, not only masks and edges.
 
     settings_type : its knobs. prepare : (body, cameras, settings of that type) to a `Weigher`. loss : when a frame is
     lost.
@@ -59,7 +59,7 @@ class Weighting:
 
 
 def _check(weighting: Weighting) -> None:
-    """Raise SettingsError where the evidence is not to be had."""
+    """Raise SettingsError for an unknown kind of evidence."""
     if weighting.edge_kind not in EDGE_KINDS:
         raise SettingsError(f"there are no edges '{weighting.edge_kind}', only {', '.join(EDGE_KINDS)}")
     knobs_of(weighting.settings_type)

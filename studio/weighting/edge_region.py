@@ -13,7 +13,7 @@ together, `region_samples` on three lines within (Fig. 6).
 **Where nothing is seen.** N is the same for every pose: a sample outside the picture, or of a limb that
 reaches behind a camera or out of its lens, reads p = 0, the worst there is. So no pose gains by leaving a
 picture, a view that sees nothing of the body costs a + b, and log w lies between -(a + b) × cameras and 0 for
-any finite pose. Leaving such samples out instead, as the benchmark does, makes hiding pay; the price of not
+any finite pose. Leaving such samples out instead, as the benchmark does, rewards hiding; the cost of not
 doing so is small: with all four Lee-walk pictures cut off below the hips the best root position moves by 20
 mm.
 
@@ -90,12 +90,12 @@ class EdgeRegionSettings:
 
     @property
     def edge_chunks(self) -> int:
-        """How many times sixteen samples lie on each side."""
+        """Samples on each side, in units of sixteen."""
         return max(1, round(self.edge_samples / (EDGE_LINES * CHUNK)))
 
     @property
     def region_chunks(self) -> int:
-        """How many times sixteen samples lie on each inner line."""
+        """Samples on each inner line, in units of sixteen."""
         return max(1, round(self.region_samples / (REGION_LINES * CHUNK)))
 
 
@@ -104,7 +104,7 @@ class EdgeRegionWeigher(Preparation):
 
     @property
     def samples_per_evaluation(self) -> int:
-        """Map reads that one pose costs."""
+        """Map reads of one pose."""
         settings = self.settings
         chunks = EDGE_LINES * settings.edge_chunks + REGION_LINES * settings.region_chunks
         return chunks * CHUNK * self.projector.limb_count * len(self.cameras)

@@ -1,4 +1,4 @@
-"""Edge and region sums of Eq. 14 and 15 for many poses, in two passes: where to look, then bare loads.
+"""Edge and region sums of Eq. 14 and 15 for many poses, in two passes: indices first, then bare loads.
 
 A limb in a view is five straight lines of n samples: its two sides (edges) and three lines within (region), n
 a multiple of sixteen, found for sixteen poses at a time. The first pass steps along a pose's lines, sixteen

@@ -5,9 +5,9 @@ Fleischmann et al.
     log w = - Σ over cameras of (a Σe + b Σr + c (1 - f_s))  =  cameras · (f - a - b - c)
 
 Σe and Σr are those of `edge_region` (Eq. 14 and 15 of Deutscher & Reid 2005), f_s that of `edge_silhouette`
-(Fleischmann et al. 2012, section 2.2); the log-weight is Eq. 16 and 17 with a third term. The region looks inside the
-model only, f_s both ways; together, 1 : 1 : 1, they lost the fewest limbs in the prototypes. In the first stage of a
-search only the trunk's edges count, the other two terms look at the whole body.
+(Fleischmann et al. 2012, section 2.2); the log-weight is Eq. 16 and 17 with a third term. The region compares inside
+the model only, f_s in both directions; together, 1 : 1 : 1, they lost the fewest limbs in the prototypes. In the first
+stage of a search only the trunk's edges count, the other two terms use the whole body.
 """
 
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ class EdgeRegionSilhouetteSettings(EdgeRegionSettings):
 
 
 class EdgeRegionSilhouetteWeigher:
-    """Makes the problem of any frame; holds nothing that changes."""
+    """Makes the problem of any frame; immutable."""
 
     def __init__(
         self, body: BodyModel, cameras: tuple[Camera, ...], settings: EdgeRegionSilhouetteSettings

@@ -46,7 +46,7 @@ class EdgeSilhouetteSettings:
         200.0,
         0.5,
         help="log w = scale · f; at 25 a tenth of Condensation's particles survives. The studio's own trackers choose"
-        " their sharpness themselves, so it changes numbers on screen only.",
+        " their own exponent, so it changes numbers on screen only.",
     )
     silhouette_resolution: str = resolution_knob()
     samples_per_edge: int = next_frame_knob(
@@ -59,7 +59,7 @@ class EdgeSilhouetteSettings:
 
     @property
     def edge_chunks(self) -> int:
-        """How many times sixteen samples lie on each edge."""
+        """Samples on each edge, in units of sixteen."""
         return max(1, round(self.samples_per_edge / CHUNK))
 
 

@@ -1,4 +1,4 @@
-"""That pictures are not too large for the kernels, and that a frame's evidence belongs to its cameras."""
+"""Checks that pictures are not too large for the kernels, and that a frame's evidence fits its cameras."""
 
 from studio.errors import FootageError
 from studio.evidence.frame_evidence import FrameEvidence
@@ -23,7 +23,7 @@ def check_sizes(cameras: tuple[Camera, ...]) -> None:
 def check_views(cameras: tuple[Camera, ...], evidence: FrameEvidence, edges: bool = True) -> None:
     """Raises FootageError where views are missing, or their maps' sizes are not the cameras'.
 
-    edges : whether the edge maps are looked at.
+    edges : whether the edge maps are checked.
     """
     names = [view.camera for view in evidence.views]
     if names != [camera.name for camera in cameras]:

@@ -1,17 +1,18 @@
-"""What a body cannot do: leave its joints' limits, and have one limb inside another.
+"""Hard priors: joint limits are kept, and no limb is inside another.
 
 The two hard priors of Balan, Sigal & Black 2005 as Fleischmann et al. 2012, section 2.3, use them. Limbs are compared
 in pairs by how far their axes are apart, as a share of the two radii between them (`hard_prior_kernels`): 1 where they
 touch, 0 where their axes cross. A pair may come as near as its `least` share:
 
-- Radii are those of clothes and flesh, which give way, and inverse kinematics and markers err. In recorded walks, runs,
+- Radii are those of clothes and flesh, which give way, and inverse kinematics and markers have errors. In recorded
+walks, runs,
   jumps, dance and a cartwheel laid on human31, limbs come down to 0.39 of their radii (a foot at the other thigh;
   shins in trousers of 80 mm that pass each other: 0.51), trunk and head to 0.60. So arms and legs may come as near as
   LIMB_SHARE, about where bones would meet; trunk and head are wide by bones and keep TRUNK_SHARE.
 - Limbs that are joined are not compared where the one begins inside the other (knee, hip, neck); an upper arm begins
   beside the trunk and is.
-- Pairs that overlap at rest may come NEUTRAL_SHARE as near as they are in the rest pose, if that is nearer; where
-  nothing of their distance is left at rest (collar bones that begin at one point), they are not compared.
+- Pairs that overlap at rest may come NEUTRAL_SHARE as near as they are in the rest pose, if that is nearer; pairs
+  without distance at rest (collar bones that begin at one point) are not compared.
 """
 
 from dataclasses import dataclass
@@ -53,7 +54,7 @@ class LimbPairs:
     least: Floats
 
     def shares(self, poses: Array) -> Floats:
-        """(N, P) how far each pair is apart in poses (N, D), as a share of the radii between their axes."""
+        """(N, P) distance of each pair's axes in poses (N, D), as a share of the radii between them."""
         count = -(-len(poses) // LANES)
         out = np.empty((count, len(self.limbs), LANES), dtype=np.float32)
         parallel_blocks(ratio_blocks, count, BLOCKS_A_THREAD, poses, self.program, self.limbs, out)
@@ -61,7 +62,7 @@ class LimbPairs:
 
 
 class HardPriors:
-    """What a body cannot do; holds nothing that changes."""
+    """The hard priors of a body; immutable."""
 
     def __init__(self, body: BodyModel) -> None:
         self.body = body
@@ -72,8 +73,8 @@ class HardPriors:
         """(N, D) poses to (N,) whether every parameter lies within its limits, both included, and, if
         `limbs_apart`, no limb is inside another.
 
-        Poses outside the limits are not looked at further. Raises BodyError for poses that are no (N, D); a pose with
-        a NaN or an infinity holds nothing.
+        Poses outside the limits are not compared further. Raises BodyError for poses that are no (N, D); False for a
+        pose with a NaN or an infinity.
         """
         poses = checked_poses(self.body, poses)
         held = np.all((poses >= self.lower) & (poses <= self.upper) & np.isfinite(poses), axis=1)
@@ -106,14 +107,14 @@ def limb_pairs(body: BodyModel) -> LimbPairs:
     )
     at_rest = candidates.shares(checked_poses(body, body.neutral))[0]
     solid = np.array([limb.part != "" for limb in body.drawn])
-    wanted = np.where(solid[candidates.limbs].any(axis=1), TRUNK_SHARE, LIMB_SHARE)
-    least = np.minimum(wanted, NEUTRAL_SHARE * at_rest).astype(np.float32)
+    default = np.where(solid[candidates.limbs].any(axis=1), TRUNK_SHARE, LIMB_SHARE)
+    least = np.minimum(default, NEUTRAL_SHARE * at_rest).astype(np.float32)
     compared = least > NOTHING_LEFT
     return LimbPairs(program, candidates.limbs[compared], least[compared])
 
 
 def _parents(body: BodyModel) -> list[int]:
-    """For each drawn limb the nearest drawn limb on the way to the root, -1 where there is none."""
+    """For each drawn limb the nearest drawn limb towards the root, -1 where there is none."""
     owner: dict[int, int] = {}
     for index, limb in enumerate(body.drawn):
         owner.setdefault(limb.joint, index)

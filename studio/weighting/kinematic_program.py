@@ -2,7 +2,7 @@
 
 Steps by constants are folded into one fixed motion each and joints that carry no drawn limb are left out, so
 that a pose costs one pair of column turns for each of its angles and little else. Any tree that
-`KinematicTables` can hold can be compiled; nothing here knows a body by name.
+`KinematicTables` can hold can be compiled.
 """
 
 from typing import NamedTuple
@@ -66,7 +66,7 @@ def compile_program(tables: KinematicTables) -> KinematicProgram:
 
 
 def _needed_joints(tables: KinematicTables) -> IntArray:
-    """The joints on the way from the world to a drawn limb, parents first."""
+    """The joints between the world and a drawn limb, parents first."""
     needed = np.zeros(len(tables.parent), dtype=np.bool_)
     for joint in tables.limb_joint:
         index = int(joint)

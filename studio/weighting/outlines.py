@@ -1,4 +1,4 @@
-"""Projected outlines of a body's limbs for many poses: what calls the outline kernel."""
+"""Projected outlines of a body's limbs for many poses, by the outline kernel."""
 
 import copy
 
@@ -21,7 +21,7 @@ BLOCKS_A_THREAD = 200
 
 
 class OutlineProjector:
-    """Projects one body into some cameras; holds nothing that changes."""
+    """Projects one body into some cameras; immutable."""
 
     def __init__(self, tables: KinematicTables, cameras: tuple[Camera, ...]) -> None:
         self.program = compile_program(tables)
@@ -41,7 +41,7 @@ class OutlineProjector:
 
     @property
     def limb_count(self) -> int:
-        """How many limbs are drawn."""
+        """Number of drawn limbs."""
         return len(self.program.limb_frame)
 
     def blocks(self, poses: Array) -> Floats:
@@ -58,7 +58,7 @@ class OutlineProjector:
         if not np.isfinite(poses.sum()) and not np.isfinite(poses).all():
             row, column = np.argwhere(~np.isfinite(poses))[0]
             raise BodyError(
-                f"Parameter {column} of pose {row} is {poses[row, column]}, which is no number.",
+                f"Parameter {column} of pose {row} is {poses[row, column]}, which is not finite.",
                 "Give finite poses.",
             )
         count = -(-len(poses) // LANES)

@@ -1,4 +1,4 @@
-"""What a weighting looks at, to be drawn over the pictures: outlines and sample points, the very ones kernels
+"""Overlay of a weighting's outlines and sample points on the pictures, the same ones that the kernels
 read.
 """
 
@@ -51,7 +51,7 @@ def overlay_points(
     pose: Array,
     settings: Any,  # noqa: ANN401 - any weighting's settings
 ) -> tuple[ViewOverlay, ...]:
-    """What to draw over each camera's picture for a pose (D,). Raises BodyError for a pose that does not fit.
+    """The overlay on each camera's picture for a pose (D,). Raises BodyError for a pose that does not fit.
 
     settings : of the weighting in use; sample points are those of its kernels.
     """
@@ -80,8 +80,8 @@ def _edges_read(
     pose: Array,
     settings: Any,  # noqa: ANN401
 ) -> tuple[IntArray | None, NDArray[np.bool_]]:
-    """Edges (K, 3) as in `visible_edges` and (V, K, samples) which of their samples are in sight, where the weighting
-    asks; None where it does not.
+    """Edges (K, 3) as in `visible_edges` and (V, K, samples) which of their samples are visible, where the weighting
+    uses them; else None.
     """
     if isinstance(settings, EdgeSilhouetteSettings):
         lines = body_edges(body).whole
@@ -136,7 +136,7 @@ def _middles(count: int) -> Array:
 
 
 def _intervals(line: Array, step: float) -> int:
-    """How many intervals the benchmark divides a line into."""
+    """Number of intervals into which the benchmark divides a line."""
     return max(LEAST, int(np.hypot(line[0], line[1]) / step + 0.5))
 
 

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,7 +30,7 @@ def joined_maps(
             if table is None:
                 values[start:end] = picture.ravel()
             else:
-                values[start:end] = cv2.LUT(picture, table).ravel()
+                np.take(table, picture.ravel(), out=values[start:end])
             values[end : end + len(padding)] = padding
             start = end + len(padding)
     return Maps(values, places)

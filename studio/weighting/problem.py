@@ -1,4 +1,4 @@
-"""The shape of every weighting's problem, and what some can do beside weighing."""
+"""The interface of every weighting's problem, and its optional extensions."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -15,12 +15,12 @@ from studio.weighting.outlines import OutlineProjector
 
 Array = NDArray[np.float64]
 
-# Stages of a search: what of the body a weighting may look at.
+# Stages of a search: which part of the body a weighting uses.
 WHOLE_BODY, TRUNK_FIRST = 0, 1
 
 
 class FrameProblem(Protocol):
-    """One frame as a function of poses. stage : WHOLE_BODY, or TRUNK_FIRST where only root and trunk are sought."""
+    """One frame as a function of poses. stage : WHOLE_BODY, or TRUNK_FIRST where only root and trunk are searched."""
 
     def weigh(self, poses: Array, stage: int = WHOLE_BODY) -> Array:
         """(N, D) poses to (N,) log-weights; -inf never, NaN never."""
@@ -38,9 +38,7 @@ class FrameProblem(Protocol):
 
 
 class Preparation:
-    """A weighting made ready for one body, some cameras and some settings; makes the problem of any frame, and holds
-    nothing that changes.
-    """
+    """A weighting prepared for one body, some cameras and some settings; makes the problem of any frame; immutable."""
 
     def __init__(self, body: BodyModel, cameras: tuple[Camera, ...], settings: Any) -> None:  # noqa: ANN401
         """settings : the weighting's own. Raises FootageError for a camera whose pictures are too large."""
@@ -51,9 +49,7 @@ class Preparation:
 
 
 class PreparedProblem(ABC):
-    """What the frames of most weightings have in common: a fitness that is the log-weight, and the body's hard
-    priors.
-    """
+    """Base of most weightings' problems: the fitness is the log-weight, and the body has its hard priors."""
 
     priors: HardPriors
 
@@ -72,35 +68,35 @@ class PreparedProblem(ABC):
 
 @runtime_checkable
 class Expectant(Protocol):
-    """A frame that must be told where the body is expected before it can weigh well: the blobs of Caillette, Galata &
-    Howard 2007, section 6.3, which are fitted to the hull from predicted poses.
+    """A frame that needs expected poses before it can weigh well: the blobs of Caillette, Galata & Howard 2007,
+    section 6.3, which are fitted to the hull from predicted poses.
 
     A search calls `expecting` once, before its first weight, and weighs with what that returns; after its last weight
-    it asks that for `remembered` and hands this to the next frame. Both are functions of their arguments alone, so a
-    frame searched again, or gone on with in another process, gives the same result bit for bit.
+    it calls `remembered` of that and passes the result to the next frame. Both depend on their arguments only, so a
+    frame searched again, or resumed in another process, gives the same result bit for bit.
     """
 
     def expecting(self, poses: Array, memory: Mapping[str, Array]) -> FrameProblem:
-        """The frame as seen from expected poses (S, D), S >= 1. memory : what `remembered` gave at the end of the
-        frame before; empty in a run's first frame.
+        """The frame given expected poses (S, D), S >= 1. memory : from `remembered` at the end of the frame before;
+        empty in a run's first frame.
         """
         ...
 
     def remembered(self, pose: Array) -> Mapping[str, Array]:
-        """What the next frame's `expecting` is to know, named arrays, now that the frame's pose (D,) is found."""
+        """Memory for the next frame's `expecting`, named arrays, given this frame's pose (D,)."""
         ...
 
 
 @runtime_checkable
 class SelfJudging(Protocol):
-    """A frame that says how well the pictures can be explained at all, before any pose is weighed (section 6.3: a poor
-    likelihood of the voxels means that the tracker is lost).
+    """A frame that measures how well its pictures can be explained by any pose (section 6.3: a poor likelihood of the
+    voxels means that the tracker is lost).
     """
 
     @property
     def quality(self) -> float:
-        """How much better (nats per voxel) the pictures are explained than the weighting expects of a body that it is
-        on; about 0 while on it, far below 0 when not, never NaN, -inf where nothing is seen.
+        """Likelihood of the pictures less that expected of a tracked body, nats per voxel: about 0 while tracked, far
+        below 0 when lost, never NaN, -inf where nothing is seen.
         """
         ...
 

@@ -1,4 +1,4 @@
-"""How well many bodies of different sizes meet the silhouettes of some frames, each body in poses of its own.
+"""Fitness of many bodies of different sizes to the silhouettes of some frames, each body in its own poses.
 
 A weighting is prepared for one body, and preparing it costs more than weighing a pose. Here the body is a variable:
 the fixed motions between a body's joints and its cones' sizes are linear in its dimensions (a `KinematicProgram` folds
@@ -26,15 +26,15 @@ from studio.weighting.silhouette_areas import HALF, Silhouettes
 Array = NDArray[np.float64]
 
 POSES = 16
-"""Of a body, weighed at once."""
+"""Poses of a body that are evaluated together."""
 STEP = 10.0
-"""mm by which a dimension is changed to see what it moves; the change is linear, so any step does."""
+"""mm by which a dimension is changed to measure its effect; the effect is linear, so any step will do."""
 
 
 ROUND = np.pi / 4.0
-"""How far a limb reaches beyond a ball joint, of its radius there: flesh is round at shoulders and hips, where a cone
-ends flat; a rectangle so deep has a half-disc's area. Without it a fit moves these joints inwards, and upper arms and
-thighs come out 25 to 55 mm too long."""
+"""Extension of a limb beyond a ball joint, as a share of its radius there: flesh is round at shoulders and hips, where
+a cone ends flat; a rectangle of this depth has a half-disc's area. Without it a fit moves these joints inwards, and
+upper arms and thighs become 25 to 55 mm too long."""
 
 
 class ShapePrograms:
@@ -89,7 +89,7 @@ class ShapeSilhouettes:
 
     @property
     def frame_count(self) -> int:
-        """How many frames there are, F."""
+        """Number of frames, F."""
         return len(self._frames)
 
     def fitness(self, shapes: Array, poses: Array) -> Array:
@@ -122,7 +122,7 @@ def limbs_of_ball_joints(body: BodyModel) -> NDArray[np.int64]:
 
 
 def round_off(outlines: NDArray[np.float32], limbs: NDArray[np.int64], depth: float = ROUND) -> None:
-    """Let limbs of outlines (B, V, L, 160) begin further back, by a share of their radius there; in place."""
+    """Extend limbs of outlines (B, V, L, 160) backwards by a share of their radius at the start; in place."""
     rows = outlines.reshape(*outlines.shape[:3], -1, POSES)
     for limb in limbs:
         corners = rows[:, :, limb, :8].reshape(*rows.shape[:2], 4, 2, POSES)

@@ -37,13 +37,13 @@ def resolution_knob() -> Any:  # noqa: ANN401 - as `knob` itself
     return next_frame_knob(
         HALF,
         choices=(HALF, FULL),
-        help="Resolution of the silhouettes' areas; half orders poses as full does and is nearly twice as fast.",
+        help="Resolution of the silhouettes' areas; half ranks poses as full does and is nearly twice as fast.",
     )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Areas:
-    """Areas of N poses in V views, pixels at the resolution asked for.
+    """Areas of N poses in V views, pixels at the chosen resolution.
 
     both : (N, V) Y. projected : (N, V) B + Y. observed : (V,) R + Y. outside : (N, V) area of limbs beyond the
     picture, overlaps counted twice; the whole picture's for each limb that cannot be projected.

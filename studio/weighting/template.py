@@ -2,8 +2,8 @@
 18).
 
 The limbs are drawn as filled quadrilaterals, their projected outlines; a pixel belongs to the template where
-its centre lies in any of them. The weight compares template and silhouette over **all** pixels, so that what
-is drawn but not seen counts as much as what is seen but not drawn ("both directions"; Eq. 15 alone looks only
+its centre lies in any of them. The weight compares template and silhouette over **all** pixels, so that
+pixels drawn but not seen count as much as pixels seen but not drawn ("both directions"; Eq. 15 alone compares only
 inside the model):
 
     log w = - Σ over cameras of the mean squared difference of template and silhouette, both 0 or 1.
@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class TemplateSettings:
-    """The template has nothing to turn: all pixels count, equally."""
+    """No knobs: all pixels count equally."""
 
     title: ClassVar[str] = "Template"
 

@@ -49,10 +49,10 @@ def edge_lines(outlines, block, view, corners, lines, samples):
 def fill_edge(line, bits, not_counted, width, indices, number):
     """Indices of the samples of an edge of a limb that is wholly inside the picture."""
     for chunk in range(indices.shape[1]):
-        gone = np.uint32(bits & np.uint64(0xFFFF))
+        dropped = np.uint32(bits & np.uint64(0xFFFF))
         for j in range(CHUNK):
             index = pixel(line, chunk * CHUNK + j, width)
-            indices[number, chunk, 0, j] = not_counted if (gone >> np.uint32(j)) & np.uint32(1) else index
+            indices[number, chunk, 0, j] = not_counted if (dropped >> np.uint32(j)) & np.uint32(1) else index
         bits >>= np.uint64(CHUNK)
 
 

@@ -35,14 +35,14 @@ Words = NDArray[np.uint64]
 
 TRUNK, HEAD = "trunk", "head"
 SIDES, NEAR_EDGE, FAR_EDGE = ((0, 1), (3, 2)), (0, 3), (1, 2)
-"""Corners of an outline (A0 A1 B1 B0) from which to which edges run."""
+"""First and last corners (A0 A1 B1 B0) of an outline's edges."""
 BLOCKS_A_THREAD = 24
 """About half a millisecond of a four-camera frame."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyEdges:
-    """The edges that are looked at, (K, 3): drawn limb, corner where it begins, corner where it ends.
+    """The edges that are used, (K, 3): drawn limb, corner where it begins, corner where it ends.
 
     whole : of the body. trunk : in the first stage of a search.
     """
@@ -56,7 +56,7 @@ class BodyEdges:
 
 
 def body_edges(body: BodyModel) -> BodyEdges:
-    """The edges of a body that the paper's fitness looks at."""
+    """The edges of a body that the paper's fitness uses."""
     trunk = [index for index, limb in enumerate(body.drawn) if limb.part == TRUNK]
     shown = [(index, *side) for index, limb in enumerate(body.drawn) if limb.part != HEAD for side in SIDES]
     if not trunk:

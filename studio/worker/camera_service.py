@@ -3,15 +3,16 @@
 import contextlib
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from studio.capture.camera_addresses import CameraAddress
 from studio.capture.camera_streams import Shot
 from studio.capture.live_cameras import CameraStanding, SpreadFigures
 from studio.errors import NotFoundError, RunError, StudioError
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.sessions.recordings import check_cameras, import_recording
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -112,12 +113,14 @@ class CameraService:
             lambda job: self._record(job, readers, folder, place, calibration, seconds),
         )
 
-    def track(self, base: Session, wish: TakeWish, request: RunRequest, on_run: OnRun) -> RecordingState:
+    def track(
+        self, base: Session, wish: TakeWish, wanted: Mapping[str, Any], on_run: OnRun
+    ) -> RecordingState:
         """Record the cameras into a take and hand its live run to whoever tracks. Raises RunError, FootageError."""
         readers = self._free_readers(wish.into)
         return self._begin(
             RecordingState(kind="track", session=wish.into.name, limit=wish.seconds),
-            lambda job: self._track(job, readers, base, wish, request, on_run),
+            lambda job: self._track(job, readers, base, wish, wanted, on_run),
         )
 
     def stop(self) -> RecordingState | None:
@@ -177,12 +180,12 @@ class CameraService:
         readers: CameraReaders,
         base: Session,
         wish: TakeWish,
-        request: RunRequest,
+        wanted: Mapping[str, Any],
         on_run: OnRun,
     ) -> dict[str, object]:
         recording = open_take(base, readers, wish)
         try:
-            run = prepare_run(recording.session, request)
+            run = prepare_run(recording.session, **wanted)
             on_run(recording.session, run)
         except BaseException:
             discard_take(recording)

@@ -3,15 +3,16 @@
 import contextlib
 import math
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from studio.capture.camera_addresses import CameraAddress
 from studio.errors import RunError, StudioError
 from studio.progress import Progress
 from studio.runs.live_summary import LiveSummary
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.takes import begin_take
@@ -75,30 +76,30 @@ def track_cameras(
     base: Session,
     addresses: Sequence[CameraAddress],
     wish: TakeWish,
-    request: RunRequest,
+    run: Mapping[str, Any],
     report: Progress,
     *,
     readers: CameraReaders | None = None,
 ) -> TrackedCameras:
     """Track what cameras see with a session's calibration, empty room and person, and keep it as a session of its own.
 
-    request : of the live run. report : told how it goes. readers : of cameras that are open already; they are closed at
-    the end. Raises StudioError; KeyboardInterrupt is passed on, what was tracked is kept.
+    run : of the live run, as `prepare_run` takes it. report : told how it goes. readers : of cameras that are open
+    already; they are closed at the end. Raises StudioError; KeyboardInterrupt is passed on, what was tracked is kept.
     """
     with readers or CameraReaders(addresses) as opened:
         report("waiting for the cameras", 0, 1)
         recording = open_take(base, opened, wish)
         try:
-            run = prepare_run(recording.session, request, report)
+            made = prepare_run(recording.session, **run, progress=report)
         except BaseException:
             discard_take(recording)
             raise
         said = _Words(recording, report)
         try:
-            summary = track_live(recording.session, run, said)
+            summary = track_live(recording.session, made, said)
         finally:
             session = recording.close()
-    return TrackedCameras(session, session.run(run.name), summary, recording.standing)
+    return TrackedCameras(session, session.run(made.name), summary, recording.standing)
 
 
 class _Words:

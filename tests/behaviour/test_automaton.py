@@ -1,4 +1,4 @@
-"""The automaton's entropy (Eq. 2) by hand, and its walk."""
+"""The automaton's entropy (Eq. 2) by hand, and its paths."""
 
 import math
 from dataclasses import replace
@@ -37,7 +37,7 @@ def test_entropy_by_hand(automaton: Automaton) -> None:
     # () -0-> 0 (1/2), 0 -0-> 0 (1/4), 0 -1-> 01 (3/4), 01 -1-> 1 (4/5), 1 -0-> 0 (1)
     length = -math.log(0.5 * 0.25 * 0.75 * 0.8 * 1.0)
     assert automaton.entropy([np.array([0, 0, 1, 1, 0])]) == pytest.approx(length / 5)
-    # Every recording starts afresh: () -1-> 1 (1/2).
+    # Every recording starts again: () -1-> 1 (1/2).
     both = automaton.entropy([np.array([0, 0, 1, 1, 0]), np.array([1])])
     assert both == pytest.approx((length + math.log(2.0)) / 6)
 

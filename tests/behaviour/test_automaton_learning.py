@@ -1,4 +1,4 @@
-"""The learnt automaton against counting by brute force, and what its knobs do."""
+"""The learnt automaton against counting by brute force, and the effect of its knobs."""
 
 import itertools
 from collections import Counter
@@ -77,7 +77,7 @@ def test_predictions_are_those_of_a_brute_force_count(seed: int, symbols: int, e
             np.testing.assert_allclose(got, wanted, atol=1e-12)
 
 
-def test_states_are_deterministic_and_walk_along_longest_suffixes() -> None:
+def test_states_are_deterministic_and_follow_longest_suffixes() -> None:
     automaton = learn_automaton(random_recordings(2, 3), 3, TEST)
     states = set(automaton.contexts)
     for number, context in enumerate(automaton.contexts):
@@ -88,7 +88,7 @@ def test_states_are_deterministic_and_walk_along_longest_suffixes() -> None:
     np.testing.assert_allclose(automaton.probabilities.sum(axis=1), 1.0)
 
 
-def test_every_state_tells_its_cluster() -> None:
+def test_every_state_determines_its_cluster() -> None:
     recordings = random_recordings(4, 4)
     automaton = learn_automaton(recordings, 4, replace(TEST, epsilon=50.0))
     for labels in recordings:
@@ -178,8 +178,8 @@ def test_only_seen_transitions_are_possible() -> None:
 @pytest.mark.parametrize(
     ("recordings", "words"),
     [
-        ([], "nothing to learn"),
-        ([np.zeros(0, dtype=int)], "nothing to learn"),
+        ([], "no labels to learn"),
+        ([np.zeros(0, dtype=int)], "no labels to learn"),
         ([np.array([0, 3])], "outside 0 to 2"),
     ],
 )

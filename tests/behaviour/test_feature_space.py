@@ -58,7 +58,7 @@ def test_whole_turns_are_taken_out_within_and_between_recordings() -> None:
     np.testing.assert_allclose(space.features(wrapped + 4.0 * math.pi), space.features(poses), atol=1e-12)
 
 
-def test_refusals_name_the_thing() -> None:
+def test_errors_name_the_cause() -> None:
     body = load_body("human25")
     space = feature_space(body, 30.0)
     with pytest.raises(BehaviourError, match="1 frame has no derivatives"):
@@ -69,7 +69,7 @@ def test_refusals_name_the_thing() -> None:
     poses[3, 7] = np.nan
     with pytest.raises(BehaviourError, match="frame 3"):
         space.features(poses)
-    with pytest.raises(BehaviourError, match="0 frames per second"):
+    with pytest.raises(BehaviourError, match="0 is not a valid frame rate"):
         feature_space(body, 0.0)
     with pytest.raises(BehaviourError, match="'human25' with 25 parameters, not of 'dog' with 29"):
         space.check_body(load_body("dog"))

@@ -1,4 +1,4 @@
-"""Component-wise EM finds how many Gaussians there are, and fits them as well as plain EM that is told."""
+"""Component-wise EM finds the number of Gaussians, and fits them as well as plain EM that is given it."""
 
 import itertools
 from dataclasses import dataclass
@@ -103,7 +103,7 @@ def test_the_answer_has_the_shortest_message() -> None:
     assert shortest.log_likelihood == pytest.approx(mixture.log_likelihood(points), rel=1e-10)
 
 
-def test_every_component_pays_for_its_parameters() -> None:
+def test_every_component_has_points_for_its_parameters() -> None:
     points = np.random.default_rng(0).standard_normal((400, 6))
     mixture, history = fit_mixture(points, np.random.default_rng(1), Search(most=60))
     assert mixture.size == 1
@@ -147,19 +147,19 @@ def test_same_seed_same_mixture() -> None:
     np.testing.assert_array_equal(one.covariances, other.covariances)
 
 
-def test_progress_is_told() -> None:
-    told: list[tuple[str, int, int]] = []
+def test_progress_is_reported() -> None:
+    steps: list[tuple[str, int, int]] = []
     points = unequal().sample(300, np.random.default_rng(0))
-    fit_mixture(points, np.random.default_rng(0), Search(most=8), lambda *step: told.append(step))
-    assert told[-1][1:] == (7, 8)
-    assert all(before[1] < after[1] for before, after in itertools.pairwise(told))
+    fit_mixture(points, np.random.default_rng(0), Search(most=8), lambda *step: steps.append(step))
+    assert steps[-1][1:] == (7, 8)
+    assert all(before[1] < after[1] for before, after in itertools.pairwise(steps))
 
 
 @pytest.mark.parametrize(
     ("points", "search", "words"),
     [
         (np.zeros((100, 38)), Search(most=5), "100 frames are too few"),
-        (np.full((100, 2), np.nan), Search(most=5), "no numbers"),
+        (np.full((100, 2), np.nan), Search(most=5), "not finite"),
         (np.zeros((100, 2)), Search(most=5, least=6), "from 5 down to 6"),
         (np.zeros((100, 2)), Search(most=5, covariance="round"), "'round'"),
     ],

@@ -1,4 +1,4 @@
-"""Generated motion walks through the automaton and is the most probable one for its labels."""
+"""Generated motion follows the automaton and is the most probable one for its labels."""
 
 import itertools
 
@@ -19,7 +19,7 @@ def model() -> BehaviourModel:
     return toy_model()
 
 
-def test_only_possible_transitions_are_walked(model: BehaviourModel) -> None:
+def test_only_possible_transitions_are_taken(model: BehaviourModel) -> None:
     _, states = generate(np.random.default_rng(5), model, 400)
     labels = model.automaton.last_symbols[states]
     for (before, after), label in zip(itertools.pairwise(states), labels[1:], strict=True):
@@ -28,8 +28,8 @@ def test_only_possible_transitions_are_walked(model: BehaviourModel) -> None:
     assert len(set(labels)) >= 4
 
 
-def test_walks_visit_clusters_as_often_as_the_training(model: BehaviourModel) -> None:
-    # The two waves never follow each other: a walk stays in the one it starts in.
+def test_paths_visit_clusters_as_often_as_the_training(model: BehaviourModel) -> None:
+    # The two waves never follow each other: a path stays in the one it starts in.
     slow = np.concatenate(model.making.labels[::2])
     own = np.unique(slow)
     start = int(np.flatnonzero(np.isin(model.automaton.last_symbols, own) & (model.automaton.start > 0.0))[0])
@@ -96,7 +96,7 @@ def test_at_another_rate_the_motion_takes_as_long(model: BehaviourModel, rate: f
     assert 0.4 < per_second / (usual * model.fps) < 1.6
 
 
-def test_a_walk_that_comes_to_an_end_begins_anew() -> None:
+def test_a_path_that_ends_restarts() -> None:
     labels = np.array([0] * 5 + [1] * 5 + [2] * 20)
     automaton = learn_automaton([labels] * 4, 3, ContextTest(3, 0.1, 0.0))
     taken = walk(np.random.default_rng(2), automaton, 500)

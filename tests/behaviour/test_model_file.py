@@ -1,4 +1,4 @@
-"""A model's file: the same model comes back, and what is no model is refused."""
+"""A model's file: the same model is read back, and other files are refused."""
 
 import io
 import json
@@ -59,7 +59,7 @@ def test_another_rate_is_kept(model: BehaviourModel, tmp_path: Path) -> None:
     assert (back.fps, back.making.learnt_fps) == (60.0, 25.0)
 
 
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+def test_a_missing_file(tmp_path: Path) -> None:
     with pytest.raises(BehaviourError, match=r"no behaviour model 'gone.behaviour'"):
         read_model(tmp_path / "gone.behaviour")
 

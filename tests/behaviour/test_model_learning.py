@@ -115,13 +115,13 @@ def test_a_larger_body_and_progress() -> None:
     poses = np.repeat(body.neutral[None], 400, axis=0)
     poses[:, 6:] += np.sin(np.arange(400)[:, None] / 12.0 + np.arange(19)) * 0.4
     poses += 0.002 * rng.standard_normal(poses.shape)
-    told: list[tuple[str, int, int]] = []
+    steps: list[tuple[str, int, int]] = []
     settings = changed(SETTINGS, {"reduced_dimensions": 3})
-    model = learn_model([poses], body, 30.0, settings, rng, lambda *step: told.append(step), ["wave"])
+    model = learn_model([poses], body, 30.0, settings, rng, lambda *step: steps.append(step), ["wave"])
     assert model.dynamics.covariances.shape[1:] == (38, 38)
     assert (np.linalg.eigvalsh(model.dynamics.covariances) > 0.0).all()
     assert model.making.sources == ("wave",)
-    assert told
+    assert steps
 
 
 def test_bad_recordings_are_refused() -> None:

@@ -21,7 +21,7 @@ def model() -> BehaviourModel:
 
 
 def crossroads(model: BehaviourModel) -> tuple[int, np.ndarray]:
-    """A state with several ways on, and features between the clusters they lead to."""
+    """A state with several transitions, and features between the clusters they lead to."""
     ways = (model.automaton.predictions > 0.0).sum(axis=1)
     ways[model.automaton.last_symbols < 0] = 0
     state = int(np.argmax(ways))
@@ -98,7 +98,7 @@ def test_staying_moves_by_equation_4(model: BehaviourModel) -> None:
     assert np.abs(away).max() < 5.0 / np.sqrt(count)
 
 
-def test_without_noise_a_particle_goes_on_as_it_moves(model: BehaviourModel) -> None:
+def test_without_noise_a_particle_keeps_its_velocity(model: BehaviourModel) -> None:
     state, features = crossroads(model)
     moved = propagate(np.random.default_rng(1), model, *repeated(state, features, 500), 0.0)
     stayed = ~moved.jumped

@@ -1,4 +1,4 @@
-"""How roots move in clusters: changes along the heading, Gaussians of them, files and other rates."""
+"""Root motion of clusters: changes along the heading, Gaussians of them, files and other rates."""
 
 import dataclasses
 from pathlib import Path
@@ -22,7 +22,7 @@ TURN, STRIDE = np.radians(18.0), 30.0
 
 
 def wandering(body: BodyModel, frames: int, seed: int) -> np.ndarray:
-    """(F, D) a root that goes anywhere, its angles left as they add up."""
+    """(F, D) a root that wanders, its angles accumulated."""
     rng = np.random.default_rng(seed)
     poses = np.tile(body.neutral, (frames, 1))
     root = root_frame(body)
@@ -34,7 +34,7 @@ def wandering(body: BodyModel, frames: int, seed: int) -> np.ndarray:
 
 
 def turned(body: BodyModel, poses: np.ndarray, angle: float) -> np.ndarray:
-    """The same recording seen by somebody who faces `angle` (rad) elsewhere."""
+    """The same recording seen by an observer turned by `angle` (rad)."""
     root = root_frame(body)
     assert root is not None
     found, level = poses.copy(), root.columns[root.level]
@@ -47,7 +47,7 @@ def turned(body: BodyModel, poses: np.ndarray, angle: float) -> np.ndarray:
 
 def two_ways(frames: int = 240, begin: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """A person who walks straight ahead looking right for 20 frames, then turns on the spot looking left for 20, and so
-    on: poses (F, D) of human25 and which of both (F,).
+    on: poses (F, D) of human25 and which of the two (F,).
     """
     body = load_body("human25")
     names = [entry.name for entry in body.parameters]
@@ -71,7 +71,7 @@ def model() -> BehaviourModel:
 
 
 @pytest.mark.parametrize("name", ["human25", "human31", "dog"])
-def test_what_changed_when_added_leads_to_the_next_frame(name: str) -> None:
+def test_adding_a_change_gives_the_next_frame(name: str) -> None:
     body = load_body(name)
     poses, root = wandering(body, 60, 1), root_frame(body)
     assert root is not None
@@ -93,7 +93,7 @@ def test_the_first_frame_has_the_seconds_change_and_angles_go_the_short_way() ->
 
 @pytest.mark.parametrize("angle", [0.7, -2.0, np.pi])
 @pytest.mark.parametrize("name", ["human25", "human31"])
-def test_it_is_the_same_whichever_way_one_faces(name: str, angle: float) -> None:
+def test_changes_do_not_depend_on_the_heading(name: str, angle: float) -> None:
     body = load_body(name)
     poses, root = wandering(body, 50, 2), root_frame(body)
     assert root is not None
@@ -106,7 +106,7 @@ def test_it_is_the_same_whichever_way_one_faces(name: str, angle: float) -> None
     )
 
 
-def test_bodies_that_stand_fast_have_none(tmp_path: Path) -> None:
+def test_fixed_bodies_have_none(tmp_path: Path) -> None:
     assert root_frame(load_body("planar_arm4")) is None
     fixed = toy_model()
     assert fixed.root is None
@@ -127,12 +127,12 @@ def test_clusters_of_turning_turn_and_those_of_walking_walk(model: BehaviourMode
     spins = turning[inside]
     assert np.allclose(means[spins, place], TURN, atol=0.15 * TURN)
     assert np.allclose(means[~spins, place], 0.0, atol=0.15 * TURN)
-    # Ahead along its heading, whichever way that was in the room.
+    # Ahead along its heading, whatever that is in the room.
     assert np.allclose(means[~spins][:, root.frame.level], [STRIDE, 0.0], atol=0.15 * STRIDE)
     assert np.allclose(means[spins][:, root.frame.level], [0.0, 0.0], atol=0.15 * STRIDE)
 
 
-def test_particles_go_as_their_clusters_went_with_its_covariance() -> None:
+def test_particles_move_as_their_clusters_with_its_covariance() -> None:
     frame = RootFrame(np.array([0, 1, 2]), np.array([False, False, True]), 2, np.array([0, 1]))
     rng = np.random.default_rng(3)
     mixing = np.array([[4.0, 0.0, 0.0], [1.0, 2.0, 0.0], [0.02, 0.03, 0.1]])
@@ -141,19 +141,19 @@ def test_particles_go_as_their_clusters_went_with_its_covariance() -> None:
     shares = np.repeat(np.eye(2), [40, 4000], axis=0)
     motion = RootMotion(frame, gaussians_of(changes, shares))
     poses = np.tile([100.0, 200.0, 0.5 * np.pi, 7.0], (20000, 1))
-    gone = motion.moved(np.random.default_rng(4), poses, np.ones(20000, dtype=np.int64))
-    assert np.array_equal(gone[:, 3], poses[:, 3])
+    after = motion.moved(np.random.default_rng(4), poses, np.ones(20000, dtype=np.int64))
+    assert np.array_equal(after[:, 3], poses[:, 3])
     # Facing +y: ahead is y, left is -x.
-    assert np.allclose(gone.mean(axis=0)[:3], [101.0, 209.0, 0.5 * np.pi + 0.3], atol=0.2)
-    back = np.stack([gone[:, 1] - 200.0, 100.0 - gone[:, 0], gone[:, 2] - 0.5 * np.pi], axis=1)
+    assert np.allclose(after.mean(axis=0)[:3], [101.0, 209.0, 0.5 * np.pi + 0.3], atol=0.2)
+    back = np.stack([after[:, 1] - 200.0, 100.0 - after[:, 0], after[:, 2] - 0.5 * np.pi], axis=1)
     assert np.allclose(np.cov(back.T), mixing @ mixing.T, atol=0.8)
     still = motion.moved(np.random.default_rng(4), poses, np.zeros(20000, dtype=np.int64), spread=0.0)
     assert np.allclose(still, poses, atol=1e-9)
     twice = motion.moved(np.random.default_rng(4), poses, np.ones(20000, dtype=np.int64), spread=2.0)
-    assert np.allclose(twice.std(axis=0)[:2], 2.0 * gone.std(axis=0)[:2], rtol=0.02)
+    assert np.allclose(twice.std(axis=0)[:2], 2.0 * after.std(axis=0)[:2], rtol=0.02)
 
 
-def test_another_rate_scales_what_happens_in_a_frame(model: BehaviourModel) -> None:
+def test_another_rate_scales_the_changes_of_a_frame(model: BehaviourModel) -> None:
     fast = model.at_rate(2.0 * FPS)
     assert model.root is not None
     assert fast.root is not None
@@ -175,15 +175,15 @@ def test_a_file_keeps_it_and_refuses_what_does_not_fit(model: BehaviourModel, tm
             np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
     poses = np.tile(load_body("human25").neutral, (30, 1))
     labels = np.arange(30) % model.clusters
-    gone = [motion.moved(np.random.default_rng(5), poses, labels) for motion in (model.root, back.root)]
-    np.testing.assert_array_equal(gone[0], gone[1])
+    after = [motion.moved(np.random.default_rng(5), poses, labels) for motion in (model.root, back.root)]
+    np.testing.assert_array_equal(after[0], after[1])
     short = RootMotion(model.root.frame, model.root.changes.chosen(np.arange(model.clusters - 1)))
     write_model(dataclasses.replace(model, root=short), path)
     with pytest.raises(BehaviourError, match=r"'turning\.behaviour' is not a behaviour model"):
         read_model(path)
 
 
-def test_new_clusters_come_after_those_there_are(model: BehaviourModel) -> None:
+def test_new_clusters_are_appended(model: BehaviourModel) -> None:
     assert model.root is not None
     width = len(model.root.frame.columns)
     more = gaussians_of(np.full((30, width), 2.0), np.ones((30, 1)))
@@ -192,5 +192,5 @@ def test_new_clusters_come_after_those_there_are(model: BehaviourModel) -> None:
     np.testing.assert_array_equal(both.changes.means[:-1], model.root.changes.means)
     np.testing.assert_allclose(both.changes.means[-1], 2.0)
     poses = np.zeros((1, load_body("human25").neutral.size))
-    gone = both.moved(np.random.default_rng(0), poses, np.array([model.clusters]), spread=0.0)
-    np.testing.assert_allclose(gone[0, model.root.frame.columns], 2.0)
+    after = both.moved(np.random.default_rng(0), poses, np.array([model.clusters]), spread=0.0)
+    np.testing.assert_allclose(after[0, model.root.frame.columns], 2.0)

@@ -1,4 +1,4 @@
-"""The benchmark measures what it says; how fast is for `studio bench` to print, never for a test to assert."""
+"""The benchmark measures the right quantities; speeds are printed by `studio bench`, never asserted in a test."""
 
 import json
 
@@ -20,15 +20,15 @@ from studio.weighting.edge_region import EdgeRegionSettings, EdgeRegionWeigher
 
 @pytest.fixture(scope="module")
 def result():
-    told = []
+    steps = []
     threads = numba.get_num_threads()
-    found = run_benchmark(repeats=2, progress=lambda *step: told.append(step))
+    found = run_benchmark(repeats=2, progress=lambda *step: steps.append(step))
     assert numba.get_num_threads() == threads
-    assert told[-1] == ("Weighing", 2, 2)
+    assert steps[-1] == ("Weighing", 2, 2)
     return json.loads(json.dumps(found))
 
 
-def test_what_is_reported(result):
+def test_the_report(result):
     edge_region = result["edge_region"]
     assert list(edge_region) == [
         "evaluations_per_second",
@@ -60,8 +60,8 @@ def test_the_scene_is_a_person_in_four_pictures():
         assert 0.005 < (view.edges > 128).mean() < 0.2
 
 
-def test_the_limit_reads_what_the_weighting_reads():
-    """The loads alone add up to the very terms that the weighting finds."""
+def test_the_limit_reads_the_weightings_entries():
+    """The loads alone add up to the weighting's own terms."""
     body = load_body("human31")
     cameras = ring_of_cameras(body)
     rng = np.random.default_rng(0)

@@ -1,4 +1,4 @@
-"""The hull's benchmark measures whole hulls of a person, and puts the paper's table beside them."""
+"""The hull's benchmark measures whole hulls of a person, and compares with the paper's table."""
 
 import json
 
@@ -16,10 +16,10 @@ from studio.volume.reconstruction import reconstruct
 from studio.volume.tracking_space import box_of
 
 
-def test_what_is_reported() -> None:
-    told = []
-    result = json.loads(json.dumps(run_hull_benchmark(repeats=1, progress=lambda *step: told.append(step))))
-    assert told[-1] == ("Carving hulls", 1, 1)
+def test_the_report() -> None:
+    steps = []
+    result = json.loads(json.dumps(run_hull_benchmark(repeats=1, progress=lambda *step: steps.append(step))))
+    assert steps[-1] == ("Carving hulls", 1, 1)
     rows = result["reconstruction"]
     assert [(row["views"], row["depth"]) for row in rows] == [
         (views, depth) for views in VIEWS for depth in DEPTHS

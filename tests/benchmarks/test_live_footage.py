@@ -1,4 +1,4 @@
-"""Videos made longer, forth and back; a stage's clock."""
+"""Videos extended by playing forwards and backwards; a stage's clock."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Live runs with the scene open: a viewer takes part, and the scene makes room for the search."""
+"""Live runs with the scene open: a viewer is connected, and the scene leaves time to the search."""
 
 import dataclasses
 import math
@@ -20,7 +20,7 @@ from studio.worker.events import nothing_open
 from studio.worker.live_tracking import replay_live
 
 
-def test_a_light_viewer_takes_part() -> None:
+def test_a_light_viewer_connects() -> None:
     workspace = Workspace()
     control = StudioControl(workspace)
     stage = SceneServer(workspace, control)
@@ -40,7 +40,7 @@ def test_pictures_come_less_often_while_a_live_run_is_tracked() -> None:
     assert picture_pause(dataclasses.replace(live, state="paused")) == PICTURE_SECONDS
 
 
-def test_the_panel_says_how_a_live_run_keeps_up() -> None:
+def test_the_panel_shows_a_live_runs_rate() -> None:
     state = dataclasses.replace(nothing_open(), session="toy", run="live", state="tracking")
     state = dataclasses.replace(state, live=LiveStanding(3, 0.01, 24.2, 29.8))
     assert "live · 29.8 fps · latency 24 ms · 3 dropped" in search_html(state)
@@ -52,29 +52,29 @@ def test_a_live_run_with_the_scene_open() -> None:
     workspace = Workspace()
     session = make_session(workspace.place_for("toy"))
     run = live_run(session, last=120, to_and_fro=True)
-    said: list[str] = []
-    found = track_watched(workspace, session, run, lambda step, done, total: said.append(step))
+    steps: list[str] = []
+    found = track_watched(workspace, session, run, lambda step, done, total: steps.append(step))
     assert run.summary().status == "finished"
     assert len(found.live.tracked) + len(found.live.dropped) == 120 - found.live.tracked[0]
     assert found.viewer_messages > 0.0
     assert found.viewer_bytes > 0.0
-    assert any("latency" in words for words in said)
+    assert any("latency" in words for words in steps)
     made = prepare_replay(session, run)
     assert replay_live(session, run, made, lambda *_: None).different == ()
     assert compare(run, made).frames == len(found.live.tracked)
 
 
 @pytest.mark.slow
-def test_the_live_benchmark_measures_and_tells() -> None:
-    told = run_live_benchmark(lambda *_: None, seconds=3.0)
-    stages = {row["stage"]: row for row in told["stages"]}  # pyright: ignore[reportGeneralTypeIssues]
+def test_the_live_benchmark_measures_and_reports() -> None:
+    report = run_live_benchmark(lambda *_: None, seconds=3.0)
+    stages = {row["stage"]: row for row in report["stages"]}  # pyright: ignore[reportGeneralTypeIssues]
     assert all(row["ms"] > 0.0 for name, row in stages.items() if name != "the rest")
     assert stages["reconstruction"]["paper_ms"] == 28.1
     parts = sum(row["ms"] for name, row in stages.items() if name != "whole frame")
     assert stages["whole frame"]["ms"] == pytest.approx(parts, rel=0.2)
     for name, frames in (("scene_open", 90), ("scene_open_pressed", 108), ("alone", 90), ("at_60_hz", 90)):
-        figures = told[name]
+        figures = report[name]
         assert figures["tracked"] + figures["dropped"] <= frames  # pyright: ignore[reportIndexIssue]
         assert figures["tracked"] > 0  # pyright: ignore[reportIndexIssue]
         assert math.isfinite(figures["latency_ms"]["p95"])  # pyright: ignore[reportIndexIssue]
-    assert isinstance(told["sustained"], bool)
+    assert isinstance(report["sustained"], bool)

@@ -1,16 +1,16 @@
-"""The answer to a moved slider is measured from the wish to the last layer."""
+"""The answer to a moved slider is measured from the change to the last layer."""
 
 import pytest
 
 from studio.benchmarks.reannealing import measure_reannealing
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 from studio.worker.control import StudioControl
 
 
 def test_every_answer_is_waited_for(session_on_disk: Session) -> None:
-    run = prepare_run(session_on_disk, RunRequest(last=2, changes={"layers": 3, "particles": 40}))
+    run = prepare_run(session_on_disk, last=2, knobs={"layers": 3, "particles": 40})
     control = StudioControl(Workspace(session_on_disk.path.parent))
     try:
         found = measure_reannealing(control, session_on_disk, run, repeats=3)
@@ -24,7 +24,7 @@ def test_every_answer_is_waited_for(session_on_disk: Session) -> None:
 
 
 def test_a_run_of_another_session_is_refused(session_on_disk: Session) -> None:
-    run = prepare_run(session_on_disk, RunRequest(last=1))
+    run = prepare_run(session_on_disk, last=1)
     control = StudioControl(Workspace(session_on_disk.path / "elsewhere"))
     try:
         with pytest.raises(Exception, match="toy"):

@@ -1,4 +1,4 @@
-"""Poses rewritten into the limits: the same body in space, whatever spelling it came in."""
+"""Poses rewritten within the limits: the same body in space, on any branch of the angles."""
 
 import math
 
@@ -15,7 +15,7 @@ from studio.body.forward_kinematics import joint_frames, limb_ends, marker_point
 from studio.body.model import BodyModel
 
 HALF_TURN = math.pi
-# A pose of the walk's kind, degrees, by parameter; what is left out is neutral.
+# A pose of the walk's kind, degrees, by parameter; the others are neutral.
 STRIDE = {
     **{"left_hip_rx": 5.0, "left_hip_ry": 30.0, "left_hip_rz": -12.0, "left_knee_ry": -40.0},
     **{"right_hip_rx": -4.0, "right_hip_ry": -15.0, "right_hip_rz": 8.0, "right_knee_ry": -20.0},
@@ -36,7 +36,7 @@ def _stride(body: BodyModel) -> np.ndarray:
     return pose
 
 
-def _respelt(
+def _on_branch(
     body: BodyModel, pose: np.ndarray, ball: str, hinge: str, over: bool, turned: bool
 ) -> np.ndarray:
     """The pose with one ball joint (and the hinge after it) written in another way."""
@@ -65,23 +65,23 @@ CHAINS = [
     spellings=st.lists(st.tuples(st.booleans(), st.booleans()), min_size=4, max_size=4),
     turns=st.lists(st.integers(-2, 2), min_size=31, max_size=31),
 )
-def test_every_spelling_of_a_stride_comes_back_to_the_one_within_the_limits(
+def test_every_branch_of_a_stride_comes_back_within_the_limits(
     spellings: list[tuple[bool, bool]], turns: list[int]
 ) -> None:
     body = load_body("human31")
     pose = _stride(body)
-    spelt = pose.copy()
+    rewritten = pose.copy()
     for (ball, hinge), (over, turned) in zip(CHAINS, spellings, strict=True):
-        spelt = _respelt(body, spelt, ball, hinge, over, turned)
+        rewritten = _on_branch(body, rewritten, ball, hinge, over, turned)
     bounded = np.array([entry.kind == "angle" and np.isfinite(entry.upper) for entry in body.parameters])
-    spelt += 2.0 * HALF_TURN * np.array(turns) * bounded
-    np.testing.assert_allclose(limb_ends(body, spelt), limb_ends(body, pose), atol=1e-9)
-    found = within_limits(body, spelt)
+    rewritten += 2.0 * HALF_TURN * np.array(turns) * bounded
+    np.testing.assert_allclose(limb_ends(body, rewritten), limb_ends(body, pose), atol=1e-9)
+    found = within_limits(body, rewritten)
     np.testing.assert_allclose(found, pose, rtol=0.0, atol=1e-11)
 
 
 def test_a_ball_joints_other_angles_are_the_same_rotation() -> None:
-    """The identity behind it, by another library: Ry(-b) Rx(-a) Rz(-c) in both spellings."""
+    """The identity behind it, by another library: Ry(-b) Rx(-a) Rz(-c) on both branches."""
     a, b, c = 0.4, -1.3, 0.7
     one = Rotation.from_euler("YXZ", [-b, -a, -c]).as_matrix()
     two = Rotation.from_euler("YXZ", [-(b + HALF_TURN), -(HALF_TURN - a), -(c + HALF_TURN)]).as_matrix()
@@ -89,7 +89,7 @@ def test_a_ball_joints_other_angles_are_the_same_rotation() -> None:
 
 
 @pytest.mark.parametrize("name", list_bodies())
-def test_a_pose_within_the_limits_stays_as_it_is(name: str) -> None:
+def test_a_pose_within_the_limits_is_unchanged(name: str) -> None:
     body = load_body(name)
     rng = np.random.default_rng(3)
     lower = np.array([max(entry.lower, -1000.0) for entry in body.parameters])
@@ -99,19 +99,19 @@ def test_a_pose_within_the_limits_stays_as_it_is(name: str) -> None:
         np.testing.assert_array_equal(within_limits(body, pose), pose)
 
 
-def test_a_drawn_foot_tells_the_leg_turned_half_around_from_the_other() -> None:
+def test_a_drawn_foot_distinguishes_a_leg_turned_by_half() -> None:
     """Without feet a leg turned by π with its knee negated is the same leg; a foot would point backwards."""
     plain = load_body("human31")
     shod = with_dimensions(plain, {"left_foot_length": 260.0, "right_foot_length": 260.0})
     pose = _stride(plain)
-    turned = _respelt(plain, pose, "left_hip", "left_knee_ry", over=False, turned=True)
+    turned = _on_branch(plain, pose, "left_hip", "left_knee_ry", over=False, turned=True)
     np.testing.assert_allclose(within_limits(plain, turned), pose, atol=1e-11)
     kept = within_limits(shod, turned)
     np.testing.assert_allclose(joint_frames(shod, kept), joint_frames(shod, turned), atol=1e-9)
     assert not np.allclose(limb_ends(shod, pose), limb_ends(shod, turned), atol=1.0)
 
 
-def test_what_has_no_spelling_within_the_limits_is_not_moved() -> None:
+def test_a_pose_without_a_branch_within_the_limits_is_unchanged() -> None:
     body = load_body("human31")
     pose = _stride(body)
     pose[_places(body, "left_knee_ry")] = math.radians(60.0)

@@ -127,7 +127,7 @@ def test_positive_angles_mean_the_same_on_both_sides(name: str) -> None:
     ("lean_forward", "Head", 0, 1),
     ("lean_right", "Head", 1, -1),
 ])  # fmt: skip
-def test_angles_turn_the_way_their_names_say(parameter: str, marker: str, axis: int, sign: int) -> None:
+def test_angles_turn_as_their_names_indicate(parameter: str, marker: str, axis: int, sign: int) -> None:
     for name in ("human29", "human34", "human25"):
         body = load_body(name)
         pose = body.neutral
@@ -203,7 +203,7 @@ def test_a_users_body_goes_before_the_packages(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["human99", "../models/human31", "", "human31/"])
-def test_an_unknown_body_is_named_with_those_at_hand(name: str) -> None:
+def test_an_unknown_body_is_named_with_the_known_ones(name: str) -> None:
     with pytest.raises(BodyError, match="There is no body") as caught:
         load_body(name)
     assert "human31" in caught.value.hint

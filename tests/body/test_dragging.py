@@ -1,4 +1,4 @@
-"""Dragging limbs: the target is reached within the limits, the rest follows only where it must."""
+"""Dragging limbs: the target is reached within the limits, the rest follows only where needed."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def test_a_dragged_wrist_reaches_the_target_within_limits(name: str) -> None:
         found = dragger.dragged(body.neutral, "left forearm", target)
         assert found.left_mm < REACHED
         assert within(body, found.pose)
-        # An independent reading of where the wrist is: the marker's own kinematics.
+        # An independent measure of the wrist's position: the marker's kinematics.
         at_wrist = marker_points(body, np.stack([found.pose, other]))[:, wrist]
         assert np.linalg.norm(at_wrist[0] - at_wrist[1]) < 1.5 * REACHED
         right = [
@@ -48,7 +48,7 @@ def test_a_dragged_wrist_reaches_the_target_within_limits(name: str) -> None:
         assert np.array_equal(found.pose[right], body.neutral[right]), "the other limbs stay as they are"
 
 
-def test_out_of_the_arms_reach_the_body_follows_and_the_feet_hold_on() -> None:
+def test_out_of_the_arms_reach_the_body_follows_and_the_feet_stay() -> None:
     body = load_body("human31")
     dragger = Dragger(body)
     grip, foot = dragger.grip("right forearm"), dragger.grip("left shin")
@@ -88,7 +88,7 @@ def test_small_drags_move_smoothly() -> None:
     assert np.linalg.norm(dragger.points(pose)[at] - start - 15 * np.array([15.0, 0.0, 10.0])) < 5.0
 
 
-def test_every_limb_of_every_body_can_be_taken() -> None:
+def test_every_limb_of_every_body_can_be_dragged() -> None:
     for name in list_bodies():
         body = load_body(name)
         dragger = Dragger(body)
@@ -99,22 +99,22 @@ def test_every_limb_of_every_body_can_be_taken() -> None:
 
 
 @pytest.mark.parametrize("name", ["human25", "human31", "dog"])
-def test_the_root_goes_where_it_is_put(name: str) -> None:
+def test_the_root_moves_to_its_frame(name: str) -> None:
     body = load_body(name)
     dragger = Dragger(body)
     before = dragger.root_frame(body.neutral)
     assert before is not None
     turn = rotation_from_vector(np.array([0.2, -0.1, 0.9]))
-    wanted = np.column_stack([turn @ before[:, :3], before[:, 3] + [300.0, -200.0, 50.0]])
-    found = dragger.with_root(body.neutral, wanted)
+    goal = np.column_stack([turn @ before[:, :3], before[:, 3] + [300.0, -200.0, 50.0]])
+    found = dragger.with_root(body.neutral, goal)
     after = dragger.root_frame(found)
     assert after is not None
-    np.testing.assert_allclose(after, wanted, atol=1e-3)
+    np.testing.assert_allclose(after, goal, atol=1e-3)
     assert np.array_equal(found[6:], body.neutral[6:])
     assert Dragger(load_body("planar_arm4")).root_frame(np.zeros(4)) is None
 
 
-def test_what_does_not_fit_is_refused_in_words() -> None:
+def test_wrong_input_is_refused() -> None:
     dragger = Dragger(load_body("planar_arm4"))
     with pytest.raises(BodyError, match="no limb 'wing'") as refusal:
         dragger.dragged(np.zeros(4), "wing", np.zeros(3))

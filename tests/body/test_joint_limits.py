@@ -1,4 +1,4 @@
-"""human31's limits: what people do is within them, what no joint can do is not."""
+"""human31's limits: real poses are within them, impossible ones are not."""
 
 import math
 
@@ -82,7 +82,7 @@ def test_other_motions_are_met_exactly_within_the_limits(name: str) -> None:
     ],
     ids=str,
 )
-def test_what_no_joint_can_do_is_outside_in_every_spelling(degrees: dict[str, float]) -> None:
+def test_impossible_joint_angles_are_outside_on_every_branch(degrees: dict[str, float]) -> None:
     body, _ = fit_subject(load_body("human31"), Subject("human31", HEIGHT))
     assert _kept(body, _posed(body))
     impossible = _posed(body, **degrees)
@@ -103,6 +103,6 @@ def test_what_no_joint_can_do_is_outside_in_every_spelling(degrees: dict[str, fl
     ],
     ids=str,
 )
-def test_what_people_do_is_inside(degrees: dict[str, float]) -> None:
+def test_real_joint_angles_are_inside(degrees: dict[str, float]) -> None:
     body = load_body("human31")
     assert _kept(body, _posed(body, **degrees))

@@ -1,4 +1,4 @@
-"""Recorded motion mended: lost feet, a knee behind its leg, hands in the floor; sound motion left alone."""
+"""Recorded motion mended: lost feet, a knee behind its leg, hands in the floor; sound motion unchanged."""
 
 import numpy as np
 import pytest

@@ -41,7 +41,7 @@ def humanoid(frames: int, turned: dict[str, Rotation], height: float = 900.0) ->
     return moved_skeleton(NAMES, PARENTS, offsets, local, root, fps=60.0, source="made up")
 
 
-def test_a_known_pose_is_taken_over() -> None:
+def test_a_known_pose_is_reproduced() -> None:
     turned = {
         "left_upper_arm": Rotation.from_euler("y", -90, degrees=True),
         "left_lower_arm": Rotation.from_euler("y", -30, degrees=True),
@@ -131,7 +131,7 @@ def test_recorded_limbs_keep_their_directions_and_hinges(real_data: Path, name: 
             assert cosine.min() > 1.0 - 1e-9, ours
         for upper, lower, sign in (("thigh", "shin", 1.0), ("upper_arm", "forearm", -1.0)):
             bend = np.swapaxes(motion.turns[f"{side}_{upper}"], 1, 2) @ motion.turns[f"{side}_{lower}"]
-            # Turns about y alone, and only the way that knees and elbows bend.
+            # Turns about y alone, and only in the direction that knees and elbows bend.
             assert bend[:, 1, 1].min() > 1.0 - 1e-4
             assert (sign * np.arctan2(bend[:, 0, 2], bend[:, 2, 2])).min() > -0.06
         assert lowest_of_sole(motion, side).min() > -1e-6

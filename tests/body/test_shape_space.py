@@ -9,7 +9,7 @@ from studio.body.shape_space import levelled, shape_space
 from studio.errors import BodyError
 
 
-def test_sides_are_one_group_unless_asked_otherwise() -> None:
+def test_sides_are_one_group_by_default() -> None:
     body = load_body("human31")
     both, each = shape_space(body), shape_space(body, symmetric=False)
     thigh = next(group for group in both.groups if group.name == "thigh_length")
@@ -40,7 +40,7 @@ def test_a_dog_has_a_shape_too() -> None:
     assert {"femur_length", "chest_radius_start"} <= set(space.names)
 
 
-def test_limbs_that_are_not_there_stay_away() -> None:
+def test_absent_limbs_stay_absent() -> None:
     body = load_body("human31")
     assert body.dimensions["left_foot_length"] == 0.0
     assert "foot_length" not in shape_space(body).names

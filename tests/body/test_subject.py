@@ -46,7 +46,7 @@ def test_lengths_are_met_in_every_pose(name: str) -> None:
     assert {note.split("'")[1] for note in notes} == bends
 
 
-def test_what_is_missing_follows_from_the_height_hands_and_feet_included(human31: BodyModel) -> None:
+def test_missing_dimensions_follow_from_the_height(human31: BodyModel) -> None:
     body, notes = fit_subject(human31, Subject(height_mm=HEIGHT, lengths_mm={"RHip_RKnee": 420.0}))
     assert notes == ()
     shares = {"left_foot_length": 0.152, "right_hand_length": 0.108, "left_forearm_length": 0.146,
@@ -106,13 +106,13 @@ def test_without_height_it_follows_from_the_lengths(human31: BodyModel) -> None:
     assert "1600 mm follows" in notes[0]
 
 
-def test_nothing_known_leaves_the_body_as_it_is(human31: BodyModel) -> None:
+def test_an_empty_subject_leaves_the_body_unchanged(human31: BodyModel) -> None:
     body, notes = fit_subject(human31, Subject())
     assert body.dimensions == human31.dimensions
     assert notes == ()
 
 
-def test_dimensions_are_taken_as_they_are(human31: BodyModel) -> None:
+def test_dimensions_are_used_unchanged(human31: BodyModel) -> None:
     given = {"left_foot_length": 0.0, "right_thigh_length": 400.0}
     subject = Subject(
         height_mm=HEIGHT, lengths_mm={"RHip_RKnee": 500.0}, dimensions_mm=given, ratios={"head_scale_y": 0.9}

@@ -14,7 +14,7 @@ from playwright.sync_api import Browser, Page, expect
 from sample_walk import copy_of_walk
 from studio_server import StudioServer
 
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.start_pose_file import keep_start_pose
 from studio.runs.tracks import read_track, write_track
 from studio.sessions.made_from import note
@@ -35,10 +35,10 @@ def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator[StudioServer]:
     root = tmp_path_factory.mktemp("back") / "workspace"
     root.mkdir()
     session = copy_of_walk(root / "walk")
-    before = prepare_run(session, RunRequest(name="before", last=START + 1, changes=QUICK))
+    before = prepare_run(session, name="before", last=START + 1, knobs=QUICK)
     track_to_end(session, before, lambda *_: None)
     keep_start_pose(session, session.body(), read_track(before).poses[-1], START)
-    late = prepare_run(session, RunRequest(name="late", last=LAST, changes=QUICK))
+    late = prepare_run(session, name="late", last=LAST, knobs=QUICK)
     track_to_end(session, late, lambda *_: None)
     made = StudioServer("serve", root)
     yield made

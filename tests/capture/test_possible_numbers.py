@@ -12,7 +12,7 @@ from studio.body.subject import Subject, fit_subject, read_subject
 from studio.errors import BodyError, StudioError, TruthError
 from studio.motion_files.c3d import read_c3d
 from studio.motion_files.trc import MarkerMotion, read_trc, write_trc
-from studio.runs.new_run import start_pose
+from studio.runs.new_run import start_of
 from studio.runs.start_pose_file import keep_start_pose
 from studio.sessions.named_rows import read_pose, write_pose
 from studio.sessions.session import Session
@@ -63,7 +63,7 @@ def test_start_poses(value: float, session_on_disk: Session, tmp_path: Path) -> 
     with pytest.raises(StudioError):
         keep_start_pose(session_on_disk, body, pose)
     with pytest.raises(BodyError):
-        start_pose(session_on_disk, body, pose, "given")
+        start_of(session_on_disk, body, pose, "given")
     write_pose(tmp_path / "start_pose.csv", names, pose)
     with pytest.raises(BodyError, match=names[2]):
         read_pose(tmp_path / "start_pose.csv", names)

@@ -10,8 +10,8 @@ from click.testing import CliRunner, Result
 from moving_bodies import c3d_of, swinging
 
 from studio.body.catalogue import load_body
-from studio.cli import behaviour_commands
 from studio.cli.main import main
+from studio.operations import behaviours
 from studio.sessions.workspace import Workspace, begin_session, workspace_root
 
 BODY = load_body("human25")
@@ -98,7 +98,7 @@ def test_a_cancelled_learning_leaves_nothing(motions: Path, monkeypatch: pytest.
     def interrupted(*_arguments: object, **_options: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(behaviour_commands, "learn", interrupted)
+    monkeypatch.setattr(behaviours, "learn_from", interrupted)
     result = run("learn", str(motions / "one.c3d"), "--into", "mine", *QUICK)
     assert result.exit_code == 130
     assert not (workspace_root() / "models").exists()

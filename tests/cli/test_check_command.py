@@ -8,7 +8,7 @@ from toy_session import FRAMES, true_poses
 
 import studio
 from studio.cli.main import main
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.tracks import Track, write_track
 from studio.sessions.session import Session
 
@@ -21,7 +21,7 @@ def kept(session: Session, name: str, poses: np.ndarray) -> None:
 
 
 def test_a_leap_is_told_and_kept(session_on_disk: Session) -> None:
-    prepare_run(session_on_disk, RunRequest(name="one", start_pose=true_poses()[0]))
+    prepare_run(session_on_disk, name="one", start_pose=true_poses()[0])
     wrong = true_poses()
     wrong[5:, 0] += 1.0
     kept(session_on_disk, "smoothed", wrong)

@@ -14,7 +14,7 @@ from sample_walk import WALK, copy_of_walk
 
 from studio.cli.main import COMMANDS, main
 from studio.cli.output import progress_lines
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.tracking_run import Stepped
 from studio.sessions.session import Session
 from studio.worker.open_run import OpenRun
@@ -203,9 +203,7 @@ def test_evaluate_prints_numbers_with_their_alignment(tmp_path: Path) -> None:
 def test_a_cancelled_run_is_resumed_with_the_result_of_an_unbroken_one(session_on_disk: Session) -> None:
     arguments = ("track", session_on_disk.name, "--particles", "30", "--layers", "3", "--frames", "0:4")
     whole = told(*arguments, "--name", "whole")
-    run_ = prepare_run(
-        session_on_disk, RunRequest(last=4, changes={"particles": 30, "layers": 3}, name="broken")
-    )
+    run_ = prepare_run(session_on_disk, last=4, knobs={"particles": 30, "layers": 3}, name="broken")
     opened = OpenRun(str(session_on_disk.path), str(run_.folder))
     for _ in range(8):
         opened.step_layer()

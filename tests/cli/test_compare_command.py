@@ -7,8 +7,8 @@ import pytest
 from click.testing import CliRunner, Result
 from sample_walk import copy_of_walk
 
-from studio.cli import comparison_commands
 from studio.cli.main import main
+from studio.operations import comparing
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 
@@ -67,7 +67,7 @@ def test_the_document_is_as_agreed(walk: Session, tmp_path: Path) -> None:
 
 def test_after_ctrl_c_the_same_command_goes_on(walk: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     arguments = ("walk", "--trackers", "annealed,condensation", "--seeds", "1", *SMALL)
-    really = comparison_commands.run_comparison
+    really = comparing.run_comparison
 
     def interrupted(kept: object, session: object, _report: object, **more: object) -> object:
         def report(_step: str, done: int, _total: int) -> None:
@@ -76,7 +76,7 @@ def test_after_ctrl_c_the_same_command_goes_on(walk: Session, monkeypatch: pytes
 
         return really(kept, session, report, **more)  # pyright: ignore[reportArgumentType]
 
-    monkeypatch.setattr(comparison_commands, "run_comparison", interrupted)
+    monkeypatch.setattr(comparing, "run_comparison", interrupted)
     stopped = run(*arguments)
     assert stopped.exit_code == 130
     assert "finished is kept" in stopped.stderr

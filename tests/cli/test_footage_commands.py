@@ -148,7 +148,6 @@ def test_one_of_several_trials(footage: Path, workspace: Path, tmp_path: Path) -
         (["--rotate", "cam1=90"], "are 96x128, and its calibration is for 128x96"),
         (["--offset", "cam7=1"], "There is no camera 'cam7'"),
         (["--offset", "cam1=1", "--apply"], "by hand and estimated"),
-        (["--within", "-1"], "no time to look in"),
     ],
 )
 def test_refusals(footage: Path, workspace: Path, words: list[str], cause: str) -> None:

@@ -54,8 +54,8 @@ def test_words_for_a_person(started: Session) -> None:
     ("wish", "cause"),
     [
         (("--repeat",), "has no end"),
-        (("--seconds", "0"), "cannot take 0 seconds"),
-        (("--seconds", "nan"), "cannot take nan seconds"),
+        (("--seconds", "0"), "0<x<=86400"),
+        (("--seconds", "nan"), "'seconds' cannot be nan"),
         (("--set", "online_learning=true"), "cannot train"),
         (("--from", "8"), "do not lie in the footage"),
         (("--replay", "nobody"), "nobody"),

@@ -12,7 +12,7 @@ import pytest
 from toy_session import make_session, true_poses
 from tracked_runs import finish, poses_of
 
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
@@ -26,7 +26,7 @@ def session(tmp_path: Path) -> Session:
 
 
 def prepared(session: Session, name: str) -> StoredRun:
-    return prepare_run(session, RunRequest(name=name, seed=3, start_pose=true_poses()[0], changes=SLOW))
+    return prepare_run(session, name=name, seed=3, start_pose=true_poses()[0], knobs=SLOW)
 
 
 @pytest.mark.parametrize(

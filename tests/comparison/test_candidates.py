@@ -1,4 +1,4 @@
-"""Who takes part in a comparison: names, labels, changes, equal evaluations."""
+"""The candidates of a comparison: names, labels, changes, equal evaluations."""
 
 import pytest
 
@@ -16,7 +16,7 @@ def made(
     return {candidate.name: candidate for candidate in candidates(lineup)}
 
 
-def test_everyone_weighs_as_many_poses() -> None:
+def test_all_candidates_have_equal_evaluations() -> None:
     found = made("annealed", "annealed:eq13", "condensation")
     assert list(found) == ["annealed", "annealed:eq13", "condensation"]
     for candidate in found.values():
@@ -31,14 +31,14 @@ def test_everyone_weighs_as_many_poses() -> None:
     )
 
 
-def test_layers_are_divided_anew_and_still_weigh_the_same() -> None:
+def test_other_layers_keep_the_evaluations() -> None:
     found = made("annealed", "annealed:five", changes=("annealed:five.layers=5",))
     assert found["annealed:five"].settings().tracker.particles == 200
     assert made("annealed", layers=20)["annealed"].settings().tracker.particles == 50
 
 
 @pytest.mark.parametrize("name", VARIANTS)
-def test_a_known_label_brings_its_knobs(name: str) -> None:
+def test_a_known_label_implies_its_knobs(name: str) -> None:
     settings = made(name)[name].settings().tracker
     for knob, value in VARIANTS[name].changes.items():
         assert getattr(settings, knob) == value
@@ -59,7 +59,7 @@ def test_every_partition_of_the_swarm_weighs_as_many_poses(evaluations: int) -> 
         assert candidate.settings().tracker.partition in candidate.name or candidate.name == "swarm"
 
 
-def test_changes_go_to_whom_they_name() -> None:
+def test_changes_apply_to_the_named_candidate() -> None:
     changes = (
         "annealed.survival=0.5",
         "annealed:b.crossover=0",
@@ -85,20 +85,20 @@ def test_recorded_changes_make_the_same_settings_again() -> None:
     ("names", "changes", "words"),
     [
         (("annealed", "annealed"), (), "named twice"),
-        (("nobody",), (), "no tracker 'nobody'"),
-        (("annealed:a b",), (), "no name"),
+        (("unknown",), (), "no tracker 'unknown'"),
+        (("annealed:a b",), (), "not a tracker's name"),
         (("annealed:mine",), (), "does not differ"),
         (("annealed",), ("condensation.particles=3",), "does not take part"),
         (("annealed",), ("annealed.survivor=1",), "no setting 'survivor'"),
         (("annealed",), ("survivor=1",), "No tracker that takes part has a setting 'survivor'"),
-        (("annealed",), ("weighting=bodytrack",), "no knob"),
+        (("annealed",), ("weighting=bodytrack",), "not a knob"),
         (("annealed",), ("annealed.particles=500",), "5000 poses a frame instead of 1000"),
         (("annealed",), ("annealed.weighting=nothing",), "no weighting 'nothing'"),
-        (("annealed",), ("annealed.survival",), "changes nothing"),
+        (("annealed",), ("annealed.survival",), "is not an assignment"),
         ((), (), "No tracker"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_compared_is_refused_in_words(
+def test_impossible_comparisons_are_refused_with_a_remedy(
     names: tuple[str, ...], changes: tuple[str, ...], words: str
 ) -> None:
     with pytest.raises(StudioError, match=words) as refused:

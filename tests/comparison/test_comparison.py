@@ -1,4 +1,4 @@
-"""Trackers compared on one session: what is tracked, what follows from it, the bundled walk as the long run."""
+"""Trackers compared on one session: trials, conclusions, and the bundled walk as the long run."""
 
 import json
 import math
@@ -36,7 +36,7 @@ def plan(*names: str, evaluations: int = 200, seeds: tuple[int, ...] = (0, 1, 2)
 
 
 def made_up(drawn: Plan) -> list[Outcome]:
-    """Outcomes with errors that can be told apart: tracker t, seed s, frame f gives 10 (t + 1) + s + f / 10."""
+    """Outcomes with distinct errors: tracker t, seed s, frame f gives 10 (t + 1) + s + f / 10."""
     outcomes = []
     for trial in trials(drawn):
         seed = trial.arguments["seed"]
@@ -111,16 +111,16 @@ def test_findings_show_each_seed_thin_and_the_mean_thick(concluded: Comparison) 
 
 
 def test_the_document_has_the_agreed_fields(concluded: Comparison) -> None:
-    told = json.loads(json.dumps(document(concluded)))
+    report = json.loads(json.dumps(document(concluded)))
     fields = {"tracker", "evaluations", "mean_mm", "worst_mm", "lost_frames", "seconds"}
-    for entry in told["trackers"]:
+    for entry in report["trackers"]:
         assert entry.keys() == fields | {"seeds"}
         assert [seed.keys() == fields | {"seed"} for seed in entry["seeds"]] == [True] * 3
-    assert told["frames"] == [0, 4]
-    assert told["settings"]["annealed:eq13"]["adaptive_diffusion"] is False
+    assert report["frames"] == [0, 4]
+    assert report["settings"]["annealed:eq13"]["adaptive_diffusion"] is False
 
 
-def test_csv_and_text_say_the_same(concluded: Comparison) -> None:
+def test_csv_and_text_agree(concluded: Comparison) -> None:
     lines = frames_csv(concluded).splitlines()
     assert lines[0] == "tracker,seed,frame,error_mm,limbs_lost"
     assert len(lines) == 1 + 3 * 3 * 4
@@ -142,7 +142,7 @@ def test_wrong_seeds_and_frames_are_refused(wrong: dict) -> None:
         plan("annealed", **wrong)
 
 
-def test_the_weighting_is_one_for_all_and_the_sessions_unless_said() -> None:
+def test_one_weighting_for_all_by_default_the_sessions() -> None:
     assert {candidate.weighting for candidate in plan("annealed", "condensation").entrants} == {
         DEFAULT_WEIGHTING
     }

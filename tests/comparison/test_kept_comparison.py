@@ -1,4 +1,4 @@
-"""Comparisons on disk: made, found again, finished, thrown away and brought back."""
+"""Comparisons on disk: made, listed, finished, deleted and restored."""
 
 import json
 from pathlib import Path
@@ -28,20 +28,20 @@ from studio.sessions.workspace import Workspace
 
 @pytest.fixture
 def walk(tmp_path: Path) -> Session:
-    """The bundled walk in a workspace of its own (without its pictures, which nobody looks at here)."""
+    """The bundled walk in a workspace of its own (without its pictures, which are not needed)."""
     return copy_of_walk(tmp_path / "workspace" / "walk", "videos")
 
 
 @pytest.fixture
 def kept(walk: Session) -> KeptComparison:
-    """A comparison that was begun."""
+    """A comparison that was started."""
     return new_comparison(place_of(walk), plan("annealed", "condensation"))
 
 
-def test_what_was_asked_is_read_back(walk: Session, kept: KeptComparison) -> None:
+def test_the_request_is_read_back(walk: Session, kept: KeptComparison) -> None:
     assert kept.name == "comparison-1"
-    asked = plan("annealed", "condensation")
-    assert kept.record().plan == asked
+    requested = plan("annealed", "condensation")
+    assert kept.record().plan == requested
     assert kept.plan(walk).footage == str(walk.path)
     assert kept.status() == "interrupted"
     assert kept.result() is None
@@ -79,7 +79,7 @@ def test_a_finished_one_has_numbers_findings_and_frames(kept: KeptComparison) ->
     assert (kept.folder / "frames.csv").read_text().startswith("tracker,seed,frame")
 
 
-def test_the_same_wish_goes_on_where_it_was_not_finished(walk: Session, kept: KeptComparison) -> None:
+def test_the_same_request_resumes_an_unfinished_comparison(walk: Session, kept: KeptComparison) -> None:
     again = kept.plan(walk)
     found = unfinished_like(walk, again)
     assert found is not None
@@ -88,7 +88,7 @@ def test_the_same_wish_goes_on_where_it_was_not_finished(walk: Session, kept: Ke
     assert unfinished_like(walk, again) is None
 
 
-def test_a_trial_is_known_wherever_the_session_lies(walk: Session, kept: KeptComparison) -> None:
+def test_a_trials_key_does_not_depend_on_the_sessions_path(walk: Session, kept: KeptComparison) -> None:
     there = [trial_key(trial) for trial in trials(kept.plan(walk))]
     assert there == [trial_key(trial) for trial in trials(plan("annealed", "condensation"))]
     assert len(set(there)) == 6
@@ -99,7 +99,7 @@ def test_differences_are_named(kept: KeptComparison) -> None:
     assert set(differences(plan("annealed", seeds=(0,)), kept.plan())) == {"entrants", "seeds"}
 
 
-def test_only_one_process_works_at_it(walk: Session, kept: KeptComparison) -> None:
+def test_only_one_process_works_on_it(walk: Session, kept: KeptComparison) -> None:
     lock = ProcessLock.take(kept.folder / LOCK_NAME)
     assert lock is not None
     assert kept.status() == "running"
@@ -110,14 +110,14 @@ def test_only_one_process_works_at_it(walk: Session, kept: KeptComparison) -> No
     assert kept.status() == "interrupted"
 
 
-def test_how_it_ended_is_kept(kept: KeptComparison) -> None:
+def test_its_end_is_stored(kept: KeptComparison) -> None:
     kept.end("failed", "The disk is full.")
     assert (kept.status(), kept.record().problem) == ("failed", "The disk is full.")
     kept.end("")
     assert kept.status() == "interrupted"
 
 
-def test_the_trash_gives_it_back(walk: Session, kept: KeptComparison) -> None:
+def test_it_is_restored_from_the_trash(walk: Session, kept: KeptComparison) -> None:
     workspace = Workspace(walk.path.parent)
     place = throw_away(workspace, walk, kept)
     assert comparison_count(walk) == 0
@@ -126,7 +126,7 @@ def test_the_trash_gives_it_back(walk: Session, kept: KeptComparison) -> None:
     assert back.record().plan == plan("annealed", "condensation")
 
 
-def test_a_damaged_record_is_told_in_words(kept: KeptComparison) -> None:
+def test_a_damaged_record_is_reported(kept: KeptComparison) -> None:
     (kept.folder / "comparison.json").write_text('{"schema": 1, "name": 3}')
     with pytest.raises(SessionError, match="not a comparison's record"):
         kept.record()

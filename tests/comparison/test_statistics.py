@@ -26,7 +26,7 @@ def test_the_interval_of_a_mean_is_close_to_students_and_repeatable() -> None:
     assert (low, high) == bootstrap_interval(values)
 
 
-def test_the_interval_covers_the_truth_as_often_as_it_says() -> None:
+def test_the_interval_has_its_nominal_coverage() -> None:
     rng = np.random.default_rng(7)
     covered = sum(
         low <= 1.0 <= high for low, high in (bootstrap_interval(rng.exponential(1.0, 20)) for _ in range(150))
@@ -94,6 +94,6 @@ def test_the_whole_is_as_good_as_its_worst() -> None:
     assert overall(["reproduced", "not reproduced", "better"]) == "not reproduced"
 
 
-def test_few_seeds_are_said() -> None:
+def test_few_seeds_are_reported() -> None:
     assert firmness(10) == ""
     assert firmness(3) == "not firm: 3 seeds of at least 10"

@@ -1,4 +1,4 @@
-"""A tracker on a footage, in memory: measured, the same again, and what of it is plain."""
+"""A tracker on a footage, in memory: measured, reproducible, and as plain values."""
 
 import json
 from dataclasses import asdict
@@ -46,7 +46,7 @@ def test_an_attempt_is_measured_and_gives_the_same_again(shelf) -> None:
     assert not same(first, track(attempt(seed=4), shelf))
 
 
-def test_attempts_and_what_they_reach_survive_json(shelf) -> None:
+def test_attempts_and_results_survive_json(shelf) -> None:
     kept = attempt(cameras=("cam1", "cam3"))
     assert Attempt.of_plain(json.loads(json.dumps(kept.plain()))) == kept
     json.dumps(asdict(track(attempt(last=1), shelf)), allow_nan=False)
@@ -58,7 +58,7 @@ def test_a_later_first_frame_starts_near_the_truth_and_steps_skip_frames(shelf) 
     assert found.per_frame_mm[0] < 40.0
 
 
-def test_damage_changes_what_the_tracker_sees_and_nothing_kept(shelf) -> None:
+def test_damage_changes_the_trackers_input_and_nothing_stored(shelf) -> None:
     def blind(evidence: FrameEvidence) -> FrameEvidence:
         views = [
             ViewEvidence(view.camera, view.picture, np.zeros_like(view.mask), np.zeros_like(view.edges))
@@ -90,7 +90,7 @@ def test_unknown_footage_and_camera_are_named(shelf) -> None:
         track(attempt(cameras=("cam9",)), shelf)
 
 
-def test_the_shelf_forgets_the_oldest_evidence_first() -> None:
+def test_the_cache_drops_the_oldest_evidence_first() -> None:
     shelf = FootageShelf(SAMPLES, most_bytes=4_000_000)
     session = shelf.session("walk")
     cameras = session.cameras()

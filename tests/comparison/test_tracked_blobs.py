@@ -1,4 +1,4 @@
-"""An attempt weighed by blobs: the shelf gives it pictures, and what is learnt goes from frame to frame."""
+"""An attempt weighed by blobs: the cache provides pictures, and learnt blobs are passed from frame to frame."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ def test_the_walk_is_followed_by_blobs() -> None:
     assert found.worst_mm < 90.0
 
 
-def test_pictures_are_kept_only_for_those_who_read_them() -> None:
+def test_pictures_are_kept_only_for_weightings_that_read_them() -> None:
     shelf = FootageShelf(SAMPLES)
     session = shelf.session("walk")
     cameras = session.cameras()

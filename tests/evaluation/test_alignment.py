@@ -12,53 +12,51 @@ from studio.evaluation.errors import moved_to_root, similarity_aligned
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
 def test_an_exact_similarity_is_undone(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    wanted = rng.normal(0.0, 300.0, (15, 3))
+    goal = rng.normal(0.0, 300.0, (15, 3))
     turn = Rotation.random(random_state=seed).as_matrix()
-    points = (wanted - 40.0) @ turn.T * 0.7 + rng.normal(0.0, 1000.0, 3)
-    np.testing.assert_allclose(similarity_aligned(points, wanted), wanted, atol=1e-8)
+    points = (goal - 40.0) @ turn.T * 0.7 + rng.normal(0.0, 1000.0, 3)
+    np.testing.assert_allclose(similarity_aligned(points, goal), goal, atol=1e-8)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
-def test_the_remaining_error_is_the_least_that_any_similarity_leaves(seed: int) -> None:
+def test_the_remaining_error_is_the_least_of_all_similarities(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    wanted = rng.normal(0.0, 300.0, (12, 3))
-    points = wanted + rng.normal(0.0, 120.0, (12, 3))
+    goal = rng.normal(0.0, 300.0, (12, 3))
+    points = goal + rng.normal(0.0, 120.0, (12, 3))
 
     def residuals(values: np.ndarray) -> np.ndarray:
         laid = values[0] * Rotation.from_rotvec(values[1:4]).apply(points) + values[4:7]
-        return (laid - wanted).ravel()
+        return (laid - goal).ravel()
 
     searched = least_squares(residuals, np.array([1.0, 0, 0, 0, 0, 0, 0]), xtol=1e-14, ftol=1e-14)
-    found = np.sum((similarity_aligned(points, wanted) - wanted) ** 2)
+    found = np.sum((similarity_aligned(points, goal) - goal) ** 2)
     assert found == pytest.approx(2.0 * searched.cost, rel=1e-6)
 
 
 @pytest.mark.parametrize("seed", [5, 6, 7])
 def test_the_disparity_is_scipys_where_no_mirroring_helps(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    wanted = rng.normal(0.0, 1.0, (15, 3))
-    points = wanted + rng.normal(0.0, 0.2, (15, 3))
-    _, _, disparity = procrustes(wanted, points)
-    spread = np.sum((wanted - wanted.mean(axis=0)) ** 2)
-    assert np.sum((similarity_aligned(points, wanted) - wanted) ** 2) / spread == pytest.approx(
+    goal = rng.normal(0.0, 1.0, (15, 3))
+    points = goal + rng.normal(0.0, 0.2, (15, 3))
+    _, _, disparity = procrustes(goal, points)
+    spread = np.sum((goal - goal.mean(axis=0)) ** 2)
+    assert np.sum((similarity_aligned(points, goal) - goal) ** 2) / spread == pytest.approx(
         disparity, rel=1e-9
     )
 
 
 def test_mirroring_is_not_used() -> None:
-    wanted = np.random.default_rng(8).normal(0.0, 300.0, (15, 3))
-    mirrored = wanted * np.array([-1.0, 1.0, 1.0])
-    assert np.linalg.norm(similarity_aligned(mirrored, wanted) - wanted, axis=1).mean() > 30.0
-    assert procrustes(wanted, mirrored)[2] < 1e-12  # scipy's may mirror, so the case is a hard one
+    goal = np.random.default_rng(8).normal(0.0, 300.0, (15, 3))
+    mirrored = goal * np.array([-1.0, 1.0, 1.0])
+    assert np.linalg.norm(similarity_aligned(mirrored, goal) - goal, axis=1).mean() > 30.0
+    assert procrustes(goal, mirrored)[2] < 1e-12  # scipy's may mirror, so the case is a hard one
 
 
 def test_points_on_one_place_are_only_moved() -> None:
-    wanted = np.random.default_rng(9).normal(0.0, 300.0, (4, 3))
-    np.testing.assert_allclose(
-        similarity_aligned(np.ones((4, 3)), wanted), np.tile(wanted.mean(axis=0), (4, 1))
-    )
+    goal = np.random.default_rng(9).normal(0.0, 300.0, (4, 3))
+    np.testing.assert_allclose(similarity_aligned(np.ones((4, 3)), goal), np.tile(goal.mean(axis=0), (4, 1)))
 
 
 def test_root_alignment_moves_and_does_not_turn() -> None:
-    wanted = np.random.default_rng(10).normal(0.0, 300.0, (5, 3))
-    np.testing.assert_allclose(moved_to_root(wanted + np.array([5.0, -7.0, 9.0]), wanted, 2), wanted)
+    goal = np.random.default_rng(10).normal(0.0, 300.0, (5, 3))
+    np.testing.assert_allclose(moved_to_root(goal + np.array([5.0, -7.0, 9.0]), goal, 2), goal)

@@ -53,7 +53,7 @@ def test_a_shifted_body_is_off_by_the_shift_and_not_when_aligned() -> None:
     assert found.without_offsets_mm == pytest.approx(0.0, abs=1e-9)
 
 
-def test_what_is_constant_of_a_marker_is_told_apart_from_what_changes() -> None:
+def test_constant_offsets_are_separated_from_changes() -> None:
     poses, truth = moving()
     moved = truth.positions.copy()
     wrist = truth.names.index("LWrist")

@@ -1,4 +1,4 @@
-"""Evaluations in words and as JSON."""
+"""Evaluations as text and as JSON."""
 
 import json
 
@@ -24,7 +24,7 @@ def evaluation(mean: float, lost: tuple[str, ...] = ()) -> Evaluation:
     )
 
 
-def test_the_document_is_strict_json_and_the_words_say_threshold_and_alignment() -> None:
+def test_the_document_is_strict_json_and_the_text_has_threshold_and_alignment() -> None:
     found = evaluation(21.04, ("left arm",))
     document = json.loads(json.dumps(as_document(found), allow_nan=False))
     assert document["mean_mm"] == 21.04

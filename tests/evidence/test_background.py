@@ -103,7 +103,7 @@ def walking(frames: int) -> list[np.ndarray]:
     return found
 
 
-def test_the_median_forgets_who_walks_through() -> None:
+def test_the_median_has_no_person_walking_through() -> None:
     background = gaussian_from_median(np.stack(walking(27)))
     assert np.abs(background.mean - ROOM).max() < 4 * NOISE
     assert np.abs(np.median(np.sqrt(background.variance)) - NOISE) < 0.6

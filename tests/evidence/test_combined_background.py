@@ -16,7 +16,7 @@ def room(rng: np.random.Generator) -> np.ndarray:
 
 
 def frames_of(empty: np.ndarray, rng: np.random.Generator, width: int = 40) -> np.ndarray:
-    """A dark person who goes to and fro in the left half, with noise."""
+    """A dark person walking back and forth in the left half, with noise."""
     out = []
     for k in range(COUNT):
         picture = empty.copy()
@@ -26,7 +26,7 @@ def frames_of(empty: np.ndarray, rng: np.random.Generator, width: int = 40) -> n
     return np.stack(out)
 
 
-def test_who_stood_in_the_plate_is_replaced_by_the_footage() -> None:
+def test_a_person_in_the_plate_is_replaced_by_the_footage() -> None:
     rng = np.random.default_rng(1)
     empty = room(rng)
     plate = empty.copy()

@@ -34,7 +34,7 @@ def test_border_points_lie_on_the_border_and_point_away() -> None:
     assert np.all((found.outward * middle / radii[:, None]).sum(axis=1) > 0.95)
 
 
-def test_points_are_no_more_than_asked_for_and_spread_around() -> None:
+def test_points_are_at_most_the_given_number_and_spread_around() -> None:
     found = distances_of(disc(), most=20)
     assert 10 <= len(found.border) <= 20
     angles = np.sort(np.arctan2(*(found.border - [30.0, 28.0]).T))
@@ -57,7 +57,7 @@ def test_stepped_distances_are_nearly_the_exact_ones() -> None:
 
 @pytest.mark.parametrize("exact", [True, False])
 def test_distances_do_not_depend_on_where_the_mask_lies(exact: bool) -> None:
-    """OpenCV's own do, by 3e-5 pixels, and a descent makes millimetres of that: the same run must come out the same."""
+    """OpenCV's own do, by 3e-5 pixels, and a descent amplifies that to millimetres: runs must be reproducible."""
     mask = np.zeros((480, 640), np.uint8)
     mask[150:300, 250:330] = mask[200:220, 200:400] = 255
     first = distances_of(mask, exact=exact).signed

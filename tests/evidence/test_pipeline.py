@@ -123,7 +123,7 @@ def test_masks_that_are_asked_for_and_missing(footage: Footage) -> None:
     settings = dataclasses.replace(SETTINGS, background_model="mask")
     maker = EvidenceMaker(CAMERAS, footage, Backgrounds(footage), settings)
     np.testing.assert_array_equal(maker.view("masked", 1).mask, true_mask(1))
-    with pytest.raises(FootageError, match="No masks came with camera plate"):
+    with pytest.raises(FootageError, match="Camera plate has no masks"):
         maker.view("plate", 1)
 
 
@@ -135,7 +135,7 @@ def test_too_few_frames_for_a_median(tmp_path: Path) -> None:
         Backgrounds(footage).model("c", "gaussian")
 
 
-def test_a_plate_of_nearly_the_footages_size_is_fitted_the_way_it_was_made() -> None:
+def test_a_plate_of_nearly_the_footages_size_is_fitted() -> None:
     size = (408, 306)
     plate = noisy(cv2.resize(room(), size, interpolation=cv2.INTER_CUBIC), 1)
     cropped = plate[2:-2, 4:-4]

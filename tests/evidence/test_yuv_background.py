@@ -74,7 +74,7 @@ def slow_distance(
 
 
 @pytest.mark.parametrize("deepest", [0.0, 0.4])
-def test_shadow_and_background_are_told_apart_by_luminance(deepest: float) -> None:
+def test_shadow_and_background_are_distinguished_by_luminance(deepest: float) -> None:
     rng = np.random.default_rng(4)
     pictures = clip(rng)
     background = learn_background(list(pictures), least_noise=2.5)

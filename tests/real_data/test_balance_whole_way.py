@@ -22,7 +22,7 @@ import studio
 from studio.body.forward_kinematics import marker_points
 from studio.geometry.projection import project
 from studio.motion_files.trc import read_trc
-from studio.notebook.aligning import Alignment
+from studio.operations.cameras import Alignment
 from studio.runs.checking import RunCheck, check_run
 from studio.runs.mask_quality import MaskQuality
 from studio.runs.overlay_pictures import ViewComposer

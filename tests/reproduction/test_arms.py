@@ -1,4 +1,4 @@
-"""The arms' pictures: all in view, upright, as large as geometry says, and best explained by their own pose."""
+"""The arms' pictures: all in view, upright, of the right size, and best explained by their own pose."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What follows from made-up outcomes of the third paper's experiments, either way."""
+"""Conclusions from made-up outcomes of the third paper's experiments, in both directions."""
 
 import dataclasses
 import json
@@ -26,7 +26,7 @@ SCALE = Scale(seeds=(0, 1, 2))
 
 
 def followed(error: float, seed: int = 0, lost: int = 0, frames: int = 90) -> Followed:
-    """A run of so many frames: degrees of error, ten times as many mm; off in the last `lost` frames."""
+    """A run of `frames` frames: degrees of error, ten times as many mm; off in the last `lost` frames."""
     rng = np.random.default_rng(seed)
     angles = error + 0.02 * error * (seed - 1) + rng.normal(0.0, 0.01, frames)
     positions = 10.0 * angles
@@ -44,7 +44,7 @@ def followed(error: float, seed: int = 0, lost: int = 0, frames: int = 90) -> Fo
 
 
 def table_1(seed: int, views: float = 1.1, particles: float = 2.0) -> dict[str, float]:
-    """Times in which depth counts four times."""
+    """Times that grow fourfold with depth."""
     found: dict[str, float] = {"threads": 2}
     for place, depth in enumerate((6, 7, 8)):
         for count in (3, 4, 5):
@@ -54,7 +54,7 @@ def table_1(seed: int, views: float = 1.1, particles: float = 2.0) -> dict[str, 
 
 
 def learnt_sizes(count: int, clusters: float = 0.5) -> dict[str, float]:
-    """A model of so many classes."""
+    """A model of `count` classes."""
     growth = count**clusters
     return {
         "frames": 1000.0 * count,
@@ -67,7 +67,7 @@ def learnt_sizes(count: int, clusters: float = 0.5) -> dict[str, float]:
 
 
 def clusters_outcome(trial: Trial, clusters: float, states: float) -> dict:
-    """What `clusters_and_states.measure` gives."""
+    """An outcome of `clusters_and_states.measure`."""
     if trial.arguments["kind"] != clusters_and_states.DANCE:
         return {"clusters": 5, "frames": 1000, "seconds": 1.0, "kept": 0.9}
     cells = [
@@ -109,7 +109,7 @@ ONLINE = ("not learning", "first pass, learning", "second pass, with what the fi
 
 
 def concluded(name: str, made=usual) -> Findings:
-    """The findings when `made(trial)` is measured."""
+    """The findings for outcomes `made(trial)`."""
     experiment = EXPERIMENTS[name]
     outcomes = [Outcome(trial, json.loads(json.dumps(made(trial)))) for trial in experiment.trials(SCALE)]
     return experiment.conclude(outcomes)
@@ -138,7 +138,7 @@ def test_findings_are_plain_and_name_their_settings(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", FOLLOWING)
-def test_quick_looks_at_fewer_frames_and_learns_from_one_exercise(name: str) -> None:
+def test_a_preview_uses_fewer_frames_and_one_exercise(name: str) -> None:
     full, quick = (EXPERIMENTS[name].trials(Scale((0,), quick)) for quick in (False, True))
     for trial in full + quick:
         follow = Follow.of_plain(json.loads(json.dumps(trial.arguments)))
@@ -162,7 +162,7 @@ def test_only_the_guided_have_a_model() -> None:
         assert not trial.arguments["from_truth"]
 
 
-def test_fig_12_asks_that_few_guided_equal_annealing_and_beat_condensation() -> None:
+def test_fig_12_requires_few_guided_to_equal_annealing_and_beat_condensation() -> None:
     def as_claimed(label: str) -> float:
         return 30.0 if label.startswith("Condensation") else 20.0
 
@@ -175,7 +175,7 @@ def test_fig_12_asks_that_few_guided_equal_annealing_and_beat_condensation() -> 
     assert concluded("caillette-fig-12", of_errors(worse_than_annealed)).verdict == "not reproduced"
 
 
-def test_what_was_never_learnt_gives_the_reason_where_the_share_does_not_help() -> None:
+def test_an_unlearnt_clip_gives_the_reason_where_the_share_does_not_help() -> None:
     def helped(label: str) -> float:
         return 40.0 if "no model-free share" in label else 20.0
 
@@ -207,7 +207,7 @@ def test_fig_11_counts_tracks_that_are_lost_for_a_second() -> None:
     )
 
 
-def test_fig_13_asks_that_longer_memories_are_better() -> None:
+def test_fig_13_requires_longer_memories_to_be_better() -> None:
     def longer_is(better: bool):
         def made(trial: Trial) -> dict:
             if "entropy_of" in trial.arguments:
@@ -228,7 +228,7 @@ def test_fig_13_asks_that_longer_memories_are_better() -> None:
     assert len(EXPERIMENTS["caillette-fig-13"].trials(SCALE)) == len(models.MEMORIES) * 4
 
 
-def test_clusters_stand_beside_the_papers() -> None:
+def test_clusters_are_compared_with_the_papers() -> None:
     experiment = "caillette-clusters"
     good = concluded(experiment, lambda trial: clusters_outcome(trial, 122.0, 948.0))
     verdicts = {entry.name: entry.verdict for entry in good.numbers}
@@ -240,7 +240,7 @@ def test_clusters_stand_beside_the_papers() -> None:
     assert other.verdict == "not reproduced"
 
 
-def test_table_1_judges_what_no_machine_changes() -> None:
+def test_table_1_judges_ratios_independent_of_the_machine() -> None:
     def of(**wanted: float):
         return concluded("caillette-table-1", lambda trial: table_1(trial.arguments["seed"], **wanted))
 

@@ -1,4 +1,4 @@
-"""Trials of the third paper's experiments: what is learnt once, true motion, frames told the truth, runs."""
+"""Trials of the third paper's experiments: shared models, true motion, frames given the true pose, runs."""
 
 import dataclasses
 import json
@@ -38,7 +38,7 @@ LAST = 3
 
 @pytest.fixture(scope="module")
 def shelf(tmp_path_factory):
-    """The bundled walk in a folder of its own, where things can be learnt."""
+    """The bundled walk in its own folder, where models can be learnt."""
     folder = tmp_path_factory.mktemp("footage")
     (folder / "walk").symlink_to(SAMPLES / "walk")
     found = FootageShelf(folder)
@@ -46,7 +46,7 @@ def shelf(tmp_path_factory):
     found.close()
 
 
-def test_a_thing_is_made_once_for_what_it_is_made_from(tmp_path) -> None:
+def test_data_are_made_once_for_equal_inputs(tmp_path) -> None:
     made = []
 
     def make(folder: Path) -> None:
@@ -61,7 +61,7 @@ def test_a_thing_is_made_once_for_what_it_is_made_from(tmp_path) -> None:
     assert len(made) == 2
 
 
-def test_what_failed_is_made_again_and_leaves_nothing(tmp_path) -> None:
+def test_failed_data_are_made_again_and_leave_nothing(tmp_path) -> None:
     shelf = FootageShelf(tmp_path)
 
     def fail(folder: Path) -> None:
@@ -75,7 +75,7 @@ def test_what_failed_is_made_again_and_leaves_nothing(tmp_path) -> None:
     assert not list((tmp_path / training_set.LEARNT).glob(".partial-*"))
 
 
-def test_who_waits_takes_what_another_process_has_made(tmp_path, monkeypatch) -> None:
+def test_a_waiting_process_uses_the_data_of_another(tmp_path, monkeypatch) -> None:
     shelf = FootageShelf(tmp_path)
     place = made_once(shelf, "thing", {}, lambda folder: None)
     place.rmdir()
@@ -143,7 +143,7 @@ def test_footage_of_another_motion_is_refused(shelf, tmp_path) -> None:
     empty = FootageShelf(tmp_path)
     with pytest.raises(TruthError, match="another motion") as refused:
         true_motion(empty, stale, LAST)  # pyright: ignore[reportArgumentType]
-    assert "rendered anew" in refused.value.hint
+    assert "rendered again" in refused.value.hint
     no_recipe = SimpleNamespace(path=tmp_path, truth_path=session.truth_path, **fields)
     with pytest.raises(TruthError, match="not made by a recipe"):
         true_motion(empty, no_recipe, LAST)  # pyright: ignore[reportArgumentType]
@@ -172,7 +172,7 @@ def test_errors_are_wrapped_and_over_the_joints_alone(shelf) -> None:
     np.testing.assert_allclose(joint_errors(body, columns, one, truth).angle_deg, expected)
 
 
-def test_frames_are_told_the_truth_and_not_told_again(shelf) -> None:
+def test_frames_are_given_the_truth_once(shelf) -> None:
     session = shelf.session("walk")
     truth = true_motion(shelf, session, LAST).poses
     settings = changed_settings(default_settings("condensation", "blobs"), COARSE)
@@ -203,7 +203,7 @@ def test_a_guided_run_is_measured_and_gives_the_same_again(shelf) -> None:
     assert first.mean_mm < 250.0
 
 
-def test_a_blind_run_tells_of_no_model(shelf) -> None:
+def test_a_run_without_model_has_no_model_figures(shelf) -> None:
     wanted = Follow("walk", "condensation", "blobs", 1, LAST, {"particles": 30, **COARSE})
     found = Followed(**measure(wanted.plain(), shelf))
     assert found.free == []

@@ -1,4 +1,4 @@
-"""Spoilt evidence: the degree that was asked for, the same for the same seed, nothing else touched."""
+"""Damaged evidence: of the requested degree, reproducible by seed, nothing else changed."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from studio.reproduction.open_questions.robustness import (
 
 
 def person_mask() -> np.ndarray:
-    """A standing person's worth of pixels."""
+    """A mask of a standing person's size."""
     mask = np.zeros((240, 320), np.uint8)
     mask[60:200, 140:190] = 255
     return mask
@@ -30,7 +30,7 @@ def evidence(frame: int = 5) -> FrameEvidence:
 
 
 @pytest.mark.parametrize("degree", [0.1, 0.3, 0.6])
-def test_masks_are_damaged_as_much_as_asked(degree: float) -> None:
+def test_masks_are_damaged_to_the_given_degree(degree: float) -> None:
     mask = person_mask()
     damaged = damaged_mask(mask, degree, np.random.default_rng(0))
     person = (mask > 0).sum()
@@ -57,7 +57,7 @@ def test_damage_differs_between_frames_views_and_seeds_and_repeats() -> None:
     assert (mask_damage(0.3, seed=3).evidence(evidence(5)).views[0].mask != first.views[0].mask).any()
 
 
-def test_clutter_covers_its_share_and_stays_where_it_is() -> None:
+def test_clutter_covers_its_share_and_stays_in_place() -> None:
     rng = np.random.default_rng(1)
     assert not clutter_edges((120, 160), 0.0, rng).any()
     sparse, dense = clutter_edges((120, 160), 0.02, rng), clutter_edges((120, 160), 0.2, rng)
@@ -71,7 +71,7 @@ def test_clutter_covers_its_share_and_stays_where_it_is() -> None:
 
 
 @pytest.mark.parametrize("pixels", [2.0, 10.0])
-def test_a_turned_camera_is_off_by_so_many_pixels_and_stays_where_it_stands(pixels: float) -> None:
+def test_a_turned_camera_is_off_by_the_given_pixels_and_stays_in_place(pixels: float) -> None:
     matrix = np.array([[500.0, 0.0, 160.0], [0.0, 500.0, 120.0], [0.0, 0.0, 1.0]])
     camera = Camera("a", 320, 240, matrix, np.zeros(5), np.eye(3), np.array([10.0, 20.0, 3000.0]))
     (turned,) = calibration_error(pixels, seed=1).cameras((camera,))

@@ -56,7 +56,7 @@ def shelf():
 
 
 def on_the_walk(trial: Trial, first: int = 0, last: int = 4) -> dict:
-    """A trial's arguments as they come back from JSON, but on a few frames of the walk and with few particles."""
+    """A trial's arguments as read from JSON, but on a few frames of the walk and with few particles."""
     arguments = json.loads(json.dumps(trial.arguments))
     return {
         **arguments,
@@ -88,7 +88,7 @@ def run(
 
 
 def concluded(name: str, made) -> Findings:
-    """The findings of an experiment whose runs `made(group, seed)` gives."""
+    """The findings of an experiment with runs `made(group, seed)`."""
     experiment = EXPERIMENTS[name]
     outcomes = [
         Outcome(trial, json.loads(json.dumps(asdict(made(group_of(trial), trial.arguments["seed"])))))
@@ -132,7 +132,7 @@ def test_three_cameras_are_judged_by_the_papers_own_filter(name: str) -> None:
     assert len(thick) == 3
 
 
-def test_the_longest_loss_is_one_limbs_longest_row() -> None:
+def test_the_longest_loss_is_one_limbs_longest_spell() -> None:
     assert longest_loss(run(30.0)) == 0.0
     assert longest_loss(run(30.0, lost=(3, 4, 5, 9))) == pytest.approx(3 / 60)
 
@@ -151,7 +151,7 @@ def test_fig_8_is_reproduced_where_condensation_fails_and_ten_layers_track() -> 
     assert concluded("deutscher-fig-8", lambda group, seed: run(200.0)).verdict == "not reproduced"
 
 
-def test_terminal_failure_is_the_one_that_never_ends() -> None:
+def test_terminal_failure_is_the_final_one() -> None:
     assert terminal_failure(run(30.0)) == 1.0
     assert terminal_failure(run(200.0)) == 0.0
     assert terminal_failure(run(30.0, last_error=200.0)) == 0.5
@@ -172,7 +172,7 @@ def test_200_particles_are_judged_with_eq_13() -> None:
     assert too_few.verdict == "not reproduced"
 
 
-def test_the_fewest_particles_of_a_body_are_sought_on_footage(shelf) -> None:
+def test_the_fewest_particles_of_a_body_are_searched_on_footage(shelf) -> None:
     trial = particles_needed.body_trials(Scale((1,), quick=True), {"Eq. 13": {"survival": 0.5, "layers": 2}})[
         0
     ]
@@ -221,12 +221,12 @@ def test_the_pelvis_is_where_its_marker_is(shelf) -> None:
     body = session.body()
     names = [entry.name for entry in body.parameters]
     laid = true_poses(session, body, frames)[:, [names.index(name) for name in layers_of_a_body.PLACES]]
-    # The body has not quite the person's proportions, so it is laid on the markers to within some mm.
+    # The body's proportions differ a little from the person's, so it fits the markers to within some mm.
     assert np.linalg.norm(places - laid, axis=1).max() < 25.0
     assert np.linalg.norm(places[2] - places[0]) > 300.0
 
 
-def test_a_cloud_covers_what_lies_within_three_deviations() -> None:
+def test_a_cloud_covers_points_within_three_deviations() -> None:
     cloud = np.random.default_rng(1).standard_normal((4000, 2)) * (10.0, 1.0)
     assert layers_of_a_body.covers(cloud, np.array([25.0, 0.0]))
     assert not layers_of_a_body.covers(cloud, np.array([0.0, 5.0]))
@@ -269,7 +269,7 @@ def test_fig_7_is_judged_by_modes_and_peak() -> None:
     assert weight_of_a_knee.half_width(angles, one) == pytest.approx(2 * 8.0 * np.sqrt(np.log(2.0)), abs=1.5)
 
 
-def test_fig_16_asks_for_a_gain_on_branches_and_no_harm_on_a_chain() -> None:
+def test_fig_16_requires_a_gain_on_branches_and_no_harm_on_a_chain() -> None:
     def made(chain: float, branched: float) -> Findings:
         outcomes = []
         for index, trial in enumerate(localisation.trials_fig_16(SEEDS)):

@@ -1,4 +1,4 @@
-"""The experiments that can be asked for: names, nearest names, and trials that can be kept."""
+"""The catalogue of experiments: names, nearest names, and trials that can be stored."""
 
 import pickle
 from types import SimpleNamespace
@@ -50,14 +50,14 @@ def test_every_experiment_can_be_planned_and_kept(name: str) -> None:
     assert len({job.label for job in full.jobs}) == len(full.jobs), "two trials have the same label"
     for job in quick.jobs:
         if name.startswith("deutscher-") and experiment.footage:
-            # A quick look renders less than a second of each footage.
+            # A preview renders less than a second of each footage.
             assert job.frames is not None
             assert 1 <= job.frames <= 48
         assert plain(job.arguments) == job.arguments
         assert pickle.loads(pickle.dumps(job)) == job
 
 
-def test_only_the_frames_that_are_looked_at_are_needed(tmp_path) -> None:
+def test_only_used_frames_are_needed(tmp_path) -> None:
     assert frames_of({"footage": "walk", "last": 90}) == 90
     assert frames_of({"footage": "walk", "last": None}) is None
     assert frames_of({"attempt": {"last": 30}, "other": {"last": 50}}) == 50

@@ -1,4 +1,4 @@
-"""The fewest particles by bisection, and what the claims in numbers make of them."""
+"""The fewest particles by bisection, and the claims on them."""
 
 import json
 import math
@@ -45,18 +45,18 @@ def test_sizes_stand_in_equal_ratios() -> None:
 
 @pytest.mark.parametrize("needed", range(8, 1025, 37))
 def test_bisection_finds_the_first_size_that_is_enough(needed: int) -> None:
-    asked: list[int] = []
+    tried: list[int] = []
 
     def succeeds(particles: int, run: int) -> bool:
         assert run < 3
-        asked.append(particles)
+        tried.append(particles)
         return particles >= needed
 
     found = fewest(succeeds, GRID, 3)
     assert found.particles == next(size for size in GRID if size >= needed)
     assert found.censored == (BELOW if needed <= 8 else "")
     # A sure answer takes two runs of three, and bisection no more sizes than the grid has doublings of itself.
-    assert len(asked) == 2 * len(found.tried)
+    assert len(tried) == 2 * len(found.tried)
     assert len(found.tried) <= math.ceil(math.log2(len(GRID) + 1))
 
 
@@ -67,7 +67,7 @@ def test_most_runs_decide() -> None:
     assert sorted(found.tried) == [[16, 1, 3], [32, 2, 3]]
 
 
-def test_the_ends_of_the_grid_are_said() -> None:
+def test_the_ends_of_the_grid_are_marked() -> None:
     above = fewest(lambda particles, run: False, (8, 16, 32), 1)
     assert (above.particles, above.censored) == (64.0, ABOVE)
     below = fewest(lambda particles, run: True, (8, 16, 32), 1)
@@ -81,7 +81,7 @@ def test_saving_is_the_geometric_mean_of_ratios_paired_by_seed() -> None:
     assert found.ours == pytest.approx((2.0 * 4.0 * 2.0) ** (1 / 3))
     assert found.low <= 2.0 <= found.high
     assert found.verdict == "reproduced"
-    # Where both fail with the most particles nothing is known of the ratio.
+    # Where both fail with the most particles the ratio is unknown.
     both = saving("saved", [*slow, Fewest(2048, ABOVE, [])], [*fast, Fewest(2048, ABOVE, [])], 2.0)
     assert (both.ours, both.seeds) == (found.ours, 3)
     # Where only the slow one fails its bound counts.
@@ -126,7 +126,7 @@ def test_a_trial_is_measured_the_same_again_and_survives_json(tmp_path) -> None:
 
 
 def concluded(experiment: Experiment, needed: dict[str, float]) -> Findings:
-    """The findings where each group needs about so many particles (a step of the grid more or less)."""
+    """The findings where each group needs about a given number of particles (a step of the grid more or less)."""
     outcomes = []
     for trial in experiment.trials(SEEDS):
         particles = needed[group_of(trial)] * 2.0 ** (((7 * trial.arguments["seed"]) % 5 - 2) / 8)
@@ -170,9 +170,9 @@ def test_crossover_saves_on_branches_and_not_on_a_chain(branched: float, chain: 
     found = concluded(experiment, needed)
     assert found.verdict == verdict
     ours = {entry.name: entry.ours for entry in found.numbers}
-    told = "particles saved, {}: adaptive, α 0.5, cut by parameters"
-    assert ours[told.format("branched arms")] == pytest.approx(100.0 / branched)
-    assert ours[told.format("chain")] == pytest.approx(100.0 / chain)
+    name = "particles saved, {}: adaptive, α 0.5, cut by parameters"
+    assert ours[name.format("branched arms")] == pytest.approx(100.0 / branched)
+    assert ours[name.format("chain")] == pytest.approx(100.0 / chain)
 
 
 def test_every_particle_is_crossed_and_the_chain_is_shared_with_adaptive_diffusion() -> None:

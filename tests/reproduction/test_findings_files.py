@@ -1,4 +1,4 @@
-"""What is written for programs and people: valid JSON, CSV that reads back, a page that holds everything."""
+"""Files for programs and people: valid JSON, CSV that reads back, a self-contained page."""
 
 import base64
 import csv
@@ -64,7 +64,7 @@ class Page(HTMLParser):
         self._kind = ""
 
 
-def test_the_report_holds_everything_it_needs(document: dict) -> None:
+def test_the_report_is_self_contained(document: dict) -> None:
     results = {"software": "<b>1</b>", "date": DATE, "experiments": [document]}
     text = report_html(results)
     page = Page(text)
@@ -102,7 +102,7 @@ def test_findings_read_back_and_old_charts_go(document: dict, tmp_path: Path) ->
         read_findings(tmp_path, "toy")
 
 
-def test_the_overview_has_what_was_run_in_the_catalogues_order(document: dict, tmp_path: Path) -> None:
+def test_the_overview_has_the_experiments_in_the_catalogues_order(document: dict, tmp_path: Path) -> None:
     known = [toy(name, tmp_path) for name in ("second", "never", "toy")]
     write_findings(tmp_path, document)
     write_findings(tmp_path, document | {"name": "second"})
@@ -123,7 +123,7 @@ def test_the_summary_is_a_table(document: dict) -> None:
     assert "| failed | Not concluded. seed 1: No ∣ luck. |" in lines[3]
 
 
-def test_documents_are_json_whatever_was_measured(tmp_path: Path) -> None:
+def test_documents_are_json_for_any_measurement(tmp_path: Path) -> None:
     gaps = Series("a", (0.0, 1.0), (math.nan, math.inf))
     numbers = (Number("n", math.nan, math.nan, math.inf, seeds=12),)
     found = Findings(
@@ -133,27 +133,27 @@ def test_documents_are_json_whatever_was_measured(tmp_path: Path) -> None:
         charts=(Chart("c", "lines", "x", "y", (gaps,)),),
         settings={"s": (1, math.nan)},
     )
-    told = json.loads(json.dumps(as_document(toy("toy", tmp_path), found, making()), allow_nan=False))
-    assert told["charts"][0]["series"][0]["y"] == [None, None]
-    assert told["settings"] == {"s": [1, None]}
-    assert (told["numbers"][0]["ours"], told["numbers"][0]["high"]) == (None, None)
+    written = json.loads(json.dumps(as_document(toy("toy", tmp_path), found, making()), allow_nan=False))
+    assert written["charts"][0]["series"][0]["y"] == [None, None]
+    assert written["settings"] == {"s": [1, None]}
+    assert (written["numbers"][0]["ours"], written["numbers"][0]["high"]) == (None, None)
 
 
-def test_verdicts_say_what_they_rest_on(tmp_path: Path) -> None:
+def test_verdicts_state_their_basis(tmp_path: Path) -> None:
     few = Findings("reproduced", "", (Number("n", 1, 0, 2, paper=1, seeds=5, verdict="reproduced"),))
-    told = as_document(toy("toy", tmp_path), few, making(12, quick=True, measured_by=(SOFTWARE, "0.0.9")))
-    assert (told["firm"], told["numbers"][0]["firm"]) == (False, False)
-    assert told["notes"][0] == "The verdict is not firm: 5 seeds of at least 10."
-    assert "quick" in told["notes"][1]
-    assert "(0.0.9)" in told["notes"][2]
+    written = as_document(toy("toy", tmp_path), few, making(12, quick=True, measured_by=(SOFTWARE, "0.0.9")))
+    assert (written["firm"], written["numbers"][0]["firm"]) == (False, False)
+    assert written["notes"][0] == "The verdict is not firm: 5 seeds of at least 10."
+    assert "quick" in written["notes"][1]
+    assert "(0.0.9)" in written["notes"][2]
     assert as_document(toy("toy", tmp_path), Findings("answered", ""), making())["notes"] == []
 
 
 def test_many_failures_are_counted(tmp_path: Path) -> None:
     reasons = [(f"seed {seed}", "No luck.") for seed in range(4)]
-    told = failed_document(toy("toy", tmp_path), reasons, making())
-    assert told["words"] == "Not concluded, for 4 of 24 trials failed; the first: seed 0: No luck."
-    assert len(told["failures"]) == 4
+    written = failed_document(toy("toy", tmp_path), reasons, making())
+    assert written["words"] == "Not concluded: 4 of 24 trials failed; the first: seed 0: No luck."
+    assert len(written["failures"]) == 4
 
 
 @pytest.mark.parametrize(
@@ -169,9 +169,9 @@ def test_many_failures_are_counted(tmp_path: Path) -> None:
 )
 def test_numbers_in_words(values: tuple, words: str) -> None:
     ours, low, high, paper = values
-    told = {"name": "n", "ours": ours, "low": low, "high": high, "unit": "mm", "paper": paper}
-    assert number_in_words({**told, "verdict": "answered"}) == words
-    assert number_in_words({**told, "verdict": "better"}) == f"{words}: better"
+    written = {"name": "n", "ours": ours, "low": low, "high": high, "unit": "mm", "paper": paper}
+    assert number_in_words({**written, "verdict": "answered"}) == words
+    assert number_in_words({**written, "verdict": "better"}) == f"{words}: better"
 
 
 def test_csv_quotes_and_leaves_out_null() -> None:

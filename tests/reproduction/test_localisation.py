@@ -23,7 +23,7 @@ FIGURES = {entry.name: entry for entry in (*localisation.EXPERIMENTS, *localisat
 
 
 def falling(shares: list[list[float]], noisy: float = 1.0) -> dict:
-    """A measured search: shares (M, D), and what noise leaves of each variance in the first layer."""
+    """A measured search: shares (M, D), and the factor on each variance by noise in the first layer."""
     drawn = shares[1] if len(shares) > 1 else shares[0]
     return {
         "shares": shares,
@@ -48,7 +48,7 @@ def test_crossings_are_counted_from_the_first_cloud() -> None:
     assert crossing_layers(shares).tolist() == [[1, 3, 4]]
 
 
-def test_seeds_are_counted_as_the_claim_says() -> None:
+def test_seeds_are_counted_as_in_the_claim() -> None:
     rising = falling([[1, 1, 1], [0.05, 1, 1], [0.05, 0.05, 1], [0.01, 0.01, 0.01]])
     even = falling([[1, 1, 1], [1, 1, 1], [0.05, 0.05, 0.5], [0.01, 0.01, 0.01]])
     unfinished = falling([[1, 1, 1], [0.05, 1, 1], [0.05, 0.05, 1], [0.01, 0.01, 0.5]])
@@ -75,7 +75,7 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Outcome]:
 
 
 def concluded(experiment: Experiment, measured: dict[str, Outcome]) -> Findings:
-    """The findings of a figure from what was measured."""
+    """The findings of a figure from the measurements."""
     keys = [
         f"{experiment.measure.__name__} {json.dumps(trial.arguments, sort_keys=True)}"
         for trial in experiment.trials(SEEDS)
@@ -93,7 +93,7 @@ def test_joints_are_localised_from_the_root_outwards(measured: dict[str, Outcome
     assert len(found.charts[0].series) == 4 * (1 + len(SEEDS.seeds))
 
 
-def test_noise_wipes_out_what_was_gained_only_without_adaptive_diffusion(
+def test_noise_undoes_the_gain_only_without_adaptive_diffusion(
     measured: dict[str, Outcome],
 ) -> None:
     found = concluded(FIGURES["deutscher-fig-12"], measured)
@@ -103,7 +103,7 @@ def test_noise_wipes_out_what_was_gained_only_without_adaptive_diffusion(
     assert numbers["variance of x1 after adaptive noise"] < 1.1 * numbers["variance of x1 after drawing"]
 
 
-def test_the_plain_filter_is_even_or_the_words_say_why(measured: dict[str, Outcome]) -> None:
+def test_the_plain_filter_is_even_or_the_text_gives_the_reason(measured: dict[str, Outcome]) -> None:
     found = concluded(FIGURES["deutscher-fig-14"], measured)
     numbers = {entry.name: entry.ours for entry in found.numbers}
     assert (
@@ -140,19 +140,19 @@ def test_both_branched_arms_are_localised_from_the_hinge(measured: dict[str, Out
 
 
 def made(name: str, shares: list[list[float]], noisy: float = 1.0) -> Findings:
-    """The findings of a figure all of whose searches fell like this."""
+    """The findings of a figure with searches of these shares."""
     experiment = FIGURES[name]
     return experiment.conclude([Outcome(trial, falling(shares, noisy)) for trial in experiment.trials(SEEDS)])
 
 
-def test_verdicts_follow_what_was_measured() -> None:
+def test_verdicts_follow_the_measurements() -> None:
     assert made("deutscher-fig-13", RISING).verdict == "reproduced"
     assert made("deutscher-fig-13", EVEN).verdict == "not reproduced"
     assert made("deutscher-fig-14", EVEN).verdict == "reproduced"
     assert "The reason:" not in made("deutscher-fig-14", EVEN).words
     assert made("deutscher-fig-14", RISING).verdict == "not reproduced"
     assert "The reason:" in made("deutscher-fig-14", RISING).words
-    # Noise that leaves everything as it was undoes nothing: Fig. 12c is not seen.
+    # Noise that changes nothing undoes nothing: Fig. 12c is not seen.
     assert made("deutscher-fig-12", RISING, noisy=1.0).verdict == "not reproduced"
     six = [[*row[:3], *row[:3]] for row in RISING]
     assert made("deutscher-fig-17", six).verdict == "reproduced"

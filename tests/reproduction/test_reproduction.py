@@ -1,4 +1,4 @@
-"""Running experiments: every trial once, kept, resumed; failures are told and hold nothing up."""
+"""Running experiments: every trial once, stored, resumed; failures are reported and stop nothing else."""
 
 import csv
 import dataclasses
@@ -39,11 +39,11 @@ def lines(log: Path) -> list[str]:
 
 def test_everything_is_written_and_nothing_is_run_twice(tmp_path: Path) -> None:
     log, out = tmp_path / "log", tmp_path / "out"
-    told = []
-    first = run([toy("toy", log)], out, processes=2, report=lambda *words: told.append(words))
+    steps = []
+    first = run([toy("toy", log)], out, processes=2, report=lambda *words: steps.append(words))
     assert (first.measured, first.kept, first.failed) == (4, 0, 0)
     assert len({line.split()[0] for line in lines(log)}) == 2
-    assert told[-1] == ("toy: " + told[-1][0].removeprefix("toy: "), 4, 4)
+    assert steps[-1] == ("toy: " + steps[-1][0].removeprefix("toy: "), 4, 4)
     document = first.documents[0]
     assert document["verdict"] == "reproduced"
     assert document["firm"] is False
@@ -106,7 +106,7 @@ def test_a_failing_trial_fails_its_experiment_only(
     assert reason in bad["words"]
 
 
-def test_what_failed_is_tried_again_and_what_was_measured_is_kept(tmp_path: Path) -> None:
+def test_failed_trials_run_again_and_outcomes_are_kept(tmp_path: Path) -> None:
     log, out = tmp_path / "log", tmp_path / "out"
     run([toy("bad", log, seed1="once refused")], out)
     found = run([toy("bad", log, seed1="once refused")], out)
@@ -121,7 +121,7 @@ def test_a_process_that_dies_once_is_replaced(tmp_path: Path) -> None:
     assert len(lines(log)) == 5
 
 
-def test_a_conclusion_that_cannot_be_drawn_is_told(tmp_path: Path) -> None:
+def test_a_failing_conclusion_is_reported(tmp_path: Path) -> None:
     log = tmp_path / "log"
     wrong = toy("toy", log)
     wrong = dataclasses.replace(wrong, shown=lambda outcomes: outcomes[0].measured["nothing"])
@@ -180,7 +180,7 @@ def test_an_unknown_recipe_fails_its_experiment_only(tmp_path: Path) -> None:
     assert "There is no recipe 'nowhere'." in found.documents[0]["words"]
 
 
-def test_outcomes_of_another_version_are_used_and_said(tmp_path: Path) -> None:
+def test_outcomes_of_another_version_are_used_and_noted(tmp_path: Path) -> None:
     out = tmp_path / "out"
     run([toy("toy", tmp_path / "log")], out)
     path = next((out / "trials").glob("*.json"))
@@ -233,7 +233,7 @@ if __name__ == "__main__":
 
 
 def start_waiting(tmp_path: Path) -> subprocess.Popen:
-    """A reproduction in a process of its own, that hangs in its second trial."""
+    """A reproduction in its own process that hangs in its second trial."""
     (tmp_path / "script.py").write_text(SCRIPT)
     environment = {**os.environ, "PYTHONPATH": f"{ROOT / 'tests'}{os.pathsep}{ROOT}"}
     process = subprocess.Popen(
@@ -249,7 +249,7 @@ def start_waiting(tmp_path: Path) -> subprocess.Popen:
     return process
 
 
-def gone(identifier: int) -> bool:
+def has_ended(identifier: int) -> bool:
     try:
         os.kill(identifier, 0)
     except ProcessLookupError:
@@ -258,17 +258,17 @@ def gone(identifier: int) -> bool:
 
 
 @pytest.mark.parametrize("sign", [signal.SIGKILL, signal.SIGINT])
-def test_what_a_killed_command_finished_is_kept(tmp_path: Path, sign: int) -> None:
+def test_a_killed_commands_finished_trials_are_kept(tmp_path: Path, sign: int) -> None:
     process = start_waiting(tmp_path)
     process.send_signal(sign)
     process.communicate(timeout=60)
     worker = int(lines(tmp_path / "log")[0].split()[0])
     deadline = time.monotonic() + 30
-    while not gone(worker):
+    while not has_ended(worker):
         assert time.monotonic() < deadline, "the trial's process outlived the command"
         time.sleep(0.05)
     (tmp_path / "log.gate").write_text("")
     found = run([toy("toy", tmp_path / "log", seed1="wait")], tmp_path / "out")
     assert (found.measured, found.kept) == (3, 1)
-    # The trial that was in hand ran twice, the finished one once.
+    # The interrupted trial ran twice, the finished one once.
     assert len(lines(tmp_path / "log")) == 5

@@ -1,4 +1,4 @@
-"""Experiments made of tracked footage: their trials, and what follows from made-up outcomes, either way."""
+"""Experiments of tracked footage: their trials, and conclusions from made-up outcomes, in both directions."""
 
 import json
 from dataclasses import asdict
@@ -58,7 +58,7 @@ def made(trial: Trial, error: float, lost: tuple[int, ...] = ()) -> Outcome:
 
 
 def concluded(name: str, error_of) -> Findings:
-    """The findings of an experiment whose runs have the error that `error_of(trial label)` says."""
+    """The findings of an experiment whose runs have the error `error_of(trial label)`."""
     experiment = EXPERIMENTS[name]
     return experiment.conclude([made(trial, error_of(trial.label)) for trial in experiment.trials(SCALE)])
 
@@ -89,7 +89,7 @@ def test_table_2_is_reproduced_bettered_or_not() -> None:
     assert findings.verdict == "not reproduced"
 
 
-def test_fig_6_asks_that_the_swarm_wins_at_20_and_is_equal_at_60() -> None:
+def test_fig_6_requires_the_swarm_to_win_at_20_and_equal_at_60() -> None:
     def as_claimed(label: str) -> float:
         return 70.0 if "Eq. 13" in label and "20 Hz" in label else 40.0
 
@@ -106,7 +106,7 @@ def test_fig_6_asks_that_the_swarm_wins_at_20_and_is_equal_at_60() -> None:
     assert concluded("fleischmann-fig-6", worse_at_60).verdict == "not reproduced"
 
 
-def test_partitions_ask_that_soft_is_better_than_all_but_three_stages() -> None:
+def test_partitions_require_soft_to_be_better_than_all_but_three_stages() -> None:
     def as_claimed(label: str) -> float:
         return 40.0 if label.startswith("soft") else 60.0
 
@@ -129,7 +129,7 @@ def test_spells_are_rows_of_frames_with_a_limb_lost() -> None:
     ]
 
 
-def test_damage_that_no_tracker_stands_is_said() -> None:
+def test_damage_that_no_tracker_tolerates_is_reported() -> None:
     def hopeless(label: str) -> float:
         return 400.0 if not label.split(", ")[-2].endswith(" 0") else 30.0
 
@@ -154,7 +154,7 @@ def test_groups_keep_the_order_of_seeds_and_curves_their_mean() -> None:
     )
 
 
-def test_generalisation_keeps_the_halves_apart_and_says_who_is_near_where() -> None:
+def test_generalisation_keeps_the_halves_apart_and_counts_near_clips() -> None:
     def error(label: str) -> float:
         if "reporting" in label:
             return 50.0
@@ -170,7 +170,7 @@ def test_generalisation_keeps_the_halves_apart_and_says_who_is_near_where() -> N
     assert short.columns[1:] == tuple(entry.name for entry in ENTRIES)
     (walk, *_) = short.rows
     assert str(walk[1]).startswith("30.0 / ")
-    # Which no behaviour model fits, and which one does.
+    # A kind that no behaviour model fits, and one that it does.
     behaviour = short.columns.index("behaviour")
     cells = {str(row[0]).split(" (")[0]: row[behaviour] for row in short.rows}
     assert cells["leap"] == "–"
@@ -197,9 +197,9 @@ def test_generalisation_counts_frames_with_a_limb_lost() -> None:
     assert numbers["named of other frames, swarm, choosing"] == 0.0
 
 
-def test_generalisation_is_measured_with_a_model_where_one_is_asked_for() -> None:
-    taught = [trial for trial in EXPERIMENTS["generalisation"].trials(SCALE) if "training" in trial.arguments]
-    assert {trial.arguments["attempt"]["tracker"] for trial in taught} == {"behaviour"}
-    assert all(frames_of(trial.arguments) == trial.arguments["attempt"]["last"] for trial in taught)
+def test_generalisation_is_measured_with_a_model_where_one_is_needed() -> None:
+    guided = [trial for trial in EXPERIMENTS["generalisation"].trials(SCALE) if "training" in trial.arguments]
+    assert {trial.arguments["attempt"]["tracker"] for trial in guided} == {"behaviour"}
+    assert all(frames_of(trial.arguments) == trial.arguments["attempt"]["last"] for trial in guided)
     alone = [trial for trial in EXPERIMENTS["generalisation"].trials(SCALE) if "height alone" in trial.label]
     assert {trial.arguments["attempt"]["subject"] for trial in alone} == {"subject_height.toml"}

@@ -14,7 +14,7 @@ from studio.geometry.camera import Camera
 from studio.geometry.projection import project
 from studio.runs.background_setup import set_up_background
 from studio.runs.clean_plates import median_of_empty
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.session_settings import session_settings
 from studio.sessions.background_files import (
     given_backgrounds,
@@ -129,14 +129,14 @@ def test_who_stood_in_a_plate_is_cleaned_away(session: Session, tmp_path: Path) 
 def test_a_run_begins_with_the_sessions_knobs(session: Session) -> None:
     set_up_background(session, "median", knobs={"mask_threshold": 9.0}, tune=False)
     assert read_evidence(session).knobs["background_model"] == "median"
-    run = prepare_run(session, RunRequest(body="human31", start_pose=session.body("human31").neutral))
+    run = prepare_run(session, body="human31", start_pose=session.body("human31").neutral)
     assert run.record.settings["mask_threshold"] == 9.0
     assert run.record.settings["background_model"] == "median"
     other = prepare_run(
         session,
-        RunRequest(
-            body="human31", start_pose=session.body("human31").neutral, changes={"mask_threshold": 5.0}
-        ),
+        body="human31",
+        start_pose=session.body("human31").neutral,
+        knobs={"mask_threshold": 5.0},
     )
     assert other.record.settings["mask_threshold"] == 5.0
 

@@ -18,7 +18,7 @@ from studio.comparison.tracked import Attempt, track
 from studio.errors import BehaviourError, NotFoundError, SettingsError, StudioError
 from studio.motion_files.trc import MarkerMotion, write_trc
 from studio.runs.behaviour_models import check_prediction, fitting, models_folder, models_in
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
 from studio.runs.run_behaviour import LEARNT_NAME
@@ -41,14 +41,12 @@ def made(session: Session, tracker: str, name: str = "", **changes: object) -> S
     """A guided run of all eight frames."""
     return prepare_run(
         session,
-        RunRequest(
-            tracker=tracker,
-            weighting="edge-region",
-            name=name,
-            seed=4,
-            start_pose=true_poses()[0],
-            changes={**GUIDED[tracker], **changes},
-        ),
+        tracker=tracker,
+        weighting="edge-region",
+        name=name,
+        seed=4,
+        start_pose=true_poses()[0],
+        knobs={**GUIDED[tracker], **changes},
     )
 
 
@@ -85,21 +83,21 @@ def test_the_only_model_that_fits_is_used_and_reported(session_on_disk: Session,
     model = run.behaviour()
     assert model is not None
     assert model.fps == FPS == run.record.fps
-    assert prepare_run(session_on_disk, RunRequest()).record.behaviour == ""
+    assert prepare_run(session_on_disk).record.behaviour == ""
 
 
 def test_a_model_is_named_or_given_by_path(session_on_disk: Session, models: Path, tmp_path: Path) -> None:
     elsewhere = tmp_path / "mine.behaviour"
     write_model(arm_model().at_rate(30.0), elsewhere)
-    for requested, name in (("swings", "swings"), ("swings.behaviour", "swings"), (str(elsewhere), "mine")):
-        run = prepare_run(session_on_disk, RunRequest(behaviour=requested))
+    for asked, name in (("swings", "swings"), ("swings.behaviour", "swings"), (str(elsewhere), "mine")):
+        run = prepare_run(session_on_disk, behaviour=asked)
         assert run.record.behaviour == name
         assert not any("behaviour" in note.lower() for note in run.record.notes)
 
 
 def refused(session: Session, **wanted: object) -> StudioError:
     with pytest.raises(StudioError) as caught:
-        prepare_run(session, RunRequest(start_pose=true_poses()[0], **wanted))  # pyright: ignore[reportArgumentType]
+        prepare_run(session, start_pose=true_poses()[0], **wanted)  # pyright: ignore[reportArgumentType]
     assert caught.value.hint
     folder = session.path / "runs"
     assert not folder.exists() or not list(folder.iterdir())
@@ -116,7 +114,7 @@ def test_refusals_list_the_models(session_on_disk: Session) -> None:
     assert isinstance(unknown, NotFoundError)
     assert "'swings'" in unknown.hint
     keep_arm_model(session_on_disk.path.parent, "more")
-    several = refused(session_on_disk, changes={"prediction": "behaviour"})
+    several = refused(session_on_disk, knobs={"prediction": "behaviour"})
     assert "'more', 'swings'" in several.message
     (models_folder(session_on_disk.path.parent) / "broken.behaviour").write_bytes(b"no model")
     broken = refused(session_on_disk, behaviour="broken")
@@ -195,7 +193,7 @@ def test_lessons_are_the_same_wherever_a_run_is_taken_up(long_session: Session, 
         learnt.automaton.next_state, read_model(broken.folder / LEARNT_NAME).automaton.next_state
     )
     # What was learnt serves another run.
-    following = prepare_run(long_session, RunRequest(behaviour=str(whole.folder / LEARNT_NAME)))
+    following = prepare_run(long_session, behaviour=str(whole.folder / LEARNT_NAME))
     assert following.record.behaviour == "learnt"
 
 

@@ -5,7 +5,7 @@ import pytest
 from toy_session import true_poses
 from tracked_runs import abandon, finish, opened
 
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.overlay_drawing import OVERLAYS
 from studio.runs.overlay_pictures import compose_view
 from studio.runs.reannealing import Reannealing
@@ -18,8 +18,7 @@ CHANGES = {"particles": 40, "layers": 4, "start_repeats": 2, "blob_learning": 3,
 
 def new_run(session: Session, name: str) -> StoredRun:
     start = true_poses()[0] + 0.02
-    request = RunRequest(name=name, weighting="blobs", seed=7, start_pose=start, last=6, changes=CHANGES)
-    return prepare_run(session, request)
+    return prepare_run(session, name=name, weighting="blobs", seed=7, start_pose=start, last=6, knobs=CHANGES)
 
 
 def outcome(run: StoredRun) -> tuple[Array, list[dict[str, Array]]]:

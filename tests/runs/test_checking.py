@@ -8,7 +8,7 @@ from studio.body.catalogue import load_body
 from studio.body.mirroring import Mirror
 from studio.errors import RunError
 from studio.runs.checking import check_run, kept_check, sudden_turns
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.refining import SMOOTHED
 from studio.runs.tracks import Track, best_track, write_track
 from studio.runs.way import way_of
@@ -38,7 +38,7 @@ def kept(run, poses):
 
 
 def test_the_true_poses_fit_and_others_do_not(session):
-    run = prepare_run(session, RunRequest(start_pose=true_poses()[0]))
+    run = prepare_run(session, start_pose=true_poses()[0])
     with pytest.raises(RunError, match="no finished frame"):
         check_run(session, run)
     kept(run, true_poses())

@@ -9,7 +9,7 @@ from tracked_runs import finish, opened, poses_of
 
 from studio.errors import NotFoundError, RunError
 from studio.runs.correcting import prepare_correction, track_backwards
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.sessions.results_store import ResultsWriter
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -37,7 +37,7 @@ def wrong(session_on_disk: Session) -> StoredRun:
         "recovery": "off",
         "refine_frames": False,
     }
-    run = prepare_run(session_on_disk, RunRequest(name="wrong", start_pose=start, changes=changes))
+    run = prepare_run(session_on_disk, name="wrong", start_pose=start, knobs=changes)
     poses = finish(session_on_disk, run)
     assert off(poses, 6) > 0.3
     return run
@@ -147,7 +147,7 @@ def test_poses_and_names_are_checked(session_on_disk: Session, wrong: StoredRun)
 
 
 def test_what_was_lost_before_is_not_held_against_a_corrected_frame(session_on_disk: Session) -> None:
-    run = prepare_run(session_on_disk, RunRequest(name="lost", start_pose=true_poses()[0], changes=QUICK))
+    run = prepare_run(session_on_disk, name="lost", start_pose=true_poses()[0], knobs=QUICK)
     finish(session_on_disk, run)
     with run.results() as results, ResultsWriter(run.folder) as writer:
         for frame in (2, 3, 4):

@@ -11,7 +11,7 @@ from studio.benchmarks.kernels import made_evidence, ring_of_cameras
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
 from studio.evidence.frame_evidence import FrameEvidence
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.search_space import default_sigma, search_space
 from studio.sessions.session import Session
 from studio.settings import changed_settings, default_settings
@@ -31,9 +31,12 @@ def test_a_pair_follows_the_arm(session_on_disk: Session, tracker: str, weightin
     changes = {**knobs_for_evaluations(tracker, EVALUATIONS), "start_repeats": 1}
     run = prepare_run(
         session_on_disk,
-        RunRequest(
-            tracker=tracker, weighting=weighting, seed=1, start_pose=tuple(start), last=3, changes=changes
-        ),
+        tracker=tracker,
+        weighting=weighting,
+        seed=1,
+        start_pose=tuple(start),
+        last=3,
+        knobs=changes,
     )
     finish(session_on_disk, run)
     with run.results() as results:

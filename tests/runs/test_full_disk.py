@@ -12,7 +12,7 @@ from tracked_runs import finish, opened, poses_of
 
 from studio.errors import SessionError
 from studio.runs.live_replay import compare, prepare_replay, replay
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.problem_source import ProblemSource
 from studio.runs.reannealing import Reannealing
 from studio.runs.run_footage import footage_of
@@ -30,7 +30,7 @@ FRAME = 1.0 / FPS
 
 def new_run(session: Session, name: str) -> StoredRun:
     start = true_poses()[0] + 0.02
-    return prepare_run(session, RunRequest(name=name, seed=7, start_pose=start, last=LAST, changes=QUICK))
+    return prepare_run(session, name=name, seed=7, start_pose=start, last=LAST, knobs=QUICK)
 
 
 def content(run: StoredRun) -> list[bytes]:

@@ -21,7 +21,7 @@ from studio.runs.initialising import (
     seek,
     whole_problem,
 )
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.search_space import default_sigma, parameter_names, search_space
 from studio.runs.start_pose_file import start_pose_from_file
 from studio.sessions.session import Session
@@ -82,7 +82,7 @@ def test_people_in_random_moments_and_headings_are_found(people: Session) -> Non
 
 def test_a_run_without_start_pose_finds_one(people: Session) -> None:
     steps: list[tuple[str, int, int]] = []
-    run = prepare_run(people, RunRequest(first=1, last=2), lambda *step: steps.append(step))
+    run = prepare_run(people, first=1, last=2, progress=lambda *told: steps.append(told))
     assert run.record.start_pose is not None
     assert run.record.start_source.startswith("found in frame 1, confidence ")
     assert steps[-1][0] == "checking each limb"
@@ -90,9 +90,16 @@ def test_a_run_without_start_pose_finds_one(people: Session) -> None:
 
 
 def test_a_cancelled_search_ends(people: Session) -> None:
-    answers = iter([False, False, True])
+    steps: list[str] = []
+
+    def stopped(step: str, _done: int, _total: int) -> None:
+        steps.append(step)
+        if len(steps) == 3:
+            raise WorkCancelledError("Stopped.")
+
     with pytest.raises(WorkCancelledError):
-        initialise(people, 0, cancelled=lambda: next(answers))
+        initialise(people, 0, progress=stopped)
+    assert len(steps) == 3
 
 
 def test_a_frame_that_is_not_there(people: Session) -> None:

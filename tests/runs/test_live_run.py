@@ -8,7 +8,7 @@ from toy_session import FPS, true_poses
 from studio.errors import NotFoundError, RunError
 from studio.runs.live_replay import compare, prepare_replay, replay
 from studio.runs.live_summary import summary_of
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.problem_source import ProblemSource
 from studio.runs.run_footage import footage_of
 from studio.sessions.session import Session
@@ -61,7 +61,7 @@ def test_a_slow_tracker_takes_the_newest_and_counts_the_others(session_on_disk: 
 
 def test_the_body_is_followed_over_dropped_frames(session_on_disk: Session) -> None:
     changes = {"particles": 150, "layers": 6}
-    run = live_run(session_on_disk, changes=changes)
+    run = live_run(session_on_disk, knobs=changes)
     with driving(session_on_disk, run) as drive:
         drive.to_end(1.8 * FRAME)
     with run.results() as results:
@@ -148,19 +148,19 @@ def test_forth_and_back_goes_on_behind_the_end(session_on_disk: Session) -> None
 
 def test_a_live_run_recovers_quickly_by_default(session_on_disk: Session) -> None:
     assert live_run(session_on_disk, "a").record.settings["recovery"] == SPREAD
-    requested = live_run(session_on_disk, "b", changes={"recovery": INITIALISE})
-    assert requested.record.settings["recovery"] == INITIALISE
-    assert prepare_run(session_on_disk, RunRequest(name="c")).record.settings["recovery"] == INITIALISE
+    asked = live_run(session_on_disk, "b", knobs={"recovery": INITIALISE})
+    assert asked.record.settings["recovery"] == INITIALISE
+    assert prepare_run(session_on_disk, name="c").record.settings["recovery"] == INITIALISE
 
 
 def test_what_cannot_be_done_live_is_refused(session_on_disk: Session) -> None:
     with pytest.raises(RunError, match="cannot train"):
-        prepare_run(session_on_disk, live_request(changes={"online_learning": True}))
+        prepare_run(session_on_disk, **live_request(knobs={"online_learning": True}))
     with pytest.raises(RunError, match="Only a live run"):
-        prepare_run(session_on_disk, RunRequest(to_and_fro=True))
+        prepare_run(session_on_disk, to_and_fro=True)
     with pytest.raises(RunError, match="do not lie"):
-        prepare_run(session_on_disk, live_request(last=9))
-    plain = prepare_run(session_on_disk, RunRequest(name="plain"))
+        prepare_run(session_on_disk, **live_request(last=9))
+    plain = prepare_run(session_on_disk, name="plain")
     with pytest.raises(NotFoundError, match="not tracked live"):
         summary_of(plain)
     with pytest.raises(RunError, match="no frames"):

@@ -1,5 +1,7 @@
 """Defaults are filled in, and errors are raised before anything is made."""
 
+from typing import Any
+
 import msgspec
 import numpy as np
 import pytest
@@ -7,7 +9,7 @@ from toy_session import FRAMES, true_poses
 
 from studio.body.subject import Subject
 from studio.errors import BodyError, RunError, SettingsError, StudioError
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.search_space import default_sigma, parameter_names
 from studio.runs.start_pose_file import keep_start_pose
 from studio.sessions.named_rows import write_pose, write_sigma
@@ -45,7 +47,7 @@ def test_the_sessions_own_sigma_goes_before_scaled_by_the_frame_rate(session_on_
 
 def test_a_run_keeps_its_body_and_cameras_whatever_becomes_of_the_sessions(session_on_disk: Session) -> None:
     measures = Subject("planar_arm4", None, {}, {"link_1_length": 300.0})
-    run = prepare_run(session_on_disk, RunRequest(subject=measures))
+    run = prepare_run(session_on_disk, subject=measures)
     cameras = (session_on_disk.path / "calibration" / "cameras.toml").read_bytes()
     (session_on_disk.path / "calibration" / "cameras.toml").write_text("")
     assert (run.folder / "cameras.toml").read_bytes() == cameras
@@ -57,25 +59,25 @@ def test_a_run_keeps_its_body_and_cameras_whatever_becomes_of_the_sessions(sessi
 @pytest.mark.parametrize(
     ("request_", "kind", "words"),
     [
-        (RunRequest(first=3, last=9), RunError, "3:9"),
-        (RunRequest(first=-1), RunError, "-1:8"),
-        (RunRequest(first=4, last=4), RunError, "4:4"),
-        (RunRequest(seed=-1), RunError, "seed -1"),
-        (RunRequest(tracker="magic"), SettingsError, "magic"),
-        (RunRequest(weighting="magic"), SettingsError, "magic"),
-        (RunRequest(body="nobody"), BodyError, "nobody"),
-        (RunRequest(changes={"survival": 2.0}), SettingsError, "survival"),
-        (RunRequest(changes={"speed": 2.0}), SettingsError, "speed"),
-        (RunRequest(start_pose=np.zeros(3)), BodyError, "4 finite numbers"),
-        (RunRequest(start_pose=np.array([0, np.nan, 0, 0])), BodyError, "finite"),
-        (RunRequest(name="../x"), StudioError, "cannot be the name"),
+        (dict(first=3, last=9), RunError, "3:9"),
+        (dict(first=-1), RunError, "-1:8"),
+        (dict(first=4, last=4), RunError, "4:4"),
+        (dict(seed=-1), RunError, "seed -1"),
+        (dict(tracker="magic"), SettingsError, "magic"),
+        (dict(weighting="magic"), SettingsError, "magic"),
+        (dict(body="nobody"), BodyError, "nobody"),
+        (dict(knobs={"survival": 2.0}), SettingsError, "survival"),
+        (dict(knobs={"speed": 2.0}), SettingsError, "speed"),
+        (dict(start_pose=np.zeros(3)), BodyError, "4 finite numbers"),
+        (dict(start_pose=np.array([0, np.nan, 0, 0])), BodyError, "finite"),
+        (dict(name="../x"), StudioError, "cannot be the name"),
     ],
 )
 def test_refusals_leave_nothing(
-    session_on_disk: Session, request_: RunRequest, kind: type[StudioError], words: str
+    session_on_disk: Session, request_: dict[str, Any], kind: type[StudioError], words: str
 ) -> None:
     with pytest.raises(kind, match=words) as caught:
-        prepare_run(session_on_disk, request_)
+        prepare_run(session_on_disk, **request_)
     assert caught.value.hint
     folder = session_on_disk.path / "runs"
     assert not folder.exists() or not list(folder.iterdir())
@@ -92,18 +94,18 @@ def test_a_run_begins_in_the_frame_of_the_start_pose(session_on_disk: Session) -
     assert session.start_pose_frame() == 0
     keep_start_pose(session, body, true_poses()[3], 3)
     assert session.start_pose_frame() == 3
-    run = prepare_run(session, RunRequest(name="usual"))
+    run = prepare_run(session, name="usual")
     assert (run.record.first, run.record.last) == (3, FRAMES)
     assert np.allclose(run.record.start_pose or (), true_poses()[3])
-    named = prepare_run(session, RunRequest(name="named", first=1, last=2))
-    assert (named.record.first, named.record.last) == (1, 2)
-    assert "begins in frame 1, the session's start pose is of frame 3" in named.record.notes[-1]
-    given = prepare_run(session, RunRequest(name="given", start_pose=true_poses()[0]))
+    told = prepare_run(session, name="named", first=1, last=2)
+    assert (told.record.first, told.record.last) == (1, 2)
+    assert "begins in frame 1, the session's start pose is of frame 3" in told.record.notes[-1]
+    given = prepare_run(session, name="given", start_pose=true_poses()[0])
     assert given.record.first == 0
     keep_start_pose(session, body, true_poses()[0])
     assert session.start_pose_frame() == 3
     with pytest.raises(RunError, match="is of frame 3, after the last requested frame") as refusal:
-        prepare_run(session, RunRequest(last=2))
+        prepare_run(session, last=2)
     assert "first frame" in refusal.value.hint
     with pytest.raises(RunError, match="has no frame 99"):
         keep_start_pose(session, body, true_poses()[0], 99)

@@ -7,7 +7,7 @@ from studio.body.inverse_kinematics import pose_from_markers
 from studio.body.model import BodyModel
 from studio.evaluation.errors import evaluate, rows_of_frames
 from studio.motion_files.trc import MarkerMotion, read_trc
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.refining import refine_run, smooth_run
 from studio.runs.tracks import Track, read_track, write_track
 from studio.sessions.session import Session
@@ -28,7 +28,7 @@ def walk(tmp_path_factory: pytest.TempPathFactory) -> Session:
 def tracked(session: Session, seed: int) -> StoredRun:
     """A run of 1000 evaluations a frame."""
     changes = {"particles": 100, "layers": 10}
-    run = prepare_run(session, RunRequest(seed=seed, last=FRAMES, changes=changes))
+    run = prepare_run(session, seed=seed, last=FRAMES, knobs=changes)
     track_to_end(session, run, lambda _step, _done, _total: None)
     return run
 

@@ -9,7 +9,7 @@ from tracked_runs import finish, opened
 
 from studio.body.forward_kinematics import marker_points
 from studio.errors import NotFoundError, RunError, SettingsError, WorkCancelledError
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.refining import jitter, refine_run, smooth_run
 from studio.runs.tracks import Track, read_track, track_names, write_track
 from studio.sessions.session import Session
@@ -21,8 +21,9 @@ from studio.tracking.tracker import LOST
 
 @pytest.fixture
 def run(session_on_disk: Session) -> StoredRun:
-    request = RunRequest(start_pose=true_poses()[0] + 0.02, changes={"particles": 20, "layers": 3})
-    stored = prepare_run(session_on_disk, request)
+    stored = prepare_run(
+        session_on_disk, start_pose=true_poses()[0] + 0.02, knobs={"particles": 20, "layers": 3}
+    )
     finish(session_on_disk, stored)
     return stored
 
@@ -123,19 +124,17 @@ def test_refusals_keep_what_is_there(session_on_disk: Session, run: StoredRun) -
 
 
 def test_a_cancelled_refinement_keeps_nothing(session_on_disk: Session, run: StoredRun) -> None:
-    calls: list[int] = []
-
-    def cancelled() -> bool:
-        calls.append(1)
-        return len(calls) > 3
+    def stopped(_step: str, done: int, _total: int) -> None:
+        if done == 2:
+            raise WorkCancelledError("Stopped.")
 
     with pytest.raises(WorkCancelledError):
-        refine_run(session_on_disk, run, cancelled=cancelled)
+        refine_run(session_on_disk, run, progress=stopped)
     assert track_names(run) == ("raw",)
 
 
 def test_a_run_without_frames_is_refused(session_on_disk: Session) -> None:
-    empty = prepare_run(session_on_disk, RunRequest(start_pose=true_poses()[0]))
+    empty = prepare_run(session_on_disk, start_pose=true_poses()[0])
     with pytest.raises(RunError, match="no finished frame"):
         refine_run(session_on_disk, empty)
 

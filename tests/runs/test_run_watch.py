@@ -13,7 +13,7 @@ from studio.behaviour.model_learning import learn_model
 from studio.behaviour.settings import LearningSettings
 from studio.body.forward_kinematics import marker_points
 from studio.motion_files.trc import read_trc
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.reannealing import Reannealing
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -38,9 +38,9 @@ def black(walk: Session, tmp_path_factory: pytest.TempPathFactory) -> Session:
     return interrupted(walk, tmp_path_factory.mktemp("black") / "walk", frames, range(4, 9), BLACK, FPS)
 
 
-def made(session: Session, **options: object) -> StoredRun:
-    changes = SMALL | dict(options.pop("changes", {}))  # pyright: ignore[reportCallIssue, reportArgumentType]
-    return prepare_run(session, RunRequest(changes=changes, **options))  # pyright: ignore[reportArgumentType]
+def made(session: Session, **wish: object) -> StoredRun:
+    changes = SMALL | dict(wish.pop("changes", {}))  # pyright: ignore[reportCallIssue, reportArgumentType]
+    return prepare_run(session, knobs=changes, **wish)  # pyright: ignore[reportArgumentType]
 
 
 def tracked(session: Session, run: StoredRun) -> list[FrameResult]:
@@ -207,7 +207,7 @@ def test_every_tracker_tracks_again_within_a_second(
     session = interrupted(longer, tmp_path / "walk", list(range(LONGER)), blind, kind, float(SECOND))
     model, recovered = str(habits) if tracker == "behaviour" else "", []
     for seed in range(10):
-        run = prepare_run(session, RunRequest(tracker=tracker, seed=seed, behaviour=model))
+        run = prepare_run(session, tracker=tracker, seed=seed, behaviour=model)
         results = tracked(session, run)
         states = [result.tracking for result in results]
         reported = all(states[frame] in (NO_EVIDENCE, LOST) for frame in blind)

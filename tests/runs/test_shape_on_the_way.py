@@ -13,7 +13,7 @@ from studio.body.dimensions import with_dimensions
 from studio.body.shape_space import dimension_kinds, end_lengths
 from studio.body.subject import Subject, fit_subject
 from studio.runs import shape_on_the_way
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.search_space import default_sigma
 from studio.runs.shape_on_the_way import FOLDER, shaped_body
 from studio.runs.way_results import run_changes
@@ -66,25 +66,25 @@ def test_thicker_limbs_are_found_and_bones_are_kept() -> None:
 def test_a_run_begins_with_the_shape_says_so_and_fits_it_once(
     walk: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    first = prepare_run(walk, RunRequest(last=20)).record
+    first = prepare_run(walk, last=20).record
     own = walk.body().dimensions
     assert any("shape was fitted to frames 0 to 29" in note for note in first.notes)
     assert first.dimensions["left_thigh_length"] == own["left_thigh_length"]
     assert first.dimensions["left_thigh_radius_start"] != own["left_thigh_radius_start"]
     monkeypatch.setattr(shape_on_the_way, "shaped_body", lambda *_, **__: pytest.fail("fitted again"))
-    again = prepare_run(walk, RunRequest(last=20, seed=5)).record
+    again = prepare_run(walk, last=20, seed=5).record
     assert (again.dimensions, again.start_pose) == (first.dimensions, first.start_pose)
-    plain = prepare_run(walk, RunRequest(last=20, fit_shape=False)).record
+    plain = prepare_run(walk, last=20, fit_shape=False).record
     assert plain.dimensions == dict(own)
     assert (first.subject_dimensions, plain.subject_dimensions) == (dict(own), {})
     assert run_changes(walk, walk.run(first.name)) == []
 
 
 def test_few_frames_or_one_camera_give_no_shape(walk: Session, session_on_disk: Session) -> None:
-    late = RunRequest(first=145, start_pose=walk.start_pose())
-    assert prepare_run(walk, late).record.dimensions == dict(walk.body().dimensions)
+    late = prepare_run(walk, first=145, start_pose=walk.start_pose())
+    assert late.record.dimensions == dict(walk.body().dimensions)
     start = np.zeros(4)
-    arm = prepare_run(session_on_disk, RunRequest(start_pose=start)).record
+    arm = prepare_run(session_on_disk, start_pose=start).record
     assert arm.dimensions == dict(session_on_disk.body().dimensions)
     assert not (session_on_disk.path / FOLDER).exists()
 
@@ -99,6 +99,6 @@ def test_masks_that_show_something_else_change_nothing(
         return dataclasses.replace(found, overlap=(0.5, 0.4))
 
     monkeypatch.setattr(shape_on_the_way, "fitted_shape", worse)
-    record = prepare_run(walk, RunRequest(last=12)).record
+    record = prepare_run(walk, last=12).record
     assert record.dimensions == dict(walk.body().dimensions)
     assert any("The shape was not fitted" in note for note in record.notes)

@@ -13,7 +13,7 @@ from studio.capture.calibration_files import write_calibration
 from studio.errors import CalibrationError
 from studio.geometry.camera import Camera
 from studio.runs.mask_quality import mask_quality, measure_masks
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.session_settings import session_settings
 from studio.runs.silhouette_doubts import silhouette_doubts
 from studio.runs.way import way_of
@@ -108,21 +108,21 @@ def test_measuring_the_masks_finds_exchanged_cameras(walk: Session) -> None:
 def test_a_session_whose_footage_contradicts_its_cameras_is_not_tracked(walk: Session) -> None:
     """Nothing is refused before the masks are measured, nor once the calibration is set right."""
     sound = walk.cameras()
-    assert prepare_run(walk, RunRequest(last=2, fit_shape=False)).record.notes == ()
+    assert prepare_run(walk, last=2, fit_shape=False).record.notes == ()
     write_calibration(exchanged(sound, 0, 2), walk.path / CAMERAS_PATH)
     spoilt = Session(walk.path)
-    prepare_run(spoilt, RunRequest(last=2, fit_shape=False))
+    prepare_run(spoilt, last=2, fit_shape=False)
     measure_masks(spoilt)
 
     with pytest.raises(CalibrationError) as refused:
-        prepare_run(spoilt, RunRequest(last=2, fit_shape=False))
+        prepare_run(spoilt, last=2, fit_shape=False)
     assert sound[0].name in refused.value.message
     assert sound[2].name in refused.value.message
     assert len(spoilt.runs()) == 2
-    (note,) = prepare_run(spoilt, RunRequest(last=2, fit_shape=False, despite_findings=True)).record.notes
+    (note,) = prepare_run(spoilt, last=2, fit_shape=False, despite_findings=True).record.notes
     assert note.startswith("Tracked despite: ")
     step = next(step for step in way_of(spoilt).steps if step.step == "calibration")
     assert (step.state, "speaks against" in step.why) == ("stale", True)
 
     write_calibration(sound, walk.path / CAMERAS_PATH)
-    assert prepare_run(Session(walk.path), RunRequest(last=2, fit_shape=False)).record.notes == ()
+    assert prepare_run(Session(walk.path), last=2, fit_shape=False).record.notes == ()

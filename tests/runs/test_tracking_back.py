@@ -4,7 +4,7 @@ import numpy as np
 from toy_session import FRAMES, true_poses
 
 from studio.runs.correcting import prepare_correction, track_backwards
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.sessions.session import Session
 from studio.worker.batch import track_to_end
 
@@ -13,8 +13,7 @@ QUICK = {"particles": 60, "layers": 4, "start_repeats": 2}
 
 
 def test_the_frames_before_the_start_pose_are_tracked_backwards(session_on_disk: Session) -> None:
-    first = RunRequest(name="late", first=K, start_pose=true_poses()[K], changes=QUICK)
-    late = prepare_run(session_on_disk, first)
+    late = prepare_run(session_on_disk, name="late", first=K, start_pose=true_poses()[K], knobs=QUICK)
     track_to_end(session_on_disk, late, lambda *_: None)
     with late.results() as results:
         frames, forwards = results.poses()
@@ -34,9 +33,7 @@ def test_the_frames_before_the_start_pose_are_tracked_backwards(session_on_disk:
 
 
 def test_a_cancelled_way_back_goes_on_from_a_whole_run(session_on_disk: Session) -> None:
-    late = prepare_run(
-        session_on_disk, RunRequest(name="late", first=3, start_pose=true_poses()[3], changes=QUICK)
-    )
+    late = prepare_run(session_on_disk, name="late", first=3, start_pose=true_poses()[3], knobs=QUICK)
     track_to_end(session_on_disk, late, lambda *_: None)
     with late.results() as results:
         forwards = results.poses()[1]

@@ -6,7 +6,7 @@ from toy_session import true_poses
 from tracked_runs import abandon, finish, opened
 
 from studio.errors import NotFoundError, RunError
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.reannealing import Reannealing
 from studio.runs.tracking_run import TrackingRun
 from studio.sessions.results_store import ResultsWriter
@@ -20,9 +20,7 @@ QUICK = {"particles": 40, "layers": 4, "start_repeats": 2}
 
 def new_run(session: Session, name: str, seed: int = 7, **changes: object) -> StoredRun:
     start = true_poses()[0] + 0.02
-    return prepare_run(
-        session, RunRequest(name=name, seed=seed, start_pose=start, last=5, changes={**QUICK, **changes})
-    )
+    return prepare_run(session, name=name, seed=seed, start_pose=start, last=5, knobs={**QUICK, **changes})
 
 
 def assert_same_layers(ones: list[LayerRecord], others: list[LayerRecord]) -> None:
@@ -185,7 +183,7 @@ def test_seeds_differ(session_on_disk: Session) -> None:
 
 
 def test_without_a_start_pose_the_cloud_is_spread_over_the_limits(session_on_disk: Session) -> None:
-    run = prepare_run(session_on_disk, RunRequest(last=1, changes={"particles": 400, "layers": 1}))
+    run = prepare_run(session_on_disk, last=1, knobs={"particles": 400, "layers": 1})
     assert run.record.start_pose is None
     finish(session_on_disk, run)
     with run.results() as results:

@@ -8,7 +8,7 @@ from nudged_camera import DEGREES, NUDGED, make_nudged_session, nudged, true_cam
 
 from studio.errors import CalibrationError, NotFoundError
 from studio.runs.aligning import SessionAlignment, align_cameras
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.turned_cameras import remember_alignment, turn_back, turn_cameras, turned_from
 from studio.runs.way import way_of
 from studio.runs.way_step import StepStatus
@@ -61,7 +61,7 @@ def test_the_way_recommends_turning_and_is_content_afterwards(
 def test_turning_back_restores_every_byte_and_makes_runs_good_again(
     session: Session, aligned: SessionAlignment
 ) -> None:
-    run = prepare_run(session, RunRequest(start_pose=session.body().neutral, last=2, name="before"))
+    run = prepare_run(session, start_pose=session.body().neutral, last=2, name="before")
     report = session.path / "calibration" / "cameras.report.json"
     report.write_text('{"cameras": []}')
     before = (session.path / CAMERAS_PATH).read_bytes()

@@ -11,7 +11,7 @@ from toy_session import true_poses
 from tracked_runs import finish, opened, poses_of
 
 from studio.errors import DamagedError
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.verifying import repair, verify
 from studio.sessions.file_checksums import note_files
 from studio.sessions.results_reader import FILE_NAME
@@ -26,9 +26,7 @@ LAST = 5
 def run(session_on_disk: Session) -> StoredRun:
     """A finished run."""
     start = true_poses()[0] + 0.02
-    made = prepare_run(
-        session_on_disk, RunRequest(name="a", seed=7, start_pose=start, last=LAST, changes=QUICK)
-    )
+    made = prepare_run(session_on_disk, name="a", seed=7, start_pose=start, last=LAST, knobs=QUICK)
     finish(session_on_disk, made)
     return made
 
@@ -114,9 +112,7 @@ def test_a_damaged_frame_is_a_gap_everywhere_until_it_is_tracked_again(
 def test_damage_in_the_middle_of_an_unfinished_run_comes_first(session_on_disk: Session) -> None:
     def made(name: str) -> StoredRun:
         start = true_poses()[0] + 0.02
-        return prepare_run(
-            session_on_disk, RunRequest(name=name, seed=7, start_pose=start, last=LAST, changes=QUICK)
-        )
+        return prepare_run(session_on_disk, name=name, seed=7, start_pose=start, last=LAST, knobs=QUICK)
 
     wanted = finish(session_on_disk, made("whole"))
     run = made("a")
@@ -191,7 +187,11 @@ def test_first_settings_and_a_half_searched_frame(session_on_disk: Session, run:
 
     other = prepare_run(
         session_on_disk,
-        RunRequest(name="b", seed=7, start_pose=true_poses()[0] + 0.02, last=LAST, changes=QUICK),
+        name="b",
+        seed=7,
+        start_pose=true_poses()[0] + 0.02,
+        last=LAST,
+        knobs=QUICK,
     )
     finish(session_on_disk, other, layers=3)
     change(other, "UPDATE partial SET blob = zeroblob(30)")

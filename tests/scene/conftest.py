@@ -19,7 +19,7 @@ from swaying_session import (
 from studio.body.catalogue import load_body
 from studio.body.model import BodyModel
 from studio.geometry.camera import Camera
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.scene.guarded_server import GuardedServer
 from studio.scene.scene_server import SceneServer
 from studio.sessions.results_store import ResultsWriter
@@ -51,7 +51,7 @@ def workspace(tmp_path: Path, cameras: tuple[Camera, ...], human: BodyModel) -> 
     root = tmp_path / "studio"
     root.mkdir()
     session = make_session(root / "swaying", cameras, human)
-    run = prepare_run(session, RunRequest(start_pose=swaying_pose(human, 0), changes={"layers": LAYERS}))
+    run = prepare_run(session, start_pose=swaying_pose(human, 0), knobs={"layers": LAYERS})
     with ResultsWriter(run.folder) as writer:
         for frame in range(FRAMES - 1):
             layers = [cloud_record(human, frame, layer) for layer in range(LAYERS)]

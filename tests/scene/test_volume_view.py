@@ -12,7 +12,7 @@ from tracked_runs import finish
 from studio.body.model import BodyModel
 from studio.errors import StudioError
 from studio.runs.colour_tokens import colour_tokens
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.problem_source import ProblemSource
 from studio.scene.frame_volume import FrameVolume, FrameVolumes
 from studio.scene.guarded_server import GuardedServer
@@ -106,7 +106,7 @@ def tracked(session: Session, weighting: str) -> StoredRun:
     changes = {"particles": 40, "layers": 3, "start_repeats": 1}
     changes |= {"blob_learning": 2, "hull_depth": 6} if weighting == "blobs" else {}
     start = true_poses()[0]
-    run = prepare_run(session, RunRequest(weighting=weighting, start_pose=start, last=4, changes=changes))
+    run = prepare_run(session, weighting=weighting, start_pose=start, last=4, knobs=changes)
     finish(session, run)
     return run
 

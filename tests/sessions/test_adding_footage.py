@@ -103,8 +103,12 @@ def test_a_calibrated_session_refuses_footage_of_another_size(made, raw, tmp_pat
 
 
 def test_a_cancelled_addition_leaves_nothing(empty, raw):
+    def stopped(step: str, _done: int, _total: int) -> None:
+        if step == "finishing":
+            raise WorkCancelledError("Stopped.")
+
     with pytest.raises(WorkCancelledError):
-        add_footage(empty, raw, ImportOptions(fps=60.0), cancelled=lambda: True)
+        add_footage(empty, raw, ImportOptions(fps=60.0), progress=stopped)
     assert sorted(path.name for path in empty.path.iterdir()) == ["session.json"]
 
 

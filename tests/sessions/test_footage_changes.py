@@ -11,7 +11,7 @@ from sources import FRAMES, full_source
 from toy_footage import number_of
 
 from studio.errors import FootageError
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.sessions.footage_changes import change_footage, stale_runs
 from studio.sessions.importers.importing import import_source
 from studio.sessions.run_record import write_run_record
@@ -37,7 +37,7 @@ def test_offsets_keep_the_smallest_at_zero(session: Session) -> None:
 
 def test_the_notes_name_stale_parts(session: Session) -> None:
     assert session.thumbnail() is not None
-    old = prepare_run(session, RunRequest(name="old"))
+    old = prepare_run(session, name="old")
     change = change_footage(session, {"cam_2": 1})
     assert change.stale_runs == ("old",)
     notes = " ".join(change.notes)
@@ -51,7 +51,7 @@ def test_the_notes_name_stale_parts(session: Session) -> None:
     assert not (session.path / "thumbnail.jpg").exists()
     assert old.record.last == FRAMES
     # A run made afterwards is not stale; the old one stays so when its record is written again or made earlier.
-    new = prepare_run(change.session, RunRequest(name="new"))
+    new = prepare_run(change.session, name="new")
     assert stale_runs(Session(session.path)) == ("old",)
     assert new.record.last == FRAMES - 1
     earlier = msgspec.structs.replace(old.record, created="2026-01-01T00:00:00+00:00")

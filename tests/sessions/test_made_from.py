@@ -7,7 +7,7 @@ import pytest
 from toy_session import make_session, true_poses
 
 from studio.capture.calibration_files import read_calibration, write_calibration
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.way import way_of
 from studio.sessions import made_from
 from studio.sessions.named_rows import write_pose
@@ -72,7 +72,7 @@ def test_measured_masks_are_stale_after_other_knobs(session):
 
 
 def test_a_run_is_stale_where_its_snapshot_differs(session):
-    run = prepare_run(session, RunRequest())
+    run = prepare_run(session)
     assert step(session, "track").state == "ready"
     with ResultsWriter(run.folder):
         pass

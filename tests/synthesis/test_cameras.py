@@ -1,4 +1,4 @@
-"""Made-up cameras against OpenCV's projection."""
+"""Synthetic cameras against OpenCV's projection."""
 
 import cv2
 import numpy as np
@@ -33,7 +33,7 @@ def test_rays_go_through_their_pixels(index: int, samples: int) -> None:
     np.testing.assert_allclose(seen.reshape(-1, 2), wanted, atol=2e-3)
 
 
-def test_a_camera_looks_where_it_is_told_with_the_floor_below() -> None:
+def test_a_camera_looks_at_its_target_with_the_floor_below() -> None:
     camera = placed_camera("one", (2000.0, 1000.0, 2500.0), (0.0, 0.0, 800.0), size=SIZE, focal_px=120.0)
     np.testing.assert_allclose(camera.centre, [2000.0, 1000.0, 2500.0])
     pixels, depth = project(camera, np.array([[0.0, 0.0, 800.0], [0.0, 0.0, 0.0]]))

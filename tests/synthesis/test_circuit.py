@@ -1,4 +1,4 @@
-"""The circuit with a halt: the same motion at any frame rate, still while it says so, feet that do not slide."""
+"""The circuit with a halt: the same motion at any frame rate, still in the halt, feet that do not slide."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from studio.body.person import PersonMotion, Skeleton, joint_points, marker_motion
 from studio.errors import StudioError
 from studio.synthesis.circuit import Halt as CircuitHalt
-from studio.synthesis.circuit import circuit, walked
+from studio.synthesis.circuit import circuit, path_length
 from studio.synthesis.person import skeleton_of_height
 
 FRAMES = 450
@@ -55,7 +55,7 @@ def soles(motion: PersonMotion, side: str) -> tuple[np.ndarray, np.ndarray]:
     return ball, heel
 
 
-def test_it_starts_where_and_as_it_is_told_and_turns_to_the_right(made: PersonMotion) -> None:
+def test_it_starts_as_in_the_options_and_turns_to_the_right(made: PersonMotion) -> None:
     np.testing.assert_allclose(made.root[0, :2], (135.0, 940.0), atol=25.0)
     ahead = made.turns["pelvis"][:, :2, 0]
     heading = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
@@ -135,13 +135,15 @@ def test_arms_stay_out_of_the_trunk(made: PersonMotion) -> None:
             assert away.min() > 1.0, (side, joint)
 
 
-def test_the_way_walked_ends_and_goes_on_smoothly() -> None:
+def test_the_path_length_stops_and_continues_smoothly() -> None:
     halt = CircuitHalt(5.5, 7.0)
     times = np.linspace(0.0, 10.0, 2001)
-    way = walked(times, 800.0, halt)
+    way = path_length(times, 800.0, halt)
     speed = np.gradient(way, times)
     np.testing.assert_allclose(speed[(times < 4.7) | (times > 7.8)], 800.0, rtol=1e-6)
-    np.testing.assert_allclose(way[(times >= 5.5) & (times <= 7.0)], walked(np.array([6.0]), 800.0, halt)[0])
+    np.testing.assert_allclose(
+        way[(times >= 5.5) & (times <= 7.0)], path_length(np.array([6.0]), 800.0, halt)[0]
+    )
     assert np.abs(np.diff(speed)).max() < 12.0
     assert way[0] == 0.0
 
@@ -154,8 +156,8 @@ def test_without_a_halt_it_walks_on(bones: Skeleton) -> None:
 
 
 @pytest.mark.parametrize("halt", [(0.5, 3.0), (4.0, 4.2)])
-def test_a_halt_that_cannot_be_stepped_into_is_refused(bones: Skeleton, halt: tuple[float, float]) -> None:
-    wish = {**OPTIONS, "still_from_s": halt[0], "still_until_s": halt[1]}
-    with pytest.raises(StudioError, match="halt") as told:
-        circuit(bones, np.arange(10) / 60.0, wish)
-    assert "still_from_s" in told.value.hint
+def test_an_impossible_halt_is_refused(bones: Skeleton, halt: tuple[float, float]) -> None:
+    options = {**OPTIONS, "still_from_s": halt[0], "still_until_s": halt[1]}
+    with pytest.raises(StudioError, match="halt") as refusal:
+        circuit(bones, np.arange(10) / 60.0, options)
+    assert "still_from_s" in refusal.value.hint

@@ -1,4 +1,4 @@
-"""The distance field against closed forms: spheres, capsules, and what may never happen (passing through)."""
+"""The distance field against closed forms: spheres, capsules, and the absence of passing through."""
 
 import numpy as np
 import pytest
@@ -54,7 +54,7 @@ def test_a_capsule_is_a_capsule() -> None:
         )
 
 
-def test_the_surface_of_a_bulging_elliptical_piece_lies_where_its_formula_says() -> None:
+def test_the_surface_of_a_bulging_elliptical_piece_follows_its_formula() -> None:
     limb = piece((0.0, 0.0, 0.0), (0.0, 0.0, 400.0), (80.0, 50.0), bulge=12.0, scale=(0.8, 1.1))
     x, y = limb[flesh.AXES : flesh.AXES + 3], limb[flesh.AXES + 3 : flesh.AXES + 6]
     for share in (0.1, 0.4, 0.9):
@@ -126,7 +126,7 @@ def test_normals_point_outwards_along_the_steepest_rise() -> None:
         )  # step / radius
 
 
-def test_the_nearest_piece_lends_its_material() -> None:
+def test_the_nearest_piece_gives_its_material() -> None:
     pieces = np.stack(
         [piece((0, 0, 0), (0, 0, 0), (10.0, 10.0)), piece((100, 0, 0), (100, 0, 0), (10.0, 10.0))]
     )
@@ -134,7 +134,7 @@ def test_the_nearest_piece_lends_its_material() -> None:
     assert nearest_piece(20.0, 0.0, 0.0, pieces, np.arange(2), 2) == 0
 
 
-def test_a_ball_under_a_lamp_shades_what_geometry_says() -> None:
+def test_a_ball_under_a_lamp_shades_as_in_geometry() -> None:
     """Lamp of radius 100 at 2000, ball of radius 150 at 1000: full shadow inside 200, none beyond 400 of the axis."""
     ball = piece((0.0, 0.0, 1000.0), (0.0, 0.0, 1000.0), (150.0, 150.0))[None]
     labels, active = np.zeros((1, 2), np.int64), np.zeros(1, np.int64)

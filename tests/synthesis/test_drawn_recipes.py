@@ -1,4 +1,4 @@
-"""The suite against tuning: what is drawn is the same every time, its halves share nothing, and all kinds are there."""
+"""The suite against tuning: draws are reproducible, its halves share nothing, and all kinds are included."""
 
 import os
 from pathlib import Path
@@ -27,13 +27,13 @@ def half(name: str) -> dict[str, Recipe]:
     return {clip: read_recipe(find_recipe(clip)) for clip in clip_names(name)}
 
 
-def test_all_drawn_recipes_come_along() -> None:
+def test_all_drawn_recipes_are_bundled() -> None:
     assert {name for side in HALVES for name in clip_names(side)} <= set(recipe_names())
 
 
 @pytest.mark.real_data
 @pytest.mark.parametrize("side", HALVES)
-def test_drawing_again_gives_the_files_that_come_along(
+def test_drawing_again_gives_the_bundled_files(
     real_data: Path, monkeypatch: pytest.MonkeyPatch, side: str
 ) -> None:
     monkeypatch.setenv("STUDIO_REAL_DATA", os.fspath(real_data))

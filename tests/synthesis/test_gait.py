@@ -13,7 +13,7 @@ BONES = skeleton_of_height(1760.0, np.random.default_rng(1))
 @pytest.mark.parametrize(
     "path", [circle_path(900.0, 0.3), line_path((10.0, -20.0), 0.7), winding_path(1000.0, 80.0, 2.0)]
 )
-def test_the_heading_is_the_way_the_path_goes(path: object) -> None:
+def test_the_heading_is_the_paths_direction(path: object) -> None:
     distance = np.linspace(0.0, 3000.0, 50)
     place, heading = path(distance)  # type: ignore[operator]
     ahead = path(distance + 0.5)[0] - path(distance - 0.5)[0]  # type: ignore[operator]

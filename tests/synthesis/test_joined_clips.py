@@ -1,4 +1,4 @@
-"""Clips joined to one motion: no jumps, headings and places go on, ways bend, performances; the dance exercises."""
+"""Clips joined to one motion: no jumps, continuous headings and places, bends, performances; the dance exercises."""
 
 from pathlib import Path
 
@@ -43,7 +43,7 @@ SLOW, FAST = gliding(121, 400.0, 0.4, -0.3), gliding(121, 1200.0, -2.0, -0.9)
 CLIPS = [(Clip(file="slow"), SLOW), (Clip(file="fast", blend_s=0.5), FAST)]
 
 
-def test_the_second_clip_goes_on_where_the_first_ends_without_a_jump() -> None:
+def test_the_second_clip_continues_where_the_first_ends_without_a_jump() -> None:
     motion = joined_person(CLIPS, BONES, 105, 30.0, {})
     assert (motion.frame_count, motion.fps) == (105, 30.0)
     way = np.diff(motion.root[:, :2], axis=0)
@@ -70,7 +70,7 @@ def test_options_place_and_turn_the_whole() -> None:
     assert np.arctan2(way[1], way[0]) == pytest.approx(0.4 + np.pi / 2, abs=1e-3)
 
 
-def test_a_way_is_bent_evenly_and_keeps_its_length() -> None:
+def test_a_path_is_bent_evenly_and_keeps_its_length() -> None:
     walk = make_motion("walk", BONES, 240, 60.0, {"radius_mm": 100_000.0, "sway_mm": 0.0})
     bent = wound(walk, np.radians(120.0))
     lengths = [np.linalg.norm(np.diff(motion.root, axis=0), axis=1).sum() for motion in (walk, bent)]
@@ -84,7 +84,7 @@ def test_a_way_is_bent_evenly_and_keeps_its_length() -> None:
     assert chord == pytest.approx(lengths[0] * 2.0 * np.sin(arc / 2.0) / arc, rel=0.03)
 
 
-def test_a_performance_shows_the_whole_in_as_many_frames_as_there_are() -> None:
+def test_a_performance_shows_the_whole_in_the_given_frames() -> None:
     one, other = (joined_person(CLIPS, BONES, 90, 30.0, {"performance": number}) for number in (1.0, 2.0))
     whole = joined_person(CLIPS, BONES, 105, 30.0, {})
     ways = [np.linalg.norm(motion.root[-1, :2] - motion.root[0, :2]) for motion in (one, other, whole)]
@@ -93,7 +93,7 @@ def test_a_performance_shows_the_whole_in_as_many_frames_as_there_are() -> None:
     assert apart.mean() > 15.0
 
 
-def test_what_cannot_be_joined_is_refused() -> None:
+def test_impossible_joins_are_refused() -> None:
     wrong = [
         (CLIPS, 200, {}, "last 3.51 s together"),
         (CLIPS, 60, {"tempo": 1.0}, "no option 'tempo'"),
@@ -104,9 +104,9 @@ def test_what_cannot_be_joined_is_refused() -> None:
         ([(Clip(file="slow", seconds=9.0), SLOW)], 60, {}, "'slow' lasts 2.00 s"),
     ]
     for clips, frames, options, words in wrong:
-        with pytest.raises(StudioError, match=words) as told:
+        with pytest.raises(StudioError, match=words) as refusal:
             joined_person(clips, BONES, frames, 30.0, options)
-        assert told.value.hint
+        assert refusal.value.hint
 
 
 @pytest.mark.real_data

@@ -1,4 +1,4 @@
-"""Ways that change direction."""
+"""Paths that change direction."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def test_a_turn_on_the_spot_stays_and_turns_by_the_whole_angle() -> None:
     turning = (distance > 1800.0) & (distance < 2400.0)
     assert np.linalg.norm(place[turning] - spot, axis=1).max() < 15.0
     assert way.pace(distance)[turning].max() < 0.01
-    # Back the same way: as far from the start as it has gone since.
+    # Back on the same path: as far from the start as it has moved since.
     back = place[-1] - spot
     np.testing.assert_allclose(back, -1800.0 * np.array([np.cos(0.5), np.sin(0.5)]), atol=20.0)
 

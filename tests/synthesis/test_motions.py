@@ -116,7 +116,7 @@ def test_hands_carry_the_handstand() -> None:
     assert min(points["left_toes"][0, 2], points["right_toes"][0, 2]) < 60.0
 
 
-def test_an_unknown_motion_is_named_with_those_there_are() -> None:
-    with pytest.raises(StudioError, match="fly") as told:
+def test_an_unknown_motion_is_named_with_the_known_ones() -> None:
+    with pytest.raises(StudioError, match="fly") as refusal:
         make_motion("fly", BONES, 10, FPS, {})
-    assert "handstand" in told.value.hint
+    assert "handstand" in refusal.value.hint

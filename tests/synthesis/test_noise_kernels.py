@@ -30,7 +30,7 @@ def test_value_noise_is_smooth_and_takes_the_lattice_values() -> None:
     assert np.abs(np.diff(walk)).max() < 0.02
 
 
-def test_the_noise_has_the_deviation_asked_for_at_mid_grey() -> None:
+def test_the_noise_has_the_given_deviation_at_mid_grey() -> None:
     found = noisy(127.4, 3.0, 11).astype(float)
     assert found.mean() == pytest.approx(127.4, abs=0.1)
     assert found.std() == pytest.approx(3.0, rel=0.04)

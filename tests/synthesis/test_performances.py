@@ -15,7 +15,7 @@ BONES = skeleton_of_height(1760.0, np.random.default_rng(1))
 WALK = make_motion("walk", BONES, 240, 60.0, {})
 
 
-def test_slow_noise_has_the_size_and_the_period_that_are_asked_for() -> None:
+def test_slow_noise_has_the_given_size_and_period() -> None:
     noise = smooth_noise(np.random.default_rng(3), 60_000, 3, 30.0, 2.0)
     np.testing.assert_allclose(noise.std(axis=0), 1.0, atol=0.1)
     np.testing.assert_allclose(noise.mean(axis=0), 0.0, atol=0.1)
@@ -34,7 +34,7 @@ def test_warped_times_rise_from_beginning_to_end() -> None:
     )
 
 
-def test_local_turns_are_against_the_carrier() -> None:
+def test_local_rotations_are_relative_to_the_parent() -> None:
     local = to_local(WALK)
     for name, carrier in CARRIERS.items():
         np.testing.assert_allclose(WALK.turns[carrier] @ local[name], WALK.turns[name], atol=1e-12)
@@ -43,7 +43,7 @@ def test_local_turns_are_against_the_carrier() -> None:
         np.testing.assert_allclose(back.turns[name], turn, atol=1e-12)
 
 
-def test_a_performance_is_close_but_another_and_stands_where_the_first_stood() -> None:
+def test_a_performance_is_close_but_different_and_stands_in_the_same_places() -> None:
     made = performance(WALK, 130, 30.0, Variation(0.0, 4.0), np.random.default_rng(4))
     assert (made.frame_count, made.fps) == (130, 30.0)
     same = performance(WALK, 130, 30.0, Variation(0.0, 0.0), np.random.default_rng(4))

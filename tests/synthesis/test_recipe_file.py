@@ -1,4 +1,4 @@
-"""Recipes: those that come along are sound, wrong ones are refused in words."""
+"""Recipes: the bundled ones are sound, wrong ones are refused with a remedy."""
 
 from pathlib import Path
 
@@ -26,11 +26,11 @@ def test_the_motions_of_the_issue_have_recipes() -> None:
     assert {"walk", "run", "box", "handstand", "planar_arm", "branched_arms"} <= set(recipe_names())
 
 
-def test_an_unknown_recipe_names_those_there_are(tmp_path: Path) -> None:
+def test_an_unknown_recipe_is_named_with_the_known_ones(tmp_path: Path) -> None:
     for name in ("moonwalk", "../walk", str(tmp_path / "none.toml")):
-        with pytest.raises(StudioError, match="no recipe") as told:
+        with pytest.raises(StudioError, match="no recipe") as refusal:
             find_recipe(name)
-        assert "walk" in told.value.hint
+        assert "walk" in refusal.value.hint
 
 
 @pytest.mark.parametrize(
@@ -55,10 +55,10 @@ def test_a_wrong_entry_is_named(tmp_path: Path, change: tuple[str, str], words: 
     assert change[0] in text
     path = tmp_path / "mine.toml"
     path.write_text(text.replace(*change))
-    with pytest.raises(StudioError, match=words) as told:
+    with pytest.raises(StudioError, match=words) as refusal:
         read_recipe(path)
-    assert "mine.toml" in told.value.message
-    assert told.value.hint
+    assert "mine.toml" in refusal.value.message
+    assert refusal.value.hint
 
 
 def test_a_recipe_like_another_differs_in_its_own_entries_alone(tmp_path: Path) -> None:

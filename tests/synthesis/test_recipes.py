@@ -1,4 +1,4 @@
-"""From recipe to session: small renderings, read back through the studio's own doors."""
+"""From recipe to session: small renderings, read back by the studio."""
 
 import tomllib
 from pathlib import Path
@@ -36,8 +36,8 @@ def small(folder: Path, name: str, **changes: object) -> Path:
 def test_a_rendered_motion_becomes_a_session_whose_start_pose_meets_the_truth(
     tmp_path: Path, name: str
 ) -> None:
-    told: list[tuple[str, int, int]] = []
-    made = synthesize(small(tmp_path, name), tmp_path / "made", lambda *step: told.append(step))
+    steps: list[tuple[str, int, int]] = []
+    made = synthesize(small(tmp_path, name), tmp_path / "made", lambda *step: steps.append(step))
     session = Session(made)
     assert session.manifest.frame_count == 4
     assert session.manifest.fps == 60.0
@@ -51,7 +51,7 @@ def test_a_rendered_motion_becomes_a_session_whose_start_pose_meets_the_truth(
     found = evaluate(pose[None], np.array([0]), body, truth, 60.0)
     assert found.mean_mm < 8.0
     assert found.unmatched_markers == ()
-    assert ("rendering", 4, 4) in told
+    assert ("rendering", 4, 4) in steps
     assert (made / "recipe.toml").read_bytes() == (tmp_path / f"{name}.toml").read_bytes()
     footage = session.footage()
     try:
@@ -63,13 +63,13 @@ def test_a_rendered_motion_becomes_a_session_whose_start_pose_meets_the_truth(
 
 
 def test_masks_and_pictures_on_wish_and_the_same_bytes_again(tmp_path: Path) -> None:
-    wishes = {
+    entries = {
         "include__masks": True,
         "include__background": "picture",
         "include__start_pose": False,
         "frames": 2,
     }
-    recipe = small(tmp_path, "stand", **wishes)
+    recipe = small(tmp_path, "stand", **entries)
     one, two = synthesize(recipe, tmp_path / "one"), synthesize(recipe, tmp_path / "two")
     session = Session(one)
     assert session.start_pose() is None
@@ -126,7 +126,7 @@ def test_arms_are_their_own_body_with_exact_masks(tmp_path: Path, name: str) -> 
     np.testing.assert_allclose(links, np.broadcast_to(resting, links.shape), atol=1e-3)
 
 
-def test_an_existing_session_is_left_alone(tmp_path: Path) -> None:
+def test_an_existing_session_is_unchanged(tmp_path: Path) -> None:
     kept = tmp_path / "kept"
     kept.mkdir()
     (kept / "mine.txt").write_text("mine")

@@ -41,7 +41,7 @@ def straight(frames: int = 121, speed: float = 2000.0, heading: float = 0.7) -> 
     )
 
 
-def test_frames_of_the_recording_are_given_back_and_between_them_it_is_smooth() -> None:
+def test_recorded_frames_are_reproduced_and_smooth_in_between() -> None:
     motion = on_skeleton(straight(), BONES)
     same = sampled(motion, np.arange(30, 60) / FPS, FPS)
     np.testing.assert_allclose(same.root, motion.root[30:60], atol=1e-9)
@@ -53,7 +53,7 @@ def test_frames_of_the_recording_are_given_back_and_between_them_it_is_smooth() 
     np.testing.assert_allclose(half.turns["left_upper_arm"], expected, atol=1e-4)
 
 
-def test_speed_start_place_and_turn_are_as_asked() -> None:
+def test_speed_start_place_and_turn_are_the_given_ones() -> None:
     options = {"start_s": 0.5, "speed": 0.5, "turn_degrees": 30.0, "at_x_mm": 200.0, "at_y_mm": -300.0}
     motion = recorded_person(straight(), BONES, 60, FPS, options)
     middle = 0.5 * (motion.root.max(axis=0) + motion.root.min(axis=0))
@@ -106,14 +106,14 @@ def test_a_bent_way_is_a_circle_of_the_same_length_leaning_inwards(radius: float
         ({"cycle_s": 3.0}, "lasts 2.00 s"),
     ],
 )
-def test_what_cannot_be_is_refused(options: dict[str, float], words: str) -> None:
-    with pytest.raises(StudioError) as told:
+def test_impossible_options_are_refused(options: dict[str, float], words: str) -> None:
+    with pytest.raises(StudioError) as refusal:
         recorded_person(straight(), BONES, 60, FPS, options)
-    assert words in told.value.message
-    assert told.value.hint
+    assert words in refusal.value.message
+    assert refusal.value.hint
 
 
 def test_other_files_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(StudioError, match=r"walk\.c3d") as told:
+    with pytest.raises(StudioError, match=r"walk\.c3d") as refusal:
         read_recording(tmp_path / "walk.c3d")
-    assert ".bvh" in told.value.hint
+    assert ".bvh" in refusal.value.hint

@@ -74,7 +74,7 @@ def test_noise_differs_between_frames_and_cameras(renderer: Renderer) -> None:
     assert abs(np.corrcoef(noise[0].ravel(), noise[1].ravel())[0, 1]) < 0.02
 
 
-def test_what_stands_before_the_person_hides_it() -> None:
+def test_objects_in_front_hide_the_person() -> None:
     motion = make_motion("box", skeleton_of_height(1760.0, np.random.default_rng(1)), 180, 60.0, {})
     frame = int(np.argmin(np.abs(motion.root[:, 0])))
     counts = []

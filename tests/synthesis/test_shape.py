@@ -40,19 +40,19 @@ def sized(path: Path) -> BodyModel:
     return fit_subject(BODY, subject_of_file(path, "human31"))[0]
 
 
-def test_the_bones_are_as_long_as_the_shape_says(shape_file: Path) -> None:
+def test_the_bones_have_the_shapes_lengths(shape_file: Path) -> None:
     subject = subject_of_file(shape_file, "human31")
     motion = circuit(skeleton_of_subject(subject), np.arange(12) / 30.0, {})
     lengths = marker_lengths(motion)
-    said = subject.dimensions_mm
-    wanted = {"Hip_Neck": said["torso_length"], "Neck_Head": said["head_length"]}
+    dimensions = subject.dimensions_mm
+    wanted = {"Hip_Neck": dimensions["torso_length"], "Neck_Head": dimensions["head_length"]}
     for letter, side in (("L", "left"), ("R", "right")):
-        wanted[f"Hip_{letter}Hip"] = said[f"{side}_hip_offset"]
-        wanted[f"{letter}Hip_{letter}Knee"] = said[f"{side}_thigh_length"]
-        wanted[f"{letter}Knee_{letter}Ankle"] = said[f"{side}_shin_length"]
-        wanted[f"Neck_{letter}Shoulder"] = said[f"{side}_clavicle_length"]
-        wanted[f"{letter}Shoulder_{letter}Elbow"] = said[f"{side}_upper_arm_length"]
-        wanted[f"{letter}Elbow_{letter}Wrist"] = said[f"{side}_forearm_length"]
+        wanted[f"Hip_{letter}Hip"] = dimensions[f"{side}_hip_offset"]
+        wanted[f"{letter}Hip_{letter}Knee"] = dimensions[f"{side}_thigh_length"]
+        wanted[f"{letter}Knee_{letter}Ankle"] = dimensions[f"{side}_shin_length"]
+        wanted[f"Neck_{letter}Shoulder"] = dimensions[f"{side}_clavicle_length"]
+        wanted[f"{letter}Shoulder_{letter}Elbow"] = dimensions[f"{side}_upper_arm_length"]
+        wanted[f"{letter}Elbow_{letter}Wrist"] = dimensions[f"{side}_forearm_length"]
     assert lengths == pytest.approx(wanted, abs=1e-6)
 
 
@@ -92,7 +92,7 @@ def test_hands_and_feet_are_drawn_where_the_subject_has_them(shape_file: Path) -
     assert (foot[1] - foot[0])[0] > 0.95 * np.linalg.norm(foot[1] - foot[0])
 
 
-def test_a_shape_that_is_none_is_refused(tmp_path: Path, shape_file: Path) -> None:
+def test_a_wrong_shape_file_is_refused(tmp_path: Path, shape_file: Path) -> None:
     with pytest.raises(BodyError, match="not a file"):
         subject_of_file(tmp_path / "none.txt", "human31")
     shape_file.write_text(" ".join(shape_file.read_text().split()[:-1]))
@@ -109,8 +109,8 @@ def test_a_recipe_may_name_shape_and_sigma(tmp_path: Path, shape_file: Path) -> 
     names = [entry.name for entry in BODY.parameters]
     sigma = np.linspace(0.01, 0.31, len(names))
     (tmp_path / "steps.txt").write_text(" ".join(map(str, [*sigma, *np.zeros(62)])))
-    wishes = {"shape": "shape.txt", "sigma": "steps.txt", "girth": 1.2, "fps": 20, "room": "office"}
-    recipe = small(tmp_path, "stand", frames=2, wardrobe="plain", **wishes)
+    entries = {"shape": "shape.txt", "sigma": "steps.txt", "girth": 1.2, "fps": 20, "room": "office"}
+    recipe = small(tmp_path, "stand", frames=2, wardrobe="plain", **entries)
     session = Session(synthesize(recipe, tmp_path / "made"))
     assert session.manifest.warnings == ()
     body = session.body()
@@ -132,16 +132,18 @@ def test_a_recipe_may_name_shape_and_sigma(tmp_path: Path, shape_file: Path) -> 
 
 
 @pytest.mark.parametrize(
-    ("wish", "words"),
+    ("entry", "words"),
     [
         ({"girth": 3.0}, "girth is 3"),
         ({"room": "cellar"}, "room is 'cellar'"),
         ({"wardrobe": "armour"}, "wardrobe is 'armour'"),
     ],
 )
-def test_wrong_wishes_are_refused_in_words(tmp_path: Path, wish: dict[str, object], words: str) -> None:
+def test_wrong_entries_are_refused_with_a_remedy(
+    tmp_path: Path, entry: dict[str, object], words: str
+) -> None:
     with pytest.raises(StudioError, match=words):
-        read_recipe(small(tmp_path, "stand", **wish))
+        read_recipe(small(tmp_path, "stand", **entry))
 
 
 def test_a_sigma_file_that_is_too_short_is_refused(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Damage that a recipe asks for lies in the stored session: blurred pictures, a turned calibration, things in front of
+"""Damage of a recipe is in the stored session: blurred pictures, a turned calibration, objects in front of
 the person, a camera without footage.
 """
 
@@ -55,7 +55,7 @@ def rig(folder: Path) -> tuple[Camera, ...]:
     return recipe_cameras(recipe, np.random.default_rng(recipe.seed))
 
 
-def test_a_stored_calibration_is_off_by_as_many_pixels_as_asked_for(tmp_path: Path) -> None:
+def test_a_stored_calibration_is_off_by_the_given_pixels(tmp_path: Path) -> None:
     for folder, pixels in (("none", 0.0), ("two", 2.0)):
         (tmp_path / folder).mkdir()
         session = made(tmp_path / folder, damage={"calibration_px": pixels}, motion="stand")

@@ -1,4 +1,4 @@
-"""Footage as Deutscher & Reid 2005 had it, and recorded motion for users: what their recipes show."""
+"""Recipes of footage as in Deutscher & Reid 2005, and of recorded motion for users."""
 
 import shutil
 import tomllib
@@ -171,13 +171,13 @@ def test_a_few_small_frames_become_a_session(tmp_path: Path, name: str) -> None:
         assert np.all(sigma >= default_sigma(body, 60.0) - 1e-4)
 
 
-def test_without_the_real_data_a_recorded_recipe_says_what_is_missing(
+def test_without_the_real_data_a_recorded_recipe_names_the_missing_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("STUDIO_REAL_DATA", str(tmp_path / "nothing"))
-    with pytest.raises(StudioError, match=r"amp_humanoid_run\.npz") as told:
+    with pytest.raises(StudioError, match=r"amp_humanoid_run\.npz") as refusal:
         made("run-three-cameras")
-    assert "STUDIO_REAL_DATA" in told.value.hint
+    assert "STUDIO_REAL_DATA" in refusal.value.hint
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,7 @@ def test_the_shadow_of_a_ball_lies_where_the_lamp_throws_it() -> None:
     assert np.all(ambient == 1.0)  # nothing is near the floor
 
 
-def test_what_stands_on_the_floor_darkens_it_around() -> None:
+def test_objects_on_the_floor_darken_it_around() -> None:
     key, ambient = np.ones((61, 61), np.float32), np.ones((61, 61), np.float32)
     floor_shadow(-600.0, -600.0, 20.0, ball((0.0, 0.0, 100.0), 100.0), LABELS, LIGHTS, key, ambient)
     assert ambient[30, 30] < 0.8
@@ -85,7 +85,7 @@ def test_what_stands_on_the_floor_darkens_it_around() -> None:
 
 
 def test_tiles_leave_out_nothing_of_a_person() -> None:
-    """Against the distance to the whole body along each ray, tried out closely and with no piece passed over."""
+    """Against the distance to the whole body along each ray, sampled densely with no piece skipped."""
     bones = skeleton_of_height(1760.0, np.random.default_rng(4))
     tables, labels = flesh.piece_tables(make_motion("walk", bones, 12, 60.0, {}), flesh.clothed_pieces(bones))
     body, camera = tables[11], CAMERA

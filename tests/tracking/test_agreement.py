@@ -1,4 +1,4 @@
-"""Limbs and silhouettes that do not agree: which limb it is, both ways."""
+"""Disagreement of limbs and silhouettes, per limb and in both directions."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def shares(body: BodyModel, pose: np.ndarray, truth: np.ndarray) -> dict[str, fl
     return agreement.of(pose, silhouette_distances(drawn_evidence(body, truth, CAMERAS))).shares()
 
 
-def test_the_pose_that_is_seen_is_denied_nowhere(body: BodyModel) -> None:
+def test_the_true_pose_agrees_everywhere(body: BodyModel) -> None:
     truth = place(body)
     assert max(shares(body, truth, truth).values()) < 0.5 * LIMB_LOST_SHARE
 
@@ -48,7 +48,7 @@ def test_the_pose_that_is_seen_is_denied_nowhere(body: BodyModel) -> None:
 @pytest.mark.parametrize(
     ("limb", "angle", "by"), [("left arm", "left_shoulder_ry", 0.9), ("right leg", "right_hip_ry", -0.7)]
 )
-def test_a_limb_in_the_wrong_place_is_the_one_that_is_denied(
+def test_a_misplaced_limb_is_the_one_that_disagrees(
     body: BodyModel, limb: str, angle: str, by: float
 ) -> None:
     truth = place(body)
@@ -57,8 +57,8 @@ def test_a_limb_in_the_wrong_place_is_the_one_that_is_denied(
     assert max(found, key=found.__getitem__) == limb
 
 
-def test_both_legs_on_one_leave_the_other_bare(body: BodyModel) -> None:
-    """Little of the model is outside the silhouettes: what is left bare gives it away."""
+def test_both_legs_on_one_leave_the_other_uncovered(body: BodyModel) -> None:
+    """Little of the model is outside the silhouettes: only the uncovered silhouette shows the error."""
     truth = place(body)
     names = [entry.name for entry in body.parameters]
     both = truth.copy()

@@ -1,4 +1,4 @@
-"""The filter's steps beside closed forms: what is carried, how the cloud narrows, what is reported."""
+"""The filter's steps against closed forms: start set, narrowing of the cloud, reported pose."""
 
 import dataclasses
 
@@ -77,7 +77,7 @@ def test_a_start_without_a_pose_needs_limits() -> None:
 
 
 @pytest.mark.parametrize("alpha", [0.3, 0.5, 0.8])
-def test_variance_falls_as_a_gaussian_says(alpha: float) -> None:
+def test_variance_falls_as_for_a_gaussian(alpha: float) -> None:
     # Cloud of variance s², w^β = exp(-β x²): with b = 2 β s², α = √(1 + 2b) / (1 + b) fixes b, and the
     # survivors' variance is s² / (1 + b); shrinking keeps it. So every layer narrows by the same factor.
     space = toy_space(1, limit=np.inf, sigma=1.0)
@@ -155,7 +155,7 @@ def test_impossible_poses_do_not_survive() -> None:
     assert FILTER.end_frame(particles, SPACE, settings).pose[0] <= 0.0
 
 
-def test_a_weight_that_is_no_number_is_an_error() -> None:
+def test_a_weight_that_is_not_finite_is_an_error() -> None:
     class Broken(Bowl):
         def weigh(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
             return np.full(len(poses), np.nan)

@@ -1,4 +1,4 @@
-"""β is the root of D(β) = α N: closed forms, invariances, and sets on which the search could go astray."""
+"""β is the root of D(β) = α N: closed forms, invariances, and sets that are hard for the search."""
 
 import numpy as np
 import pytest
@@ -94,7 +94,7 @@ def test_fewer_than_one_survivor_wanted() -> None:
     assert np.exp(found.log_weights[0]) == pytest.approx(1.0)
 
 
-def test_what_cannot_survive_weighs_nothing_and_counts() -> None:
+def test_particles_that_cannot_survive_have_no_weight_but_count() -> None:
     log_weights = np.random.default_rng(3).normal(size=100)
     barred = log_weights.copy()
     barred[::2] = -np.inf

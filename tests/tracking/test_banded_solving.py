@@ -8,7 +8,7 @@ from studio.tracking.banded_solving import solve_banded
 
 
 @pytest.mark.parametrize(("count", "reach"), [(1, 0), (5, 4), (60, 1), (200, 17)])
-def test_it_solves_what_scipy_solves(count: int, reach: int) -> None:
+def test_solution_is_scipys(count: int, reach: int) -> None:
     rng = np.random.default_rng(count)
     factor = np.tril(np.triu(rng.normal(size=(count, count)), -reach)) + 4.0 * np.eye(count)
     matrix, right = factor @ factor.T, rng.normal(size=count)
@@ -21,7 +21,7 @@ def test_it_solves_what_scipy_solves(count: int, reach: int) -> None:
     np.testing.assert_allclose(solve_banded(lower, right), wanted, rtol=1e-9, atol=1e-12)
 
 
-def test_what_is_not_positive_definite_is_refused_or_held() -> None:
+def test_indefinite_matrices_are_refused_or_pivots_raised() -> None:
     singular = np.array([[0.0, 4.0], [4.0, 4.0]])
     with pytest.raises(FloatingPointError):
         solve_banded(singular.copy(), np.ones(2))

@@ -1,4 +1,4 @@
-"""The baseline is no straw man: its scale is chosen, kept, and makes it the filter that theory says it is."""
+"""The baseline is fair: its scale is chosen, kept, and gives the posterior of theory."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ TRACKER = Condensation()
 def track(
     centres: np.ndarray, settings: CondensationSettings, width: float, count: int
 ) -> tuple[list[LayerRecord], list[Carried]]:
-    """Follow a bowl whose centre moves; one record a frame, and what each frame carried."""
+    """Follow a bowl whose centre moves; one record a frame, and each frame's final state."""
     carried = [Carried(ParticleSet(np.zeros((1, count)), np.zeros(1)))]
     records: list[LayerRecord] = []
     for frame, centre in enumerate(centres):

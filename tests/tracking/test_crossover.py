@@ -1,4 +1,4 @@
-"""Children are cut as Eq. 19 cuts them."""
+"""Children are cut as in Eq. 19."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def test_no_share_leaves_the_first_parent() -> None:
 
 
 @pytest.mark.parametrize("length", [4, 6])
-def test_each_parameter_comes_from_the_second_parent_as_often_as_equation_19_says(length: int) -> None:
+def test_each_parameter_comes_from_the_second_parent_as_often_as_in_equation_19(length: int) -> None:
     # γ ≤ ε: the smaller and larger of two uniform numbers of 1 … L; x_j is the second's where γ < j ≤ ε.
     made = children(1.0, "parameters", list(range(length)))
     place = np.arange(1, length + 1)

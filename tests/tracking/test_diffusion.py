@@ -1,4 +1,4 @@
-"""Noise has the covariance that Eq. 13 and 18 give it; shrinking keeps what was gained."""
+"""Noise has the covariance that Eq. 13 and 18 give it; shrinking keeps the variance."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A frame is told once a search where the body is expected, and hands what it learnt to the next frame."""
+"""Each search informs the frame once of the expected poses; its memory goes to the next frame."""
 
 from collections.abc import Mapping
 
@@ -18,37 +18,37 @@ SETTINGS = AnnealedSettings(layers=3, particles=40)
 START = Carried(ParticleSet(np.full((1, 6), 0.2), np.zeros(1)))
 
 
-class Told(Bowl):
-    """A bowl about the mean of what was expected."""
+class Informed(Bowl):
+    """A bowl about the mean of the expected poses."""
 
     def __init__(self, centre: Array, expected: Array, memory: Mapping[str, Array]) -> None:
         super().__init__(centre)
         self.expected, self.memory = expected, memory
 
-    def expecting(self, poses: Array, memory: Mapping[str, Array]) -> "Told":
-        raise AssertionError("told twice")
+    def expecting(self, poses: Array, memory: Mapping[str, Array]) -> "Informed":
+        raise AssertionError("informed twice")
 
     def remembered(self, pose: Array) -> Mapping[str, Array]:
         seen = self.memory.get("seen", np.zeros((0, 6)))
         return {"seen": np.concatenate([seen, pose[None]])}
 
 
-class Asking(Bowl):
-    """A frame whose weights depend on what it was told."""
+class Informable(Bowl):
+    """A frame whose weights depend on the expected poses."""
 
     def __init__(self) -> None:
         super().__init__(np.zeros(6))
         self.calls: list[tuple[Array, Mapping[str, Array]]] = []
 
-    def expecting(self, poses: Array, memory: Mapping[str, Array]) -> Told:
+    def expecting(self, poses: Array, memory: Mapping[str, Array]) -> Informed:
         self.calls.append((poses.copy(), memory))
-        return Told(0.5 * poses.mean(axis=0) + 0.1, poses, memory)
+        return Informed(0.5 * poses.mean(axis=0) + 0.1, poses, memory)
 
     def remembered(self, pose: Array) -> Mapping[str, Array]:
         return self.expecting(pose[None], {}).remembered(pose)
 
     def weigh(self, poses: Array, stage: int = 0) -> Array:
-        raise AssertionError("weighed before it was told")
+        raise AssertionError("weighed before it was informed")
 
 
 def searched(problem: Bowl, previous: Carried, repeats: int = 1, frame: int = 3) -> FrameResult:
@@ -64,11 +64,11 @@ def searched(problem: Bowl, previous: Carried, repeats: int = 1, frame: int = 3)
     )
 
 
-def test_told_once_a_search_with_the_mean_of_the_set_that_the_first_layer_weighs() -> None:
-    asking = Asking()
-    result = searched(asking, START, repeats=2)
-    assert len(asking.calls) == 2
-    (first, memory), (second, _) = asking.calls
+def test_each_search_expects_the_mean_of_its_first_set() -> None:
+    problem = Informable()
+    result = searched(problem, START, repeats=2)
+    assert len(problem.calls) == 2
+    (first, memory), (second, _) = problem.calls
     assert first.shape == second.shape == (1, 6)
     assert dict(memory) == {}
     # 40 particles of σ 0.3 about the start pose.
@@ -77,15 +77,15 @@ def test_told_once_a_search_with_the_mean_of_the_set_that_the_first_layer_weighs
     assert result.evaluations == 2 * 3 * 40
 
 
-def test_the_last_reported_pose_is_expected_too_and_memory_goes_from_frame_to_frame() -> None:
-    asking, carried, poses = Asking(), START, []
+def test_the_last_reported_pose_is_expected_and_memory_is_passed_on() -> None:
+    problem, carried, poses = Informable(), START, []
     for frame in range(4):
-        result = searched(asking, carried, frame=frame)
+        result = searched(problem, carried, frame=frame)
         carried = result.carried
         poses.append(result.estimate.pose)
-    assert [len(expected) for expected, _ in asking.calls] == [1, 2, 3, 3]
+    assert [len(expected) for expected, _ in problem.calls] == [1, 2, 3, 3]
     for frame in (1, 2, 3):
-        expected, memory = asking.calls[frame]
+        expected, memory = problem.calls[frame]
         np.testing.assert_array_equal(expected[-1], poses[frame - 1])
         if frame > 1:
             np.testing.assert_array_equal(expected[1], 2.0 * poses[frame - 1] - poses[frame - 2])
@@ -94,39 +94,39 @@ def test_the_last_reported_pose_is_expected_too_and_memory_goes_from_frame_to_fr
 
 
 class Foreseer(AnnealedParticleFilter):
-    """Expects the body in three places."""
+    """Expects three poses."""
 
     def expectations(self, particles: ParticleSet, space: SearchSpace, settings: AnnealedSettings) -> Array:
         return np.stack([np.full(6, float(place)) for place in (1, 2, 3)])
 
 
-def test_a_tracker_may_expect_several_places_the_likeliest_first() -> None:
-    asking = Asking()
+def test_a_tracker_may_expect_several_poses_the_likeliest_first() -> None:
+    problem = Informable()
     search = FrameSearch(
         Foreseer(), Carried(START.particles, np.full(6, 9.0)), SPACE, seed=1, frame=0, repeats=1
     )
-    search.step(asking, 1, SETTINGS)
-    assert asking.calls[0][0][:, 0].tolist() == [1, 9, 2, 3]
-    assert isinstance(search.problem, Told)
+    search.step(problem, 1, SETTINGS)
+    assert problem.calls[0][0][:, 0].tolist() == [1, 9, 2, 3]
+    assert isinstance(search.problem, Informed)
 
 
 @pytest.mark.parametrize("stop_after", range(7))
-def test_going_on_tells_another_process_the_same(stop_after: int) -> None:
-    whole = searched(Asking(), START, repeats=2)
+def test_a_resumed_search_expects_the_same(stop_after: int) -> None:
+    whole = searched(Informable(), START, repeats=2)
     search = FrameSearch(AnnealedParticleFilter(), START, SPACE, seed=7, frame=3, repeats=2)
     for _ in range(stop_after):
-        search.step(Asking(), 1, SETTINGS)
+        search.step(Informable(), 1, SETTINGS)
     kept = search.state
     assert isinstance(kept, SearchState)
     resumed = FrameSearch(AnnealedParticleFilter(), START, SPACE, seed=7, frame=3, repeats=2, state=kept)
     while not resumed.finished:
-        resumed.step(Asking(), 1, SETTINGS)
+        resumed.step(Informable(), 1, SETTINGS)
     result = resumed.result()
     np.testing.assert_array_equal(result.estimate.pose, whole.estimate.pose)
     np.testing.assert_array_equal(result.carried.memory["seen"], whole.carried.memory["seen"])
 
 
-def test_others_are_told_nothing_and_hand_nothing_on() -> None:
+def test_plain_problems_are_not_informed_and_have_no_memory() -> None:
     bowl = Bowl(np.full(6, 0.4))
     search = FrameSearch(AnnealedParticleFilter(), START, SPACE, seed=7, frame=3)
     assert search.problem is None
@@ -136,16 +136,16 @@ def test_others_are_told_nothing_and_hand_nothing_on() -> None:
     assert dict(search.result().carried.memory) == {}
 
 
-def test_condensation_hands_memory_on_too() -> None:
-    asking = Asking()
+def test_condensation_passes_memory_on() -> None:
+    problem = Informable()
     result = search_frame(
         Condensation(),
-        asking,
+        problem,
         START,
         SPACE,
         seed=2,
         frame=0,
         settings_source=lambda: (1, CondensationSettings(particles=50)),
     )
-    assert len(asking.calls) == 1
+    assert len(problem.calls) == 1
     np.testing.assert_array_equal(result.carried.memory["seen"], result.estimate.pose[None])

@@ -1,4 +1,4 @@
-"""A frame can be stopped, kept, gone on with and replayed; settings are swapped between its layers."""
+"""A frame can be stopped, saved, resumed and replayed; settings may change between its layers."""
 
 import dataclasses
 from typing import Any
@@ -57,7 +57,7 @@ def test_carried_holds_the_final_set_and_two_estimates() -> None:
 
 
 @pytest.mark.parametrize("stop_after", range(8))
-def test_going_on_from_a_kept_state_changes_nothing(stop_after: int) -> None:
+def test_resuming_a_saved_state_changes_nothing(stop_after: int) -> None:
     whole, _ = searched(repeats=2)
     search = new_search(2)
     for _ in range(stop_after):
@@ -123,7 +123,7 @@ def test_only_the_knob_differs_when_a_frame_is_annealed_again() -> None:
     assert not np.array_equal(plain[1].poses, other[1].poses)
 
 
-def test_misuse_is_named() -> None:
+def test_misuse_raises() -> None:
     search = new_search()
     with pytest.raises(RunError, match="Frame 3 is not searched"):
         search.result()

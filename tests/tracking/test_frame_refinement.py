@@ -1,4 +1,4 @@
-"""Refinement inside the loop: nearer to the truth, lost limbs drawn anew, the same bits each time, off when off."""
+"""Refinement inside the loop: nearer to the truth, lost limbs resampled, reproducible, off when switched off."""
 
 import dataclasses
 from collections.abc import Callable
@@ -54,7 +54,7 @@ def problem(body: BodyModel, evidence: FrameEvidence) -> FrameProblem:
 
 
 def searched(pose: np.ndarray, frame: int = 3) -> FrameResult:
-    """What a search found, five particles about it."""
+    """The result of a search, five particles about the pose."""
     particles = ParticleSet(pose + 0.01 * np.arange(5)[:, None], np.full(5, -np.log(5.0)))
     return FrameResult(frame, Estimate(pose, pose, pose, -1.0), 1, 5, 1, 1.0, Carried(particles, pose))
 
@@ -92,7 +92,7 @@ def test_a_frame_comes_nearer_and_the_next_starts_there(body: BodyModel, truth: 
     assert np.ptp(cloud.carried.particles.poses, axis=0).max() > 0.03
 
 
-def test_an_arm_that_is_lost_is_drawn_anew(body: BodyModel, truth: np.ndarray, refined) -> None:
+def test_a_lost_arm_is_resampled(body: BodyModel, truth: np.ndarray, refined) -> None:
     names = [entry.name for entry in body.parameters]
     pose = truth.copy()
     pose[names.index("left_shoulder_ry")] += 1.4
@@ -113,10 +113,10 @@ def test_an_arm_that_is_lost_is_drawn_anew(body: BodyModel, truth: np.ndarray, r
         ((-0.4, -2.8, -0.9, -0.2), (0.3, 0.9, 2.0, 0.2), (0.7, -1.9, -0.2, -0.7), (-1.0, 1.7, 2.2, -1.1)),
     ],
 )
-def test_two_arms_that_stand_in_for_each_other_are_drawn_anew_together(
+def test_two_exchanged_arms_are_resampled_together(
     body: BodyModel, left: Angles, right: Angles, left_astray: Angles, right_astray: Angles
 ) -> None:
-    """Neither finds its own place while the other one lies there: drawn anew one by one, both stay lost."""
+    """Neither finds its own place while the other is there: resampled one by one, both stay lost."""
     names = [entry.name for entry in body.parameters]
     angles = ("shoulder_rx", "shoulder_ry", "shoulder_rz", "elbow_ry")
     arms = [names.index(f"{side}_{angle}") for side in ("left", "right") for angle in angles]
@@ -132,10 +132,10 @@ def test_two_arms_that_stand_in_for_each_other_are_drawn_anew_together(
     assert off(body, found.estimate.pose, shown) < 30.0
 
 
-def test_an_arm_hidden_in_the_trunk_is_found_where_silhouettes_are_bare(
+def test_an_arm_hidden_in_the_trunk_is_found_where_silhouettes_are_uncovered(
     body: BodyModel, truth: np.ndarray, refined
 ) -> None:
-    """Folded at the shoulder it costs no weight; weights that rank the places drawn left it there for forty frames."""
+    """Folded at the shoulder it costs no weight; ranking the samples by weight left it there for forty frames."""
     names = [entry.name for entry in body.parameters]
     pose = truth.copy()
     pose[names.index("left_elbow_ry")] = body.parameters[names.index("left_elbow_ry")].lower
@@ -147,7 +147,7 @@ def test_an_arm_hidden_in_the_trunk_is_found_where_silhouettes_are_bare(
     assert off(body, found.estimate.pose, truth) < 20.0
 
 
-def test_the_last_frames_pose_is_tried_where_the_search_went_astray(
+def test_the_last_frames_pose_is_tried_where_the_search_failed(
     body: BodyModel, truth: np.ndarray, evidence: FrameEvidence, problem: FrameProblem
 ) -> None:
     names = [entry.name for entry in body.parameters]
@@ -170,12 +170,12 @@ def test_switched_off_or_without_masks_nothing_changes(
     off_result = refined(truth, FrameRefinementSettings(refine_frames=False))
     assert off_result.estimate.searched is None
     assert off_result.disagreement == {}
-    nobody = partial(silhouettes_by_camera, drawn_evidence(body, None, CAMERAS))
+    no_person = partial(silhouettes_by_camera, drawn_evidence(body, None, CAMERAS))
     result = searched(truth)
-    assert FrameRefiner(body, CAMERAS, 7).refined(result, nobody, problem, SETTINGS) is result
+    assert FrameRefiner(body, CAMERAS, 7).refined(result, no_person, problem, SETTINGS) is result
 
 
-def test_what_was_refined_is_stored_whole(truth: np.ndarray, refined) -> None:
+def test_a_refined_result_is_stored_completely(truth: np.ndarray, refined) -> None:
     found = refined(truth + 0.02)
     stored = unpack_result(pack_result(found))
     assert np.array_equal(stored.estimate.searched, found.estimate.searched)
@@ -193,8 +193,8 @@ def test_sigma_is_smaller_after_a_refined_frame_and_whole_where_a_run_starts(
     assert space_after(space, followed, FrameRefinementSettings(refine_frames=False)) is space
 
 
-def test_rigid_feet_explain_what_is_seen_but_hardly_pull(body: BodyModel, truth: np.ndarray) -> None:
-    """A person's ankle turns, the body's does not: toes that are seen elsewhere must not move the leg."""
+def test_rigid_feet_explain_the_border_but_hardly_pull(body: BodyModel, truth: np.ndarray) -> None:
+    """A person's ankle turns, the body's does not: toes seen elsewhere must not move the leg."""
     sized, _ = fit_subject(body, Subject(height_mm=1760.0))
     rigid = [limb.name for limb, is_rigid in zip(sized.drawn, rigid_limbs(sized), strict=True) if is_rigid]
     assert rigid == ["left foot", "right foot", "left hand", "right hand"]

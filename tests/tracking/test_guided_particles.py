@@ -1,4 +1,4 @@
-"""Particles moved by a behaviour model: what they carry, where they go, and what is expected of them."""
+"""Particles moved by a behaviour model: their states, movements and expectations."""
 
 import dataclasses
 
@@ -38,7 +38,7 @@ def walkers(frame: int = 12, free: bool = False) -> Walkers:
 
 
 def walking_space() -> SearchSpace:
-    """A space whose model knows how the root of `turning_poses` goes as well."""
+    """A space whose model includes the root motion of `turning_poses`."""
     frame = RootFrame(np.arange(ROOT), np.zeros(ROOT, dtype=bool), -1, np.array([], dtype=np.int64))
     poses = turning_poses(9, 8 * PERIOD)
     root = RootMotion(frame, gaussians_of(frame.changes(poses), np.eye(CLUSTERS)[MODEL.labels(poses)]))
@@ -48,47 +48,47 @@ def walking_space() -> SearchSpace:
 def test_the_root_gets_noise_and_the_angles_the_models_movement() -> None:
     past = walkers()
     rules = BehaviourSettings(attenuation=0.0, global_scale=0.5)
-    gone = walked(np.random.default_rng(0), past, SPACE, rules, SPACE.sigma)
-    root = gone.poses[:, :ROOT] - past.poses[:, :ROOT]
+    moved = walked(np.random.default_rng(0), past, SPACE, rules, SPACE.sigma)
+    root = moved.poses[:, :ROOT] - past.poses[:, :ROOT]
     assert np.allclose(root.mean(axis=0), 0.0, atol=5 * 0.15 / np.sqrt(COUNT))
     assert np.allclose(root.std(axis=0), 0.15, rtol=0.05)
-    # λ = 0: who stays in the cluster goes on exactly as it went (Eq. 4).
+    # λ = 0: a particle that stays in its cluster keeps its velocity exactly (Eq. 4).
     before = MODEL.automaton.last_symbols[past.states]
-    stayed = MODEL.automaton.last_symbols[gone.states] == before
+    stayed = MODEL.automaton.last_symbols[moved.states] == before
     assert stayed.sum() > 100
-    assert np.allclose(gone.poses[stayed, ROOT:], past.poses[stayed, ROOT:] + past.velocity[stayed])
-    assert np.allclose(gone.velocity[stayed], past.velocity[stayed])
+    assert np.allclose(moved.poses[stayed, ROOT:], past.poses[stayed, ROOT:] + past.velocity[stayed])
+    assert np.allclose(moved.velocity[stayed], past.velocity[stayed])
 
 
 @pytest.mark.parametrize(("prediction", "wanted"), [("learnt", 0.05), ("noise", 0.0)])
-def test_the_root_goes_as_it_was_learnt_or_by_noise_alone(prediction: str, wanted: float) -> None:
+def test_the_root_moves_as_learnt_or_by_noise_alone(prediction: str, wanted: float) -> None:
     past = walkers()
     past = dataclasses.replace(past, free=np.arange(COUNT) % 2 == 0)
     rules = BehaviourSettings(root_prediction=prediction, global_scale=0.5)
-    gone = walked(np.random.default_rng(5), past, walking_space(), rules, SPACE.sigma)
-    led, free = (gone.poses[rows, :ROOT] - past.poses[rows, :ROOT] for rows in (~past.free, past.free))
+    moved = walked(np.random.default_rng(5), past, walking_space(), rules, SPACE.sigma)
+    led, free = (moved.poses[rows, :ROOT] - past.poses[rows, :ROOT] for rows in (~past.free, past.free))
     assert np.allclose(led.mean(axis=0), [wanted, 0.0, 0.0], atol=5 * 0.3 / np.sqrt(COUNT / 2))
-    # What was learnt has next to no spread here; noise of σ0 comes to it as before.
+    # The learnt motion has almost no spread here; noise of σ0 is added as before.
     assert np.allclose(led.std(axis=0), 0.15, rtol=0.06)
-    # Free particles are moved without the model, and that is without its root too.
+    # Free particles are moved without the model, their root included.
     assert np.allclose(free.mean(axis=0), 0.0, atol=5 * 0.3 / np.sqrt(COUNT / 2))
     assert np.allclose(free.std(axis=0), 0.3, rtol=0.06)
 
 
-def test_the_root_goes_as_many_steps_as_the_space_has() -> None:
+def test_the_root_moves_as_many_steps_as_the_space_has() -> None:
     past, rules = walkers(), BehaviourSettings(global_scale=0.0)
     space = dataclasses.replace(walking_space(), steps=3)
-    gone = walked(np.random.default_rng(6), past, space, rules, SPACE.sigma)
-    assert np.allclose(gone.poses[:, :ROOT] - past.poses[:, :ROOT], [0.15, 0.0, 0.0], atol=1e-4)
+    moved = walked(np.random.default_rng(6), past, space, rules, SPACE.sigma)
+    assert np.allclose(moved.poses[:, :ROOT] - past.poses[:, :ROOT], [0.15, 0.0, 0.0], atol=1e-4)
 
 
 def test_noise_of_those_that_stay_has_the_clusters_covariance_times_lambda_squared() -> None:
     past = walkers()
-    gone = walked(np.random.default_rng(1), past, SPACE, BehaviourSettings(attenuation=0.5), SPACE.sigma)
+    moved = walked(np.random.default_rng(1), past, SPACE, BehaviourSettings(attenuation=0.5), SPACE.sigma)
     label = int(MODEL.automaton.last_symbols[past.states[0]])
-    stayed = MODEL.automaton.last_symbols[gone.states] == label
-    change = gone.velocity[stayed] - past.velocity[stayed]
-    further = gone.poses[stayed, ROOT:] - past.poses[stayed, ROOT:] - gone.velocity[stayed]
+    stayed = MODEL.automaton.last_symbols[moved.states] == label
+    change = moved.velocity[stayed] - past.velocity[stayed]
+    further = moved.poses[stayed, ROOT:] - past.poses[stayed, ROOT:] - moved.velocity[stayed]
     measured = np.cov(np.hstack([further, change]).T) / 0.25
     wanted = MODEL.dynamics.covariances[label]
     assert np.abs(measured - wanted).max() < 6.0 / np.sqrt(stayed.sum()) * np.diag(wanted).max()
@@ -96,20 +96,20 @@ def test_noise_of_those_that_stay_has_the_clusters_covariance_times_lambda_squar
 
 def test_a_free_particle_is_spread_by_sigma_in_every_parameter_and_follows_the_automaton() -> None:
     past = walkers(free=True)
-    gone = walked(np.random.default_rng(2), past, SPACE, BehaviourSettings(), SPACE.sigma)
-    moved = gone.poses - past.poses
-    assert np.allclose(moved.std(axis=0), 0.3, rtol=0.06)
-    assert np.array_equal(gone.velocity, past.velocity)
-    features = np.hstack([gone.poses[:, ROOT:], gone.velocity])
+    moved = walked(np.random.default_rng(2), past, SPACE, BehaviourSettings(), SPACE.sigma)
+    change = moved.poses - past.poses
+    assert np.allclose(change.std(axis=0), 0.3, rtol=0.06)
+    assert np.array_equal(moved.velocity, past.velocity)
+    features = np.hstack([moved.poses[:, ROOT:], moved.velocity])
     distances = MODEL.mixture.log_joint(features)
     by_hand = [
         MODEL.automaton.next_state[state, label]
         for state, label in zip(past.states, distances.argmax(axis=1), strict=True)
     ]
-    assert gone.states.tolist() == by_hand
+    assert moved.states.tolist() == by_hand
 
 
-def test_states_found_again_are_those_of_reading_the_recording() -> None:
+def test_recomputed_states_are_those_of_reading_the_recording() -> None:
     poses = turning_poses(9, 3 * PERIOD)
     states = MODEL.automaton.states_along(MODEL.labels(poses))
     changes = np.diff(poses[:, ROOT:], axis=0)
@@ -142,7 +142,7 @@ def test_near_a_pose_states_are_of_the_clusters_that_it_lies_in() -> None:
         assert np.isfinite(velocity).all()
 
 
-def test_far_from_all_clusters_movements_stay_sober() -> None:
+def test_far_from_all_clusters_movements_stay_bounded() -> None:
     far = np.tile(turning_poses(9, 1), (50, 1)) + 100.0
     _, velocity = near(np.random.default_rng(0), far, SPACE)
     # Eight standard deviations of the widest movement, not a hundred radians of extrapolation.
@@ -163,7 +163,7 @@ def test_recovery_spreads_over_all_clusters_as_often_as_they_were_seen() -> None
     assert spread.extra[VELOCITY].shape == (COUNT, 6)
 
 
-def test_the_model_may_come_in_on_the_way() -> None:
+def test_the_model_may_be_added_during_a_run() -> None:
     poses = turning_poses(9, 14)
     last = ParticleSet(np.tile(poses[13], (200, 1)), np.full(200, -np.log(200)))
     carried = Carried(last, poses[13], poses[12])

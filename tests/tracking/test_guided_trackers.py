@@ -1,4 +1,4 @@
-"""What every tracker keeps when a behaviour model guides it."""
+"""The tracker contract under guidance by a behaviour model."""
 
 import dataclasses
 from typing import Any
@@ -27,12 +27,12 @@ TRUTH = turning_poses(9, PERIOD)
 
 
 class Walled(Bowl):
-    """A bowl about the truth of a body whose first angle ends at a wall."""
+    """A bowl about the truth of a body whose first angle has an extra limit."""
 
     wall = 0.6
 
     def feasible(self, poses: np.ndarray, limbs_apart: bool = False) -> np.ndarray:
-        """Before the wall, and within the space's limits."""
+        """Within the extra limit and the space's limits."""
         return (poses[:, 3] <= self.wall) & (np.abs(poses) <= 5.0).all(axis=1)
 
 
@@ -130,7 +130,7 @@ def test_same_seed_same_result_and_any_checkpoint_resumes_bit_for_bit(name: str)
         assert all(np.array_equal(one.extra[key], other.extra[key]) for key in one.extra)
 
 
-def test_what_is_carried_comes_back_from_the_store_bit_for_bit(name: str) -> None:
+def test_the_stored_state_is_read_back_bit_for_bit(name: str) -> None:
     results, records = followed(name, 2)
     stored = unpack_result(pack_result(results[-1])).carried.particles
     kept = results[-1].carried.particles
@@ -159,12 +159,11 @@ def test_hard_priors_hold_in_guided_sets(name: str, constraints: str) -> None:
         assert np.all((states >= 0) & (states < MODEL.states))
 
 
-def test_a_body_that_can_take_nothing_is_tracked_all_the_same(name: str) -> None:
+def test_a_body_without_possible_poses_is_still_tracked(name: str) -> None:
     class Nothing(Bowl):
         """No pose is possible."""
 
         def feasible(self, poses: np.ndarray, limbs_apart: bool = False) -> np.ndarray:
-            """None."""
             return np.zeros(len(poses), dtype=bool)
 
     for constraints in ("redraw", "reject", "clamp"):
@@ -172,7 +171,7 @@ def test_a_body_that_can_take_nothing_is_tracked_all_the_same(name: str) -> None
         assert np.isfinite(results[-1].estimate.pose).all()
 
 
-def test_the_record_says_how_many_go_without_the_model(name: str) -> None:
+def test_the_record_has_the_model_free_share(name: str) -> None:
     _, records = followed(name, 3, model_free_share=0.3, model_free_grows=False)
     first = [record for record in records if record.layer == 0][1:]
     wanted = {"behaviour": 0.3, "annealed": 0.3, "swarm": 0.3}[name]
@@ -204,7 +203,7 @@ def test_the_share_grows_on_a_motion_that_the_model_does_not_know(name: str) -> 
     assert errors["unknown", True] < 1.2 * errors["unknown", False]
 
 
-def test_a_model_may_be_taken_up_and_left_between_frames() -> None:
+def test_a_model_may_be_added_and_removed_between_frames() -> None:
     settings = [settings_of("annealed", prediction=kind) for kind in ("noise", "behaviour", "noise")]
     carried = Carried(ParticleSet(TRUTH[:1], np.zeros(1)))
     for frame in range(9):
@@ -228,7 +227,7 @@ def test_without_prediction_a_model_changes_nothing(name: str) -> None:
     with_model, _ = followed(name, 3, prediction="noise")
     without, _ = followed(name, 3, prediction="noise", space=toy_space(9))
     assert np.array_equal(with_model[-1].estimate.pose, without[-1].estimate.pose)
-    # And wanted without a model it is noise, at no frame an error: runs are refused when they are made.
+    # Selected without a model it is noise and no frame fails: runs are refused when they are created.
     wanted, _ = followed(name, 3, prediction="behaviour", space=toy_space(9))
     assert np.array_equal(wanted[-1].estimate.pose, without[-1].estimate.pose)
 
@@ -253,7 +252,7 @@ def test_expectations_follow_the_clusters_that_particles_are_in() -> None:
     assert np.allclose(places[:, :ROOT], first.poses[:, :ROOT].mean(axis=0))
 
 
-def test_weights_may_be_taken_as_they_are() -> None:
+def test_weights_may_be_used_unchanged() -> None:
     _, records = followed("behaviour", 3, selection="weights")
     assert {record.beta for record in records} == {1.0}
     assert all(np.isnan(record.alpha_wanted) for record in records)

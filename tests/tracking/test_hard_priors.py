@@ -1,4 +1,4 @@
-"""Redraw, reject, clamp and ignore: what each does to poses that the body cannot take, for every tracker."""
+"""Redraw, reject, clamp and ignore: handling of impossible poses, for every tracker."""
 
 import dataclasses
 
@@ -19,17 +19,17 @@ RULES = AnnealedSettings()
 
 
 class Picky(Bowl):
-    """Takes poses whose first parameter is at most `most`; counts the questions and remembers `limbs_apart`."""
+    """Accepts poses whose first parameter is at most `most`; counts the calls and remembers `limbs_apart`."""
 
     def __init__(self, most: float, dimensions: int = 3) -> None:
         super().__init__(np.zeros(dimensions))
         self.most = most
-        self.asked: list[int] = []
+        self.counts: list[int] = []
         self.apart: set[bool] = set()
 
     def feasible(self, poses: np.ndarray, limbs_apart: bool = False) -> np.ndarray:
         """x0 <= most."""
-        self.asked.append(len(poses))
+        self.counts.append(len(poses))
         self.apart.add(limbs_apart)
         return poses[:, 0] <= self.most
 
@@ -80,10 +80,10 @@ def test_after_ten_redraws_a_particle_stays_where_it_came_from() -> None:
     assert draws == [1] * MOST_REDRAWS == [1] * 10
     assert np.array_equal(done.poses[:, 0], [0.1, 0.4])
     assert np.array_equal(done.velocities, [[3.0] * 3, [0.0] * 3])
-    assert np.array_equal(first.poses[:, 0], [0.1, 0.8]), "what was proposed is not written into"
+    assert np.array_equal(first.poses[:, 0], [0.1, 0.8]), "the proposals are not changed"
 
 
-def test_where_nothing_is_possible_the_first_draw_stands() -> None:
+def test_where_nothing_is_possible_the_first_draw_stays() -> None:
     first = Proposals(column([0.6, 0.8]), np.full((2, 3), 3.0))
 
     def again(rows: Indices) -> Proposals:
@@ -93,7 +93,7 @@ def test_where_nothing_is_possible_the_first_draw_stands() -> None:
     assert done is first
 
 
-def test_what_is_possible_is_left_alone() -> None:
+def test_possible_poses_are_unchanged() -> None:
     first = Proposals(column([0.1, 0.2]), np.ones((2, 3)))
     assert settled(Picky(0.5), SPACE, rules("redraw"), first, column([0, 0]), never) is first
 
@@ -104,7 +104,7 @@ def test_clamp_sets_on_the_limit_and_stops_there() -> None:
     done = settled(Picky(0.5), SPACE, rules("clamp"), Proposals(poses, velocities), np.zeros((2, 3)), never)
     assert np.array_equal(done.poses, [[1.0, 0.2, -1.0], [0.1, 0.2, 0.3]])
     assert np.array_equal(done.velocities, [[0.0, 0.1, 0.0], [0.4, 0.5, 0.6]])
-    # What clamping cannot mend is rejected.
+    # A pose that clamping cannot make possible is rejected.
     assert np.array_equal(possible(Picky(0.5), done.poses, rules("clamp")), [False, True])
 
 
@@ -115,7 +115,7 @@ def test_reject_and_ignore_move_nothing() -> None:
     assert np.array_equal(possible(Picky(0.5), first.poses, rules("reject")), [False, True])
     problem = Picky(0.5)
     assert possible(problem, first.poses, rules("ignore")).all()
-    assert not problem.asked
+    assert not problem.counts
 
 
 # ----------------------------------------------------------------- in the trackers
@@ -153,7 +153,7 @@ def test_redraw_gives_the_law_of_the_noise_cut_off(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(TRACKERS))
-def test_random_numbers_of_what_needs_no_redraw_are_the_same(name: str) -> None:
+def test_particles_without_redraw_keep_their_random_numbers(name: str) -> None:
     free, ignored = (
         search(name, Picky(9.0), constraints=constraints) for constraints in ("redraw", "ignore")
     )

@@ -1,4 +1,4 @@
-"""Boxes in front of the body are learnt, lost limbs are not taken for hidden ones, and the state is handed on whole."""
+"""Boxes in front of the body are learnt, lost limbs are not taken for hidden ones, and the state is passed on."""
 
 import dataclasses
 from functools import partial
@@ -36,7 +36,7 @@ def truth(body: BodyModel) -> np.ndarray:
 
 
 def behind_a_box(evidence: FrameEvidence, views: int) -> FrameEvidence:
-    """The lower part of the masks of some views is gone, as if a box stood there."""
+    """Evidence with the lower part of some views' masks removed, as if a box stood there."""
     cut = []
     for number, view in enumerate(evidence.views):
         mask = view.mask.copy()
@@ -48,7 +48,7 @@ def behind_a_box(evidence: FrameEvidence, views: int) -> FrameEvidence:
 
 
 def followed(body: BodyModel, evidence: FrameEvidence, pose: np.ndarray, frames: int) -> FrameResult:
-    """The last of some frames in which the search ends at `pose` and nothing is refined by much."""
+    """The last of some frames in which the search ends at `pose` and refinement changes little."""
     weighting = WEIGHTINGS["edge-silhouette"]
     problem = weighting.prepare(body, CAMERAS, weighting.settings_type()).problem(evidence)
     refiner = FrameRefiner(body, CAMERAS, 7)
@@ -75,7 +75,7 @@ def test_legs_behind_a_box_are_lost_at_first_and_then_known_to_be_hidden(
     assert hidden == {HIDDEN + camera.name for camera in CAMERAS[:2]}
 
 
-def test_an_arm_that_is_lost_is_not_taken_for_a_hidden_one(body: BodyModel, truth: np.ndarray) -> None:
+def test_a_lost_arm_is_not_taken_for_a_hidden_one(body: BodyModel, truth: np.ndarray) -> None:
     names = [entry.name for entry in body.parameters]
     pose = truth.copy()
     pose[names.index("left_shoulder_rx")] += 1.5
@@ -84,7 +84,7 @@ def test_an_arm_that_is_lost_is_not_taken_for_a_hidden_one(body: BodyModel, trut
     assert not any((counts >= FRAMES).any() for counts in lost.carried.memory.values())
 
 
-def test_what_shows_again_is_no_longer_hidden(body: BodyModel, truth: np.ndarray) -> None:
+def test_areas_seen_again_are_no_longer_hidden(body: BodyModel, truth: np.ndarray) -> None:
     clear = drawn_evidence(body, truth, CAMERAS)
     hidden = followed(body, behind_a_box(clear, views=2), truth, int(FRAMES) + 1)
     weighting = WEIGHTINGS["edge-silhouette"]

@@ -90,7 +90,7 @@ def test_an_attitude_far_from_rest_is_found_and_faces_the_right_way() -> None:
 
 
 def test_the_same_seed_gives_the_same_pose_and_progress_counts_up_to_its_end() -> None:
-    problem, told = NearMarkers(pose_with(heading=-60, pelvis_z=920)), []
+    problem, reports = NearMarkers(pose_with(heading=-60, pelvis_z=920)), []
     first = candidates((0.0, 0.0, 900.0))
     poses = [search(problem).run(first).pose for _ in range(2)]
     assert np.array_equal(poses[0], poses[1])
@@ -102,12 +102,12 @@ def test_the_same_seed_gives_the_same_pose_and_progress_counts_up_to_its_end() -
         cameras=4,
         seed=4,
         effort=QUICK,
-        progress=lambda done, total: told.append((done, total)),
+        progress=lambda done, total: reports.append((done, total)),
     )
     assert not np.array_equal(watched.run(first).pose, poses[0])
-    assert [done for done, _ in told] == sorted(done for done, _ in told)
-    assert len({total for _, total in told}) == 1
-    assert told[-1][0] <= told[-1][1]
+    assert [done for done, _ in reports] == sorted(done for done, _ in reports)
+    assert len({total for _, total in reports}) == 1
+    assert reports[-1][0] <= reports[-1][1]
 
 
 def test_a_known_pose_is_a_line_from_the_start() -> None:
@@ -131,11 +131,11 @@ def test_progress_may_end_the_search() -> None:
 
 def test_no_candidates_are_refused() -> None:
     nothing = StartCandidates(np.zeros((0, len(NAMES))), np.zeros(0, np.int64), fixed=False)
-    with pytest.raises(RunError, match="no pose to begin"):
+    with pytest.raises(RunError, match="no candidate pose"):
         search(NearMarkers(BODY.neutral)).run(nothing)
 
 
-def test_legs_that_are_swapped_are_put_right_two_at_a_time() -> None:
+def test_exchanged_legs_are_corrected_in_pairs() -> None:
     truth = pose_with(left_hip_swing=45, left_knee=20, right_hip_swing=-20, right_knee=35)
     swapped = pose_with(right_hip_swing=45, right_knee=20, left_hip_swing=-20, left_knee=35)
     problem = NearMarkers(truth)
@@ -148,7 +148,7 @@ def test_legs_that_are_swapped_are_put_right_two_at_a_time() -> None:
     assert steps.evaluations > 1000
 
 
-def test_being_at_ease_costs_what_it_says() -> None:
+def test_the_penalty_of_attitudes_far_from_rest() -> None:
     problem = NearMarkers(BODY.neutral)
     eased = AtEase.of(problem, SPACE, BODY.neutral, 4)
     bent = pose_with(left_elbow=np.degrees(BODY.neutral[NAMES.index("left_elbow")]) + 77.5)
@@ -180,7 +180,7 @@ def test_candidates_stand_on_the_hull_in_every_heading() -> None:
     assert (made.poses <= SPACE.upper).all()
 
 
-def test_somebody_who_lies_is_among_the_candidates() -> None:
+def test_a_person_lying_is_among_the_candidates() -> None:
     hull = column_hull((0.0, 0.0, 150.0), (850.0, 200.0, 150.0))
     made = start_candidates(np.random.default_rng(0), BODY, hull, BOX, 4)
     upright = joint_frames(BODY, made.poses)[:, 0, 2, 2]
@@ -204,7 +204,7 @@ def test_prototypes_are_half_of_the_candidates() -> None:
     assert 0.35 < np.mean(np.isclose(knee, np.radians(100.0))) < 0.65
 
 
-def test_a_body_that_is_fixed_has_attitudes_only() -> None:
+def test_a_fixed_body_has_attitudes_only() -> None:
     arm = load_body("planar_arm4")
     made = start_candidates(np.random.default_rng(0), arm, None, BOX, 10)
     assert made.fixed

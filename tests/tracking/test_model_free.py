@@ -1,4 +1,4 @@
-"""How many particles go without the model, and when they become more."""
+"""The share of model-free particles, and when it grows."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def half_free(better: float) -> tuple[dict, np.ndarray]:
     return {FREE: free}, np.where(free, better, 0.0) + 0.1 * np.sin(np.arange(20))
 
 
-def test_whoever_weighs_more_moves_the_verdict() -> None:
+def test_the_heavier_kind_moves_the_verdict() -> None:
     for better, low, high in ((50.0, 0.95, 1.0), (-50.0, 0.0, 0.05)):
         extra, weights = half_free(better)
         for _ in range(30):
@@ -48,7 +48,7 @@ def test_the_verdict_is_smoothed_over_frames() -> None:
     assert first == pytest.approx(NEWEST, rel=0.05)
 
 
-def test_sets_of_one_kind_and_rejected_particles_say_nothing_wrong() -> None:
+def test_sets_of_one_kind_and_rejected_particles_do_not_mislead() -> None:
     everyone = {FREE: np.ones(5, dtype=bool), BEATEN: np.array([0.3])}
     assert judged(everyone, np.zeros(5)) is everyone
     assert judged({}, np.zeros(5)) == {}

@@ -1,4 +1,4 @@
-"""What a run teaches its model, and that it stays the same model however the run was interrupted."""
+"""Online learning: what is added to the model, and that interruptions of the run do not change it."""
 
 import dataclasses
 
@@ -13,8 +13,8 @@ from studio.tracking.online_learning import (
     OnlineLearner,
     novel,
     stretches,
-    taught,
     translated,
+    updated_model,
     well_tracked,
 )
 from studio.tracking.tracker import Carried, ParticleSet
@@ -47,7 +47,7 @@ def test_stretches_are_cut_where_tracking_was_bad_and_smoothed() -> None:
     weights = np.zeros(100)
     weights[[30, 31, 40]] = -50.0
     found = stretches(jitter, weights + 1e-3 * np.sin(np.arange(100)), MODEL)
-    # 32 … 39 is too short to say anything about movement.
+    # 32 … 39 is too short to show movement.
     assert [len(one) for one in found] == [30, 59]
     rough = np.abs(np.diff(jitter[41:, ROOT:], axis=0) - np.diff(poses[41:, ROOT:], axis=0)).mean()
     smooth = np.abs(np.diff(found[1][:, ROOT:], axis=0) - np.diff(poses[41:, ROOT:], axis=0)).mean()
@@ -63,16 +63,16 @@ def test_stretches_are_read_at_the_rate_that_the_model_was_learnt_at() -> None:
     assert np.abs(found[10:-10] - poses[10:-10]).max() < 0.15
 
 
-def test_only_what_no_cluster_explains_is_new() -> None:
+def test_only_unexplained_frames_are_new() -> None:
     known, strange = turning_poses(9, 200), nodding(200)
     # The first frame has no movement of its own.
     assert not novel(MODEL, MODEL.space.features(known))[1:].any()
     assert novel(MODEL, MODEL.space.features(strange)).all()
 
 
-def test_a_lesson_adds_clusters_behind_the_others_and_explains_what_was_new() -> None:
+def test_a_lesson_appends_clusters_that_explain_new_frames() -> None:
     poses = nodding(FRAMES)
-    after = taught(MODEL, MODEL, poses, np.zeros(FRAMES), np.random.default_rng(1))
+    after = updated_model(MODEL, MODEL, poses, np.zeros(FRAMES), np.random.default_rng(1))
     assert after.clusters > CLUSTERS
     assert np.array_equal(after.dynamics.means[:CLUSTERS], MODEL.dynamics.means)
     assert np.array_equal(after.dynamics.covariances[:CLUSTERS], MODEL.dynamics.covariances)
@@ -84,7 +84,7 @@ def test_a_lesson_adds_clusters_behind_the_others_and_explains_what_was_new() ->
     assert np.all(labels >= CLUSTERS)
     assert after.prototypes.poses.shape == (after.clusters, 9)
     assert np.all(after.prototypes.poses[CLUSTERS:, 3] > 1.0)
-    # The automaton knows the order of what was known, and that of what is new.
+    # The automaton has the order of known and of new clusters.
     assert after.automaton.symbols == after.clusters
     assert after.entropy([turning_poses(9, 200)]) == pytest.approx(
         MODEL.entropy([turning_poses(9, 200)]), abs=0.1
@@ -94,17 +94,17 @@ def test_a_lesson_adds_clusters_behind_the_others_and_explains_what_was_new() ->
     assert after.making.sources[-1] == SOURCE
 
 
-def test_a_lesson_of_known_movement_teaches_its_order_only() -> None:
-    """Turning the other way round: known places, an order that was never seen."""
+def test_a_lesson_of_known_movement_adds_its_order_only() -> None:
+    """Turning the other way round: known poses in a new order."""
     labels = MODEL.labels(turning_poses(9, 300))
     assert set(np.unique(labels)) == set(range(CLUSTERS))
-    after = taught(MODEL, MODEL, turning_poses(9, 300), np.zeros(300), np.random.default_rng(1))
+    after = updated_model(MODEL, MODEL, turning_poses(9, 300), np.zeros(300), np.random.default_rng(1))
     assert after.clusters == CLUSTERS
     assert after.making.frames == MODEL.making.frames + 300
 
 
-def test_nothing_tracked_well_teaches_nothing() -> None:
-    assert taught(MODEL, MODEL, nodding(4), np.zeros(4), np.random.default_rng(0)) is MODEL
+def test_without_well_tracked_frames_nothing_is_learnt() -> None:
+    assert updated_model(MODEL, MODEL, nodding(4), np.zeros(4), np.random.default_rng(0)) is MODEL
 
 
 def lessons(frames: int) -> np.ndarray:
@@ -112,16 +112,16 @@ def lessons(frames: int) -> np.ndarray:
     return np.concatenate([turning_poses(9, 2 * PERIOD), nodding(frames - 2 * PERIOD)])
 
 
-def test_lessons_are_the_same_wherever_a_run_is_taken_up() -> None:
-    poses, asked = lessons(FRAMES), []
+def test_lessons_are_the_same_wherever_a_run_is_resumed() -> None:
+    poses, counts = lessons(FRAMES), []
 
     def tracked(count: int) -> tuple[np.ndarray, np.ndarray]:
-        asked.append(count)
+        counts.append(count)
         return poses[:count], np.zeros(count)
 
     going_on = OnlineLearner(MODEL, 100, seed=7)
     models = [going_on.model_in(number, tracked) for number in range(0, FRAMES, 50)]
-    assert asked == [100, 200, 300]
+    assert counts == [100, 200, 300]
     assert models[0] is models[1] is MODEL
     taken_up = OnlineLearner(MODEL, 100, seed=7).model_in(FRAMES - 50, tracked)
     assert np.array_equal(taken_up.dynamics.means, models[-1].dynamics.means)
@@ -133,7 +133,7 @@ def test_lessons_are_the_same_wherever_a_run_is_taken_up() -> None:
 
 @pytest.mark.parametrize("name", [STATES, LEADER_STATE])
 def test_states_stand_for_the_same_histories_in_the_next_automaton(name: str) -> None:
-    after = taught(MODEL, MODEL, nodding(FRAMES), np.zeros(FRAMES), np.random.default_rng(1))
+    after = updated_model(MODEL, MODEL, nodding(FRAMES), np.zeros(FRAMES), np.random.default_rng(1))
     states = np.arange(MODEL.states)
     particles = ParticleSet(np.zeros((len(states), 9)), np.zeros(len(states)), extra={name: states})
     carried = translated(Carried(particles), MODEL.automaton, after.automaton)

@@ -1,5 +1,5 @@
-"""The swarm beside Algorithm 1 written out for one particle and one parameter at a time, and beside hand-worked
-values of Eq. 2 and 3.
+"""The swarm against Algorithm 1 written out for one particle and one parameter at a time, and against values of Eq. 2
+and 3 worked out by hand.
 """
 
 import dataclasses
@@ -64,7 +64,7 @@ def test_equation_2_by_hand() -> None:
 @pytest.mark.parametrize(
     ("c", "chi"),
     [
-        # φ = 4.1: √(16.81 - 16.4) = √0.41 = 0.6403124; 2 / 2.7403124. The value Clerc & Kennedy print: 0.7298.
+        # φ = 4.1: √(16.81 - 16.4) = √0.41 = 0.6403124; 2 / 2.7403124. Clerc & Kennedy give 0.7298.
         (2.05, 0.7298437881),
         # φ = 4.3: √(18.49 - 17.2) = √1.29 = 1.1357817; 2 / 3.4357817.
         (2.15, 0.5821091654),
@@ -199,9 +199,9 @@ def test_bests_never_get_worse_within_a_stage() -> None:
     assert leaders[-1] == pytest.approx(best, abs=1e-12)
 
 
-def test_first_stage_looks_at_the_trunk_only() -> None:
+def test_first_stage_uses_the_trunk_only() -> None:
     class Watched(Bowl):
-        """Notes the stages that are asked for."""
+        """Records the requested stages."""
 
         stages: list[int]
 
@@ -210,16 +210,16 @@ def test_first_stage_looks_at_the_trunk_only() -> None:
             self.stages.append(stage)
             return super().fitness(poses, stage)
 
-    asked = {}
+    requested = {}
     for partition in ("soft", "soft-three", "hard-two", "global-local", "global"):
         problem = Watched(np.zeros(6))
         problem.stages = []
         settings = dataclasses.replace(SMALL, partition=partition, stage1_iterations=6)
         searched(settings, problem)
-        asked[partition] = problem.stages
+        requested[partition] = problem.stages
     for partition in ("soft", "soft-three", "hard-two"):
-        assert asked[partition] == [1] * 6 + [0] * 7
-    assert set(asked["global-local"]) == set(asked["global"]) == {0}
+        assert requested[partition] == [1] * 6 + [0] * 7
+    assert set(requested["global-local"]) == set(requested["global"]) == {0}
 
 
 def test_the_reported_pose_is_the_best_or_the_mean_of_bests() -> None:
@@ -296,9 +296,9 @@ def test_without_a_start_pose_everything_moves_at_first() -> None:
     assert np.linalg.norm(result.estimate.pose) < 0.5
 
 
-def test_a_fitness_that_is_no_number_is_named() -> None:
+def test_a_fitness_that_is_not_finite_raises() -> None:
     class Broken(Bowl):
-        """Nothing is known of the pose."""
+        """A problem whose fitness is NaN."""
 
         def fitness(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
             """NaN."""

@@ -1,4 +1,4 @@
-"""Every partition weighs as many poses, moves only what it may, and follows the body's tree."""
+"""Every partition weighs as many poses, moves only free parameters, and follows the body's tree."""
 
 import dataclasses
 
@@ -63,7 +63,7 @@ def test_totals_differ_by_half_a_swarm_at_most(partition: str, n1: int, n2: int)
 
 
 @pytest.mark.parametrize("partition", PARTITIONS)
-def test_only_what_is_free_moves(partition: str) -> None:
+def test_only_free_parameters_move(partition: str) -> None:
     poses, leaders = sets_of(partition)
     stages = partitions.stages_of(SPACE.hierarchy, settings_of(partition))
     for layer, weighed in enumerate(poses):
@@ -128,7 +128,7 @@ def test_kinds_of_limbs_are_searched_apart() -> None:
     assert np.array_equal(stages[2].freedom, pairs == 1)
 
 
-def test_a_body_that_is_all_root_is_searched_whole() -> None:
+def test_a_body_with_only_a_root_is_searched_whole() -> None:
     zeros = np.zeros(3, dtype=np.int64)
     point = Hierarchy(zeros, np.ones(3, dtype=bool), zeros, zeros - 1)
     for partition in ("hard-two", "global-local"):
@@ -137,7 +137,7 @@ def test_a_body_that_is_all_root_is_searched_whole() -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "said"),
+    ("changes", "message"),
     [
         ({"stage1_iterations": 2}, "'stage1_iterations'"),
         ({"stage2_iterations": 1}, "'stage2_iterations'"),
@@ -149,8 +149,8 @@ def test_a_body_that_is_all_root_is_searched_whole() -> None:
         ({"partition": "thirteen"}, "'partition'"),
     ],
 )
-def test_too_few_iterations_and_small_phi_are_refused(changes: dict[str, object], said: str) -> None:
-    with pytest.raises(SettingsError, match=said) as caught:
+def test_too_few_iterations_and_small_phi_are_refused(changes: dict[str, object], message: str) -> None:
+    with pytest.raises(SettingsError, match=message) as caught:
         changed(SwarmSettings(), changes)
     assert caught.value.hint
 
@@ -165,7 +165,7 @@ def test_settings_made_by_hand_are_checked_too(wrong: dict[str, float]) -> None:
 
 @pytest.mark.parametrize("tracker", ["annealed", "behaviour", "condensation", "swarm"])
 @pytest.mark.parametrize("wanted", [200, 500, 1000, 2000, 4000])
-def test_knobs_give_the_evaluations_asked_for(tracker: str, wanted: int) -> None:
+def test_knobs_give_the_requested_evaluations(tracker: str, wanted: int) -> None:
     knobs = knobs_for_evaluations(tracker, wanted)
     settings = changed(TRACKERS[tracker].settings_type(), knobs)
     assert TRACKERS[tracker].evaluations(settings) == wanted

@@ -23,7 +23,7 @@ def body() -> BodyModel:
 
 @pytest.fixture(scope="module")
 def truth(body: BodyModel) -> np.ndarray:
-    """Standing with arms and a leg away from the trunk, so that every limb makes border."""
+    """Standing with arms and a leg away from the trunk, so that every limb has border."""
     rng = np.random.default_rng(4)
     pose = body.neutral.copy()
     names = [entry.name for entry in body.parameters]
@@ -55,7 +55,7 @@ def shaken(body: BodyModel, truth: np.ndarray, seed: int, size: float = 0.08) ->
 
 
 class Judge:
-    """A weighting that prefers poses near one of its own."""
+    """A weighting that prefers poses near a given one."""
 
     def __init__(self, liked: np.ndarray) -> None:
         self.liked = liked
@@ -95,7 +95,7 @@ def test_the_gradient_is_that_of_the_loss(
         (refiner.loss(pose + row, seen)[0] - refiner.loss(pose - row, seen)[0]) / 0.016 for row in step
     ]
     agreement = np.corrcoef(gradient, by_differences)[0, 1]
-    # Which outline explains a point changes with the pose, so the loss has kinks that no slope knows.
+    # Which outline explains a point changes with the pose, so the loss has kinks.
     assert agreement > 0.97
     assert np.dot(gradient, by_differences) / np.dot(gradient, gradient) == pytest.approx(1.0, abs=0.15)
 
@@ -116,7 +116,7 @@ def test_limits_hold(body: BodyModel, truth: np.ndarray, seen: tuple[SilhouetteD
     assert np.isfinite(found).all()
 
 
-def test_the_weighting_has_the_last_word(
+def test_refinement_never_lowers_the_log_weight(
     body: BodyModel, truth: np.ndarray, seen: tuple[SilhouetteDistances, ...]
 ) -> None:
     refiner, start = Refiner(body, CAMERAS, SETTINGS), shaken(body, truth, 1)

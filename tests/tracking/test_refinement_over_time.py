@@ -1,4 +1,4 @@
-"""Frames refined together: slopes, the banded equations, windows, and a movement that comes out as one."""
+"""Frames refined together: slopes, the banded equations, windows, and a consistent movement."""
 
 import itertools
 
@@ -55,7 +55,7 @@ def seen(body: BodyModel, movement: Array) -> list[tuple[SilhouetteDistances, ..
 
 @pytest.fixture(scope="module")
 def found_by_a_search(body: BodyModel, movement: Array) -> Array:
-    """As a search finds them: every frame a little off, each in its own way."""
+    """Poses as from a search: every frame a little off, independently."""
     rng = np.random.default_rng(5)
     unit = np.array([1.0 if entry.kind == "angle" else 250.0 for entry in body.parameters])
     return movement + 0.07 * unit * rng.standard_normal(movement.shape)
@@ -88,7 +88,7 @@ def test_frames_refined_together_move_as_one_and_lie_as_near(
     assert off(body, together, movement) < 0.6 * off(body, found_by_a_search, movement)
 
 
-def test_a_frame_that_says_nothing_follows_its_neighbours(
+def test_a_frame_without_evidence_follows_its_neighbours(
     body: BodyModel, movement: Array, seen: list[tuple[SilhouetteDistances, ...]]
 ) -> None:
     refiner = Refiner(body, CAMERAS, RefinementSettings())
@@ -119,7 +119,7 @@ def test_held_frames_hold_a_windows_beginning(
 
 
 def test_the_gradient_is_that_of_the_acceleration(body: BodyModel, movement: Array) -> None:
-    """With a pull for each frame's loss, what is left is smooth, so differences are an exact oracle."""
+    """With a pull for each frame's loss, the remaining loss is smooth, so differences are an exact oracle."""
     refiner = Refiner(body, CAMERAS, RefinementSettings(refinement_pull=30.0))
     mover = MovementRefiner(refiner, FPS, 15.0)
     starts, poses = movement[2:5], movement[2:5] + 0.02
@@ -134,7 +134,7 @@ def test_the_gradient_is_that_of_the_acceleration(body: BodyModel, movement: Arr
         assert np.sum(equations.gradient * way) == pytest.approx((ahead - back) / 4e-4, rel=1e-3)
 
 
-def test_blocks_lie_where_the_solver_looks_for_them() -> None:
+def test_blocks_lie_where_the_solver_expects_them() -> None:
     rng = np.random.default_rng(3)
     count, size = 5, 3
     whole, rows = np.zeros((15, 15)), np.zeros((15, 9))
@@ -165,7 +165,7 @@ def test_windows_keep_every_frame_once_and_look_ahead(count: int) -> None:
 
 
 def test_points_show_a_twist_that_moves_no_marker(body: BodyModel) -> None:
-    """A straight arm that turns about itself."""
+    """A straight arm that turns about its own axis."""
     names = [entry.name for entry in body.parameters]
     poses = np.repeat(body.neutral[None], 2, axis=0)
     poses[:, names.index("left_elbow_ry")] = 0.0

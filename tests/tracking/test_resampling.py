@@ -1,4 +1,4 @@
-"""Draws have the right expectation, the right spread, and never take what weighs nothing."""
+"""Draws have the right expectation, the right spread, and never take a particle without weight."""
 
 import numpy as np
 import pytest
@@ -50,7 +50,7 @@ def test_systematic_draw_keeps_more_distinct_survivors() -> None:
 
 
 @pytest.mark.parametrize("scheme", ["systematic", "multinomial"])
-def test_what_weighs_nothing_is_never_drawn(scheme: str) -> None:
+def test_particles_without_weight_are_never_drawn(scheme: str) -> None:
     weights = np.array([0.0, 1.0, 0.0])
     for seed in range(50):
         assert np.all(draw(np.random.default_rng(seed), weights, 33, scheme) == 1)

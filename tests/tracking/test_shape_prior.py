@@ -1,4 +1,4 @@
-"""What is known of a size before pictures, against normal densities written out, and against finite differences."""
+"""The prior of body sizes against densities written out and finite differences."""
 
 import numpy as np
 import pytest
@@ -51,8 +51,8 @@ def test_equations_are_the_density_and_its_slope(space: ShapeSpace) -> None:
         assert (np.linalg.eigvalsh(matrix) > 0.0).all()
 
 
-def test_a_wrong_guess_of_the_height_is_given_up(space: ShapeSpace) -> None:
-    """Near the guess a centimetre costs much, eight centimetres away little."""
+def test_a_wrong_reported_height_is_overruled(space: ShapeSpace) -> None:
+    """Near the reported height a centimetre costs much, eight centimetres away little."""
     prior, bare = ShapePrior(space, SPREADS, 1750.0), ShapePrior(space, SPREADS, None)
     long = np.array([group.kind == "length" for group in space.groups], dtype=float)
     scale = (1750.0 - 1740.0) / (prior.height(long) - prior.height(0.0 * long))

@@ -1,4 +1,4 @@
-"""Sizes and poses descended to together, on silhouettes that are drawn of cones of known size."""
+"""Sizes and poses refined together, on silhouettes drawn from cones of known size."""
 
 import cv2
 import numpy as np
@@ -39,17 +39,17 @@ BENT = {
     "right_shoulder_rx": 0.8,
 }
 LIMBS = {"thigh_length": 0.07, "shin_length": -0.06, "upper_arm_length": -0.08, "forearm_length": 0.06}
-TOLD_MM = 1750.0
+REPORTED_MM = 1750.0
 
 
 @pytest.fixture(scope="module")
 def space() -> ShapeSpace:
-    body, _ = fit_subject(load_body("human31"), Subject(height_mm=TOLD_MM))
+    body, _ = fit_subject(load_body("human31"), Subject(height_mm=REPORTED_MM))
     return shape_space(body)
 
 
 def silhouettes(space: ShapeSpace, shape: Array, poses: Array) -> list[list[SilhouetteDistances]]:
-    """Of each pose, one a camera: all cones filled by OpenCV."""
+    """Silhouettes of each pose, one a camera: all cones filled by OpenCV."""
     corners, _ = OutlineProjector.of_body(space.body_of(shape), CAMERAS).corners(poses)
     frames = []
     for frame in corners:
@@ -74,10 +74,10 @@ def truth(space: ShapeSpace) -> tuple[Array, Array]:
     return shape, np.clip(poses + 0.02 * rng.normal(size=poses.shape), *limits)
 
 
-def refined(space: ShapeSpace, truth: tuple[Array, Array], told: float, frames: int = 3) -> RefinedShape:
-    """A fit that begins with the usual shape and poses that are 0.05 rad off."""
+def refined(space: ShapeSpace, truth: tuple[Array, Array], reported: float, frames: int = 3) -> RefinedShape:
+    """A fit that starts from the usual shape and poses that are 0.05 rad off."""
     rng = np.random.default_rng(5)
-    prior = ShapePrior(space, ShapeSpreads(), told)
+    prior = ShapePrior(space, ShapeSpreads(), reported)
     drawn = silhouettes(space, truth[0], truth[1][:frames])
     refiner = ShapeRefiner(ShapePrograms(space), CAMERAS, drawn, prior)
     start = truth[1][:frames] + 0.05 * rng.normal(size=(frames, truth[1].shape[1]))
@@ -85,14 +85,14 @@ def refined(space: ShapeSpace, truth: tuple[Array, Array], told: float, frames: 
 
 
 def limb_errors(space: ShapeSpace, found: RefinedShape, truth: Array) -> Array:
-    """mm, of the limbs that were changed."""
+    """Errors of the changed limbs, mm."""
     rows = [space.names.index(name) for name in LIMBS]
     return (space.sizes(found.shape) - space.sizes(truth))[rows]
 
 
 def test_limbs_are_measured_where_they_bend(space: ShapeSpace, truth: tuple[Array, Array]) -> None:
     """They were 15 to 30 mm off. The cones' flat near ends are border that no outline explains, hence the residual."""
-    found = refined(space, truth, TOLD_MM)
+    found = refined(space, truth, REPORTED_MM)
     before = np.abs(limb_errors(space, refined_nowhere(found), truth[0]))
     after = np.abs(limb_errors(space, found, truth[0]))
     print(before.round(1), after.round(1), found.residual)
@@ -108,15 +108,15 @@ def refined_nowhere(found: RefinedShape) -> RefinedShape:
 
 
 def test_fewer_frames_are_less_sure(space: ShapeSpace, truth: tuple[Array, Array]) -> None:
-    one, three = refined(space, truth, TOLD_MM, frames=1), refined(space, truth, TOLD_MM)
-    prior = ShapePrior(space, ShapeSpreads(), TOLD_MM)
+    one, three = refined(space, truth, REPORTED_MM, frames=1), refined(space, truth, REPORTED_MM)
+    prior = ShapePrior(space, ShapeSpreads(), REPORTED_MM)
     rows = [space.names.index(name) for name in LIMBS]
     assert (three.deviation[rows] < one.deviation[rows]).all()
     assert (one.deviation[rows] < np.hypot(prior.sigma, ShapeSpreads().size)[rows]).all()
 
 
 def test_silhouettes_overrule_a_wrong_height(space: ShapeSpace, truth: tuple[Array, Array]) -> None:
-    prior = ShapePrior(space, ShapeSpreads(), TOLD_MM)
+    prior = ShapePrior(space, ShapeSpreads(), REPORTED_MM)
     true = prior.height(truth[0])
     found = prior.height(refined(space, truth, true + 80.0).shape)
     assert abs(found - true) < 25.0

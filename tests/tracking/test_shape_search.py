@@ -42,7 +42,7 @@ def refined(person: DrawnPerson, seed: int) -> RefinedShape:
 
 
 def errors(person: DrawnPerson, shape: NDArray[np.float64]) -> NDArray[np.float64]:
-    """mm, of each measured limb."""
+    """Error of each measured limb, mm."""
     space = shape_space(person.body)
     sizes = dict(zip(space.names, space.sizes(shape), strict=True))
     return np.array([sizes[name] - person.lengths[name] for name in MEASURED])
@@ -77,7 +77,7 @@ def test_poses_follow_a_shape_so_that_limbs_stay(person: DrawnPerson) -> None:
     assert np.linalg.norm(carried) < 0.75 * np.linalg.norm(left)
 
 
-def test_an_arm_that_was_lost_is_found_again(person: DrawnPerson) -> None:
+def test_a_lost_arm_is_found_again(person: DrawnPerson) -> None:
     """Small steps do not bring an arm back from behind the trunk: a runner's here, 0.7 m away."""
     names = [entry.name for entry in person.body.parameters]
     lost = person.poses.copy()

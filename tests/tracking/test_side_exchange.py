@@ -1,4 +1,4 @@
-"""Sides put right over a clip: legs exchanged where they crossed, a body that faces backwards, and nothing else."""
+"""Sides corrected over a clip: legs exchanged where they crossed, a body that faces backwards, and nothing else."""
 
 from functools import cache
 
@@ -53,13 +53,13 @@ def off(poses: np.ndarray, truth: np.ndarray) -> float:
     return float(np.linalg.norm(marker_points(BODY, poses) - marker_points(BODY, truth), axis=2).mean())
 
 
-def test_a_sound_clip_stays_as_it_is(walk: np.ndarray, shown) -> None:
+def test_a_sound_clip_is_unchanged(walk: np.ndarray, shown) -> None:
     found, changes = put_right(walk, shown)
     assert changes == ()
     assert np.array_equal(found, walk)
 
 
-def test_legs_exchanged_where_they_cross_are_put_right(walk: np.ndarray, shown) -> None:
+def test_legs_exchanged_where_they_cross_are_corrected(walk: np.ndarray, shown) -> None:
     planted = walk.copy()
     for row in range(*CROSSING.indices(len(walk))):
         planted[row] = kind("leg").offered(walk[row])
@@ -80,7 +80,7 @@ def test_a_body_that_faces_backwards_is_turned(walk: np.ndarray, shown) -> None:
     assert off(found, walk) < 15.0 < 150.0 < off(planted, walk)
 
 
-def test_who_shows_nothing_is_left_alone(walk: np.ndarray) -> None:
+def test_a_clip_without_silhouettes_is_unchanged(walk: np.ndarray) -> None:
     empty = silhouettes_by_camera(drawn_evidence(BODY, None, CAMERAS), 150)
     still = np.repeat(walk[:1], len(walk), axis=0)
     found, changes = put_right(still, lambda _frame: empty)
@@ -88,7 +88,7 @@ def test_who_shows_nothing_is_left_alone(walk: np.ndarray) -> None:
     assert np.array_equal(found, still)
 
 
-def test_every_body_says_what_can_be_exchanged() -> None:
+def test_kinds_of_exchange_of_every_body() -> None:
     pairs = {name: [entry.what for entry in kinds_of(load_body(name))] for name in ("human31", "dog")}
     assert pairs["human31"] == [
         "front and back exchanged",
@@ -110,5 +110,5 @@ def test_sides_change_where_the_movement_allows_it() -> None:
     jump = still.copy()
     jump[2, 0, 1] = 0.5
     assert np.flatnonzero(best_path(gains, jump)[0]).tolist() == [2, 3, 4, 5]
-    # Too little is gained for two changes, and nobody looked at other frames.
+    # Too little is gained for two changes, and the other frames were not examined.
     assert not best_path(np.where(gains > 0.0, 0.5 * CHANGE, np.nan), still)[0].any()

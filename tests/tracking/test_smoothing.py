@@ -112,7 +112,7 @@ def test_the_frequency_is_where_movement_is_halved(frequency: float) -> None:
         ) == pytest.approx(0.2 * wanted, abs=0.006)
 
 
-def test_what_accelerates_evenly_is_left_as_it_is() -> None:
+def test_constant_acceleration_is_unchanged() -> None:
     time = np.arange(50) / FPS
     even = np.stack([3.0 - 2.0 * time + 4.0 * time**2, 100.0 * time], axis=1)
     found = smoothed(even, angles=False)

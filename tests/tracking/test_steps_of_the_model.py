@@ -1,4 +1,4 @@
-"""Frames that were dropped: a guided particle takes each of them, as often as a tracker without drops would."""
+"""Dropped frames: a guided particle takes a step for each, as a tracker without drops would."""
 
 import dataclasses
 
@@ -14,7 +14,7 @@ STILL = BehaviourSettings(attenuation=0.0, model_free_share=0.0)
 
 
 def turning(begin: int) -> Walkers:
-    """Walkers that turn as the model's law has it, all alike."""
+    """Particles that turn as in the model, all alike."""
     space = guided_space()
     model, columns = model_of(space), columns_of(space)
     angles = turning_angles(len(columns), 2, begin)

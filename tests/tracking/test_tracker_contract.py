@@ -1,4 +1,4 @@
-"""What every tracker of the catalogue must keep."""
+"""The contract of every tracker in the catalogue."""
 
 import dataclasses
 from typing import Any
@@ -105,7 +105,7 @@ def test_shapes(name: str) -> None:
 
 
 class Limited(Bowl):
-    """A bowl of a body that knows the limits of its space."""
+    """A bowl of a body with the limits of its space."""
 
     def __init__(self, space: SearchSpace) -> None:
         super().__init__(np.zeros(COUNT))
@@ -130,7 +130,7 @@ def test_limits_are_kept(name: str, constraints: str) -> None:
     assert np.all(results[-1].estimate.pose >= LIMITED.lower - 1e-12)
 
 
-def test_what_is_rejected_is_weighed_and_never_reported(name: str) -> None:
+def test_rejected_poses_are_weighed_and_never_reported(name: str) -> None:
     results, records = run(
         name, 3, space=LIMITED, problem=Limited(LIMITED), constraints="reject", **sizes(name, 400)
     )
@@ -149,7 +149,7 @@ def test_limits_may_be_ignored(name: str) -> None:
 
 
 @pytest.mark.parametrize("constraints", ["redraw", "reject", "clamp"])
-def test_a_body_that_can_take_nothing_is_tracked_all_the_same(name: str, constraints: str) -> None:
+def test_a_body_without_possible_poses_is_still_tracked(name: str, constraints: str) -> None:
     class Nothing(Bowl):
         """No pose is possible."""
 
@@ -181,7 +181,7 @@ def test_never_worse_than_its_start_on_a_bowl(name: str, seed: int) -> None:
     start = float(bowl.weigh(START_POSE[None])[0])
     reached = [float(bowl.weigh(result.estimate.pose[None])[0]) for result in results]
     assert min(reached) > start
-    # A swarm is sampled anew around its last estimate: where that was good already, it ends about as good.
+    # A swarm is resampled around its last estimate: where that was good already, it ends about as good.
     assert reached[-1] > reached[0] or reached[-1] > 0.1 * start
 
 

@@ -19,6 +19,6 @@ def test_a_list_goes_on_with_its_last_rate(text: str) -> None:
 
 
 @pytest.mark.parametrize("text", ["half", "0.5;0.4", "1.5", "0.5,0", "nan", "0.5,-0.2"])
-def test_a_list_that_is_none_is_refused(text: str) -> None:
+def test_text_that_is_no_list_is_refused(text: str) -> None:
     with pytest.raises(SettingsError, match="survival_per_layer"):
         changed(AnnealedSettings(), {"survival_per_layer": text})

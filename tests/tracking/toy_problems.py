@@ -27,7 +27,7 @@ class Bowl:
 
 
 class HalfBowl(Bowl):
-    """A bowl whose maximum lies where the body cannot go: x0 must not be positive."""
+    """A bowl whose maximum is impossible: x0 must not be positive."""
 
     def feasible(self, poses: np.ndarray, limbs_apart: bool = False) -> np.ndarray:
         """Possible where x0 <= 0."""

@@ -1,4 +1,4 @@
-"""A behaviour model made by hand, whose law is known: the angles of a toy space turn through four clusters."""
+"""A behaviour model made by hand with known dynamics: the angles of a toy space turn through four clusters."""
 
 import dataclasses
 
@@ -74,5 +74,5 @@ def toy_feature_space(count: int, fps: float = FPS) -> FeatureSpace:
 
 
 def guided_space(count: int = 9, **wanted: float) -> SearchSpace:
-    """A toy space that knows the toy model."""
+    """A toy space with the toy model."""
     return dataclasses.replace(toy_space(count, **wanted), behaviour=toy_model(count))

@@ -1,4 +1,4 @@
-"""Learning from recordings: what is training, what is test, and where models lie."""
+"""Learning from recordings: training and test material, and the models' files."""
 
 import dataclasses
 from pathlib import Path
@@ -48,7 +48,7 @@ def test_a_model_is_learnt_and_measured() -> None:
     np.testing.assert_array_equal(same.mixture.means, model.mixture.means)
 
 
-def test_a_test_of_its_own_leaves_the_training_whole() -> None:
+def test_a_separate_test_leaves_the_training_whole() -> None:
     _, learnt = learn(RECORDINGS[:2], BODY, SETTINGS, PLAIN, RECORDINGS[2:])
     assert (learnt.recorded_frames, learnt.test_frames) == (400, 400)
     _, untested = learn(RECORDINGS[:2], BODY, SETTINGS, PLAIN, [])

@@ -1,4 +1,4 @@
-"""Labels of other programs, skin markers, and what is said when they do not suffice."""
+"""Labels of other programs, skin markers, and the errors where they do not suffice."""
 
 import numpy as np
 import pytest
@@ -75,7 +75,7 @@ def test_the_shoulder_joint_is_preferred_to_the_collar_bone() -> None:
     np.testing.assert_allclose(points[0, names.index("LShoulder")], POINTS["LShoulder"])
 
 
-def test_head_and_neck_may_be_missing_and_hips_tell_their_middle() -> None:
+def test_head_and_neck_may_be_missing_and_hips_give_their_middle() -> None:
     labels = {name: name for name in MARKERS if name not in ("Hip", "Neck", "Head")}
     names, points = person_markers(*of(labels), "some.c3d")
     assert set(names) == set(MARKERS) - {"Neck", "Head"}
@@ -83,8 +83,8 @@ def test_head_and_neck_may_be_missing_and_hips_tell_their_middle() -> None:
     np.testing.assert_allclose(points[0, names.index("Hip")], middle)
 
 
-def test_skin_markers_tell_the_joints() -> None:
-    """A pelvis 260 mm wide and 160 deep: hip joints where Bell's shares of its width put them."""
+def test_joints_follow_from_skin_markers() -> None:
+    """A pelvis 260 mm wide and 160 deep: hip joints at Bell's shares of its width."""
     width, depth = 260.0, 160.0
     skin = {
         "S1:LASI": [depth, width / 2, 0],
@@ -107,8 +107,10 @@ def test_skin_markers_tell_the_joints() -> None:
     np.testing.assert_allclose(at["Neck"], [100.0, 0.0, 540.0])
 
 
-def test_what_is_missing_and_what_is_there_is_said() -> None:
+def test_the_error_lists_missing_and_present_labels() -> None:
     labels = {name: name for name in MARKERS if name != "LKnee"} | {"*17": "LKnee"}
-    with pytest.raises(StudioError, match=r"'x.c3d' has no points for LKnee; its points are: .*\*17") as told:
+    with pytest.raises(
+        StudioError, match=r"'x.c3d' has no points for LKnee; its points are: .*\*17"
+    ) as refusal:
         person_markers(*of(labels), "x.c3d")
-    assert "RKnee" in told.value.hint
+    assert "RKnee" in refusal.value.hint

@@ -46,7 +46,7 @@ def test_slopes_are_those_of_the_bodys_kinematics(name: str) -> None:
     np.testing.assert_allclose(right, slope, rtol=1e-5, atol=1e-5 * np.abs(slope).max())
 
 
-def test_what_is_missing_neither_pulls_nor_counts() -> None:
+def test_missing_markers_neither_pull_nor_count() -> None:
     body = load_body("human25")
     poses = swinging(body, 4, 5.0)
     whole = of_poses(body, poses)
@@ -61,7 +61,7 @@ def test_what_is_missing_neither_pulls_nor_counts() -> None:
     np.testing.assert_allclose(problem.costs(poses / problem.scale), [15 * 900.0, 3 * 900.0, 0.0, 15 * 900.0])
 
 
-def test_lengths_weigh_like_radians() -> None:
+def test_lengths_count_like_radians() -> None:
     body = load_body("human25")
     problem = MarkerProblem(body, of_poses(body, swinging(body, 2, 5.0)))
     kinds = [entry.kind for entry in body.parameters]

@@ -1,4 +1,4 @@
-"""The other spelling of joints is the same attitude, and finds what a fit alone is kept from by limits."""
+"""The other branch of joint angles is the same attitude, and is found where limits keep a fit from it."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from scipy.interpolate import CubicSpline
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends, marker_points
 from studio.training import pose_fitting
-from studio.training.other_spellings import respelt, triples
+from studio.training.other_spellings import on_branch, triples
 from studio.training.targets import of_poses
 
 OVERHEAD = np.array(
@@ -48,7 +48,7 @@ def test_shoulders_and_hips_have_three_turns_in_a_row() -> None:
 
 
 @pytest.mark.parametrize("name", ["human25", "human31"])
-def test_the_other_spelling_is_the_same_attitude(name: str) -> None:
+def test_the_other_branch_is_the_same_attitude(name: str) -> None:
     body = load_body(name)
     rng = np.random.default_rng(2)
     row = next(row for row in triples(body) if "left_shoulder" in body.parameters[row[0]].name)
@@ -61,7 +61,7 @@ def test_the_other_spelling_is_the_same_attitude(name: str) -> None:
         pose[list(row)] = rng.uniform(lower, upper)
     for beyond in (False, True):
         other = poses.copy()
-        other[:, row] = respelt(body, poses, beyond)[:, row]
+        other[:, row] = on_branch(body, poses, beyond)[:, row]
         inside = np.all((other[:, row] > lower) & (other[:, row] < upper), axis=1)
         changed = inside & np.any(other[:, row] != poses[:, row], axis=1)
         np.testing.assert_allclose(limb_ends(body, other[inside]), limb_ends(body, poses[inside]), atol=1e-6)
@@ -75,7 +75,7 @@ def test_the_other_spelling_is_the_same_attitude(name: str) -> None:
     assert kept[1].all()
 
 
-def test_a_fit_that_began_in_the_wrong_spelling_finds_the_other(monkeypatch) -> None:
+def test_a_fit_that_began_on_the_wrong_branch_finds_the_other(monkeypatch) -> None:
     body = load_body("human25")
     poses = np.tile(body.neutral, (45, 1))
     way = CubicSpline(np.linspace(0.0, 44.0, len(OVERHEAD)), np.radians(OVERHEAD))(np.arange(45))
@@ -83,11 +83,11 @@ def test_a_fit_that_began_in_the_wrong_spelling_finds_the_other(monkeypatch) -> 
     poses[:, named(body, "left_elbow")] = np.radians(40.0)
 
     def pressed_to_limits(problem, *_) -> np.ndarray:
-        return respelt(body, poses, beyond=True) / problem.scale
+        return on_branch(body, poses, beyond=True) / problem.scale
 
     monkeypatch.setattr(pose_fitting, "_followed", pressed_to_limits)
     found = pose_fitting.fit_poses(body, of_poses(body, poses), 30.0)
     assert np.sqrt(np.mean(found.rms_mm**2)) < 5.0
-    monkeypatch.setattr(pose_fitting, "respelt", lambda body, path, beyond: path)
+    monkeypatch.setattr(pose_fitting, "on_branch", lambda body, path, beyond: path)
     stuck = pose_fitting.fit_poses(body, of_poses(body, poses), 30.0)
     assert np.sqrt(np.mean(stuck.rms_mm**2)) > 10.0

@@ -1,4 +1,4 @@
-"""Training material: how much, how it differs, and that it stays a body's."""
+"""Training material: its amount, its variation, and that it stays within the body's limits."""
 
 import itertools
 
@@ -17,7 +17,7 @@ LOWER = np.array([entry.lower for entry in BODY.parameters])
 UPPER = np.array([entry.upper for entry in BODY.parameters])
 
 
-def test_every_performance_is_taken_once_a_smoothing() -> None:
+def test_every_performance_is_used_once_a_smoothing() -> None:
     settings = changed(OversamplingSettings(), {"performances": 3, "smoothings": 4})
     made = oversampled(BODY, POSES, 30.0, settings, np.random.default_rng(1))
     assert len(made) == 12
@@ -60,7 +60,7 @@ def test_without_changes_a_performance_is_the_recording() -> None:
     np.testing.assert_allclose(made, POSES, atol=1e-9)
 
 
-def test_senseless_wishes_are_refused() -> None:
+def test_invalid_settings_are_refused() -> None:
     for name, value in (("performances", 0), ("smoothings", 2.5), ("tempo_change", -0.1)):
         with pytest.raises(SettingsError, match=name):
             changed(OversamplingSettings(), {name: value})

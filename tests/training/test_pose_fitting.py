@@ -13,8 +13,8 @@ from studio.training.targets import Targets, of_poses
 def test_known_poses_are_found_again(name: str) -> None:
     body = load_body(name)
     poses = swinging(body, 30, 30.0)
-    told: list[tuple[str, int, int]] = []
-    found = fit_poses(body, of_poses(body, poses), 30.0, lambda *step: told.append(step))
+    steps: list[tuple[str, int, int]] = []
+    found = fit_poses(body, of_poses(body, poses), 30.0, lambda *step: steps.append(step))
     assert np.sqrt(np.mean(found.rms_mm**2)) < 4.0
     assert not len(bad_frames(found.rms_mm))
     lower = np.array([entry.lower for entry in body.parameters])
@@ -22,8 +22,8 @@ def test_known_poses_are_found_again(name: str) -> None:
     assert np.all((found.poses >= lower) & (found.poses <= upper))
     angles = np.array([entry.kind == "angle" for entry in body.parameters])
     assert np.degrees(np.abs(np.diff(found.poses[:, angles], axis=0)).max()) < 15.0
-    assert told[-1][1] == told[-1][2]
-    assert all(done <= total for _, done, total in told)
+    assert steps[-1][1] == steps[-1][2]
+    assert all(done <= total for _, done, total in steps)
 
 
 def test_an_arm_that_circles_through_its_singular_position_does_not_jump() -> None:

@@ -78,7 +78,7 @@ def test_the_best_stretches_of_each_limb_are_joined() -> None:
     np.testing.assert_allclose(found[35:, 1], truth[35:, 1])
 
 
-def test_a_change_that_costs_more_than_it_mends_is_not_made() -> None:
+def test_a_change_that_costs_more_than_it_gains_is_not_made() -> None:
     low, high = np.zeros((30, 1)), np.ones((30, 1))
 
     def costs(path: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Every kind of source on a body: motion that is known, read back from files and runs."""
+"""Every kind of source on a body: known motion, read back from files and runs."""
 
 import dataclasses
 from pathlib import Path
@@ -38,7 +38,7 @@ def apart(body: BodyModel, one: np.ndarray, other: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("size", [1.0, 1.12])
-def test_points_of_a_person_of_any_size_tell_the_angles(tmp_path: Path, size: float) -> None:
+def test_angles_follow_from_points_of_a_person_of_any_size(tmp_path: Path, size: float) -> None:
     lengths = {name: size * value for name, value in BODY.dimensions.items() if not name.startswith("scale")}
     person = with_dimensions(BODY, lengths)
     poses = swinging(BODY, 161, 120.0)
@@ -54,17 +54,17 @@ def test_a_trc_at_another_rate_in_metres(tmp_path: Path) -> None:
     names = tuple(marker.name for marker in BODY.markers)
     motion = MarkerMotion(names, np.arange(101) / 100.0, marker_points(BODY, poses), unit="m", rate=100.0)
     write_trc(tmp_path / "wave.trc", motion)
-    told: list[tuple[str, int, int]] = []
-    found = read_source(tmp_path / "wave.trc", BODY, fps=20.0, progress=lambda *step: told.append(step))
+    steps: list[tuple[str, int, int]] = []
+    found = read_source(tmp_path / "wave.trc", BODY, fps=20.0, progress=lambda *step: steps.append(step))
     assert found.frame_count == 21
     assert apart(BODY, found.poses, poses[::5]) < 12.0
-    assert told
+    assert steps
 
 
 def write_run(session: Session, body: BodyModel, poses: np.ndarray, frames: range) -> None:
-    """A stored run "told" of a body along poses, at 60 frames a second."""
+    """A stored run "known" of a body along poses, at 60 frames a second."""
     record = msgspec.structs.replace(
-        record_of(session, "told"),
+        record_of(session, "known"),
         body=body.name,
         dimensions=dict(body.dimensions),
         parameters=tuple(entry.name for entry in body.parameters),
@@ -81,25 +81,25 @@ def write_run(session: Session, body: BodyModel, poses: np.ndarray, frames: rang
             )
 
 
-def test_a_run_of_the_same_body_is_taken_as_it_is(session_on_disk: Session) -> None:
+def test_a_run_of_the_same_body_is_used_unchanged(session_on_disk: Session) -> None:
     poses = swinging(BODY, 41, 60.0)
     write_run(session_on_disk, BODY, poses, range(41))
-    found = read_source("toy/told", BODY)
+    found = read_source("toy/known", BODY)
     np.testing.assert_allclose(found.poses, poses[::2], atol=1e-6)
-    assert (found.name, found.rms_mm) == ("toy/told", 0.0)
-    folder = session_on_disk.path / "runs" / "told"
+    assert (found.name, found.rms_mm) == ("toy/known", 0.0)
+    folder = session_on_disk.path / "runs" / "known"
     np.testing.assert_array_equal(read_source(folder, BODY).poses, found.poses)
     assert expand(folder) == (str(folder),)
-    with pytest.raises(StudioError, match=r"'toy' is a session") as told:
+    with pytest.raises(StudioError, match=r"'toy' is a session") as refusal:
         expand(session_on_disk.path)
-    assert "toy/told" in told.value.hint
+    assert "toy/known" in refusal.value.hint
 
 
 def test_a_run_of_another_body_goes_through_its_markers(session_on_disk: Session) -> None:
     other = load_body("human31")
     poses = swinging(other, 31, 60.0)
     write_run(session_on_disk, other, poses, range(31))
-    found = read_source("toy/told", BODY, workspace=Workspace())
+    found = read_source("toy/known", BODY, workspace=Workspace())
     assert found.frame_count == 16
     assert 0.0 < found.rms_mm < 60.0
     theirs = marker_points(other, poses[::2])
@@ -135,17 +135,17 @@ def test_a_folder_is_its_motion_files(tmp_path: Path) -> None:
     (tmp_path / "none").mkdir()
     with pytest.raises(StudioError, match="holds no motion"):
         expand(tmp_path / "none")
-    assert expand("toy/told") == ("toy/told",)
+    assert expand("toy/known") == ("toy/known",)
 
 
-def test_what_cannot_be_read_is_said(tmp_path: Path, session_on_disk: Session) -> None:
+def test_unreadable_sources_are_named(tmp_path: Path, session_on_disk: Session) -> None:
     points = marker_points(BODY, swinging(BODY, 20, 120.0))
     labels = [marker.name for marker in BODY.markers]
     cases = {
         "short.c3d": "5 frames at 30",
         "labels.c3d": r"no points for RHip.*\*0, \*1",
         "broken.c3d": "not a C3D file",
-        "words.txt": "no motion that can be read",
+        "words.txt": "not a motion that can be read",
         "lonely_01.amc": "'lonely.asf', is not there",
         "empty.bvh": "has no MOTION",
     }
@@ -156,9 +156,9 @@ def test_what_cannot_be_read_is_said(tmp_path: Path, session_on_disk: Session) -
     (tmp_path / "lonely_01.amc").write_text("1\n")
     (tmp_path / "empty.bvh").write_text("HIERARCHY\n")
     for name, words in cases.items():
-        with pytest.raises(StudioError, match=words) as told:
+        with pytest.raises(StudioError, match=words) as refusal:
             read_source(tmp_path / name, BODY)
-        assert told.value.hint
+        assert refusal.value.hint
     for name in ("toy/none", "nowhere", "nothing/none", str(tmp_path / "gone.amc")):
         with pytest.raises(StudioError, match=Path(name).name):
             read_source(name, BODY)
@@ -179,7 +179,7 @@ def test_a_dance_clip_on_several_bodies(real_data: Path) -> None:
         assert np.degrees(np.abs(np.diff(found.poses[:, angles], axis=0)).max()) < 75.0
 
 
-def test_a_skeleton_with_unusual_names_is_taken_by_its_joints(tmp_path: Path) -> None:
+def test_a_skeleton_with_unknown_names_is_fitted_by_its_joints(tmp_path: Path) -> None:
     """A BVH as exported from a game character: no finger or toe joints, its own unit."""
     tree = """HIERARCHY
 ROOT mixamorig:Hips

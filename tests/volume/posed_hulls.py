@@ -1,4 +1,5 @@
-"""Hulls made of points in a body's own cones, each limb in a colour of its own: what a perfect reconstruction gives."""
+"""Hulls made of points in a body's own cones, each limb in a colour of its own: the result of a perfect
+reconstruction."""
 
 from collections.abc import Callable
 

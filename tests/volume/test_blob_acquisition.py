@@ -147,5 +147,5 @@ def test_nothing_learnt_is_the_cones(body: BodyModel) -> None:
     model, cones = blobs_of(body, Profiles.none(body), 12.0), cone_blobs(body)
     for name in ("limb", "offset", "eigenvalues", "colour", "weight"):
         np.testing.assert_array_equal(getattr(model, name), getattr(cones, name))
-    taught = learn_blobs(body, [empty_hull()], body.neutral[None])
-    np.testing.assert_array_equal(taught.offset, cones.offset)
+    learnt = learn_blobs(body, [empty_hull()], body.neutral[None])
+    np.testing.assert_array_equal(learnt.offset, cones.offset)

@@ -42,7 +42,7 @@ def apart(fitted: Fitted, model: BlobModel, body: BodyModel, pose: Array) -> Arr
     return np.linalg.norm(fitted.mixture.means - model.mixture(body, pose).means[0], axis=1)
 
 
-def test_the_kernel_finds_the_nearest_blob_and_sums_what_it_holds() -> None:
+def test_the_kernel_finds_the_nearest_blob_and_sums_its_voxels() -> None:
     rng = np.random.default_rng(0)
     voxels = rng.normal(size=(6, 1500)).astype(np.float32)
     factors = rng.normal(size=(7, FACTORS)).astype(np.float32)
@@ -100,7 +100,7 @@ def test_the_likelihood_is_that_of_every_voxel_from_its_own_blob(
     np.testing.assert_array_equal(nearest_blobs(Voxels.of(hull), fitted.mixture), fitted.labels)
 
 
-def test_a_body_like_the_model_is_as_likely_as_the_model_says(body: BodyModel, learnt: BlobModel) -> None:
+def test_a_body_like_the_model_has_the_expected_likelihood(body: BodyModel, learnt: BlobModel) -> None:
     rng = np.random.default_rng(3)
     mixture = learnt.mixture(body, body.neutral).at(0)
     rows = rng.choice(len(mixture.weights), 200_000, p=mixture.weights)
@@ -118,7 +118,7 @@ def test_the_likeliest_start_is_kept(body: BodyModel, pose: Array, hull: Hull, l
     starts = np.stack([near(body, pose, seed, frames=6) for seed in (31, 32)] + [near(body, pose, 2)])
     fitted = fit_blobs(hull, learnt, body, starts)
     assert fitted.start == 2
-    # Each as it is, and moved to the hull.
+    # Each unchanged, and translated to the hull.
     assert len(fitted.log_likelihoods) == 6
     assert fitted.log_likelihood == fitted.log_likelihoods.max()
     alone = fit_blobs(hull, learnt, body, starts[2:])

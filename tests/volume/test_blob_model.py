@@ -1,4 +1,4 @@
-"""Blobs of a body's cones, and what a pose makes of them."""
+"""Blobs of a body's cones, and their mixtures in a pose."""
 
 import numpy as np
 import pytest

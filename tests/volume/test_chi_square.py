@@ -23,7 +23,7 @@ def test_a_polynomial_of_second_order_is_near_them(most: int) -> None:
     assert polynomial.single == pytest.approx(chi2.ppf(0.99, 3))
 
 
-def test_sums_of_background_pixels_stay_below_as_often_as_asked() -> None:
+def test_sums_of_background_pixels_stay_below_at_the_given_rate() -> None:
     rng = np.random.default_rng(0)
     for count in (1, 4, 20):
         sums = (rng.normal(size=(40_000, count, 3)) ** 2).sum(axis=(1, 2))

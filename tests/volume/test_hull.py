@@ -1,4 +1,4 @@
-"""The hull as a value: what it weighs, what lies in it, its pieces."""
+"""The hull as a value: volume weights, containment, pieces."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def test_volume_weights_and_top() -> None:
     assert hull.top() == pytest.approx(62 * UNIT)
 
 
-def test_an_empty_hull_is_nothing_and_breaks_nothing() -> None:
+def test_an_empty_hull_is_handled() -> None:
     hull = hull_of_cells([])
     assert hull.empty
     assert hull.volume() == 0.0

@@ -78,7 +78,7 @@ def test_lying_down_needs_all_three_axes() -> None:
             assert np.abs(frames[one] - frames[other]).max() > 0.5
 
 
-def test_what_is_fixed_to_the_world_stays_there() -> None:
+def test_a_fixed_body_stays_in_place() -> None:
     body = load_body("planar_arm4")
     assert len(root_parameters(body)) == 0
     hull = hull_of(body, body.neutral, spacing=10.0)
@@ -86,6 +86,6 @@ def test_what_is_fixed_to_the_world_stays_there() -> None:
     assert len(root_parameters(load_body("dog"))) == 6
 
 
-def test_an_empty_hull_says_nothing() -> None:
+def test_an_empty_hull_is_refused() -> None:
     with pytest.raises(ValueError, match="empty hull"):
         root_candidates(load_body("human25"), empty_hull(), load_body("human25").neutral)

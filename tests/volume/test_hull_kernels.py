@@ -1,4 +1,4 @@
-"""What pixels and masks say of a voxel: against plain NumPy and Eq. 6 spelt out."""
+"""Classification of voxels by pixels and masks: against plain NumPy and Eq. 6 written out."""
 
 import numpy as np
 import pytest
@@ -89,7 +89,7 @@ def test_many_slightly_odd_samples_are_no_background_and_none_is_foreground() ->
 
 
 @pytest.mark.parametrize("half", [6.0, 25.0, 90.0])
-def test_background_is_taken_for_background_as_often_as_the_confidence_says(half: float) -> None:
+def test_background_is_classified_at_the_given_confidence(half: float) -> None:
     rng = np.random.default_rng(11)
     picture = np.zeros((240, 320, 3), np.uint8)
     answers = []
@@ -100,7 +100,7 @@ def test_background_is_taken_for_background_as_often_as_the_confidence_says(half
     assert np.mean(np.array(answers) == kernels.BACKGROUND) == pytest.approx(0.99, abs=0.012)
 
 
-def test_only_tiles_that_samples_fall_into_are_looked_at() -> None:
+def test_only_tiles_with_samples_are_computed() -> None:
     background, picture = scene()
     place, distances = np.empty(projection.PLACE), np.full(320 * 240, np.nan, np.float32)
     assert projection.place_voxel(CAMERAS, 0, *MIDDLE, 20.0, place)
@@ -110,7 +110,7 @@ def test_only_tiles_that_samples_fall_into_are_looked_at() -> None:
     assert np.isfinite(distances).sum() <= 4 * TILE_WIDTH * TILE_HEIGHT
 
 
-def test_what_lies_partly_outside_the_picture_does_not_carve() -> None:
+def test_voxels_partly_outside_the_picture_are_not_carved() -> None:
     picture, near = np.zeros((240, 320, 3), np.uint8), np.full(320 * 240, 1.0, np.float32)
     edge_of_picture = CAMERA.centre + CAMERA.rotation.T @ np.array([0.0, 0.415, 1.0]) * 3000.0
     assert look(picture, near, 90.0, rules(), edge_of_picture) == kernels.EDGE

@@ -59,7 +59,7 @@ def test_a_man_stands_on_the_floor_and_covers_his_silhouettes(real_data: Path) -
             assert (region & silhouette(hull, camera)).sum() >= 0.9 * region.sum()
 
 
-def test_what_the_clutter_leaves_is_small_and_apart(real_data: Path) -> None:
+def test_pieces_from_clutter_are_small_and_separate(real_data: Path) -> None:
     folder = real_data / "lee-walk"
     cameras = read_calibration(folder / "CALIB").cameras
     hull = reconstruct(frame_of(folder, cameras, 0), cameras, box_of(cameras))

@@ -105,7 +105,7 @@ def test_deeper_hulls_are_tighter(scene: Scene) -> None:
 
 
 @pytest.mark.parametrize("kind", ["masks", "pixels"])
-def test_the_octree_keeps_what_a_full_grid_keeps(scene: Scene, kind: str) -> None:
+def test_the_octree_keeps_the_voxels_of_a_full_grid(scene: Scene, kind: str) -> None:
     """Masks: nothing is lost above the last depth, so the very same voxels. Pixels: samples above it may miss."""
     settings = HullSettings(hull_depth=6)
     reconstructor = Reconstructor(scene.cameras, scene.box, settings)
@@ -162,7 +162,7 @@ def test_any_number_of_threads_finds_the_same(
         np.testing.assert_array_equal(other.view_colours, hulls[0].view_colours)
 
 
-def test_voxels_have_the_colour_of_what_they_show(scene: Scene) -> None:
+def test_voxels_have_the_bodys_colour(scene: Scene) -> None:
     """The body is 150 in every colour before a background of 60: edges are not mixed with it."""
     for evidence in (scene.masks, scene.pixels):
         hull = reconstruct(evidence, scene.cameras, scene.box)
@@ -172,8 +172,8 @@ def test_voxels_have_the_colour_of_what_they_show(scene: Scene) -> None:
         assert (np.abs(hull.colours - 150.0) < 15.0).mean() > 0.97
 
 
-def test_what_a_picture_does_not_show_is_left_to_the_others(scene: Scene) -> None:
-    """A camera whose picture ends at the knees: legs stay; at least as many views as asked for must see a voxel."""
+def test_areas_outside_a_picture_are_left_to_the_other_views(scene: Scene) -> None:
+    """A camera whose picture ends at the knees: legs stay; at least the given number of views must see a voxel."""
     camera, view = scene.cameras[0], scene.masks.views[0]
     knees = int(np.floor(project(camera, np.array([0.0, 0.0, 500.0]))[0][1]))
     short = dataclasses.replace(camera, height=knees)
@@ -198,7 +198,7 @@ def test_nothing_seen_is_an_empty_hull(scene: Scene) -> None:
 
 
 def test_an_empty_room_seen_in_pixels_leaves_next_to_nothing(scene: Scene) -> None:
-    """Each view takes one background area of a hundred for something else; all five hardly ever the same."""
+    """Each view misclassifies one background area of a hundred; all five hardly ever the same."""
     rng = np.random.default_rng(7)
     nothing = [np.zeros_like(view.mask) for view in scene.pixels.views]
     pictures = evidence_of(nothing, scene.cameras, rng).views

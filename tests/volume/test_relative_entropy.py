@@ -31,7 +31,7 @@ def mixture(means: Array, covariances: Array, weights: Array) -> BlobMixture:
 
 
 def printed(mean_f: Array, covariance_f: Array, mean_g: Array, covariance_g: Array) -> float:
-    """Eq. 10 letter by letter."""
+    """Eq. 10 as printed."""
     inverse = np.linalg.inv(covariance_f)
     apart = mean_g - mean_f
     logs = math.log(np.linalg.det(covariance_f) / np.linalg.det(covariance_g))
@@ -92,7 +92,7 @@ def test_of_mixtures_that_do_not_overlap_eq_9_is_the_true_divergence() -> None:
     assert nearest_divergence(model, image) == pytest.approx(kept_divergence(model, image))
 
 
-def test_eq_8_seeks_the_correspondence_that_eq_9_is_given() -> None:
+def test_eq_8_finds_the_correspondence_of_eq_9() -> None:
     rng = np.random.default_rng(8)
     model = mixture(20 * rng.normal(size=(5, 3)), random_covariances(rng, 5), rng.dirichlet(np.ones(5)))
     order = rng.permutation(5)

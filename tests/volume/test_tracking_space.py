@@ -1,4 +1,4 @@
-"""The box that cameras watch, and which points they see."""
+"""The box that cameras see, and the points that they see."""
 
 import dataclasses
 
@@ -10,7 +10,7 @@ from studio.errors import CalibrationError
 from studio.volume.tracking_space import Box, box_of, sees
 
 
-def test_the_box_stands_on_the_floor_around_what_all_cameras_watch() -> None:
+def test_the_box_stands_on_the_floor_in_the_common_view() -> None:
     cameras = ring(5)
     box = box_of(cameras)
     assert box.lower[2] == 0.0
@@ -19,7 +19,7 @@ def test_the_box_stands_on_the_floor_around_what_all_cameras_watch() -> None:
     assert (box.upper[:2] > 500).all()
     middle = np.array([0.0, 0.0, 900.0])
     assert all(sees(camera, middle) for camera in cameras)
-    # Outside the box there is a camera that does not see all of who stands there.
+    # Outside the box some camera does not see a whole person standing there.
     for outside in (
         [box.lower[0] - 150, 0],
         [box.upper[0] + 150, 0],
@@ -30,7 +30,7 @@ def test_the_box_stands_on_the_floor_around_what_all_cameras_watch() -> None:
         assert not all(sees(camera, places).all() for camera in cameras)
 
 
-def test_floor_height_and_margin_are_what_is_given() -> None:
+def test_floor_height_and_margin_are_the_given_ones() -> None:
     plain, other = box_of(ring(4)), box_of(ring(4), floor=-50.0, height=2000.0, margin=100.0)
     assert (other.lower[2], other.upper[2]) == (-50.0, 1950.0)
     assert other.upper[0] - other.lower[0] == pytest.approx(
@@ -54,13 +54,13 @@ def test_a_camera_that_looks_away_does_not_empty_the_space() -> None:
     assert (box.upper[:2] > 0).all()
 
 
-def test_cameras_that_share_nothing_are_refused_with_what_to_do() -> None:
+def test_cameras_without_a_common_view_are_refused_with_a_remedy() -> None:
     one = ring(2)[0]
     turned = np.diag([-1.0, 1.0, -1.0]) @ one.rotation
     other = dataclasses.replace(one, rotation=turned, translation=-turned @ one.centre)
     with pytest.raises(CalibrationError, match="No two cameras"):
         box_of((one, other))
-    with pytest.raises(CalibrationError, match="no camera"):
+    with pytest.raises(CalibrationError, match="at least one camera"):
         box_of(())
 
 

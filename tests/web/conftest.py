@@ -11,7 +11,7 @@ from web_doubles import TOKEN, RecordingControl, RecordingScenes, Studio, let_in
 
 from studio.capture.calibration_files import write_calibration
 from studio.geometry.camera import Camera
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.sessions.importers.importing import import_source
 from studio.sessions.named_rows import write_pose
 from studio.sessions.results_store import ResultsWriter
@@ -91,7 +91,7 @@ def record(rng: np.random.Generator, frame: int, layer: int, size: int, particle
 @pytest.fixture
 def tracked(session: Session) -> StoredRun:
     """A run of 'take1' with two of four frames done, three layers each."""
-    run = prepare_run(session, RunRequest(name="first", seed=3))
+    run = prepare_run(session, name="first", seed=3)
     rng = np.random.default_rng(11)
     size = len(run.record.parameters)
     with ResultsWriter(run.folder) as writer:

@@ -9,9 +9,9 @@ import pytest
 from nudged_camera import NUDGED, make_nudged_session
 from web_doubles import Studio
 
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.operations import cameras
+from studio.runs.new_run import prepare_run
 from studio.sessions.session import CAMERAS_PATH, Session
-from studio.web import alignment_routes
 
 PLACE = "/api/sessions/nudged/alignment"
 
@@ -47,7 +47,7 @@ def calibration_why(studio: Studio) -> str:
 
 def test_cameras_are_measured_turned_and_turned_back(studio: Studio, session: Session) -> None:
     before = (session.path / CAMERAS_PATH).read_bytes()
-    run = prepare_run(session, RunRequest(start_pose=session.body().neutral, last=2, name="old"))
+    run = prepare_run(session, start_pose=session.body().neutral, last=2, name="old")
     told = studio.client.get(PLACE).json()
     assert (told["possible"], told["job"], told["turned"]) == (True, None, False)
     assert studio.client.post(PLACE, json={}).status_code == 202
@@ -88,7 +88,7 @@ def test_measuring_is_cancelled_and_fails_in_words(
             progress("reading silhouettes", 1, 16)
             time.sleep(0.01)
 
-    monkeypatch.setattr(alignment_routes, "align_cameras", waits)
+    monkeypatch.setattr(cameras, "align_cameras", waits)
     assert studio.client.post(PLACE, json={}).status_code == 202
     assert studio.client.post(PLACE, json={}).json()["code"] == "run"
     studio.client.delete(PLACE)

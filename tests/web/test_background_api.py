@@ -10,9 +10,9 @@ import pytest
 from web_doubles import Studio
 
 from studio.errors import FootageError
+from studio.operations import masks
 from studio.runs.background_setup import BackgroundSetup
 from studio.sessions.session import Session
-from studio.web import background_setup_routes
 
 PLACE = "/api/sessions/take1"
 
@@ -61,7 +61,7 @@ def test_progress_cancel_and_a_second_one_at_once(studio: Studio, monkeypatch: p
             progress("finding empty regions", 2, 4)
             time.sleep(0.01)
 
-    monkeypatch.setattr(background_setup_routes, "set_up_background", waits)
+    monkeypatch.setattr(masks, "set_up_background", waits)
     assert studio.client.post(f"{PLACE}/background", json={"source": "median"}).status_code == 202
     assert at_work.wait(20.0)
     job = studio.client.get(f"{PLACE}/background").json()["job"]

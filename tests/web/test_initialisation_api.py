@@ -9,11 +9,11 @@ import pytest
 from web_doubles import Studio
 
 from studio.body.model import BodyModel
-from studio.errors import RunError, WorkCancelledError
+from studio.errors import RunError
+from studio.operations import person
 from studio.runs.initialising import InitialPose
 from studio.runs.search_space import parameter_names
 from studio.sessions.session import Session
-from studio.web import initialisation_routes
 
 Tell = Callable[[str, int, int], None]
 
@@ -60,7 +60,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> dict[str, object]:
         assert isinstance(body, BodyModel)
         return found_in(session, frame, body)
 
-    monkeypatch.setattr(initialisation_routes, "initialise", initialise)
+    monkeypatch.setattr(person, "initialise_session", initialise)
     return asked
 
 
@@ -118,7 +118,7 @@ def test_failure_is_told_in_words(studio: Studio, monkeypatch: pytest.MonkeyPatc
     def fails(*_: object, **__: object) -> InitialPose:
         raise RunError("Nothing is to be seen.", "Choose another frame.")
 
-    monkeypatch.setattr(initialisation_routes, "initialise", fails)
+    monkeypatch.setattr(person, "initialise_session", fails)
     told = studio.client.post("/api/sessions/take1/initialise", json={}).json()
     told = ended(studio, told["identifier"])
     assert (told["state"], told["message"], told["hint"]) == (
@@ -129,14 +129,14 @@ def test_failure_is_told_in_words(studio: Studio, monkeypatch: pytest.MonkeyPatc
 def test_a_search_can_be_cancelled(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
     begun = threading.Event()
 
-    def waits(*_: object, cancelled: Callable[[], bool], **__: object) -> InitialPose:
+    def waits(*_: object, progress: Tell, **__: object) -> InitialPose:
         begun.set()
         deadline = time.monotonic() + 30.0
-        while not cancelled():
-            assert time.monotonic() < deadline
-        raise WorkCancelledError("The search was cancelled.", "Start it again.")
+        while time.monotonic() < deadline:
+            progress("searching", 0, 1)
+        raise AssertionError("it was not stopped")
 
-    monkeypatch.setattr(initialisation_routes, "initialise", waits)
+    monkeypatch.setattr(person, "initialise_session", waits)
     identifier = studio.client.post("/api/sessions/take1/initialise", json={}).json()["identifier"]
     assert begun.wait(30.0)
     assert studio.client.delete(f"/api/initialisations/{identifier}").status_code == 202

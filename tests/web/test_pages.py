@@ -88,6 +88,19 @@ def test_the_guide_has_every_knob_with_its_range(studio: Studio) -> None:
         assert f'id="{anchor}"' in text
 
 
+def test_every_page_that_the_guide_refers_to_is_there(studio: Studio) -> None:
+    seen: dict[str, str] = {}
+    left = ["/guide"]
+    while left:
+        place = left.pop()
+        answer = studio.client.get(place)
+        assert answer.status_code == 200, place
+        seen[place] = answer.text
+        left += set(re.findall(r'href="(/guide(?:/[a-z]+)?)"', answer.text)) - set(seen) - set(left)
+    assert set(seen) == {"/guide", *(f"/guide/{name}" for name in ("python", "verbs", "adding", "figures"))}
+    assert studio.client.get("/guide/nothing").status_code == 404
+
+
 def test_the_guide_links_to_the_page_of_python_examples(studio: Studio) -> None:
     assert 'href="/guide/python"' in studio.client.get("/guide").text
     answer = studio.client.get("/guide/python")

@@ -23,7 +23,7 @@ from studio.comparison.kept_trials import measured_by
 from studio.errors import SettingsError
 from studio.export.formats import FORMATS
 from studio.registry import PlugInError, Registry, UnknownMemberError
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.scene.window_scenes import WindowScenes
 from studio.sessions.workspace import Workspace
 from studio.settings import default_settings
@@ -220,8 +220,7 @@ def test_a_knob_that_means_two_things_is_refused(installed: Path) -> None:
 
 def test_a_run_of_a_tracker_that_is_not_installed_is_named(installed: Path, toy_root: Path) -> None:
     session = Workspace(toy_root).session("toy")
-    request = RunRequest(tracker="random", weighting="inside", last=2, name="own", fit_shape=False)
-    prepare_run(session, request)
+    prepare_run(session, tracker="random", weighting="inside", last=2, name="own", fit_shape=False)
     for about in installed.glob("*.dist-info"):
         (about / "entry_points.txt").write_text("", encoding="utf-8")
     forget()

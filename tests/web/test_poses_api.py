@@ -10,7 +10,7 @@ from web_doubles import Studio
 
 from studio.body.catalogue import load_body
 from studio.body.forward_kinematics import limb_ends
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 
@@ -23,7 +23,7 @@ TOY = "/api/sessions/toy"
 def toy(workspace: Workspace) -> Session:
     """The toy arm in the studio's workspace, with a run."""
     session = make_session(workspace.root / "toy")
-    prepare_run(session, RunRequest(name="one", start_pose=true_poses()[0]))
+    prepare_run(session, name="one", start_pose=true_poses()[0])
     return session
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from web_doubles import Studio
 
-from studio.errors import RunError, WorkCancelledError
+from studio.errors import RunError
+from studio.operations import person
 from studio.runs.subject_fitting import FitRequest, FittedSize, FittedSubject
 from studio.sessions.session import Session
-from studio.web import subject_routes
 
 SESSION = "take1"
 
@@ -40,7 +40,7 @@ def answer(session: Session, request: FitRequest, **_: object) -> FittedSubject:
 def test_a_fit_runs_in_the_background_and_is_kept(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
     name = SESSION
     assert studio.client.put(f"/api/sessions/{name}/subject", json={"height_mm": 1800}).status_code == 200
-    monkeypatch.setattr(subject_routes, "fit_session_subject", answer)
+    monkeypatch.setattr(person, "fit_session_subject", answer)
     begun = studio.client.post(f"/api/sessions/{name}/fit-subject", json={"count": 2})
     assert begun.status_code == 202
     told = ended(studio, begun.json()["identifier"])
@@ -55,16 +55,16 @@ def test_a_failure_and_a_cancellation_are_in_words(studio: Studio, monkeypatch: 
     def fails(*_: object, **__: object) -> FittedSubject:
         raise RunError("Nothing is to be seen.", "Look at the masks.")
 
-    monkeypatch.setattr(subject_routes, "fit_session_subject", fails)
+    monkeypatch.setattr(person, "fit_session_subject", fails)
     begun = studio.client.post(f"/api/sessions/{SESSION}/fit-subject", json={})
     assert ended(studio, begun.json()["identifier"])["message"] == "Nothing is to be seen."
 
-    def waits(*_: object, cancelled: Callable[[], bool], **__: object) -> FittedSubject:
-        while not cancelled():
+    def waits(*_: object, progress: Callable[[str, int, int], None], **__: object) -> FittedSubject:
+        while True:
+            progress("fitting", 0, 1)
             time.sleep(0.01)
-        raise WorkCancelledError("Cancelled.", "Again.")
 
-    monkeypatch.setattr(subject_routes, "fit_session_subject", waits)
+    monkeypatch.setattr(person, "fit_session_subject", waits)
     begun = studio.client.post(f"/api/sessions/{SESSION}/fit-subject", json={})
     identifier = begun.json()["identifier"]
     assert studio.client.delete(f"/api/subject-fits/{identifier}").status_code == 202

@@ -8,7 +8,7 @@ from toy_session import make_session, true_poses
 from tracked_runs import finish
 from web_doubles import Studio
 
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.tracks import Track, read_track, write_track
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
@@ -20,10 +20,9 @@ RUN = "/api/sessions/toy/runs/one"
 def run(studio: Studio, workspace: Workspace) -> StoredRun:
     """A finished run of the toy arm in the studio's workspace."""
     session = make_session(workspace.root / "toy")
-    request = RunRequest(
-        name="one", start_pose=true_poses()[0] + 0.05, changes={"particles": 20, "layers": 3}
+    stored = prepare_run(
+        session, name="one", start_pose=true_poses()[0] + 0.05, knobs={"particles": 20, "layers": 3}
     )
-    stored = prepare_run(session, request)
     finish(session, stored)
     return stored
 

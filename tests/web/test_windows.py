@@ -15,7 +15,7 @@ from web_doubles import TOKEN, RecordingControl, cookie_header, let_in, serving,
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.scene.model import select
 from studio.scene.window_scenes import TooManyScenesError, WindowScenes
 from studio.sessions.session import Session
@@ -37,7 +37,7 @@ def survival_of(number: int) -> float:
 def runs(session: Session) -> list[str]:
     """Ten runs of 'take1' that differ in a knob."""
     for number in range(10):
-        prepare_run(session, RunRequest(name=f"run-{number}", changes={"survival": survival_of(number)}))
+        prepare_run(session, name=f"run-{number}", knobs={"survival": survival_of(number)})
     return [f"run-{number}" for number in range(10)]
 
 

@@ -42,7 +42,7 @@ def scattered(body: BodyModel, count: int, seed: int = 1, frames: float = 3.0) -
 
 
 def blank(evidence: FrameEvidence) -> FrameEvidence:
-    """The same views with nobody in them."""
+    """The same views without a person."""
     views = [dataclasses.replace(view, mask=np.zeros_like(view.mask)) for view in evidence.views]
     return dataclasses.replace(evidence, views=tuple(views))
 
@@ -50,17 +50,17 @@ def blank(evidence: FrameEvidence) -> FrameEvidence:
 def test_the_weight_is_one_over_the_divergence_of_the_mixtures(
     body: BodyModel, evidence: FrameEvidence, weigher: BlobWeigher
 ) -> None:
-    told = weigher.problem(evidence).expecting(body.neutral[None], {})
+    informed = weigher.problem(evidence).expecting(body.neutral[None], {})
     poses = scattered(body, 12)
-    image = blob_mixture(told)
+    image = blob_mixture(informed)
     assert image is not None
-    mixtures = told.model.mixture(body, poses)
+    mixtures = informed.model.mixture(body, poses)
     wanted = np.array([kept_divergence(mixtures.at(n), image) for n in range(12)])
-    np.testing.assert_allclose(np.exp(-told.weigh(poses)), wanted, rtol=1e-9)
-    np.testing.assert_array_equal(told.fitness(poses), told.weigh(poses))
+    np.testing.assert_allclose(np.exp(-informed.weigh(poses)), wanted, rtol=1e-9)
+    np.testing.assert_array_equal(informed.fitness(poses), informed.weigh(poses))
     sharper = BlobWeigher(body, weigher.cameras, dataclasses.replace(SETTINGS, blob_sharpness=3.0))
     again = sharper.problem(evidence).expecting(body.neutral[None], {})
-    np.testing.assert_allclose(again.weigh(poses), 3.0 * told.weigh(poses))
+    np.testing.assert_allclose(again.weigh(poses), 3.0 * informed.weigh(poses))
 
 
 def test_the_true_pose_weighs_most_though_another_was_expected(
@@ -68,35 +68,35 @@ def test_the_true_pose_weighs_most_though_another_was_expected(
 ) -> None:
     problem = weigher.problem(evidence)
     for seed in range(3):
-        told = problem.expecting(scattered(body, 1, seed, frames=1.0), {})
+        informed = problem.expecting(scattered(body, 1, seed, frames=1.0), {})
         poses = np.concatenate([body.neutral[None], scattered(body, 300, seed + 10)])
-        weights = told.weigh(poses)
+        weights = informed.weigh(poses)
         assert weights[0] > np.quantile(weights, 0.99)
 
 
-def test_before_it_is_told_it_expects_the_mean_of_what_it_weighs(
+def test_without_expectations_the_mean_of_the_weighed_poses_is_expected(
     body: BodyModel, evidence: FrameEvidence, weigher: BlobWeigher
 ) -> None:
     problem = weigher.problem(evidence)
     assert isinstance(problem, Expectant)
     assert not isinstance(problem, SelfJudging)
     poses = scattered(body, 9)
-    told = problem.expecting(poses.mean(axis=0)[None], {})
-    assert isinstance(told, SelfJudging)
-    np.testing.assert_array_equal(problem.weigh(poses), told.weigh(poses))
+    informed = problem.expecting(poses.mean(axis=0)[None], {})
+    assert isinstance(informed, SelfJudging)
+    np.testing.assert_array_equal(problem.weigh(poses), informed.weigh(poses))
     assert problem.weigh(np.zeros((0, 25))).shape == (0,)
     assert blob_mixture(problem) is None
 
 
-def test_the_trunk_alone_is_looked_at_first(
+def test_the_first_stage_uses_the_trunk_alone(
     body: BodyModel, evidence: FrameEvidence, weigher: BlobWeigher
 ) -> None:
-    told = weigher.problem(evidence).expecting(body.neutral[None], {})
+    informed = weigher.problem(evidence).expecting(body.neutral[None], {})
     knee = [entry.name for entry in body.parameters].index("left_knee")
     bent = body.neutral.copy()
     bent[knee] += 1.2
     pair = np.stack([body.neutral, bent])
-    trunk, whole = told.weigh(pair, TRUNK_FIRST), told.weigh(pair)
+    trunk, whole = informed.weigh(pair, TRUNK_FIRST), informed.weigh(pair)
     assert trunk[0] == trunk[1]
     assert whole[0] > whole[1]
 
@@ -106,47 +106,47 @@ def test_blobs_are_learnt_for_so_many_frames_then_kept(body: BodyModel, evidence
     memory: dict[str, Array] = {}
     frames = []
     for _ in range(5):
-        told = weigher.problem(evidence).expecting(body.neutral[None], memory)
-        memory = dict(told.remembered(body.neutral))
+        informed = weigher.problem(evidence).expecting(body.neutral[None], memory)
+        memory = dict(informed.remembered(body.neutral))
         frames.append(sorted(memory))
     assert frames == [["blob_frames", "blob_profiles"]] * 2 + [["blobs"]] * 3
-    told = weigher.problem(evidence).expecting(body.neutral[None], memory)
-    assert told.remembered(body.neutral) is told.memory
-    assert np.isfinite(told.model.colour).all()
+    informed = weigher.problem(evidence).expecting(body.neutral[None], memory)
+    assert informed.remembered(body.neutral) is informed.memory
+    assert np.isfinite(informed.model.colour).all()
     cones = weigher.problem(evidence).expecting(body.neutral[None], {})
     assert np.isnan(cones.model.colour).all()
-    assert told.quality > cones.quality
-    # The hull is fatter than the body, and what was learnt knows it.
-    assert told.divergences(body.neutral[None])[0] < 0.5 * cones.divergences(body.neutral[None])[0]
+    assert informed.quality > cones.quality
+    # The hull is fatter than the body, and the learnt blobs are too.
+    assert informed.divergences(body.neutral[None])[0] < 0.5 * cones.divergences(body.neutral[None])[0]
 
 
-def test_what_is_learnt_is_the_same_in_another_process(body: BodyModel, evidence: FrameEvidence) -> None:
+def test_learnt_blobs_are_the_same_in_another_process(body: BodyModel, evidence: FrameEvidence) -> None:
     poses, memories = scattered(body, 5), []
     for _ in range(2):
         memory: dict[str, Array] = {}
         for frame in range(3):
-            # A weigher of its own for every frame: nothing but the memory goes on.
+            # A separate weigher for every frame: only the memory is passed on.
             weigher = BlobWeigher(body, ring_of_cameras(body), SETTINGS)
-            told = weigher.problem(evidence).expecting(poses[frame][None], memory)
-            memory = {name: values.copy() for name, values in told.remembered(poses[frame]).items()}
-        memories.append((memory, told.weigh(poses)))
+            informed = weigher.problem(evidence).expecting(poses[frame][None], memory)
+            memory = {name: values.copy() for name, values in informed.remembered(poses[frame]).items()}
+        memories.append((memory, informed.weigh(poses)))
     for name, values in memories[0][0].items():
         np.testing.assert_array_equal(values, memories[1][0][name])
     np.testing.assert_array_equal(memories[0][1], memories[1][1])
 
 
-def test_nobody_there_is_lost_and_teaches_nothing(
+def test_an_empty_scene_is_lost_and_adds_nothing(
     body: BodyModel, evidence: FrameEvidence, weigher: BlobWeigher
 ) -> None:
     problem = weigher.problem(blank(evidence))
-    told = problem.expecting(body.neutral[None], {})
-    assert told.lost_evidence
-    assert told.quality == -np.inf
-    assert dict(told.remembered(body.neutral)) == {}
-    weights = told.weigh(scattered(body, 4))
+    informed = problem.expecting(body.neutral[None], {})
+    assert informed.lost_evidence
+    assert informed.quality == -np.inf
+    assert dict(informed.remembered(body.neutral)) == {}
+    weights = informed.weigh(scattered(body, 4))
     np.testing.assert_allclose(weights, -np.log(NOTHING_SEEN))
     np.testing.assert_allclose(problem.weigh(scattered(body, 4)), -np.log(NOTHING_SEEN))
-    assert blob_mixture(told) is None
+    assert blob_mixture(informed) is None
     seen = weigher.problem(evidence).expecting(body.neutral[None], {})
     assert not seen.lost_evidence
     assert weights[0] < seen.weigh(scattered(body, 50)).min()
@@ -160,22 +160,22 @@ def test_a_picture_full_of_foreground_is_lost(
         dataclasses.replace(view, mask=np.full_like(view.mask, 255), picture=np.zeros_like(view.picture))
         for view in evidence.views
     ]
-    told = weigher.problem(dataclasses.replace(evidence, views=tuple(black))).expecting(
+    informed = weigher.problem(dataclasses.replace(evidence, views=tuple(black))).expecting(
         body.neutral[None], memory
     )
-    assert told.lost_evidence
-    assert np.isfinite(told.weigh(scattered(body, 4))).all()
-    assert told.remembered(body.neutral) is memory
+    assert informed.lost_evidence
+    assert np.isfinite(informed.weigh(scattered(body, 4))).all()
+    assert informed.remembered(body.neutral) is memory
 
 
 def test_only_so_many_expectations_are_fitted(
     body: BodyModel, evidence: FrameEvidence, weigher: BlobWeigher
 ) -> None:
-    told = weigher.problem(evidence).expecting(scattered(body, 7), {})
-    assert isinstance(told, ExpectedBlobs)
-    assert len(told.starts) == SETTINGS.blob_starts
-    assert told.fitted is not None
-    assert SETTINGS.blob_starts <= len(told.fitted.log_likelihoods) <= 2 * SETTINGS.blob_starts
+    informed = weigher.problem(evidence).expecting(scattered(body, 7), {})
+    assert isinstance(informed, ExpectedBlobs)
+    assert len(informed.starts) == SETTINGS.blob_starts
+    assert informed.fitted is not None
+    assert SETTINGS.blob_starts <= len(informed.fitted.log_likelihoods) <= 2 * SETTINGS.blob_starts
 
 
 @pytest.mark.parametrize("name", ["dog", "human34"])
@@ -183,13 +183,13 @@ def test_every_body_can_be_weighed(name: str) -> None:
     body = load_body(name)
     cameras = ring_of_cameras(body)
     evidence = made_evidence(body, cameras, np.random.default_rng(0))["proximity"]
-    told = BlobWeigher(body, cameras, SETTINGS).problem(evidence).expecting(body.neutral[None], {})
-    assert told.fitted is not None
+    informed = BlobWeigher(body, cameras, SETTINGS).problem(evidence).expecting(body.neutral[None], {})
+    assert informed.fitted is not None
     poses = np.concatenate([body.neutral[None], scattered(body, 200)])
-    weights = told.weigh(poses)
+    weights = informed.weigh(poses)
     assert weights[0] > np.quantile(weights, 0.98)
-    assert len(told.model.limb) == len(kinematic_tables(body).limb_joint)
-    assert limb_frames(body, poses[:1]).shape[1] == len(told.model.limb)
+    assert len(informed.model.limb) == len(kinematic_tables(body).limb_joint)
+    assert limb_frames(body, poses[:1]).shape[1] == len(informed.model.limb)
 
 
 def test_what_does_not_fit_is_refused(body: BodyModel, evidence: FrameEvidence, weigher: BlobWeigher) -> None:

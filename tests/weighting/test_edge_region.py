@@ -31,7 +31,7 @@ NUDGES = 0.02 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
 
 
 def twin(body, cameras, evidence, poses, edge_samples=32, region_samples=48, hidden=None):
-    """Σe and Σr (N, V): every sample projected and read by itself."""
+    """Σe and Σr (N, V): every sample projected and read on its own."""
     along_edge = (np.arange(edge_samples // 2) + 0.5) / (edge_samples // 2)
     along_region = (np.arange(region_samples // 3) + 0.5) / (region_samples // 3)
     edge, region = np.zeros((2, len(poses), len(cameras)))
@@ -106,7 +106,7 @@ def test_the_pose_that_made_the_silhouette_weighs_most(human, ring):
 
 
 def test_leaving_the_pictures_is_never_rewarded(human, ring):
-    """Where the pictures are perfect everywhere, only what is seen of a pose is worth anything."""
+    """Where the pictures match everywhere, only the visible part of a pose gains weight."""
     problem = problem_of(human, ring, plain_evidence(ring, 255, 255))
     assert problem.weigh(human.neutral[None])[0] == 0.0
     rising = np.repeat(human.neutral[None], 40, axis=0)
@@ -141,7 +141,7 @@ def test_behind_a_camera_costs_the_most_in_that_view_alone(human, ring):
     np.testing.assert_array_equal(region[0], [0, 1, 0, 0])
 
 
-def test_any_finite_pose_weighs_a_number(human, ring, smooth):
+def test_any_finite_pose_has_a_finite_weight(human, ring, smooth):
     poses = np.repeat(human.neutral[None], 12, axis=0)
     poses[np.arange(12), np.arange(12)] = 10.0 ** np.arange(0, 300, 25)
     poses[:, 5] *= -(10.0 ** np.arange(12))
@@ -152,7 +152,7 @@ def test_any_finite_pose_weighs_a_number(human, ring, smooth):
         problem_of(human, ring, smooth).weigh(np.full((1, 31), np.nan))
 
 
-def test_a_pose_weighs_the_same_in_any_company_and_on_any_number_of_threads(human, ring, smooth):
+def test_a_weight_depends_neither_on_other_poses_nor_on_threads(human, ring, smooth):
     poses = scattered(human, 2 * 16 * BLOCKS_A_THREAD + 3)
     for occlusion_aware in (False, True):
         problem = problem_of(human, ring, smooth, occlusion_aware=occlusion_aware)

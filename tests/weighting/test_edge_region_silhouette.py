@@ -1,4 +1,4 @@
-"""Three terms together: each is the other weightings' own."""
+"""Three terms together: each equals that of the other weightings."""
 
 import numba
 import numpy as np
@@ -55,7 +55,7 @@ def test_weights_of_the_terms(human, ring, smooth):
 
 
 @pytest.mark.parametrize("aware", [False, True])
-def test_the_first_stage_looks_at_the_trunks_edges_only(human, ring, smooth, aware):
+def test_the_first_stage_uses_the_trunks_edges_only(human, ring, smooth, aware):
     """A pose that differs in the limbs alone has the trunk's edges of the other, unless a limb comes before it."""
     problem = problem_of(human, ring, smooth, occlusion_aware=aware)
     poses = np.stack([human.neutral, human.neutral])
@@ -117,7 +117,7 @@ def test_any_finite_pose_is_a_number_on_any_number_of_threads(human, ring, smoot
         np.testing.assert_array_equal(problem.weigh(poses), weights)
 
 
-def test_what_does_not_fit_is_refused(human, ring, smooth):
+def test_wrong_evidence_is_refused(human, ring, smooth):
     with pytest.raises(BodyError):
         problem_of(human, ring, smooth).weigh(np.full((1, 31), np.nan))
     with pytest.raises(FootageError, match="has views c0, c1, c2"):

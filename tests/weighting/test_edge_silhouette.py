@@ -47,7 +47,7 @@ def edges_by_name(body, stage):
 
 
 def twin(body, cameras, evidence, poses, stage=WHOLE_BODY, samples=16):
-    """(N, V) f_e, sample by sample; limbs are nearer where the kernel's own depth of their middle says so."""
+    """(N, V) f_e, sample by sample; limbs are ordered by the kernel's depth of their middle."""
     projector = EdgeSilhouetteWeigher(body, cameras, EdgeSilhouetteSettings()).projector
     corners, seen = projector.corners(poses)
     blocks = projector.blocks(poses)
@@ -132,7 +132,7 @@ def test_the_upper_edge_is_the_shoulders(human, ring):
         assert view[[first, last], 1].max() < view[:, 1].mean(), "up is towards smaller y in these cameras"
 
 
-def test_the_first_stage_looks_at_the_whole_silhouette(human, ring, smooth):
+def test_the_first_stage_uses_the_whole_silhouette(human, ring, smooth):
     poses = scattered(human, 5)
     problem = problem_of(human, ring, smooth)
     whole, first = problem.terms(poses), problem.terms(poses, TRUNK_FIRST)
@@ -175,7 +175,7 @@ def test_fitness_is_the_sum_of_the_means_and_the_log_weight_its_multiple(human, 
 
 
 def test_leaving_the_pictures_is_never_rewarded(human, ring):
-    """Where the pictures are perfect everywhere, only what is seen of a pose is worth anything."""
+    """Where the pictures match everywhere, only the visible part of a pose gains weight."""
     problem = problem_of(human, ring, plain_evidence(ring, 255, 255))
     rising = np.repeat(human.neutral[None], 40, axis=0)
     rising[:, 5] += np.linspace(0, 20000, 40)
@@ -213,7 +213,7 @@ def test_empty_pictures_and_wild_poses_are_numbers(human, ring, smooth):
         problem_of(human, ring, smooth).fitness(np.full((1, 31), np.nan))
 
 
-def test_a_pose_fits_the_same_in_any_company_and_on_any_number_of_threads(human, ring, smooth):
+def test_a_fitness_depends_neither_on_other_poses_nor_on_threads(human, ring, smooth):
     poses = scattered(human, 2 * 16 * BLOCKS_A_THREAD + 3)
     problem = problem_of(human, ring, smooth)
     numba.set_num_threads(1)

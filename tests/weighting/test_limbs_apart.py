@@ -1,4 +1,4 @@
-"""What a body cannot do, against independent geometry and against what people do."""
+"""Hard priors against independent geometry and real poses."""
 
 import math
 
@@ -107,7 +107,7 @@ def _filled(limb: Limb, frame: np.ndarray, rng: np.random.Generator) -> np.ndarr
     return local @ frame[:, :3].T + frame[:, 3]
 
 
-def test_what_is_refused_does_overlap_and_what_touches_nothing_is_kept() -> None:
+def test_refused_pairs_overlap_and_separate_pairs_are_kept() -> None:
     """Volumes filled with points: a pair below its least share has points in both; one above 1.2 has none."""
     body, rng = _body(), np.random.default_rng(5)
     poses, pairs = _around(body, 200, 0.5, 6), limb_pairs(body)
@@ -154,7 +154,7 @@ def test_collar_bones_that_begin_at_one_point_are_not_compared() -> None:
     assert frozenset(("left forearm", "thorax")) in compared
 
 
-def test_a_pose_keeps_its_verdict_whatever_it_is_judged_with() -> None:
+def test_a_verdict_does_not_depend_on_other_poses() -> None:
     body = _body()
     priors, poses = HardPriors(body), _around(body, 333, 0.25, 8)
     together = priors.hold(poses, limbs_apart=True)
@@ -173,7 +173,7 @@ def _folded(body: BodyModel) -> np.ndarray:
     return pose
 
 
-def test_limits_count_both_ends_and_limbs_only_when_asked() -> None:
+def test_limits_are_inclusive_and_limbs_compared_only_on_request() -> None:
     body = _body()
     priors = HardPriors(body)
     poses = np.repeat(body.neutral[None], 4, axis=0)

@@ -19,7 +19,7 @@ from studio.weighting.outlines import BLOCKS_A_THREAD, OutlineProjector
 
 
 @pytest.mark.parametrize("name", list_bodies())
-def test_every_body_projects_as_its_kinematics_say(name, ring):
+def test_every_body_projects_as_in_its_kinematics(name, ring):
     body = load_body(name)
     middle = limb_ends(body, body.neutral[None]).reshape(-1, 3).mean(axis=0)
     cameras = tuple(
@@ -91,7 +91,7 @@ def chain(steps, joints, pose):
     return world[:3]
 
 
-def test_a_pose_has_the_same_outlines_in_any_company_and_on_any_number_of_threads(human, ring):
+def test_outlines_depend_neither_on_other_poses_nor_on_threads(human, ring):
     projector = OutlineProjector.of_body(human, ring)
     poses = scattered(human, 2 * 16 * BLOCKS_A_THREAD + 3)
     numba.set_num_threads(1)
@@ -133,7 +133,7 @@ def test_distortion_that_folds_back_draws_nothing_into_the_picture(human):
     pose[z] += 1500.0
     naive, depth = true_corners(human, folding, pose[None])
     inside = (naive[0, head] > 0).all() and (naive[0, head] < 640).all()
-    assert inside, "the trap is set"
+    assert inside, "some points fold back"
     assert (depth[0, head] > 0).all()
     _, seen = OutlineProjector.of_body(human, (folding,)).corners(pose[None])
     assert seen[0, 0, head] == -1

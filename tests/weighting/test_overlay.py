@@ -1,4 +1,4 @@
-"""What is drawn is what the kernels read."""
+"""The overlay shows the samples that the kernels read."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Hard priors against what people do, which is never refused, and against what nobody can."""
+"""Hard priors: real poses are never refused, impossible ones are."""
 
 from pathlib import Path
 

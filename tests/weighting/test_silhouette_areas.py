@@ -151,7 +151,7 @@ def test_the_bidirectional_silhouette_in_closed_form():
     assert silhouette_fitness(projector, pose, extra) == pytest.approx(0.5 + 0.5 * area / extra.sum())
 
 
-def test_nothing_over_nothing_is_nothing():
+def test_zero_over_zero_is_zero():
     body, projector, drawn = facing_arm()
     pose = body.neutral[None]
     assert silhouette_fitness(projector, pose, np.zeros_like(drawn)) == 0.0
@@ -163,8 +163,8 @@ def test_nothing_over_nothing_is_nothing():
 
 
 @pytest.mark.parametrize("resolution", [FULL, HALF])
-def test_cutting_the_picture_beside_what_does_not_match_gains_nothing(resolution):
-    """The right half shows no silhouette; whether the picture ends there must not matter to what is drawn there."""
+def test_cutting_off_a_mismatch_gains_nothing(resolution):
+    """The right half shows no silhouette; whether the picture ends there must not change the fitness."""
     _, wide, drawn = facing_arm((320, 240))
     body = load_body("planar_arm4")
     poses = np.concatenate([body.neutral[None], scattered(body, 40, spread=20.0)])
@@ -185,7 +185,7 @@ def test_cutting_the_picture_beside_what_does_not_match_gains_nothing(resolution
     assert np.median(whole - short) < 0.02
 
 
-def test_areas_do_not_depend_on_company_or_threads():
+def test_areas_depend_neither_on_other_poses_nor_on_threads():
     body, cameras = load_body("human31"), four_cameras()
     silhouettes = Silhouettes(with_masks(speckled(cameras)), HALF)
     projector = OutlineProjector.of_body(body, cameras)

@@ -83,7 +83,7 @@ def test_the_pose_that_made_the_silhouette_weighs_one():
 
 
 def test_both_directions_count():
-    """What is drawn and not seen costs as much as what is seen and not drawn (unlike Eq. 15)."""
+    """Pixels drawn and not seen cost as much as pixels seen and not drawn (unlike Eq. 15)."""
     body, camera, weigher, mask = facing_arm()
     half = mask.copy()
     half[:, : int(np.flatnonzero(mask.any(axis=0)).mean())] = 0
@@ -107,7 +107,7 @@ def test_a_body_behind_the_camera_is_not_drawn():
     assert problem.weigh(body.neutral[None])[0] == pytest.approx(-(mask > 0).mean())
 
 
-def test_any_finite_pose_weighs_a_number_on_any_number_of_threads():
+def test_any_finite_pose_has_a_finite_weight_on_any_number_of_threads():
     human = load_body("human31")
     middle = limb_ends(human, human.neutral[None]).reshape(-1, 3).mean(axis=0)
     camera = looking_at("c", middle + np.array([1200.0, 0.0, 100.0]), middle, (160, 120), 150.0)

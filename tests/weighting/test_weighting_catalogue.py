@@ -1,4 +1,4 @@
-"""The catalogue: what every weighting must keep."""
+"""The contract of every weighting in the catalogue."""
 
 import dataclasses
 

@@ -37,8 +37,8 @@ def four_cameras() -> tuple[Camera, ...]:
 
 
 def smooth_evidence(cameras: tuple[Camera, ...], seed: int = 0) -> FrameEvidence:
-    """Maps that vary slowly over the picture, so that a sample's value says where it lies but rounding a
-    position to the next pixel changes little."""
+    """Maps that vary slowly over the picture, so that a sample's value identifies its position but rounding
+    to the next pixel changes little."""
     rng = np.random.default_rng(seed)
     views = []
     for camera in cameras:

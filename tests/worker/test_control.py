@@ -19,7 +19,7 @@ from toy_session import make_session, true_poses
 from waiting import until
 
 from studio.errors import RunError, SettingsError
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 from studio.sessions.workspace import Workspace
@@ -42,8 +42,7 @@ def control(session_on_disk: Session) -> Iterator[StudioControl]:
 
 def new_run(session: Session, name: str, last: int = 8, **changed: object) -> StoredRun:
     changes = {"particles": 100, "layers": 10, "start_repeats": 1} | changed
-    request = RunRequest(name=name, seed=11, start_pose=true_poses()[0], last=last, changes=changes)
-    return prepare_run(session, request)
+    return prepare_run(session, name=name, seed=11, start_pose=true_poses()[0], last=last, knobs=changes)
 
 
 def wait_for(watching: Subscription, wanted: Callable[[Event], bool]) -> Event:
@@ -178,7 +177,7 @@ def test_what_a_restarted_process_left_unanswered_is_refused(control: StudioCont
     refused = ThreadPoolExecutor(1).submit(control.request, commands.Pause())
     until(lambda: control._answers)
     control.restart()
-    with pytest.raises(RunError, match="died before it answered"):
+    with pytest.raises(RunError, match="died"):
         refused.result(PATIENCE)
     with pytest.raises(RunError, match="No run is open"):
         control.request(commands.Pause())

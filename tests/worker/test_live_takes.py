@@ -3,6 +3,7 @@
 import json
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,6 @@ from studio.capture.timestamps import read_timestamps
 from studio.errors import FootageError
 from studio.runs.live_replay import prepare_replay
 from studio.runs.live_summary import summary_of
-from studio.runs.new_run import RunRequest
 from studio.runs.problem_source import ProblemSource
 from studio.runs.take_following import TakeFollower
 from studio.sessions.recordings import import_recording
@@ -26,12 +26,12 @@ from studio.worker.camera_tracking import TakeWish, open_take, track_cameras
 from studio.worker.live_tracking import replay_live
 from studio.worker.stream_recording import StreamRecording
 
-QUICK = RunRequest(
+QUICK: dict[str, Any] = dict(
     tracker="annealed",
     weighting="edge-region",
     live=True,
     seed=3,
-    changes={"particles": 30, "layers": 3, "recovery": "off"},
+    knobs={"particles": 30, "layers": 3, "recovery": "off"},
 )
 FRAMES = 50
 PATIENCE = 60.0

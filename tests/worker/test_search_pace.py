@@ -7,7 +7,7 @@ import pytest
 from toy_session import true_poses
 
 from studio.errors import SettingsError
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.runs.pace import Pace
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -58,8 +58,7 @@ class Afternoon:
 
 def new_run(session: Session, name: str) -> StoredRun:
     changes = {"particles": 30, "layers": LAYERS, "start_repeats": 1}
-    request = RunRequest(name=name, seed=5, start_pose=true_poses()[0], last=FRAMES, changes=changes)
-    return prepare_run(session, request)
+    return prepare_run(session, name=name, seed=5, start_pose=true_poses()[0], last=FRAMES, knobs=changes)
 
 
 def opening(run: StoredRun) -> commands.Open:

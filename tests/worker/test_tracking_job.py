@@ -10,7 +10,7 @@ import pytest
 from full_disk import ROLLED_BACK, break_at
 from toy_session import make_session, true_poses
 
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.sessions.run_log import read_log
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
@@ -32,8 +32,7 @@ LAYERS = 3
 
 def new_run(session: Session, name: str) -> StoredRun:
     changes = {"particles": 30, "layers": LAYERS, "start_repeats": 1}
-    request = RunRequest(name=name, seed=5, start_pose=true_poses()[0], last=4, changes=changes)
-    return prepare_run(session, request)
+    return prepare_run(session, name=name, seed=5, start_pose=true_poses()[0], last=4, knobs=changes)
 
 
 class Desk:

@@ -1,8 +1,8 @@
 """Section 7.1: how many clusters the dance has and how many states the automaton, for several memories and ε.
 
 The paper finds 122 clusters in both exercises (about 1400 frames performed three times), 5 in an "arms pointing"
-sequence, and 948 and 2890 states with memories of 10 and 30. Its ε is not printed. Entropies (Eq. 2) of the training
-and of other performances are what memory and ε are chosen by (section 4.2).
+sequence, and 948 and 2890 states with memories of 10 and 30. Its ε is not printed. Memory and ε are chosen by the
+entropies (Eq. 2) of the training and of other performances (section 4.2).
 """
 
 import dataclasses
@@ -41,10 +41,10 @@ MEMORIES = (0, 1, 2, 5, 10, 20, 30)
 EPSILONS = (0.05, 0.5, 2.0)
 SHOWN_EPSILON = EPSILONS[0]
 MOST_SEEDS = 5
-"""Each learns anew from other performances; what the models track with is the first one's."""
+"""Seeds: each relearns from other performances; tracking uses the first one's models."""
 DANCE, OVERSAMPLED = "dance", "pointing, oversampled"
 FEW_SEEDS = 2
-"""Of pointing oversampled as the dance is, which is no figure of the paper's."""
+"""Settings of pointing oversampled as the dance, which is not in the paper."""
 SETS = TRAIN, TEST_SET, NEVER = "training", "test performances", "clip never learnt"
 
 
@@ -70,8 +70,8 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
 @kept_as("caillette.clusters_and_states.measure")
 def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
     """Clusters; of the dance states and entropies (nats a frame) for every memory and ε."""
-    wanted = Training.of_plain(arguments["training"])
-    lesson = learnt(shelf, wanted)
+    trained_on = Training.of_plain(arguments["training"])
+    lesson = learnt(shelf, trained_on)
     model = lesson.model
     found: dict[str, Any] = {
         "clusters": model.clusters,
@@ -81,10 +81,10 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
     }
     if arguments["kind"] != DANCE:
         return found
-    body = load_body(wanted.body)
-    tests = (TEST, TEST_2)[: len(wanted.sources)]
+    body = load_body(trained_on.body)
+    tests = (TEST, TEST_2)[: len(trained_on.sources)]
     poses = {
-        TRAIN: [recorded(shelf, name, body).poses for name in wanted.sources],
+        TRAIN: [recorded(shelf, name, body).poses for name in trained_on.sources],
         TEST_SET: [recorded(shelf, name, body).poses for name in tests],
         NEVER: [recorded(shelf, UNSEEN, body).poses],
     }
@@ -93,7 +93,7 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
     cells = []
     for epsilon in EPSILONS:
         for memory in MEMORIES:
-            settings = dataclasses.replace(wanted, memory=memory, epsilon=epsilon).settings()
+            settings = dataclasses.replace(trained_on, memory=memory, epsilon=epsilon).settings()
             other = model.with_automaton(settings)
             entropies = {name: other.automaton.entropy(own) for name, own in labels.items()}
             entropies[TRAIN] = other.making.entropy_train
@@ -112,7 +112,7 @@ def _inside(model: BehaviourModel, recordings: Sequence[Array]) -> float:
 
 
 def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    """Numbers beside the paper's; what memory and ε do to the entropies."""
+    """Numbers beside the paper's; effect of memory and ε on the entropies."""
     dance, pointing, many = (
         [outcome.measured for outcome in outcomes if outcome.trial.arguments["kind"] == kind]
         for kind in (DANCE, POINTING, OVERSAMPLED)
@@ -175,11 +175,11 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         }
         title = f"Entropy, {name} (nats a frame)"
         yield heat_chart(title, axis, "ε", map(str, MEMORIES), heat, digits=3)
-    taught = Training.of_plain(outcomes[0].trial.arguments["training"])
+    trained_on = Training.of_plain(outcomes[0].trial.arguments["training"])
     yield {
-        "training": training_words(len(taught.sources) == 1),
+        "training": training_words(len(trained_on.sources) == 1),
         "ε": SHOWN_EPSILON,
-        "dimensions the clusters are found in": taught.settings().reduced_dimensions,
+        "dimensions the clusters are found in": trained_on.settings().reduced_dimensions,
     }
 
 

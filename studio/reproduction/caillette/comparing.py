@@ -1,9 +1,9 @@
-"""What runs on the dance say beside each other: ratios, losses, curves over frames, tables.
+"""Comparison of runs on the dance: ratios, losses, curves over frames, tables.
 
 The paper's measure is the RMS joint angle error. Joints of two angles each are singular where a limb points along the
 first axis (an arm held out to the side, which dancers do): the first angle then turns nothing, and is off by 50 degrees
-for every tracker alike. So trackers are judged by the angle between a limb and its true direction, which no spelling of
-the joints changes; joint angles stand beside it.
+for every tracker alike. So trackers are judged by the angle between a limb and its true direction, which does not
+depend on the angles' branch; joint angles are reported too.
 """
 
 import dataclasses
@@ -27,7 +27,7 @@ Groups = Mapping[str, Runs]
 Error = Callable[[Followed], float]
 
 OFF_MM = 150.0
-"""RMS over the markers: the body is no longer on the person."""
+"""RMS over the markers, mm, above which the body is lost."""
 
 angle: Error = attrgetter("angle_rms")
 limb: Error = attrgetter("limb_rms")
@@ -40,16 +40,16 @@ MEASURES: Mapping[str, tuple[str, str]] = {
     ANGLE: ("angle_deg", "RMS joint angle error (°)"),
     POSITION: ("position_mm", "RMS joint position error (mm)"),
 }
-"""Words to a field of `Followed` and an axis."""
+"""Names to a field of `Followed` and an axis."""
 
 
 def by_contender(outcomes: Iterable[Outcome]) -> dict[str, list[Followed]]:
-    """What was measured, by contender in the order of the trials, seeds in order."""
+    """The measurements by contender in the order of the trials, seeds in order."""
     return grouped(outcomes, Followed)
 
 
 def beginning(run: Followed, frames: int) -> Followed:
-    """The run as if it had ended after so many frames; `mean_mm` stays that of the whole."""
+    """The run cut off after `frames` frames; `mean_mm` stays that of the whole."""
     parts = {
         name: getattr(run, name)[:frames] for name in ("angle_deg", "limb_deg", "position_mm", "lost", "free")
     }
@@ -57,7 +57,7 @@ def beginning(run: Followed, frames: int) -> Followed:
 
 
 def longest_loss(run: Followed) -> float:
-    """Seconds that a run was off by more than OFF_MM at a stretch, the longest such stretch."""
+    """Longest uninterrupted time that a run was off by more than OFF_MM, s."""
     longest = now = 0
     for error in run.position_mm:
         now = now + 1 if error > OFF_MM else 0
@@ -76,7 +76,7 @@ def ratio(name: str, ours: Runs, theirs: Runs, claim: str = "", of: Error = limb
 
 
 def errors(what: str, groups: Groups, of: Error = limb, unit: str = "°") -> Iterable[Number]:
-    """The mean over seeds of each contender's error; the paper prints curves and no figures."""
+    """The mean over seeds of each contender's error; the paper has curves but no figures."""
     return (number(f"{what}: {name}", map(of, runs), unit) for name, runs in groups.items())
 
 

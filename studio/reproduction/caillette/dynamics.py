@@ -1,16 +1,16 @@
-"""Trackers on the dance beside each other, with and without a model of it: Figs. 11 and 12, and beyond the paper.
+"""Comparison of trackers on the dance, with and without a behaviour model: Figs. 11 and 12, and beyond the paper.
 
-Fig. 11: blobs are fitted from where the tracker itself expects the body. Condensation and annealing expect it where it
-was; with 5000 evaluations a frame both "quickly loose track", while 1000 guided particles with a memory of 20 frames
+Fig. 11: blobs are fitted from the tracker's expected poses. Condensation and annealing expect the last pose;
+with 5000 evaluations a frame both "quickly loose track", while 1000 guided particles with a memory of 20 frames
 keep it (section 7.3). A run counts as having lost track when its RMS joint position error stays above 150 mm for a
 second; the paper prints no threshold.
 
-Fig. 12: the dynamics alone. Every tracker weighs with blobs fitted from the true pose, so that only where the particles
-are sent differs. On the two exercises that the model was learnt from (other performances of them, another person) and,
-beyond the paper, on a clip that it was not: there with as many evaluations as the annealed filter has.
+Fig. 12: the dynamics alone. Every tracker weighs with blobs fitted from the true pose, so that only the
+particles' prediction differs. On the two exercises of the training (other performances, another person) and, beyond the
+paper, on a clip that was not in it: there with as many evaluations as the annealed filter.
 
-Which tracker a user should take: the paper compares dynamics with its own weighting alone. Its blobs stand beside
-edges, region and silhouette, and its prediction beside noise, in its own tracker and as the first layer of the
+Which tracker a user should take: the paper compares dynamics with its own weighting alone. Here its blobs are compared
+with edges, region and silhouette, and its prediction with noise, in its own tracker and as the first layer of the
 annealed filter, tracking as a run does, at equal evaluations.
 """
 
@@ -53,7 +53,7 @@ from studio.reproduction.caillette.setting import (
     UNSEEN,
     guided,
     last_frame,
-    taught_with,
+    training_with,
     training_words,
 )
 from studio.reproduction.claims import EQUAL, LOWER, share
@@ -78,10 +78,10 @@ def _trials(
     seeds: int | None = None,
     **wanted: Any,  # noqa: ANN401 - other fields of `Follow`
 ) -> Callable[[Scale], tuple[Trial, ...]]:
-    """Every contender on every footage with every seed. clips : footage by the words behind a contender's name."""
+    """Every contender on every footage with every seed. clips : footage by the suffix of a contender's name."""
 
     def trials(scale: Scale) -> tuple[Trial, ...]:
-        taught = taught_with(MEMORY, scale.quick)
+        model_training = training_with(MEMORY, scale.quick)
         return tuple(
             follow_trial(
                 one,
@@ -89,7 +89,7 @@ def _trials(
                 footage,
                 seed,
                 last_frame(footage, scale.quick, frames),
-                training=taught if _is_guided(one) else None,
+                training=model_training if _is_guided(one) else None,
                 **wanted,
             )
             for words, footage in clips.items()
@@ -101,7 +101,7 @@ def _trials(
 
 
 def _settings(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    """The model's memory, and what it was learnt from in words."""
+    """The model's memory, and its training as text."""
     named = [outcome.trial.arguments["training"] for outcome in outcomes]
     quick = any(entry and len(entry["sources"]) == 1 for entry in named)
     return {"memory": MEMORY, "training": training_words(quick)}
@@ -130,7 +130,7 @@ def _fig_11(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield from errors("longest time off", groups, longest_loss, "s")
     yield (
         f"To have lost track: off by more than {OFF_MM:.0f} mm RMS for a second at a stretch. The paper's automatic "
-        "recovery by starting the automaton anew is not in these runs."
+        "recovery by restarting the automaton is not in these runs."
     )
     yield summary_table("Blobs fitted from the tracker's own expectations", groups)
     yield curves("RMS joint position error over the first exercise", groups, POSITION)

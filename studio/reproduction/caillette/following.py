@@ -1,4 +1,4 @@
-"""A tracker on the dance, with or without a behaviour model: the trial that most of these experiments are made of."""
+"""A tracker on the dance, with or without a behaviour model: the trial of most of these experiments."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -27,7 +27,7 @@ from studio.weighting.problem import Expectant, FrameProblem
 
 Array = NDArray[np.float64]
 
-# The frames that trials weigh, prepared once for all trials of a process that look at the same ones.
+# The frames that trials weigh, prepared once for all trials of a process that use the same ones.
 # Two ways: as in a run, where blobs are fitted from where the tracker expects the body; and with blobs that are
 # fitted from the true pose in every frame, learnt from true poses too (section 7.3: "initialised from the annotated
 # ground-truth pose", so that trackers are compared by their dynamics alone).
@@ -35,21 +35,21 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """A frame that has been told where the body is, and is not told again by those who search it."""
+    """A frame with given expected poses, which a search does not change."""
 
-    told: FrameProblem
+    informed: FrameProblem
 
     def weigh(self, poses: Array, stage: int = 0) -> Array:
         """(N, D) poses to (N,) log-weights."""
-        return self.told.weigh(poses, stage)
+        return self.informed.weigh(poses, stage)
 
     def fitness(self, poses: Array, stage: int = 0) -> Array:
-        """(N, D) poses to (N,) what a swarm maximises."""
-        return self.told.fitness(poses, stage)
+        """(N, D) poses to (N,) the fitness that a swarm maximises."""
+        return self.informed.fitness(poses, stage)
 
     def feasible(self, poses: Array, limbs_apart: bool = False) -> NDArray[np.bool_]:
-        """(N, D) poses to (N,) whether the body can take them."""
-        return self.told.feasible(poses, limbs_apart)
+        """(N, D) poses to (N,) whether they are possible for the body."""
+        return self.informed.feasible(poses, limbs_apart)
 
 
 def problems(
@@ -75,12 +75,12 @@ def problems(
 def known_problems(
     shelf: FootageShelf, session: Session, settings: RunSettings, true_poses: Array
 ) -> Callable[[int], FrameProblem]:
-    """Frame number to problem, each told the true pose (F, D) and nothing else. Raises SettingsError for a weighting
-    that needs no telling.
+    """Frame number to problem, each given the true pose (F, D) as the expected one. Raises SettingsError for a
+    weighting that does not use expected poses.
     """
     last = len(true_poses)
 
-    def told() -> Sequence[FrameProblem]:
+    def informed() -> Sequence[FrameProblem]:
         memory: Mapping[str, Array] = {}
         found = []
         of_frame = problems(shelf, session, settings, last)
@@ -88,7 +88,8 @@ def known_problems(
             problem = of_frame(frame)
             if not isinstance(problem, Expectant):
                 raise SettingsError(
-                    f"Weighting '{settings.weighting_name}' expects nothing.", "Take one that fits blobs."
+                    f"Weighting '{settings.weighting_name}' uses no expected poses.",
+                    "Take one that fits blobs.",
                 )
             expecting = problem.expecting(pose[None], memory)
             memory = cast("Expectant", expecting).remembered(pose)
@@ -96,7 +97,7 @@ def known_problems(
         return found
 
     key = ("known", session.path, settings.weighting, settings.evidence, last)
-    kept = shelf.prepared(key, told)
+    kept = shelf.prepared(key, informed)
     return lambda frame: kept[frame]
 
 
@@ -105,8 +106,8 @@ class Follow:
     """One run: all that its poses depend on, plain values.
 
     footage : a recipe's name. last : frames from the first, which begins at the true pose. changes : knobs by flat
-    name. from_truth : blobs are fitted from the true pose in every frame. training : what the behaviour model is
-    learnt from, None for none.
+    name. from_truth : blobs are fitted from the true pose in every frame. training : of the behaviour
+    model, None without one.
     """
 
     footage: str
@@ -124,7 +125,7 @@ class Follow:
 
     @classmethod
     def of_plain(cls, arguments: Mapping[str, Any]) -> "Follow":
-        """From a trial's arguments, as they come back from JSON."""
+        """From a trial's arguments, as read from JSON."""
         training = arguments.get("training")
         return cls(**{**arguments, "training": Training.of_plain(training) if training else None})
 
@@ -135,7 +136,7 @@ class Follow:
 
 @dataclass(frozen=True, slots=True)
 class Followed:
-    """What a run reached. Of each frame: angle_deg, limb_deg, position_mm : RMS over joint angles, limbs' directions
+    """The errors of a run. Of each frame: angle_deg, limb_deg, position_mm : RMS over joint angles, limbs' directions
     and markers; lost : a marker is off by more than 150 mm; free : share of the particles that no model moved, empty
     where none guides them. mean_mm : mean marker error. evaluations : of a frame. milliseconds : of a frame's search.
     """
@@ -172,7 +173,7 @@ class Followed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Way:
-    """The poses (F, D) of a run, and what the frames told. model : what it knew at its end, if anything."""
+    """The poses (F, D) of a run, and its frames' records. model : the behaviour model at its end, if any."""
 
     poses: Array
     free: list[float]
@@ -187,11 +188,11 @@ def follow_trial(
     footage: str,
     seed: int,
     last: int,
-    **wanted: Any,  # noqa: ANN401
+    **fields: Any,  # noqa: ANN401
 ) -> Trial:
-    """The trial of a contender. group : contender and setting in words. wanted : other fields of `Follow`."""
-    changes = {**contender.changes, **wanted.pop("changes", {})}
-    follow = Follow(footage, contender.tracker, contender.weighting, seed, last, changes, **wanted)
+    """The trial of a contender. group : contender and setting as text. fields : other fields of `Follow`."""
+    changes = {**contender.changes, **fields.pop("changes", {})}
+    follow = Follow(footage, contender.tracker, contender.weighting, seed, last, changes, **fields)
     return Trial(f"{group}, seed {seed}", follow.plain())
 
 
@@ -208,7 +209,7 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
 def way_of(
     shelf: FootageShelf, session: Session, truth: TrueMotion, wanted: Follow, model: BehaviourModel | None
 ) -> Way:
-    """Track the footage from the true pose of its first frame."""
+    """The run that tracks the footage from the true pose of its first frame."""
     settings, body, fps = wanted.settings(), session.body(), session.manifest.fps
     problem_of = problems(shelf, session, settings, wanted.last)
     if wanted.from_truth:
@@ -237,7 +238,7 @@ def way_of(
 
 
 def followed(session: Session, truth: TrueMotion, way: Way) -> Followed:
-    """The errors of a way."""
+    """The errors of a run."""
     body = session.body()
     found = joint_errors(body, feature_space(body, session.manifest.fps).columns, way.poses, truth)
     return Followed(

@@ -1,13 +1,12 @@
-"""What a model that knows more is good for: Fig. 13, and online learning beyond the paper.
+"""Benefit of a model with more knowledge: Fig. 13, and online learning beyond the paper.
 
-Fig. 13: how long the model should remember, 200 particles. A memory of one frame (a first-order Markov model) wastes
-particles on the wrong clusters, says the paper; longer ones are more accurate. Beside the tracker's error stands what
-the automaton itself tells of the test performance: its entropy (Eq. 2), which is what a longer memory can better at
-all.
+Fig. 13: length of the model's memory, 200 particles. In the paper a memory of one frame (a first-order Markov model)
+wastes particles on the wrong clusters; longer ones are more accurate. Besides the tracker's error the automaton's
+entropy (Eq. 2) of the test performance is shown, the only quantity that a longer memory can improve.
 
-Online learning, the paper's second future work: a run adds to its model what it tracked well, and a second pass over
-the same clip, never learnt before, is compared with the first. The tracker is the guided one with 1000 particles and a
-model-free share, without which nothing new would be tracked that could be learnt. Blobs are fitted from the true pose,
+Online learning, the paper's second future work: a run adds its well tracked frames to its model, and a second pass over
+the same clip, not in the training, is compared with the first. The tracker is the guided one with 1000 particles and a
+model-free share, without which no new motion would be tracked and learnt. Blobs are fitted from the true pose,
 so that only the dynamics differ between the passes.
 """
 
@@ -45,7 +44,7 @@ from studio.reproduction.caillette.setting import (
     UNSEEN,
     guided,
     last_frame,
-    taught_with,
+    training_with,
     training_words,
 )
 from studio.reproduction.caillette.training_set import Training, learnt, recorded
@@ -55,7 +54,7 @@ from studio.reproduction.drawing import line_chart, seed_range
 from studio.reproduction.experiment import Experiment, Part, each_seed
 
 
-def _taught(outcomes: Sequence[Outcome]) -> str:
+def _training_of(outcomes: Sequence[Outcome]) -> str:
     return training_words(len(outcomes[0].trial.arguments["training"]["sources"]) == 1)
 
 
@@ -64,7 +63,7 @@ def _taught(outcomes: Sequence[Outcome]) -> str:
 MEMORIES = (1, 2, 5, 10, 20, 30)
 FEW = guided(200)
 FRAMES = 200
-"""Before the pirouettes, in which every tracker is lost whatever its model remembers."""
+"""Frames before the pirouettes, in which every tracker is lost with any memory."""
 
 
 def _group(memory: int) -> str:
@@ -72,11 +71,11 @@ def _group(memory: int) -> str:
 
 
 def _memory_trials(scale: Scale) -> tuple[Trial, ...]:
-    """Every memory with every seed, and what each automaton says of the test performance."""
+    """Every memory with every seed, and each automaton's entropy of the test performance."""
     last = last_frame(TEST, scale.quick, FRAMES)
     found = []
     for memory in MEMORIES:
-        model, name = taught_with(memory, scale.quick), _group(memory)
+        model, name = training_with(memory, scale.quick), _group(memory)
         found += [
             follow_trial(FEW, name, TEST, seed, last, from_truth=True, training=model) for seed in scale.seeds
         ]
@@ -86,7 +85,7 @@ def _memory_trials(scale: Scale) -> tuple[Trial, ...]:
 
 @kept_as("caillette.fig_13.measure")
 def measure_memory(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
-    """Track, or (where the arguments are a training set) ask the automaton."""
+    """Track, or (where the arguments are a training set) measure the automaton."""
     if "entropy_of" not in arguments:
         return measure_following(arguments, shelf)
     wanted = {name: value for name, value in arguments.items() if name not in ("entropy_of", "last")}
@@ -101,7 +100,7 @@ def measure_memory(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[st
 
 
 def _fig_13(outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    """Runs by memory, and what each automaton says of the test performance, in the order of MEMORIES."""
+    """Runs by memory, and each automaton's entropy of the test performance, in the order of MEMORIES."""
     groups = by_contender(outcome for outcome in outcomes if "entropy_of" not in outcome.trial.arguments)
     automata = [outcome.measured for outcome in outcomes if "entropy_of" in outcome.trial.arguments]
     for memory, claim, what, of in (
@@ -138,7 +137,7 @@ def _fig_13(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         for name, label in (("train", "training"), ("test", "test performance"))
     )
     yield line_chart("Entropy over memory", "memory (frames)", "entropy (nats a frame)", entropies)
-    yield {"footage": TEST, "weighting": BLOBS, "particles": 200, "training": _taught(outcomes)}
+    yield {"footage": TEST, "weighting": BLOBS, "particles": 200, "training": _training_of(outcomes)}
 
 
 FIG_13 = Experiment(
@@ -161,12 +160,12 @@ PLAIN, FIRST, SECOND = "not learning", "first pass, learning", "second pass, wit
 
 def _online_trials(scale: Scale) -> tuple[Trial, ...]:
     """All three passes with every seed."""
-    taught, last = taught_with(MEMORY, scale.quick), last_frame(UNSEEN, scale.quick)
+    trained_on, last = training_with(MEMORY, scale.quick), last_frame(UNSEEN, scale.quick)
     free = {"model_free_share": 0.1, "estimate": "mode", "learning_interval": INTERVAL}
     knobs = {"particles": PARTICLES, **free, **SIGMA}
 
     def arguments(seed: int) -> dict[str, Any]:
-        return Follow(UNSEEN, GUIDED, BLOBS, seed, last, knobs, from_truth=True, training=taught).plain()
+        return Follow(UNSEEN, GUIDED, BLOBS, seed, last, knobs, from_truth=True, training=trained_on).plain()
 
     return tuple(each_seed("online learning", scale.seeds, arguments))
 
@@ -206,7 +205,7 @@ def _online(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield f"A lesson every {INTERVAL} frames. What is learnt is what was tracked, its errors included."
     yield summary_table("Passes over the clip", groups)
     yield curves("RMS limb direction error", groups)
-    yield {"footage": UNSEEN, "particles": PARTICLES, "memory": MEMORY, "training": _taught(outcomes)}
+    yield {"footage": UNSEEN, "particles": PARTICLES, "memory": MEMORY, "training": _training_of(outcomes)}
 
 
 ONLINE_LEARNING = Experiment(

@@ -1,4 +1,4 @@
-"""Section 7.5: what happens to the model, and to the time of learning and predicting, as classes of motion are added.
+"""Section 7.5: size of the model, and times of learning and predicting, as classes of motion are added.
 
 The paper leaves it to further research and expects: fewer clusters than in proportion, a longer time to learn, and a
 prediction whose time "would remain largely unaffected".
@@ -22,12 +22,12 @@ from studio.reproduction.drawing import line_chart, places
 from studio.reproduction.experiment import Experiment, Part
 
 CLASSES = (EXERCISE, EXERCISE_2, "walk-with-turns", "run", "jumps", "handstand")
-"""Recipes, whose motion is taken without rendering it."""
+"""Recipes, whose motion is used without rendering."""
 FRAMES, QUICK_FRAMES, QUICK_CLASSES = 150, 60, 3
 MOST_SEEDS = 2
 PARTICLES, ROUNDS = 1000, 12
 UNAFFECTED = 2.0
-"""Prediction with all classes takes at most so many times what it does with one."""
+"""Greatest time of prediction with all classes, relative to one class."""
 
 
 def trials(scale: Scale) -> tuple[Trial, ...]:
@@ -71,7 +71,7 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
 
 
 def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    """Curves over the number of classes; the verdict is on what the paper expects."""
+    """Curves over the number of classes; the verdict is on the paper's expectations."""
     seeds: dict[int, list[Mapping[str, Any]]] = {}
     for outcome in outcomes:
         seeds.setdefault(outcome.trial.arguments["training"]["seed"], []).append(outcome.measured)

@@ -1,7 +1,7 @@
-"""What the experiments of Caillette, Galata & Howard (2007) have in common: footage, training, contenders.
+"""Common parts of the experiments of Caillette, Galata & Howard (2007): footage, training, contenders.
 
-Footage: two exercises of real modern dance, performed anew by a rendered person of another build (`dance-test-1`,
-`dance-test-2`), seen by five cameras of 320 × 240 at 30 Hz as in the paper, and a clip that no model is learnt from
+Footage: two exercises of real modern dance, performed again by a rendered person of another build (`dance-test-1`,
+`dance-test-2`), seen by five cameras of 320 × 240 at 30 Hz as in the paper, and a clip that is in no training
 (`dance-unseen`). Training: the exercises as recorded and two more performances of each, each smoothed five times.
 """
 
@@ -24,12 +24,12 @@ EXERCISE, EXERCISE_2 = "dance-exercise-1", "dance-exercise-2"
 QUICK_FRAMES = 70
 
 MEMORY = 20
-"""Of the model that tracks (Figs. 9 to 11); the paper does not say which one Fig. 12 has."""
+"""Memory of the tracking model (Figs. 9 to 11); the paper does not give that of Fig. 12."""
 BOTH = Training((EXERCISE, EXERCISE_2))
 QUICK_TRAINING = Training((EXERCISE,))
 
 # The dancer turns by 12 degrees a frame and more (360 degrees a second), where the body's σ0 is 6.7: trackers without a
-# model get twice that. Measured with 1 to 4 times: less loses them in the first turn, more blurs all.
+# model get twice that. Measured with 1 to 4 times: less loses them in the first turn, more makes all less accurate.
 SIGMA: Mapping[str, Any] = {"diffusion_scale": 2.0}
 # As in the paper: no particle is moved without the model, and the best particle is the pose.
 AS_PAPER: Mapping[str, Any] = {"model_free_share": 0.0, "model_free_grows": False, "estimate": "mode"}
@@ -47,27 +47,27 @@ IMPROVED = Contender(
 
 
 def guided(particles: int, name: str = "", **changes: Any) -> Contender:  # noqa: ANN401 - knobs
-    """The paper's tracker with so many particles. changes : further knobs."""
+    """The paper's tracker with some number of particles. changes : further knobs."""
     words = name or f"guided, {particles}"
     return Contender(words, GUIDED, BLOBS, {"particles": particles, **AS_PAPER, **changes})
 
 
 def last_frame(footage: str, quick: bool, most: int | None = None) -> int:
-    """The end of what is tracked of a footage. most : frames, where not all are needed. Raises StudioError."""
+    """The end of the tracked part of a footage. most : frames, where not all are needed. Raises StudioError."""
     whole = read_recipe(find_recipe(footage)).frames
     return min(whole, QUICK_FRAMES if quick else most or whole)
 
 
 def training(quick: bool) -> Training:
-    """What models are learnt from: both exercises; the first alone for a quick look."""
+    """The training set: both exercises; the first alone for a preview."""
     return QUICK_TRAINING if quick else BOTH
 
 
-def taught_with(memory: int, quick: bool) -> Training:
-    """That, for an automaton with a memory."""
+def training_with(memory: int, quick: bool) -> Training:
+    """The training set, for an automaton with a memory."""
     return dataclasses.replace(training(quick), memory=memory)
 
 
 def training_words(quick: bool) -> str:
-    """That, for the settings of the findings."""
+    """The training set as text, for the settings of the findings."""
     return "the first exercise alone" if quick else "both exercises, three performances each"

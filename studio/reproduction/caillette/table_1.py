@@ -1,7 +1,7 @@
 """Table 1: milliseconds of the reconstruction with 3 to 5 views, of blob fitting, and of 500 and 1000 particles.
 
-On a 2 GHz Pentium 4 in the paper, on this machine here, so that times say little and their ratios much: depth decides,
-the number of views hardly, particles count in proportion, and all together keep up with 30 frames a second.
+The paper's machine is a 2 GHz Pentium 4, so that ratios rather than times are compared: time depends on depth, hardly
+on the number of views, and linearly on the particles, and all together reach 30 frames a second.
 """
 
 import dataclasses
@@ -74,7 +74,7 @@ FRAMES, QUICK_FRAMES = 8, 3
 MOST_SEEDS = 5
 FRAME_MS = 1000.0 / 30.0
 NOT_MUCH, LINEAR = 1.5, (1.5, 2.7)
-"""Five views cost at most so many times what three do; 1000 particles between so many times what 500 do."""
+"""Greatest cost of five views relative to three; range of the cost of 1000 particles relative to 500."""
 
 
 def trials(scale: Scale) -> tuple[Trial, ...]:
@@ -160,10 +160,10 @@ def searching(
     settings = changed_settings(default_settings(contender.tracker, BLOBS), contender.changes).tracker
     weigher = _weigher(session)
 
-    def search(told: Known, before: Carried, frame: int) -> FrameResult:
+    def search(informed: Known, before: Carried, frame: int) -> FrameResult:
         return search_frame(
             TRACKERS[contender.tracker],
-            told,
+            informed,
             before,
             space,
             seed=seed,
@@ -173,15 +173,17 @@ def searching(
 
     carried, frames = start_of(tuple(float(value) for value in truth[0])), []
     for frame, (hull, pose) in enumerate(zip(hulls, truth, strict=True)):
-        told = Known(BlobProblem(weigher, hull).expecting(pose[None], {}))
+        informed = Known(BlobProblem(weigher, hull).expecting(pose[None], {}))
         if frame:
-            frames.append(lambda told=told, before=carried, frame=frame: search(told, before, frame))
-        carried = search(told, carried, frame).carried
+            frames.append(
+                lambda informed=informed, before=carried, frame=frame: search(informed, before, frame)
+            )
+        carried = search(informed, carried, frame).carried
     return _milliseconds(frames)
 
 
 def _milliseconds(works: Sequence[Callable[[], Any]]) -> float:
-    """The mean over several works of the quickest of some rounds each."""
+    """The mean over several tasks of the quickest round of each."""
     return 1000.0 * float(np.mean(list(quickest(dict(enumerate(works)), ROUNDS).values())))
 
 
@@ -191,7 +193,7 @@ def _weigher(session: Session) -> BlobWeigher:
 
 
 def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    """The table beside the paper's; the verdict is on what the paper says of it, which no machine changes."""
+    """The table beside the paper's; the verdict is on the paper's claims, which do not depend on the machine."""
     runs, large = (
         [outcome.measured for outcome in outcomes if outcome.trial.arguments["footage"] == footage]
         for footage in (TEST, TEST_640)

@@ -1,6 +1,6 @@
-"""What behaviour models are learnt from, and the models, learnt once and kept beside the footage.
+"""Training sets of behaviour models, and the models, learnt once and kept beside the footage.
 
-Three performances of each exercise as the paper has them: the recording itself and two more, made as the test is (the
+Three performances of each exercise as in the paper: the recording itself and two more, made as the test is (the
 recipe's option `performance`: tempo and joints change slowly by a little); each is smoothed by several amounts (section
 7.1), which makes about 13 000 frames of two exercises. Everything is on the body in its own proportions: a model fits
 the body in any size.
@@ -39,13 +39,13 @@ from studio.training.sources import FPS, Recording, fitted_person
 from studio.training.targets import skeleton_of_body
 
 # What trials learn or fit once and share: folders of files beside the footage, each made by one process.
-# A folder is known by what it is made from and by the code that makes it, so another version of the studio makes its
-# own. It is whole or not there; who wants one that another process is making waits for it, and makes it where that
+# A folder is keyed by its inputs and by the code that makes it, so another version of the studio makes its own. It is
+# written atomically; a process that needs one that another process is making waits for it, and makes it where that
 # process died.
 
 
 LEARNT = "learnt"
-# Code that decides on what is learnt or fitted.
+# Code that affects what is learnt or fitted.
 ROOMS = ("geometry", "motion_files", "body", "behaviour", "synthesis", "training")
 WAIT_SECONDS = 0.2
 
@@ -53,7 +53,7 @@ WAIT_SECONDS = 0.2
 def made_once(
     shelf: FootageShelf, kind: str, making: Mapping[str, Plain], make: Callable[[Path], None]
 ) -> Path:
-    """The folder of a thing of some kind, made by `make(folder)` if it is not there. making : all it depends on."""
+    """The folder of some data, made by `make(folder)` if missing. making : all that it depends on."""
     known = json.dumps({"making": plain(making), "code": code_digest(ROOMS)}, sort_keys=True)
     name = f"{kind}-{hashlib.sha256(known.encode()).hexdigest()[:16]}"
     place = shelf.folder / LEARNT / name
@@ -75,7 +75,7 @@ def made_once(
 
 
 def _waited_for(place: Path) -> ProcessLock | None:
-    """The lock on a place; None once somebody else has made what belongs there."""
+    """The lock on a folder; None once another process has made it."""
     while True:
         lock = ProcessLock.take(place.with_name(f"{place.name}.lock"))
         if lock is not None:
@@ -94,7 +94,7 @@ MODEL, NUMBERS, POSES = "model.behaviour", "learnt.json", "poses.npy"
 
 @dataclass(frozen=True, slots=True)
 class Training:
-    """What a model is learnt from and how; plain values.
+    """A training set and the settings of learning; plain values.
 
     sources : recipes of people's motion, or "pointing". frames : of each at 30 Hz, 0 for all. performances : of each,
     the first as recorded. smoothings : of each performance. memory, epsilon : of the automaton. clusters : further
@@ -127,13 +127,13 @@ class Training:
         return LearningSettings(memory=self.memory, epsilon=self.epsilon, **self.clusters)
 
     def material(self) -> OversamplingSettings:
-        """The knobs of what is made of a performance."""
+        """The knobs of oversampling."""
         return OversamplingSettings(smoothings=self.smoothings)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lesson:
-    """A model with what learning it told. seconds : of clusters and automaton, without reading the sources."""
+    """A model with figures of its learning. seconds : of clusters and automaton, without reading the sources."""
 
     model: BehaviourModel
     frames: int
@@ -144,9 +144,9 @@ def recorded(
     shelf: FootageShelf, source: str, body: BodyModel, frames: int = 0, performance: int = 0
 ) -> Recording:
     """A source's motion on the body, fitted once. frames : at 30 Hz from the first, 0 for all. performance : which, 0
-    for the source as it is.
+    for the original.
 
-    Raises StudioError for an unknown recipe and for recorded motion that is not there.
+    Raises StudioError for an unknown recipe and for missing recorded motion.
     """
     if source == POINTING:
         return _performed(Recording(source, FPS, pointing_poses(body, FPS)), body, performance)
@@ -170,7 +170,7 @@ def recorded(
 
 
 def _performed(recording: Recording, body: BodyModel, performance: int) -> Recording:
-    """Another performance of what no recipe can perform anew: tempo and angles change slowly by a little."""
+    """Another performance of motion that has no recipe: tempo and angles change slowly by a little."""
     if performance == 0:
         return recording
     rng = np.random.default_rng(performance)
@@ -179,14 +179,14 @@ def _performed(recording: Recording, body: BodyModel, performance: int) -> Recor
 
 
 def learnt(shelf: FootageShelf, training: Training) -> Lesson:
-    """The model of a training set, learnt once for all who ask. Models that differ in memory or ε alone have the same
+    """The model of a training set, learnt once. Models that differ in memory or ε alone have the same
     clusters.
     """
     return _read(_learnt_folder(shelf, training))
 
 
 def model_file(shelf: FootageShelf, training: Training) -> Path:
-    """The file of that model."""
+    """The file of a training set's model."""
     return _learnt_folder(shelf, training) / MODEL
 
 
@@ -215,10 +215,10 @@ def lesson_of(shelf: FootageShelf, training: Training) -> Lesson:
     ]
     tested = [recorded(shelf, source, body, training.frames) for source in training.tested]
     began = time.perf_counter()
-    model, told = learn(
+    model, figures = learn(
         recordings, body, training.settings(), training.material(), tested, seed=training.seed
     )
-    return Lesson(model, told.frames, time.perf_counter() - began)
+    return Lesson(model, figures.frames, time.perf_counter() - began)
 
 
 def _number(training: Training, performance: int) -> int:
@@ -249,8 +249,8 @@ def _read(folder: Path) -> Lesson:
     return Lesson(read_model(folder / MODEL), int(numbers["frames"]), float(numbers["seconds"]))
 
 
-# A simple sequence to learn clusters from: somebody stands and points with one arm, here and there. The paper's
-# clustering found 5 clusters in "a simpler arms pointing sequence" of which it says no more (section 7.1). Ours: the
+# A simple sequence to learn clusters from: a standing person points with one arm at several targets. The paper's
+# clustering found 5 clusters in "a simpler arms pointing sequence" without further details (section 7.1). Ours: the
 # right arm goes from hanging to one of two places and back, each way as an arm reaches (minimum jerk), with a rest at
 # both ends.
 
@@ -258,7 +258,7 @@ TARGETS: tuple[dict[str, float], ...] = (
     {"right_shoulder_swing": 85.0, "right_shoulder_spread": 10.0, "right_elbow": 5.0},
     {"right_shoulder_swing": 20.0, "right_shoulder_spread": 85.0, "right_elbow": 5.0},
 )
-"""Degrees."""
+"""Angles of the targets, degrees."""
 ROUNDS = 4
 MOVE_S, REST_S = 0.8, 0.7
 

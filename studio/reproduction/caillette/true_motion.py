@@ -1,8 +1,8 @@
-"""The true pose of every frame of rendered footage: the tracked body laid on the very motion that was rendered.
+"""The true pose of every frame of rendered footage: the tracked body fitted to the rendered motion.
 
-The paper annotated twelve body parts by hand, smoothed their ways and took inverse kinematics (7.1). Here the motion is
-known, also how the head is turned and the feet stand, which markers at the joints do not tell; the whole path is fitted
-at once, so that what straight limbs leave open (twists) is steady.
+The paper annotated twelve body parts by hand, smoothed their paths and took inverse kinematics (7.1). Here the motion
+is known, including rotations of head and feet, which markers at the joints do not show; the whole path is fitted at
+once, so that twists of straight limbs are steady.
 """
 
 from dataclasses import dataclass
@@ -34,8 +34,8 @@ LOST_MM = 150.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrueMotion:
-    """poses : (F, D) of the tracked body. points : (F, M, 3) mm, true markers. markers : (M,) which of the body's they
-    are.
+    """poses : (F, D) of the tracked body. points : (F, M, 3) mm, true markers. markers : (M,) their numbers in the
+    body.
     """
 
     poses: Array
@@ -58,9 +58,9 @@ class JointErrors:
 
 
 def true_motion(shelf: FootageShelf, session: Session, last: int) -> TrueMotion:
-    """Of the first `last` frames of a recipe's session, for the body that its runs track.
+    """The true motion of the first `last` frames of a recipe's session, for the body that its runs track.
 
-    Raises TruthError for a session that is no recipe's, and for footage of a motion that another version made.
+    Raises TruthError for a session without recipe, and for footage rendered by another version.
     """
     recipe_path = session.path / RECIPE_COPY
     if not recipe_path.is_file():
@@ -88,14 +88,14 @@ def true_motion(shelf: FootageShelf, session: Session, last: int) -> TrueMotion:
 
 
 def _check_rendered(session: Session, truth: MarkerMotion) -> None:
-    """Raise TruthError unless the footage shows this very motion."""
+    """Raise TruthError unless the footage shows this motion."""
     assert session.truth_path is not None
     rendered = read_trc(session.truth_path)
     same = rendered.names == truth.names and len(rendered.positions) >= len(truth.positions)
     if not same or not np.allclose(rendered.positions[: len(truth.positions)], truth.positions, atol=SAME_MM):
         raise TruthError(
             f"The footage '{session.name}' shows another motion than its recipe makes now.",
-            "It was rendered by another version of the studio: delete its folder, and it is rendered anew.",
+            "It was rendered by another version of the studio: delete its folder to have it rendered again.",
         )
 
 

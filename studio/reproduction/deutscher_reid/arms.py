@@ -1,7 +1,7 @@
 """The planar arms of Deutscher & Reid (2005), section 6: one camera facing the plane, a silhouette of a known pose.
 
-Nothing is known before the search but the range of the joints (Fig. 12a: the first cloud is uniform over it), so the
-largest movement that can be expected is the whole range and σ0 of Eq. 13 is half of it.
+Only the joints' ranges are known before the search (Fig. 12a: the first cloud is uniform over them), so the largest
+expected movement is the whole range and σ0 of Eq. 13 is half of it.
 """
 
 from dataclasses import dataclass
@@ -51,7 +51,7 @@ class TemplateArm:
 
 
 def template_arm(body_name: str) -> TemplateArm:
-    """A planar body before its camera, ready to be searched. Raises BodyError for an unknown body."""
+    """A planar body before its camera. Raises BodyError for an unknown body."""
     body = load_body(body_name)
     camera = facing_camera(body)
     weighting = WEIGHTINGS["template"]

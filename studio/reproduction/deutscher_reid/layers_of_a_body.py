@@ -1,8 +1,8 @@
-"""What the layers of a frame do to the particles of a whole body: Figs. 3, 19 and 20, a person who walks in a circle.
+"""Effect of a frame's layers on the particles of a whole body: Figs. 3, 19 and 20, a person walking in a circle.
 
 Fig. 3 draws the particles' horizontal places, Fig. 19 the variance of every parameter, Fig. 20 all particles. Of the
-latter every seed tracks some frames; what is kept is the mean over the frames of each parameter's variance over that
-of the frame's first cloud, and how widely the particles scatter the markers.
+latter every seed tracks some frames; the results are the mean over the frames of each parameter's variance relative to
+the frame's first cloud, and the scatter of the markers over the particles.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -62,7 +62,7 @@ FIG_3_KNOBS: Mapping[str, Any] = {**PLAIN, "layers": 10, "particles": 200}
 PLACES = ("pelvis_x", "pelvis_y")
 # The marker at the pelvis, whose place these parameters are.
 ROOT_MARKER = "Hip"
-# A cloud covers what lies within so many of its standard deviations.
+# Standard deviations within which a cloud covers a point.
 COVERED = 3.0
 DRAWN_LAYERS = (0, 1, 2, 6, 7, 9)
 
@@ -108,7 +108,7 @@ def measure_fig_3(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str
 
 
 def true_places(session: Session, frames: Sequence[int]) -> Array:
-    """(K, 2) where the pelvis truly is, x and y in mm. Raises TruthError where the session does not say."""
+    """(K, 2) true positions of the pelvis, x and y in mm. Raises TruthError where the session has no truth."""
     if session.truth_path is None:
         raise TruthError(f"Session '{session.name}' has no truth.", "Take one made by 'studio synthesize'.")
     truth = read_trc(session.truth_path)
@@ -136,7 +136,7 @@ def fig_3(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     yield number("spread of the last cloud", spreads[:, -1], "mm")
     yield number("last cloud's middle from the true place", measured(outcomes, "distance"), "mm")
     yield (
-        f"To cover: within {COVERED:g} standard deviations. The person who was rendered is not made of cones, and a "
+        f"To cover: within {COVERED:g} standard deviations. The rendered person is not made of cones, and a "
         "layer of Eq. 13 first spreads more than it selects."
     )
     clouds = tuple(
@@ -159,7 +159,7 @@ KNOBS: Mapping[str, Any] = {**IMPROVED, "layers": 10, "particles": 200}
 SHARE = "variance over the first cloud's"
 # Ranks in the tree: the root; what hangs on the trunk; what lies beyond elbow and knee.
 RANKS = ("torso", "hips, shoulders and head", "elbows, knees and beyond")
-# Markers of both sides that tell how far out a part is.
+# Markers of both sides, by distance from the trunk.
 PARTS: Mapping[str, tuple[str, ...]] = {
     "hips": ("LHip", "RHip"),
     "shoulders": ("LShoulder", "RShoulder"),

@@ -2,10 +2,10 @@
 crossover gains in the match: Fig. 16.
 
 With adaptive diffusion (Eq. 18) a joint that is localised stays so, and the joints follow one another from the root
-outwards: a soft partition of the search. With the planned noise of Eq. 13 every joint gets the same noise, and what
-was gained for the first is lost again (Fig. 12c).
+outwards: a soft partition of the search. With the planned noise of Eq. 13 every joint gets the same noise, and the
+gain for the first is lost again (Fig. 12c).
 
-Figs. 13 and 14 show six layers and print neither particles nor survival rate. At the 0.5 of section 3.1 six layers
+Figs. 13 and 14 show six layers and give neither particles nor survival rate. At the 0.5 of section 3.1 six layers
 are too few for the last joint to fall at all; at 0.1 it falls in the sixth.
 
 Fig. 16: the match is the paper's SSD, the mean squared difference between the template of the reported pose and the
@@ -174,7 +174,7 @@ def _error(name: str, found: Reduction) -> Number:
 
 def fig_12(outcomes: Sequence[Outcome]) -> Iterator[Part]:
     """After drawing x1 has lost most variance and the others little (b, e); planned noise undoes it (c), adaptive
-    noise does not (f). The paper prints bars without figures, so the verdict is on what it says about them.
+    noise does not (f). The paper has bars without figures, so the verdict is on its statements about them.
     """
     groups = reductions(outcomes)
     adaptive, planned = groups[WITH], groups[WITHOUT]
@@ -221,7 +221,7 @@ def fig_13(outcomes: Sequence[Outcome]) -> Iterator[Part]:
 
 
 def fig_14(outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    """With planned noise all joints fall alike, or the reason why not: even noise narrows the order and does not undo
+    """With planned noise all joints fall together, or the reason why not: even noise narrows the order without removing
     it, and noise that outweighs selection in every joint loses the arm.
     """
     groups = reductions(outcomes)
@@ -257,7 +257,7 @@ SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 SETTINGS_16: Mapping[str, Any] = {"layers": 8, "particles": 100, "survival": 0.3}
 PICTURES, QUICK_PICTURES = 10, 4
 EQ19 = "cut by parameters, adaptive noise"
-# Eq. 19 cuts anywhere; the paper does not say whether Fig. 16 was drawn with the diffusion of Eq. 13 or 18.
+# Eq. 19 cuts anywhere; the paper does not give the diffusion of Fig. 16 (Eq. 13 or 18).
 CUTS: Mapping[str, Mapping[str, Any]] = {
     "cut by parameters, planned noise": {"crossover_by": "parameters", "adaptive_diffusion": False},
     EQ19: {"crossover_by": "parameters", "adaptive_diffusion": True},
@@ -387,7 +387,7 @@ def trials_fig_18(scale: Scale) -> tuple[Trial, ...]:
 
 @kept_as("deutscher_reid.figs_17_and_18.measure_fig_18")
 def measure_fig_18(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]:
-    """Per layer, how widely the ends of the links are scattered (mm), and of one seed where some of them lie."""
+    """Scatter of the links' ends per layer (mm), and for one seed the positions of some of them."""
     del shelf
     seed, arms = int(arguments["seed"]), scene(arguments["body"])
     _, records, truth = localise(arms, seed, **arguments["knobs"])

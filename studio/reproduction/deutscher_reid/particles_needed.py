@@ -1,12 +1,12 @@
-"""How many particles are needed: the paper's measure of a filter's speed (captions of Fig. 13, sections 6.1 to 6.3).
+"""Number of particles needed: the paper's measure of a filter's speed (captions of Fig. 13, sections 6.1 to 6.3).
 
 For every seed the fewest particles with which tracking succeeds are found by bisection on a grid in equal ratios.
 A success of one run can be luck, so a number of particles counts as enough when most of a few runs succeed. Both
-filters of a comparison search the same motions, so that their numbers are paired by seed; what one saves is the
+filters of a comparison search the same motions, so that their numbers are paired by seed; the saving is the
 geometric mean of the ratios.
 
 Where even the most particles fail, the next step of the grid beyond them is taken (a lower bound); where the fewest
-succeed, these (an upper bound). Pairs in which both ends fail say nothing and are left out.
+succeed, these (an upper bound). Pairs in which both ends fail are left out.
 """
 
 import math
@@ -61,7 +61,7 @@ RUNS = 3
 @dataclass(frozen=True, slots=True)
 class Fewest:
     """particles : enough for success. censored : "above" where even the most failed, "below" where the fewest
-    succeeded, else "". tried : particles, successes and runs of every size that was tried.
+    succeeded, else "". tried : particles, successes and runs of every size tried.
     """
 
     particles: float
@@ -103,7 +103,7 @@ def fewest(succeeds: Callable[[int, int], bool], grid: Sequence[int], runs: int)
 def bisections(
     scale: Scale, ends: tuple[int, int, int], filters: Mapping[str, Knobs], setting: Callable[[int], Knobs]
 ) -> Iterator[Trial]:
-    """One bisection a filter and seed. ends : the fewest and the most particles, and the most of a quick look.
+    """One bisection a filter and seed. ends : the fewest and the most particles, and the most of a preview.
     filters : knobs by the filter's name. setting : the other arguments of a seed.
     """
     few, most, quick_most = ends
@@ -127,7 +127,7 @@ def saving(name: str, slow: Sequence[Fewest], fast: Sequence[Fewest], paper: flo
 
 
 def needs(title: str, groups: Groups) -> Iterator[Part]:
-    """What all experiments on the particles needed show beside what is saved: needs, shares of success, each seed's.
+    """Common results of the experiments on particles needed: needs, shares of success, each seed's.
     title : of the chart of needs.
     """
     for name, found in groups.items():
@@ -147,8 +147,8 @@ def bars(title: str, groups: Groups) -> Chart:
 
 
 def successes(title: str, groups: Groups) -> Chart:
-    """Share of the runs that succeeded with so many particles, over all seeds' bisections (which try a size only
-    where it matters, so neighbouring sizes rest on different seeds).
+    """Share of successful runs by number of particles, over all seeds' bisections (which try a size only where needed,
+    so neighbouring sizes rest on different seeds).
     """
     series = []
     for name, found in groups.items():
@@ -175,7 +175,7 @@ def per_seed(title: str, groups: Groups) -> Table:
 # The arms of Figs. 11 and 15 in motion: 40 pictures of a moving arm, tracked from the true first pose.
 #
 # "Tracker efficiency was measured by the minimum number of particles needed to successfully track the articulated arm
-# over 40 frames" (caption of Fig. 13). The paper prints neither the motion nor what a success is. Here every joint
+# over 40 frames" (caption of Fig. 13). The paper gives neither the motion nor a criterion of success. Here every joint
 # swings as in the studio's footage of arms, up to 90° a second; σ0 is half of the largest movement from one picture
 # to the next (3.1); tracking is successful while no joint or tip is ever more than LOST_MM off, a quarter of a link.
 
@@ -183,7 +183,7 @@ LOST_MM = 62.5
 ARM_FRAMES, ARM_LAYERS = 40, 6
 ARM_SIZES = (8, 2048, 512)
 # Pictures a second. At 10 a joint turns up to 9° between two pictures and one joint hides the next one's turn; at 20
-# the search is easy, and what is saved is less.
+# the search is easy, and less is saved.
 RATE, SLOW_RATE = 10.0, 20.0
 CHAIN, BRANCHED = "planar_arm4", "branched_arms6"
 BODY_WORDS = {CHAIN: "chain", BRANCHED: "branched arms"}
@@ -218,7 +218,7 @@ def arm_sequence(body_name: str, rate: float, frames: int, seed: int) -> ArmSequ
 
 
 def is_tracked(sequence: ArmSequence, settings: AnnealedSettings, seed: int) -> bool:
-    """Whether the annealed filter keeps the arm to the last picture; it gives up where it is lost."""
+    """Whether the annealed filter keeps the arm to the last picture; it stops once the arm is lost."""
     body, carried = sequence.arm.body, start_of(tuple(sequence.poses[0]))
     truth = marker_points(body, sequence.poses)
     for frame, problem in enumerate(sequence.problems, start=1):
@@ -246,13 +246,13 @@ def arm_trials(scale: Scale, filters: Mapping[str, Knobs], body: str, rate: floa
 
 
 def group(name: str, body: str, rate: float) -> str:
-    """Filter, body and rate in words."""
+    """Filter, body and rate as text."""
     return f"{name}, {BODY_WORDS[body]}, {rate:g} pictures/s"
 
 
 @kept_as("deutscher_reid.arm_sequences.measure")
 def measure_arm(arguments: Knobs, shelf: FootageShelf) -> dict[str, Any]:
-    """The fewest particles for one seed; the motion is the seed's, and every run has random numbers of its own."""
+    """The fewest particles for one seed; the motion is the seed's, and every run has its own random numbers."""
     del shelf
     seed = int(arguments["seed"])
     sequence = arm_sequence(arguments["body"], arguments["rate"], arguments["frames"], seed)
@@ -269,7 +269,7 @@ def measure_arm(arguments: Knobs, shelf: FootageShelf) -> dict[str, Any]:
 
 SAVED_BY_DIFFUSION = 2.0
 DEGREES = {RATE: "9°", SLOW_RATE: "4.5°"}
-# The first is the paper's, as far as it can be told; a quick look takes the first two.
+# The first is the paper's, as far as known; a preview takes the first two.
 CASES = tuple((rate, survival) for survival in SURVIVALS for rate in (RATE, SLOW_RATE))
 QUICK_CASES = 2
 
@@ -321,16 +321,16 @@ DIFFUSION = Experiment(
     verdict=verdict_on(_diffusion_label(*CASES[0])),
 )
 
-# Section 6.2: crossover. 6.2.1 makes every particle from two, so the share is 100 %. What it saves depends on what it
-# is added to and on how fast the filter anneals, neither of which the paper says of this test: measured are the filter
-# with the diffusion of section 6.1 ("noise is then added … as detailed in Section 6.1") and the one of Eq. 13, each
-# with both survival rates.
+# Section 6.2: crossover. 6.2.1 makes every particle from two, so the share is 100 %. The saving depends on the filter
+# that it is added to and on how fast that anneals, neither of which the paper gives for this test: measured are the
+# filter with the diffusion of section 6.1 ("noise is then added … as detailed in Section 6.1") and the one of Eq. 13,
+# each with both survival rates.
 
 SAVED_BY_CROSSING = {BRANCHED: 2.0, CHAIN: 1.0}
 SHARE = 1.0
 # A chain is one limb: cut by limbs nothing is ever exchanged.
 CUTS = {BRANCHED: ("parameters", "limbs"), CHAIN: ("parameters",)}
-# What crossover is added to. The first is the paper's, as far as it can be told, and the only one of a quick look.
+# Filters to which crossover is added. The first is the paper's, as far as known, and the only one of a preview.
 ADDED_TO: Mapping[str, Knobs] = {
     f"{base}, α {survival:g}": {**knobs, "survival": survival}
     for base, knobs in (("adaptive", ADAPTIVE), ("Eq. 13", PLAIN))
@@ -388,8 +388,8 @@ CROSSOVER = Experiment(
 )
 
 # Whole bodies over 40 frames: the person who walks in a circle before three cameras, with the paper's body of 29
-# parameters. The paper does not say on which footage its factor of 4 was seen (6.3). Every seed tracks another 40
-# frames, from a pose laid on the true markers; success is that of `setting`: every frame below 100 mm, no limb lost.
+# parameters. The paper does not name the footage of its factor of 4 (6.3). Every seed tracks another 40
+# frames, from a pose fitted to the true markers; success is that of `setting`: every frame below 100 mm, no limb lost.
 
 BODY_FRAMES, FOOTAGE_FRAMES = 40, 240
 # From one seed's first frame to the next one's; no multiple of a stride, so that each begins with another posture.
@@ -398,7 +398,7 @@ BODY_SIZES = (4, 2048, 1024)
 
 
 def body_frames(seed: int, quick: bool = False) -> dict[str, int]:
-    """First and last frame of a seed; close together for a quick look, so that little has to be rendered."""
+    """First and last frame of a seed; close together for a preview, so that little has to be rendered."""
     first = (seed * (QUICK_STRIDE if quick else STRIDE)) % (FOOTAGE_FRAMES - BODY_FRAMES)
     return {"first": first, "last": first + BODY_FRAMES}
 
@@ -442,7 +442,7 @@ FILTERS = {
     for name, knobs in ((EQ13, PLAIN), (WITH_ADAPTIVE, ADAPTIVE), (BOTH, IMPROVED), (LIMBS, BY_LIMBS))
 }
 TOGETHER = "particles saved by both together"
-# What is saved, by the second filter instead of the first; the paper's claim is on the first line.
+# Savings by the second filter over the first; the paper's claim is on the first line.
 STEPS = (
     (TOGETHER, EQ13, BOTH, SAVED_BY_BOTH),
     ("particles saved by both, half of them crossed by limbs", EQ13, LIMBS, SAVED_BY_BOTH),
@@ -499,7 +499,7 @@ LAYER_FILTERS = {
 
 
 def _more_layers(outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    """What each doubling saves."""
+    """The saving of each doubling."""
     groups = grouped(outcomes, Fewest)
     for before, after in pairwise(groups):
         yield saving(f"particles saved by {after} instead of {before}", groups[before], groups[after], None)
@@ -513,7 +513,7 @@ def _more_layers(outcomes: Sequence[Outcome]) -> Iterator[Part]:
 
 
 def _more_than_half(numbers: Sequence[Number]) -> str:
-    """ "Better" does not exist here: more than 2 is the claim."""
+    """The verdict on the claim of more than 2; "better" does not apply."""
     first = numbers[0]
     return "reproduced" if first.low > DOUBLING or first.high > DOUBLING < first.ours else "not reproduced"
 

@@ -2,8 +2,8 @@
 0.8 times each.
 
 Frames are searched with one and with two threads in turn, within one run on one machine, so that only ratios count.
-The paper's filter takes 60 s a frame, all of it in the weighting; here a frame takes milliseconds, and what is not
-shared (drawing, noise, a lock) is a larger part of it, so the weighting alone is measured beside the whole frame.
+The paper's filter takes 60 s a frame, all of it in the weighting; here a frame takes milliseconds, and the
+serial part (drawing, noise, a lock) is larger, so the weighting alone is measured beside the whole frame.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -83,8 +83,8 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
 
 
 def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    """Speed-up over processors. The verdict is on the weighing with two, which is what the paper farms out and what its
-    frames spend their time on.
+    """Speed-up over processors. The verdict is on the weighing with two, which the paper distributes and which takes
+    most of its frames' time.
     """
     yield {"footage": CIRCLE, "layers": LAYERS, "particles": PARTICLES, "weighting": WEIGHTING}
     counts = outcomes[0].measured["threads"]

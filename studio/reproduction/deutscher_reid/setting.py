@@ -1,5 +1,5 @@
-"""What the experiments of Deutscher & Reid (2005) have in common: the filter before and after section 6, footage,
-and what a success is.
+"""Common parts of the experiments of Deutscher & Reid (2005): the filter before and after section 6, footage, and the
+criterion of success.
 
 The paper calls tracking successful "when the algorithm locks onto the body and limbs for the duration of the
 sequence" (6.3), judged by eye. Here: the mean error of every frame is below LIMIT_MM, and no marker of any limb is
@@ -31,7 +31,7 @@ CIRCLE, BOX = "circle-three-cameras", "box-and-turn"
 TURNS, RUN, HANDSTAND = "walk-with-turns", "run-three-cameras", "handstand-three-cameras"
 
 LIMIT_MM = 100.0
-# Footage is rendered as far as it is looked at; a quick look takes so many frames of each.
+# Footage is rendered as far as it is used; a preview takes this many frames of each.
 QUICK_FRAMES = 48
 
 EQ18_WORDS = (
@@ -42,7 +42,7 @@ EQ17_WORDS = "Eq. 17 is printed without the minus sign of Eq. 16; it belongs the
 
 
 def annealing_as_ten(layers: int) -> float:
-    """The survival rate with which so many layers anneal as much as the ten of 0.5 of section 3.1: the product over
+    """The survival rate with which `layers` layers anneal as much as the ten of 0.5 of section 3.1: the product over
     the layers is the same, and so is the size at which the planned noise of Eq. 13 ends.
     """
     return float(0.5 ** (10 / layers))

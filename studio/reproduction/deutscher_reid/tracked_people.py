@@ -1,12 +1,12 @@
-"""People tracked from three cameras: Figs. 8, 9, 10, 21, 22 and 23, and how many particles work well (3.1).
+"""People tracked from three cameras: Figs. 8, 9, 10, 21, 22 and 23, and the number of particles that work well (3.1).
 
-Fig. 8 sets Condensation beside the annealed filter. The paper's has the edge likelihood of Blake & Isard with a
+Fig. 8 compares Condensation with the annealed filter. The paper's has the edge likelihood of Blake & Isard with a
 silhouette; here every tracker weighs alike, and Condensation chooses the scale of its likelihood on the first frames.
 The one-layer search propagates the mode, as the paper's does, and reports it.
 
 Figs. 9 and 10 (section 5) were tracked with the filter of Eq. 13, Figs. 21 to 23 (6.3) with the improved one, which
-has bodies of 29 and 34 parameters. Beside the paper's filter and weighting every figure shows what the studio's own
-choice does with as many evaluations.
+has bodies of 29 and 34 parameters. Besides the paper's filter and weighting every figure shows the studio's own choice
+at equal evaluations.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -68,7 +68,7 @@ def _annealed(name: str, knobs: Mapping[str, Any], particles: int, layers: int =
 
 
 def _tracks(groups: Groups, paper: Mapping[str, float]) -> Iterator[Number]:
-    """The share of each line's seeds that succeed. paper : what it saw of a line: 1, it tracks; 0, it does not."""
+    """The share of each line's seeds that succeed. paper : its result for a line: 1, it tracks; 0, it does not."""
     for name, runs in groups.items():
         yield share(f"{name}: {THAT_TRACK}", map(succeeded, runs), paper.get(name))
 
@@ -97,7 +97,7 @@ CONTENDERS = (
     _annealed("studio's choice, 10 × 400", STUDIO, 400),
     _annealed("studio's choice, 10 × 100", STUDIO, 100),
 )
-# What the paper saw of each: 1, it tracks; 0, it fails.
+# The paper's results: 1, it tracks; 0, it fails.
 PAPER = {CONDENSATION: 0.0, LARGE: 0.0, ONE_LAYER: 0.0, TEN_LAYERS: 1.0, FEW: 1.0}
 # "Terminal failure after 1.2 seconds".
 PAPER_SECONDS = 1.2
@@ -105,7 +105,7 @@ FAILING = (CONDENSATION, ONE_LAYER)
 
 
 def _fig_8_lines(quick: bool) -> Iterable[Line]:
-    """40 000 particles take as long as all others together, and are left out of a quick look."""
+    """The contenders; 40 000 particles take as long as all others together, and are left out of a preview."""
     last = {"last": QUICK_FRAMES if quick else FIG_8_FRAMES}
     return (
         Line(one.name, one, CIRCLE, wanted=last) for one in CONTENDERS if not (quick and one.name == LARGE)
@@ -113,8 +113,8 @@ def _fig_8_lines(quick: bool) -> Iterable[Line]:
 
 
 def terminal_failure(found: Tracked) -> float:
-    """Seconds from the first frame to the failure that never ends: a frame's mean is LIMIT_MM or more, or a limb is
-    lost, in every frame from there on. The footage's length where the last frame is good: it fails later, if ever.
+    """Seconds from the first frame to the final failure: a frame's mean is LIMIT_MM or more, or a limb is lost, in
+    every frame from there on. The footage's length where the last frame is good.
     """
     good = [error < LIMIT_MM and not lost for error, lost in zip(found.per_frame_mm, found.lost, strict=True)]
     if good[-1]:
@@ -131,7 +131,7 @@ def _fig_8(groups: Groups) -> Iterator[Part]:
     for name, runs in groups.items():
         yield number(f"{name}: mean error", mean_errors(runs), "mm")
     yield (
-        f"{SUCCESS_WORDS} The verdict is on who tracks and who does not. A run that ends well counts with its whole "
+        f"{SUCCESS_WORDS} The verdict is on which trackers succeed. A run that ends well counts with its whole "
         "length as the time to its failure. The studio's choice (all three terms, Eq. 18, crossover by limbs, limbs "
         "kept apart) is not in the paper; it says what the footage allows. The paper names no frame rate (60 a second "
         f"here), and its Condensation has a likelihood of its own. {EQ17_WORDS}"

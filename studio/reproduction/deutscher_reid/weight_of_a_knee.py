@@ -1,6 +1,6 @@
 """Fig. 7: the weight as a function of one knee's angle, all else at the true pose.
 
-Every seed looks at another frame of the person who walks in a circle. The right knee is turned through its whole
+Every seed uses another frame of the person walking in a circle. The right knee is turned through its whole
 range; the weights of edges alone, of the region alone and of both are measured against the true angle.
 """
 
@@ -37,7 +37,7 @@ from studio.weighting.catalogue import WEIGHTINGS
 
 Array = NDArray[np.float64]
 
-# How the parameter's name begins, in every body of the catalogue.
+# Beginning of the parameter's name, in every body of the catalogue.
 KNEE = "right_knee"
 STEPS = 321
 TERMS: Mapping[str, Mapping[str, float]] = {
@@ -88,7 +88,7 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
 
 
 def true_poses(session: Session, body: BodyModel, frames: list[int]) -> Array:
-    """(K, D) the body laid on the true markers of frames that follow from each other, each sought from the one before.
+    """(K, D) the body fitted to the true markers of consecutive frames, each starting from the one before.
 
     Raises TruthError where the session has no truth, or none of a frame.
     """
@@ -102,7 +102,7 @@ def true_poses(session: Session, body: BodyModel, frames: list[int]) -> Array:
     kept, names = known_markers(body, truth.names)
     own = session.start_pose(body) if body.name == session.manifest.body else None
     pose, found = body.neutral if own is None else own, []
-    # From the start onwards, so that a heading that has turned far is followed.
+    # From the start onwards, so that large changes of heading are followed.
     for frame in range(max(frames) + 1):
         if frame in rows and (frame in frames or frame % 4 == 0):
             pose = pose_from_markers(body, names, truth.positions[rows[frame], kept], pose)[0]
@@ -112,7 +112,7 @@ def true_poses(session: Session, body: BodyModel, frames: list[int]) -> Array:
 
 
 def modes(weights: Array) -> list[tuple[int, float]]:
-    """Peaks that stand out, highest first: where, and how high above the lowest point as a share of the highest.
+    """Distinct peaks, highest first: position, and height above the lowest point as a share of the highest.
 
     An end of the curve is a peak where the curve falls away from it.
     """
@@ -135,7 +135,7 @@ def half_width(angles: Array, weights: Array) -> float:
 
 
 def _read(outcome: Outcome, name: str) -> dict[str, Any]:
-    """What the curve of one term says. Weights, not their logs, are drawn and judged (Eq. 16). dominant : no second
+    """Figures of one term's curve. Weights, not their logs, are drawn and judged (Eq. 16). dominant : no second
     mode is more than DOMINANT as high as the first.
     """
     angles = np.array(outcome.measured["angles"])
@@ -150,8 +150,8 @@ def _read(outcome: Outcome, name: str) -> dict[str, Any]:
 
 
 def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    """Modes, peaks and widths of each term; the claims are on both together. The first two frames' curves as the paper
-    draws one, and the combined curves of all.
+    """Modes, peaks and widths of each term; the claims are on both together. The first two frames' curves in the
+    paper's form, and the combined curves of all.
     """
     rows = {name: [_read(outcome, name) for outcome in outcomes] for name in TERMS}
     yield share("both: one dominant mode", [row["dominant"] for row in rows["both"]])

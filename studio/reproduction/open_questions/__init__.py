@@ -1,1 +1,1 @@
-"""What the papers leave open: how much damage each tracker stands."""
+"""Questions that the papers leave open: accuracy on other footage, tolerance of damage."""

@@ -1,7 +1,7 @@
-"""How right each tracker is on footage that it was not tuned to: the suite of drawn clips, its two halves apart.
+"""Accuracy of each tracker on footage that it was not tuned to: the suite of rendered clips, by halves.
 
-Defaults are chosen by the first half; the second is looked at only to report. Nothing of a clip is known to a tracker
-but what a session gives: the lengths of the bones, or, where a contender says so, the person's height alone.
+Defaults are chosen on the first half; the second is used only for reporting. A tracker knows of a clip only what a
+session gives: the lengths of the bones, or, for one contender, the person's height alone.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -30,8 +30,8 @@ NEAR_MM = 24.0
 """A clip with a smaller mean error counts as near."""
 QUICK_FRAMES, QUICK_KINDS = 24, ("walk", "walk-20hz", "kick", "hard")
 WALKS = ("walk", "walk-20hz", "turns", "hard")
-"""What the behaviour model, learnt from walks alone, fits."""
-TAUGHT = Training(("walk", "walk-with-turns", "circle-three-cameras"), performances=2, body="human31")
+"""Kinds of clips that the behaviour model, learnt from walks alone, fits."""
+TRAINING = Training(("walk", "walk-with-turns", "circle-three-cameras"), performances=2, body="human31")
 THREE_TERMS, PAPERS_TERMS = "edge-region-silhouette", "edge-region"
 REFINED, SEARCH_ALONE = {"refine_frames": True}, {"refine_frames": False}
 PAPER = {
@@ -41,15 +41,15 @@ PAPER = {
     "crossover_by": "parameters",
     "survival": 0.5,
 }
-"""Deutscher & Reid's filter as they write it, weighed by edges and region."""
+"""Deutscher & Reid's filter as in the paper, weighed by edges and region."""
 AS_A_RUN = {"shape_frames": FIRST_FRAMES}
 """A run begins with the shape that its first frames show."""
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A contender of the suite. kinds : clips that it tracks, () for all. fields : of its attempts. training : what
-    its behaviour model is learnt from.
+    """A contender of the suite. kinds : clips that it tracks, () for all. fields : of its attempts. training : of its
+    behaviour model.
     """
 
     contender: Contender
@@ -59,7 +59,7 @@ class Entry:
 
     @property
     def name(self) -> str:
-        """The contender's."""
+        """The contender's name."""
         return self.contender.name
 
 
@@ -79,13 +79,13 @@ ENTRIES = (
     Entry(Contender("annealed, as the paper", "annealed", PAPERS_TERMS, {**PAPER, **SEARCH_ALONE})),
     Entry(_usual("swarm", "swarm"), fields=AS_A_RUN),
     Entry(_usual("condensation", "condensation"), fields=AS_A_RUN),
-    Entry(_usual("behaviour", "behaviour"), kinds=WALKS, fields=AS_A_RUN, training=TAUGHT),
+    Entry(_usual("behaviour", "behaviour"), kinds=WALKS, fields=AS_A_RUN, training=TRAINING),
     Entry(
         _usual("annealed, default, height alone"),
         fields={**AS_A_RUN, "subject": SUBJECT_OF_HEIGHT},
     ),
 )
-"""One line each; a knob that is to be switched on or off is one of the contender's changes."""
+"""The contenders; knobs to switch on or off are among a contender's changes."""
 
 
 def _mean(of: Callable[[Tracked], float]) -> Callable[[Runs], float]:
@@ -107,11 +107,11 @@ COLUMNS: Mapping[str, Callable[[Runs], float]] = {
         1000.0 * float(np.mean([run.seconds / max(1, len(run.frames) - 1) for run in runs]))
     ),
 }
-"""Of the long tables: what is taken of all seeds of a clip."""
+"""Columns of the long tables: statistics over all seeds of a clip."""
 
 
 def trials(scale: Scale) -> tuple[Trial, ...]:
-    """Every contender on every clip with every seed, clip by clip so that a clip's evidence is made once."""
+    """Every contender on every clip with every seed, clip by clip so that a clip's evidence is computed once."""
     found: list[Trial] = []
     for clip, kind in ((clip_name(half, kind), kind) for half in HALVES for kind in KINDS):
         last = QUICK_FRAMES if scale.quick else KINDS[kind].frames
@@ -124,8 +124,8 @@ def trials(scale: Scale) -> tuple[Trial, ...]:
 
 def _arguments(entry: Entry, clip: str, last: int, seed: int) -> dict[str, Any]:
     attempt = entry.contender.attempt(clip, seed, EVALUATIONS, last=last, **entry.fields)
-    taught = {} if entry.training is None else {"training": entry.training.plain()}
-    return {"attempt": attempt.plain(), **taught}
+    extra = {} if entry.training is None else {"training": entry.training.plain()}
+    return {"attempt": attempt.plain(), **extra}
 
 
 @kept_as("open_questions.generalisation.measure")
@@ -138,7 +138,7 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
 
 
 def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    """Both halves' tables, how many clips each contender is near in, and how often it loses a limb."""
+    """Both halves' tables, the number of clips in which each contender is near, and its frames with a limb lost."""
     groups = by_group(outcomes)
     for half in HALVES:
         # By contender and kind, the runs of the half.
@@ -151,7 +151,7 @@ def shown(outcomes: Sequence[Outcome]) -> Iterator[Part]:
         "evaluations": EVALUATIONS,
         "near (mm)": NEAR_MM,
         "most frames": max(outcome.trial.arguments["attempt"]["last"] for outcome in outcomes),
-        "behaviour learnt from": ", ".join(TAUGHT.sources),
+        "behaviour learnt from": ", ".join(TRAINING.sources),
     }
 
 

@@ -1,8 +1,8 @@
-"""How much of what goes wrong in practice each tracker stands: a heat map a question, error over degree of damage.
+"""Tolerance of each tracker to practical faults: a heat map a question, error over degree of damage.
 
 Questions that the papers leave open. All trackers get the same damaged evidence, σ0 and number of evaluations; the
 footage is the Lee-walk twin (for cameras a rendered walk with eight of them). One degree of every question is none, so
-that each row begins with what the tracker reaches undamaged.
+that each row begins with the undamaged error.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -29,11 +29,11 @@ from studio.synthesis.damage import misplaced
 Array = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 
-# Ways to spoil what a tracker is given, each of a degree, the same for the same seed.
-# Masks and edge maps are spoilt as they lie in memory, calibration as cameras: nothing of the session changes.
+# Kinds of damage to a tracker's input, each of a degree, the same for the same seed.
+# Masks and edge maps are damaged in memory, the calibration in the cameras: the session itself is not changed.
 
 HOLE_SHARE = 0.5
-"""Of the damage of a mask: holes in the person; the rest are blobs beside the person."""
+"""Share of holes in a mask's damage; the rest are blobs beside the person."""
 BLOB_PIXELS = 9.0
 """Radius of holes and blobs, up to twice that: a hand's or a shadow's size in the twin's pictures."""
 AROUND = 40
@@ -44,7 +44,7 @@ FOREGROUND = 255
 
 
 def nothing(degree: float, seed: int) -> Changed:
-    """No damage, whatever the degree."""
+    """No damage."""
     return Changed()
 
 
@@ -79,7 +79,7 @@ def damaged_mask(mask: Bytes, degree: float, rng: np.random.Generator) -> Bytes:
     while torn < HOLE_SHARE * wanted:
         place = int(rng.integers(person))
         torn += _paint(damaged, columns[place], rows[place], BLOB_PIXELS * (1.0 + rng.random()), 0)
-    # Blobs fall near the person; where they hit it they count for nothing, so the number of tries is bounded.
+    # Blobs fall near the person; those that hit it do not count, so the number of tries is bounded.
     for _ in range(10_000):
         if set_ >= (1.0 - HOLE_SHARE) * wanted:
             break
@@ -104,7 +104,7 @@ def _paint(mask: Bytes, x: float, y: float, radius: float, value: int) -> int:
 
 
 def clutter(degree: float, seed: int) -> Changed:
-    """Straight edges all over the edge maps that do not move, as a cluttered room has them.
+    """Static straight edges all over the edge maps, as in a cluttered room.
 
     degree : pixels on an edge as a share of the picture's.
     """
@@ -136,15 +136,15 @@ def clutter_edges(shape: tuple[int, ...], degree: float, rng: np.random.Generato
     if degree <= 0.0:
         return np.zeros(shape, np.uint8)
     soft = gaussian_filter(lines, CLUTTER_BLUR)
-    # A lone line keeps its full height, as the evidence's own proximity maps do.
+    # A single line keeps its full height, as in the evidence's own proximity maps.
     ridge = 1.0 / (CLUTTER_BLUR * np.sqrt(2.0 * np.pi))
     return np.round(255.0 * np.minimum(1.0, soft / ridge)).astype(np.uint8)
 
 
 def calibration_error(degree: float, seed: int) -> Changed:
-    """Every camera believed to look elsewhere than it does.
+    """Cameras whose calibration is rotated.
 
-    degree : pixels by which the picture's middle is off, in a direction of its own for each camera.
+    degree : pixels by which the picture's middle is off, in a separate direction for each camera.
     """
 
     def spoil(cameras: tuple[Camera, ...]) -> tuple[Camera, ...]:
@@ -165,9 +165,9 @@ EIGHT = "eight-cameras"
 FRAMES, QUICK_FRAMES = 90, 30
 ALL_TERMS = "edge-region-silhouette"
 MOST_SEEDS = 5
-"""A cell of a heat map is a colour: more seeds than this change no colour, and there are 140 cells."""
+"""Seeds: a cell of a heat map is a colour, which more seeds do not change, and there are 140 cells."""
 STANDS_MM, STANDS_LOST = 60.0, 5.0
-"""A tracker stands a degree if the mean over seeds stays below this error, and this share of frames (%) with a loss."""
+"""Limits of tolerance: mean error over seeds, mm, and share of frames with a loss, %."""
 
 CONTENDERS = (
     replace(IMPROVED, name="annealed, all terms", weighting=ALL_TERMS),
@@ -181,8 +181,8 @@ CONTENDERS = (
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """One heat map. degrees : from none to much. damage : of DAMAGES. fields : a degree as fields of an attempt,
-    where no evidence is damaged but less of it is given. shown : a degree on the axis.
+    """One heat map. degrees : from none to much. damage : of DAMAGES. fields : of an attempt for a degree,
+    where evidence is reduced instead of damaged. shown : a degree on the axis.
     """
 
     name: str
@@ -197,7 +197,7 @@ class Question:
 
 
 def fewer_cameras(count: float) -> dict[str, Any]:
-    """So many of the eight, spread as evenly as can be (two neighbours would see the same side)."""
+    """`count` of the eight cameras, spread as evenly as possible (two neighbours would see the same side)."""
     order = (1, 5, 3, 7, 2, 6, 4, 8)
     return {"cameras": tuple(sorted(f"cam{number}" for number in order[: int(count)]))}
 
@@ -242,7 +242,7 @@ QUESTIONS = (
         "frames a second",
         "How few frames a second are enough?",
         (1.0, 2.0, 3.0, 4.0, 6.0, 10.0),
-        # Only every so many frames are seen.
+        # Frames are skipped.
         fields=lambda step: {"every": int(step)},
         shown=lambda step: f"{60.0 / step:g}",
     ),
@@ -280,7 +280,7 @@ def measure(arguments: Mapping[str, Any], shelf: FootageShelf) -> dict[str, Any]
 
 
 def _shown(question: Question, outcomes: Sequence[Outcome]) -> Iterator[Part]:
-    """Mean error (mm) and frames with a limb lost (%) of every contender at every degree; what each stands."""
+    """Mean error (mm) and frames with a limb lost (%) of every contender at every degree; the tolerance of each."""
     runs, columns = by_group(outcomes), tuple(map(question.shown, question.degrees))
     errors: dict[str, list[float]] = {}
     losses: dict[str, list[float]] = {}

@@ -3,7 +3,7 @@
 import datetime
 import math
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from studio.capture.pictures import check_picture, list_pictures
 from studio.capture.video import probe_video
 from studio.errors import CalibrationError, FootageError, SessionError
 from studio.geometry.camera import Camera
-from studio.progress import Progress, watched
+from studio.progress import Progress, unheard
 from studio.sessions.archives import FOOTAGE_PARTS, folder_of, is_archive
 from studio.sessions.atomic_files import discard, made_whole, new_folder_beside, taken
 from studio.sessions.file_checksums import note_files
@@ -102,19 +102,17 @@ def import_source(
     unit: str = "",
     up: str = "z",
     despite_findings: bool = False,
-    progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    progress: Progress = unheard,
 ) -> ImportReport:
     """Make a session at `into` from a source folder, or an archive of one; see `known_layouts`,
     `folder_layout` and `bodytrack` for the layouts, `ImportOptions` for the options.
 
-    cancelled : checked often; True stops the import with WorkCancelledError. All is checked before anything is written;
-    on failure nothing is left behind and stored data is unchanged. Raises StudioError.
+    All is checked before anything is written; whatever fails, nothing is left and nothing that was stored is touched.
+    Raises StudioError.
     """
     options = ImportOptions(
         calibration, fps, copy, trial, offsets or {}, rotations or {}, unit, up, despite_findings
     )
-    report = watched(progress, cancelled, "The import")
     _check_request(source, options)
     if into.exists():
         raise taken(into)
@@ -126,12 +124,12 @@ def import_source(
             person = check_person(plan)
             if copy:
                 check_room(plan, into)
-            measured = _checked_rig(measure_source(plan, read, fps, report), options)
+            measured = _checked_rig(measure_source(plan, read, fps, progress), options)
             with made_whole(into) as folder:
                 manifest = write_session(
-                    folder, into.name, plan, read, measured, person, copy=copy, progress=report
+                    folder, into.name, plan, read, measured, person, copy=copy, progress=progress
                 )
-                report("finishing", 1, 1)
+                progress("finishing", 1, 1)
                 note_files(folder)
     except OSError as problem:
         raise SessionError(
@@ -145,8 +143,7 @@ def add_footage(
     source: Path,
     options: ImportOptions | None = None,
     *,
-    progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    progress: Progress = unheard,
 ) -> ImportReport:
     """Add the footage (with masks and backgrounds) of a folder, or of an archive of one, to a session.
 
@@ -154,11 +151,11 @@ def add_footage(
     over where it has one (and subject, start pose and truth, where the session has none). An existing camera
     gets the new footage. All is read before anything changes; on failure the session is unchanged. Raises StudioError.
     """
-    request, report = options or ImportOptions(), watched(progress, cancelled, "The import")
-    _check_request(source, request)
+    asked = options or ImportOptions()
+    _check_request(source, asked)
     session.check_idle()
     with folder_of(source.resolve(), FOOTAGE_PARTS, session.path / "take") as folder:
-        return _added(session, folder, request, report)
+        return _added(session, folder, asked, progress)
 
 
 def _added(session: Session, source: Path, options: ImportOptions, report: Progress) -> ImportReport:

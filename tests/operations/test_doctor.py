@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from studio import self_check as examination
 from studio.cli.main import main
 from studio.errors import RunError
-from studio.notebook import doctor as examination
-from studio.notebook.doctor import Examined, doctor
+from studio.self_check import Examined, doctor
 from studio.sessions.workspace import Workspace
 
 Plant = Callable[[pytest.MonkeyPatch, Path], None]

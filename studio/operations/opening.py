@@ -1,18 +1,25 @@
-"""Sessions and runs as a person names them."""
+"""Sessions and runs as a person names them, and what there is."""
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from studio.body.catalogue import list_bodies, load_body
+from studio.body.model import BodyModel
+from studio.declaring import Whose, operation
 from studio.errors import RunError
+from studio.export.kept_exports import exported_files
 from studio.runs.tracks import Track
-from studio.sessions.session import RUNS_NAME, Session
+from studio.runs.way import Way, way_of
+from studio.runs.way_results import newest_run
+from studio.sessions.session import BODIES_NAME, RUNS_NAME, Session
 from studio.sessions.stored_run import RunSummary, StoredRun
 from studio.sessions.workspace import Workspace
 
-SessionName = Session | str | Path
+SessionName = Annotated[Session | str | Path, Whose("session")]
 """A session that was opened, its name in the workspace (STUDIO_WORKSPACE), or its folder."""
 
 
@@ -21,7 +28,7 @@ class Tracked:
     """A run that was tracked. Goes wherever a run is wanted.
 
     run : on disk. track : frames (K,), poses (K, D) rad and mm, confidence (K,), states. names : D parameters. notes :
-    on what was filled in. seconds, evaluations_per_frame : of the search.
+    on what was filled in. seconds, evaluations_per_frame : of the search. likelihood_scale : β of the last layer.
     """
 
     run: StoredRun
@@ -30,6 +37,7 @@ class Tracked:
     notes: tuple[str, ...]
     seconds: float
     evaluations_per_frame: int
+    likelihood_scale: float = float("nan")
 
     @property
     def frames(self) -> NDArray[np.int64]:
@@ -42,7 +50,7 @@ class Tracked:
         return self.track.poses
 
 
-RunName = Tracked | StoredRun | str | Path
+RunName = Annotated[Tracked | StoredRun | str | Path, Whose("run")]
 """A run that was tracked or opened, "SESSION/RUN" as in the workspace, or its folder."""
 
 
@@ -77,3 +85,17 @@ def open_run(run: RunName) -> StoredRun:
 def session_of(run: StoredRun) -> Session:
     """The session that a run belongs to."""
     return Session(run.folder.parent.parent)
+
+
+def bodies() -> tuple[BodyModel, ...]:
+    """List the bodies that are shipped and those of the workspace."""
+    folders = tuple(folder for folder in (Workspace().root / BODIES_NAME,) if folder.is_dir())
+    return tuple(load_body(name, folders) for name in list_bodies(folders))
+
+
+@operation
+def way(session: SessionName) -> Way:
+    """Tell how far a session is on the way from footage to an exported motion, and what is next."""
+    opened = open_session(session)
+    run = newest_run(opened)
+    return way_of(opened, exports=exported_files(run) if run else ())

@@ -14,15 +14,17 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import av
 import cv2
 import numpy as np
 
+from studio.declaring import Terminal
 from studio.errors import StudioError
 from studio.launch import PORT, served_at
 from studio.numba_in_threads import numba
-from studio.runs.new_run import RunRequest, prepare_run
+from studio.runs.new_run import prepare_run
 from studio.sessions.workspace import Workspace
 from studio.web.pages import assets_folder
 from studio.web.samples import install_sample
@@ -50,8 +52,13 @@ class _Fault(Exception):
     """What is wrong, and the remedy."""
 
 
-def doctor(workspace: Workspace | None = None) -> tuple[Examined, ...]:
-    """Every check, in order; none is left out because another failed, and nothing stays behind. Raises nothing."""
+def doctor(
+    workspace: Annotated[Workspace | None, Terminal(left_out=True)] = None,
+) -> tuple[Examined, ...]:
+    """Try all that the studio stands on, and say what to do where something fails; the command ends with 1 then.
+
+    No check is left out because another failed, and nothing stays behind.
+    """
     place = workspace or Workspace()
     checks: tuple[tuple[str, Callable[[], str]], ...] = (
         ("Python", _python),
@@ -210,6 +217,6 @@ def _port(root: Path) -> str:
 def _tracked() -> str:
     with tempfile.TemporaryDirectory() as folder:
         session = install_sample(Workspace(Path(folder)), "planar_arm")
-        run = prepare_run(session, RunRequest(last=1, changes=QUICK))
+        run = prepare_run(session, last=1, knobs=QUICK)
         result = track_to_end(session, run, lambda words, done, total: None)
     return f"in {result.seconds:.1f} s, compiling included"

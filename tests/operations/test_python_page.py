@@ -9,7 +9,7 @@ from board_takes import PLACES, render_takes, two_cameras
 
 import studio
 from studio.motion_files.bvh import read_bvh_file
-from studio.notebook.opening import Tracked
+from studio.operations.opening import Tracked
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "web_assets" / "guide" / "python.md").read_text(encoding="utf-8")

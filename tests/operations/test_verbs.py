@@ -11,7 +11,7 @@ from toy_session import BODY, HEIGHT, WIDTH, true_poses
 
 import studio
 from studio.body.catalogue import load_body
-from studio.notebook.progress import told
+from studio.operations.progress import reporting as told
 from studio.sessions.session import Session
 
 FEW = {"particles": 20, "layers": 2}
@@ -140,7 +140,7 @@ def test_exclusions_are_painted_and_taken_back(session_on_disk: Session) -> None
 
 
 def test_a_height_in_metres_is_refused(session_on_disk: Session) -> None:
-    with pytest.raises(studio.StudioError, match="no person's"):
+    with pytest.raises(studio.StudioError, match=r"'height_mm' cannot be 1\.76"):
         studio.subject("toy", 1.76)
     assert studio.subject("toy").name == BODY
 

@@ -1,0 +1,136 @@
+"""What becomes of a run: `refine`, `smooth`, `check`, `evaluate`, `export`, `verify`."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+
+import msgspec
+
+from studio.cli.deriving import Call, command_of
+from studio.cli.output import EXIT_CODE, FOUND_FAULTS
+from studio.evaluation.report import as_document, in_words
+from studio.export.formats import FORMATS
+from studio.operations.results import Verified, check, evaluate, export_run, refine, smooth, verify
+from studio.runs.refining import MadeTrack
+from studio.runs.tracks import track_named
+from studio.runs.verifying import Repair, Verification
+from studio.runs.way_step import counted
+
+
+@command_of(refine)
+def refine_command(call: Call) -> dict[str, object]:
+    made: MadeTrack = call()
+    agreement = {"agreement_before": made.agreement_before, "agreement_after": made.agreement_after}
+    words = (
+        f"{made.moved} of {len(made.track.frames)} frames moved; the silhouettes agree by"
+        f" {made.agreement_before:.3f} before, {made.agreement_after:.3f} after."
+    )
+    return _made(call, made, {"moved": made.moved, **agreement}, words)
+
+
+@command_of(smooth)
+def smooth_command(call: Call) -> dict[str, object]:
+    made: MadeTrack = call()
+    words = (
+        f"second difference of the markers {made.jitter_before:.1f} -> {made.jitter_after:.1f} mm RMS,"
+        f" {len(made.filled)} frames filled, {len(made.left_out)} left out."
+    )
+    return _made(call, made, {"filled": list(made.filled), "left_out": list(made.left_out)}, words)
+
+
+def _made(call: Call, made: MadeTrack, more: dict[str, object], words: str) -> dict[str, object]:
+    """A track that was made."""
+    run = call.given["run"]
+    source = made.track.made_by["from"]
+    return {
+        "session": run.session_name,
+        "run": run.name,
+        "track": made.track.name,
+        "frames": len(made.track.frames),
+        "made_by": dict(made.track.made_by),
+        "jitter_before_mm": made.jitter_before,
+        "jitter_after_mm": made.jitter_after,
+        **more,
+        "text": f"{run.session_name} / {run.name}: track '{made.track.name}' made from '{source}', {words}",
+    }
+
+
+@command_of(check)
+def check_command(call: Call) -> dict[str, object]:
+    run, found = call.given["run"], call()
+    damage, told = run.damage(), msgspec.to_builtins(found)
+    return {
+        "session": run.session_name,
+        "run": run.name,
+        "good": found.good and not damage,
+        "damage": damage,
+        "inside_mean": found.inside_mean,
+        "poor": list(found.poor),
+        **{name: value for name, value in told.items() if name not in ("schema", "stamp", "count")},
+        "text": f"{run.session_name} / {run.name}, track '{found.track}': {found.in_words()}. {damage}".rstrip(),
+    }
+
+
+@command_of(evaluate)
+def evaluate_command(call: Call) -> Mapping[str, object]:
+    track = track_named(call.given["run"], call.given["track"])
+    found = call()
+    return {**as_document(found), "track": track, "text": f"track                {track}\n{in_words(found)}"}
+
+
+@command_of(
+    export_run,
+    name="export",
+    epilog="Formats: " + "  ".join(f".{form.name} {form.title};" for form in FORMATS.values()),
+)
+def export_command(call: Call) -> dict[str, object]:
+    run, done = call.given["run"], call()
+    names = ", ".join(str(path) for path in done.files)
+    of_track = f"track '{done.track}', " if done.track else ""
+    return {
+        "session": run.session_name,
+        "run": run.name,
+        "format": done.format,
+        "track": done.track,
+        "files": [str(path) for path in done.files],
+        "bytes": done.size,
+        "frames": done.frames,
+        "fps": done.fps,
+        "checked": done.checked,
+        "notes": list(done.notes),
+        "text": f"{names} ({done.size / 1e6:.2f} MB): {of_track}{done.checked}.",
+    }
+
+
+@command_of(verify)
+def verify_command(call: Call) -> dict[str, object]:
+    done: Verified = call()
+    found = done.found
+    return {
+        EXIT_CODE: FOUND_FAULTS if found.faults else 0,
+        "session": call.given["session"].name,
+        **{name: value for name, value in asdict(found).items() if name != "faults"},
+        "faults": [asdict(fault) for fault in found.faults],
+        "repaired": [asdict(entry) for entry in done.repaired],
+        "text": "\n".join([_verified(found), *map(_repaired, done.repaired)]),
+    }
+
+
+def _verified(found: Verification) -> str:
+    parts = [f"{counted(found.files, 'file')} and {counted(found.frames, 'frame')} read"]
+    parts.append(f"{len(found.faults)} damaged" if found.faults else "all as written")
+    if found.unchecked:
+        parts.append(f"{counted(found.unchecked, 'frame')} from before there were checksums")
+    if found.written_again:
+        parts.append(f"{counted(len(found.written_again), 'file')} written again since the last time")
+    if found.new:
+        parts.append(f"{counted(found.new, 'file')} noted for the first time")
+    return f"{', '.join(parts)}."
+
+
+def _repaired(entry: Repair) -> str:
+    if entry.problem:
+        return f"{entry.run}: not repaired. {entry.problem}"
+    same = (
+        f"; {entry.same} of {entry.compared} stored poses are the same bit for bit" if entry.compared else ""
+    )
+    return f"{entry.run}: {counted(len(entry.frames), 'frame')} tracked again{same}."

@@ -1,1 +1,0 @@
-"""The verbs of the command line for Python and notebooks; `studio` itself hands them out."""

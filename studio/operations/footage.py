@@ -1,0 +1,400 @@
+"""Footage into sessions: imported, added, rendered, recorded, put in step; sessions that begin empty."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from studio.capture.camera_addresses import CameraAddress, address_from_text, check_names
+from studio.capture.synchrony import MOST_SECONDS, Synchrony
+from studio.capture.timestamps import TimedOffsets
+from studio.declaring import Body, Terminal, Web, Whose, operation
+from studio.errors import FootageError, SessionError
+from studio.footage_recipes import synthesize as synthesize_recipe
+from studio.operations.opening import SessionName, open_session
+from studio.operations.progress import Reporting, reporting, say
+from studio.progress import Progress
+from studio.sessions.footage_changes import FootageChange, change_footage, recorded_offsets, synchrony_of
+from studio.sessions.importers.importing import ImportOptions, ImportReport, import_source
+from studio.sessions.importers.importing import add_footage as add_to_session
+from studio.sessions.recordings import SpreadFigures, calibration_given, check_cameras, import_recording
+from studio.sessions.session import Session
+from studio.sessions.workspace import Workspace, begin_session
+from studio.worker.camera_readers import CameraReaders
+from studio.worker.stream_recording import RecordingStanding, StreamRecording, recording_folder
+
+LOOK_SECONDS = 0.2
+
+Source = Annotated[
+    str | Path, Field(description="A folder of footage, or an archive of one."), Terminal(kind=Path)
+]
+Into = Annotated[
+    str | Path,
+    Field(description="Name of the new session in the workspace, or a path."),
+    Terminal("--into", "SESSION", kind=str),
+]
+Place = Annotated[str | None, Field(max_length=4096)]
+Chosen = Annotated[
+    str | Path | None,
+    Field(description="Which calibration to take, where there are several."),
+    Terminal(kind=Path),
+    Web(kind=Place),
+]
+Rate = Annotated[
+    float | None,
+    Field(gt=0, le=10_000, description="Frames per second, where the footage does not say (pictures)."),
+]
+Trial = Annotated[
+    str | None,
+    Field(description="Which trial, where a folder holds several."),
+    Terminal(metavar="NAME"),
+    Web(kind=Place),
+]
+Turn = Literal[0, 90, 180, 270]
+Offsets = Annotated[
+    Mapping[str, int] | None,
+    Field(
+        max_length=64,
+        description="By camera: the frame of its footage that was taken with frame 0 of the others.",
+    ),
+    Terminal("--offset", "CAMERA=FRAMES"),
+]
+Rotations = Annotated[
+    Mapping[str, int] | None,
+    Field(
+        max_length=64,
+        description="By camera: degrees clockwise (0, 90, 180 or 270) by which its pictures are turned.",
+    ),
+    Terminal("--rotate", "CAMERA=DEGREES"),
+    Web(kind=dict[str, Turn]),
+]
+Unit = Annotated[
+    Literal["", "mm", "m"],
+    Field(
+        description="The calibration's unit, where it is taken wrongly; default: what the file says or its size."
+    ),
+]
+Up = Annotated[
+    Literal["x", "y", "z", "-x", "-y", "-z"],
+    Field(description="The axis of the calibration's world that points up."),
+]
+Wrong = Annotated[
+    bool,
+    Field(
+        description="Take a calibration that would make results wrong (z not up, a wrong unit), with a warning."
+    ),
+]
+Copy = Annotated[
+    bool,
+    Field(description="Copy the footage, or refer to it where it lies."),
+    Terminal("--copy/--reference"),
+]
+
+
+@operation
+def new_session(
+    into: Annotated[
+        str | Path,
+        Field(description="Name or path."),
+        Terminal(kind=str, metavar="SESSION"),
+        Web(left_out=True),
+    ],
+    *,
+    title: Annotated[
+        str,
+        Field(max_length=200, description="What people see; the name unless given."),
+        Web(kind=str),
+    ] = "",
+    body: Annotated[Body, Field(description="The body that is tracked; the studio's own unless given.")] = "",
+) -> Session:
+    """Make an empty session, to which footage and a calibration are added.
+
+    Raises SessionError, BodyError.
+    """
+    return begin_session(Workspace().place_for(into), title, body)
+
+
+@operation
+def import_footage(
+    source: Source,
+    into: Into,
+    *,
+    calibration: Chosen = None,
+    fps: Rate = None,
+    trial: Trial = None,
+    offsets: Offsets = None,
+    rotations: Rotations = None,
+    unit: Unit = "",
+    up: Up = "z",
+    despite_findings: Wrong = False,
+    copy: Copy = True,
+    progress: Reporting = None,
+) -> Session:
+    """Make a session from a folder (or an archive) of footage and calibration, checking one against the other.
+
+    Folders of Pose2Sim, FreeMoCap, Caliscope, anipose, EasyMocap and PARSEC are recognised.
+
+    Raises StudioError; then nothing was made.
+    """
+    with reporting(progress, "Importing") as report:
+        found = import_source(
+            Path(source),
+            Workspace().place_for(into),
+            calibration=calibration,
+            fps=fps,
+            copy=copy,
+            trial=trial,
+            offsets=offsets,
+            rotations=rotations,
+            unit=unit,
+            up=up,
+            despite_findings=despite_findings,
+            progress=report,
+        )
+    say(progress, (*found.notes, *(f"Warning: {warning}" for warning in found.warnings)))
+    return found.session
+
+
+@operation
+def add_footage(
+    session: SessionName,
+    source: Source,
+    *,
+    calibration: Chosen = None,
+    fps: Rate = None,
+    trial: Trial = None,
+    offsets: Offsets = None,
+    rotations: Rotations = None,
+    unit: Unit = "",
+    up: Up = "z",
+    replace: Annotated[bool, Field(description="Forget all cameras that the source does not name.")] = False,
+    despite_findings: Wrong = False,
+    copy: Copy = True,
+    progress: Reporting = None,
+) -> ImportReport:
+    """Add the footage of a folder to a session that is there, before or after it is calibrated.
+
+    Raises StudioError; then the session is as it was.
+    """
+    options = ImportOptions(
+        calibration, fps, copy, trial, offsets or {}, rotations or {}, unit, up, despite_findings, replace
+    )
+    with reporting(progress, "Adding") as report:
+        added = add_to_session(open_session(session), Path(source), options, progress=report)
+    say(progress, (*added.notes, *(f"Warning: {warning}" for warning in added.warnings)))
+    return added
+
+
+@operation
+def synthesize(
+    recipe: Annotated[
+        str | Path,
+        Field(description="A TOML file, or the name of a recipe that is shipped."),
+        Terminal(kind=str),
+    ],
+    into: Into,
+    *,
+    frames: Annotated[
+        int | None, Field(ge=1, description="Only so many frames; default: the recipe's.")
+    ] = None,
+    progress: Reporting = None,
+) -> Session:
+    """Render footage with exact truth from a recipe."""
+    place = Workspace().place_for(into)
+    with reporting(progress, "Rendering") as report:
+        synthesize_recipe(recipe, place, progress=report, frames=frames)
+    return Session(place)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Synchronised:
+    """How far the cameras began apart. session : as it is now. found : by motion or by recorded times, None for
+    offsets by hand. change : what was written, None for nothing.
+    """
+
+    session: Session
+    found: Synchrony | TimedOffsets | None = None
+    change: FootageChange | None = None
+
+
+@operation
+def synchronise(
+    session: SessionName,
+    *,
+    offsets: Offsets = None,
+    rotations: Rotations = None,
+    timestamps: Annotated[
+        str | Path | None,
+        Field(description="A recorder's times of the frames (timestamps.csv), instead of an estimate."),
+        Terminal(kind=Path),
+    ] = None,
+    within: Annotated[
+        float, Field(gt=0, le=600, description="Largest offset that is looked for, seconds.")
+    ] = MOST_SECONDS,
+    apply: Annotated[bool, Field(description="Write what was estimated or read into the session.")] = False,
+    progress: Reporting = None,
+) -> Synchronised:
+    """Tell by how many frames the cameras of a session began apart.
+
+    Without offsets or turns, estimates it from what moves in the pictures and says how far to trust it; nothing is
+    changed unless that is applied. Offsets and turns by hand are written at once.
+
+    Raises FootageError, also for an estimate that is to be applied and cannot be trusted.
+    """
+    opened = open_session(session)
+    if offsets or rotations:
+        if apply or timestamps is not None:
+            raise FootageError(
+                "Offsets cannot be given by hand and estimated or read at once.",
+                "Leave out --apply and --timestamps.",
+            )
+        change = change_footage(opened, offsets, rotations)
+        return Synchronised(change.session, None, change)
+    if timestamps is not None:
+        found = recorded_offsets(opened, Path(timestamps))
+    else:
+        with reporting(progress, "Estimating") as report:
+            found = synchrony_of(opened, report, within)
+        if apply and not found.sure:
+            say(progress, found.notes)
+            raise FootageError(
+                "The estimate is not reliable enough to be applied.",
+                "Give the offsets by hand with --offset CAMERA=FRAMES.",
+            )
+    if not apply:
+        return Synchronised(opened, found)
+    change = change_footage(opened, found.offsets)
+    return Synchronised(change.session, found, change)
+
+
+Cameras = Annotated[
+    Mapping[str, str] | Sequence[str],
+    Field(
+        description="A camera by its name in the calibration: http://… (MJPEG), rtsp://…, /dev/video0, or a video to be"
+        " replayed."
+    ),
+    Terminal("--camera", "NAME=ADDRESS", kind=Sequence[str], required=False),
+]
+Seconds = Annotated[float | None, Field(gt=0, le=86400)]
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """What was recorded. spread : of the pictures of a frame over time. notes : for a person, warnings last. standing :
+    how the recording ended; None for one that was cut off and is finished.
+    """
+
+    session: Session
+    spread: SpreadFigures
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+    standing: RecordingStanding | None = None
+
+
+@operation
+def record(
+    cameras: Cameras,
+    into: Into,
+    calibration: Annotated[
+        SessionName,
+        Field(description="The cameras' calibration, a file or folder; or a session that has it."),
+        Whose(""),
+        Terminal("--calibration", "CALIBRATION|SESSION", kind=str),
+    ],
+    *,
+    seconds: Annotated[
+        Seconds, Field(description="For so long; default: until the streams end, or Ctrl-C.")
+    ] = None,
+    fps: Annotated[
+        float | None, Field(gt=0, le=10_000, description="Pictures a second; default: as measured.")
+    ] = None,
+    finish: Annotated[
+        str | Path | None,
+        Field(description="Make a session of a recording that was cut off, instead."),
+        Terminal(kind=Path, metavar="FOLDER"),
+    ] = None,
+    progress: Reporting = None,
+) -> Recorded:
+    """Record live cameras all at once into a session, each picture with the time at which it came.
+
+    What is recorded lies in a folder beside the session until it is imported; a kill or a full disk loses less than a
+    second of it, and `finish` makes a session of the rest. Ctrl-C (a notebook's stop button) ends the recording and
+    keeps it.
+
+    Raises FootageError, SessionError.
+    """
+    place = Workspace().place_for(into)
+    if place.exists():
+        raise SessionError(f"There is something at '{place}' already.", "Choose another name.")
+    known = calibration_given(
+        calibration.path if isinstance(calibration, Session) else calibration, Workspace()
+    )
+    if finish is not None:
+        return _kept(Path(finish), place, known, None, progress)
+    addresses = addresses_of(cameras)
+    check_cameras(known, [address.name for address in addresses])
+    folder = recording_folder(place)
+    with CameraReaders(addresses) as readers:
+        say(progress, ["Waiting for the cameras."])
+        readers.await_pictures()
+        say(
+            progress,
+            [f"{one.name}: {one.width}x{one.height}, {one.shown}" for one in readers.cameras.standings],
+        )
+        recording = StreamRecording(readers, folder, fps or readers.await_rate())
+        try:
+            with reporting(progress, f"{place.name}: recording") as report:
+                _until(recording, seconds, report, progress)
+        except KeyboardInterrupt:
+            say(progress, ["Stopped."])
+        finally:
+            standing = recording.close()
+    return _kept(folder, place, known, standing, progress)
+
+
+def addresses_of(cameras: Mapping[str, str] | Sequence[str]) -> list[CameraAddress]:
+    """Cameras by name, or as NAME=ADDRESS. Raises FootageError."""
+    if not cameras:
+        raise FootageError(
+            "No camera was given.",
+            "Give each by its name in the calibration, with its address: NAME=ADDRESS.",
+        )
+    texts = (
+        [f"{name}={place}" for name, place in cameras.items()] if isinstance(cameras, Mapping) else cameras
+    )
+    addresses = [address_from_text(text, replays=True) for text in texts]
+    check_names(addresses)
+    return addresses
+
+
+def _until(recording: StreamRecording, seconds: float | None, report: Progress, progress: Reporting) -> None:
+    """Record for so long, or until it ends by itself."""
+    began = time.monotonic()
+    stopped: set[str] = set()
+    while seconds is None or time.monotonic() - began < seconds:
+        if recording.wait(LOOK_SECONDS):
+            return
+        standing = recording.standing
+        ended = {
+            one.name: f"{one.in_words}. {one.message}" for one in standing.cameras if one.state == "stopped"
+        }
+        say(progress, [words for name, words in ended.items() if name not in stopped])
+        stopped = set(ended)
+        total = round(seconds) if seconds else 0
+        report(standing.in_words, min(total, round(standing.seconds)), total)
+
+
+def _kept(
+    folder: Path, place: Path, calibration: Path, standing: RecordingStanding | None, progress: Reporting
+) -> Recorded:
+    """The session of a recording."""
+    with reporting(progress, f"{place.name}: importing") as report:
+        found, spread = import_recording(
+            folder, place, calibration, standing.notes if standing else (), report
+        )
+    notes = (*found.notes, *found.warnings)
+    say(progress, notes)
+    return Recorded(found.session, spread, notes, found.warnings, standing)

@@ -1,0 +1,109 @@
+"""Masks of a session: what they are made of, and how far the views agree."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import Field
+
+from studio.capture.pictures import painted_picture, png_of
+from studio.declaring import Knobs, Terminal, Values, Web, operation
+from studio.operations.opening import SessionName, open_session
+from studio.operations.progress import Reporting, reporting, say
+from studio.runs.background_setup import BackgroundSetup, set_up_background
+from studio.runs.mask_quality import MaskQuality, measure_masks
+from studio.sessions.background_files import polygon_exclusion, set_backgrounds, set_exclusion
+from studio.sessions.session import Session
+
+BackgroundSource = Literal["plate", "clip", "median", "combined"]
+
+
+@operation
+def background(
+    session: SessionName,
+    source: Annotated[
+        BackgroundSource, Field(description="Background to use from now on."), Terminal("--source")
+    ],
+    *,
+    plates: Annotated[
+        Mapping[str, str | Path] | None,
+        Field(description="By camera: a picture or clip of the empty room."),
+        Terminal(left_out=True),
+        Web(left_out=True),
+    ] = None,
+    exclude: Annotated[
+        Mapping[str, ArrayLike | str | Path | None] | None,
+        Field(
+            description="By camera, what does not count: a polygon (K, 2) of pixels, a painted picture's path, None for"
+            " nothing any more."
+        ),
+        Terminal(left_out=True),
+        Web(left_out=True),
+    ] = None,
+    knobs: Annotated[
+        Values,
+        Field(max_length=64, description="Knobs of the masks, by name."),
+        Knobs(others=True),
+        Web("knobs"),
+    ] = None,
+    tune: Annotated[
+        bool, Field(description="Try knobs, keep those under which the views agree best.")
+    ] = True,
+    exclude_unused: Annotated[
+        bool, Field(description="What no view's hull comes near does not count."), Terminal(left_out=True)
+    ] = False,
+    progress: Reporting = None,
+) -> BackgroundSetup:
+    """Choose where a session's masks come from, what does not count, and (on the command line) see how good they are.
+
+    Agreement is the smaller of two shares: of a camera's mask that the visual hull of all views covers, and of the
+    hull's silhouette that lies in the mask. From 0.9 on masks are called usable.
+
+    Raises FootageError for a source that is not there, SettingsError for a knob; then nothing is changed.
+    """
+    opened = open_session(session)
+    if plates:
+        opened = set_backgrounds(opened, {camera: Path(path) for camera, path in plates.items()})
+    for camera, region in (exclude or {}).items():
+        exclude_region(opened, camera, region)
+    with reporting(progress, f"{opened.name}: background") as report:
+        made = set_up_background(
+            opened,
+            source,
+            knobs=knobs,  # pyright: ignore[reportArgumentType]
+            tune=tune,
+            exclude_unused=exclude_unused,
+            progress=report,
+        )
+    say(progress, made.notes)
+    return made
+
+
+@operation
+def mask_quality(
+    session: SessionName,
+    frames: Annotated[
+        Sequence[int], Field(max_length=24, description="To look at; default: five, evenly spread.")
+    ] = (),
+    *,
+    progress: Reporting = None,
+) -> MaskQuality:
+    """How far the masks agree in the hull, camera by camera, and what the silhouettes say against the calibration.
+
+    Without frames it is remembered; then a fault that makes results wrong keeps tracking from beginning.
+    """
+    opened = open_session(session)
+    with reporting(progress, f"{opened.name}: masks") as report:
+        return measure_masks(opened, frames, report)
+
+
+def exclude_region(session: Session, camera: str, region: ArrayLike | str | Path | None) -> None:
+    """Let a region of a camera's pictures not count, as `background` takes it."""
+    if region is None:
+        set_exclusion(session, camera, b"")
+    elif isinstance(region, str | Path):
+        set_exclusion(session, camera, png_of(painted_picture(Path(region).read_bytes())))
+    else:
+        polygon_exclusion(session, camera, np.asarray(region, dtype=np.float64))

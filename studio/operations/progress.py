@@ -1,0 +1,76 @@
+"""Who hears how far a verb is: a function of one's own, a bar where somebody is looking, or a door's own display."""
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
+from rich.progress import Progress as Bar
+
+from studio.progress import Progress, TimeLeft, left_in_words, unheard
+
+
+@dataclass(frozen=True, slots=True)
+class Display:
+    """How a door shows what a verb does. watch : begins a stage of that title. say : shows lines at once; with a folder
+    (a session's) each but the first time that it is said of what lies there.
+    """
+
+    watch: Callable[[str], AbstractContextManager[Progress]]
+    say: Callable[[Iterable[str], Path | None], None]
+
+
+Reporting = Progress | Display | bool | None
+"""A function of one's own; True for a bar, False for nothing; None for a bar where somebody is looking."""
+
+
+@contextmanager
+def reporting(progress: Reporting, title: str) -> Iterator[Progress]:
+    """What a verb reports to. A function that raises ends the verb, and nothing half done is kept."""
+    console = Console(stderr=True, highlight=False)
+    if isinstance(progress, Display):
+        with progress.watch(title) as report:
+            yield report
+    elif callable(progress):
+        yield progress
+    elif progress or (progress is None and (console.is_terminal or console.is_jupyter)):
+        with bar(console, title) as report:
+            yield report
+    else:
+        yield unheard
+
+
+def say(progress: Reporting, lines: Iterable[str], once_in: Path | None = None) -> None:
+    """Lines that a display shows while the verb goes on; the verb's answer has them for all others."""
+    if isinstance(progress, Display):
+        progress.say(lines, once_in)
+
+
+@contextmanager
+def bar(console: Console, title: str) -> Iterator[Progress]:
+    """A bar with the time that is left."""
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[left]}"),
+        TextColumn("{task.fields[speed]}"),
+    )
+    left = TimeLeft()
+    with Bar(*columns, console=console) as shown:
+        task = shown.add_task(title, total=None, speed="", left="")
+
+        def report(step: str, done: int, total: int) -> None:
+            finished = shown.tasks[task]
+            shown.update(
+                task,
+                description=step or title,
+                completed=done,
+                total=total or None,
+                left=left_in_words(left.after(step, done, total)),
+                speed=f"{finished.speed:.1f}/s" if finished.speed else "",
+            )
+
+        yield report

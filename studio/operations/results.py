@@ -1,0 +1,228 @@
+"""What a run holds, what is made of it afterwards, how good it is, and files for other programs."""
+
+import importlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from studio.body.forward_kinematics import marker_points
+from studio.declaring import Knobs, Terminal, Values, operation
+from studio.errors import TruthError
+from studio.evaluation.errors import Evaluation
+from studio.evaluation.errors import evaluate as evaluate_poses
+from studio.export.exporting import ExportReport
+from studio.export.exporting import export_run as write_run
+from studio.export.formats import FORMATS, format_of_file
+from studio.export.options import ExportOptions
+from studio.export.task import Writer
+from studio.knobs import changed, knobs_of
+from studio.motion_files.trc import MarkerMotion, read_trc
+from studio.operations.opening import RunName, SessionName, open_run, open_session, session_of
+from studio.operations.progress import Reporting, reporting, say
+from studio.runs.checking import EVERY, RunCheck, check_run
+from studio.runs.refining import REFINED, SMOOTHED, MadeTrack, refine_run, smooth_run
+from studio.runs.tracks import BEST, Track, best_track, track_names
+from studio.runs.tracks import read_track as read_stored_track
+from studio.runs.verifying import Repair, Verification, repair
+from studio.runs.verifying import verify as verify_session
+from studio.tracking.refinement import RefinementSettings
+from studio.tracking.smoothing import SmoothingSettings
+
+TrackName = Annotated[
+    str,
+    Field(description="Best: smoothed, else refined, else raw; or any track's name."),
+    Terminal(metavar="NAME"),
+]
+Origin = Annotated[str, Terminal("--from")]
+NewTrack = Annotated[str, Field(description="Name of the track that is made.")]
+Replace = Annotated[bool, Field(description="Write over a derived track of that name.")]
+
+
+def list_tracks(run: RunName) -> tuple[str, ...]:
+    """Names of a run's tracks: "raw" is what the search found, the others were made of it."""
+    return track_names(open_run(run))
+
+
+def read_track(run: RunName, track: TrackName = BEST) -> Track:
+    """A track as arrays: name, frames (K,), poses (K, D) rad and mm, confidence (K,), states. Raises NotFoundError."""
+    return read_stored_track(open_run(run), track)
+
+
+def markers(run: RunName, track: TrackName = BEST) -> MarkerMotion:
+    """The body's markers along a track: names (M), times (K,) s, positions (K, M, 3) mm, z up."""
+    stored = open_run(run)
+    body, chosen = stored.body(), read_stored_track(stored, track)
+    return MarkerMotion(
+        tuple(marker.name for marker in body.markers),
+        np.asarray(chosen.frames / stored.record.fps),
+        marker_points(body, chosen.poses),
+        "mm",
+        stored.record.fps,
+    )
+
+
+@operation
+def refine(
+    run: RunName,
+    *,
+    source: Annotated[
+        Origin, Field(description="The track that is refined; default: as tracked, sides put right.")
+    ] = "",
+    into: NewTrack = REFINED,
+    replace: Replace = False,
+    knobs: Annotated[Values, Knobs(lambda: knobs_of(RefinementSettings))] = None,
+    progress: Reporting = None,
+) -> MadeTrack:
+    """Refine every frame of a run on its silhouettes, and keep that beside what the search found.
+
+    Frames that follow each other are refined together; no weight ever falls. Ctrl-C ends it, and nothing is kept.
+
+    Raises SessionError, RunError, SettingsError.
+    """
+    stored = open_run(run)
+    opened = session_of(stored)
+    settings = changed(RefinementSettings(), knobs or {})
+    with reporting(progress, f"{opened.name} / {stored.name}: refining") as report:
+        return refine_run(
+            opened, stored, source=source, into=into, settings=settings, replace=replace, progress=report
+        )
+
+
+@operation
+def smooth(
+    run: RunName,
+    *,
+    source: Annotated[
+        Origin, Field(description="The track that is smoothed; default: refined, else sides, else raw.")
+    ] = "",
+    into: NewTrack = SMOOTHED,
+    replace: Replace = False,
+    knobs: Annotated[Values, Knobs(lambda: knobs_of(SmoothingSettings))] = None,
+) -> MadeTrack:
+    """Smooth a run's poses in time, and keep that beside what the search found.
+
+    Short gaps are filled and marked, long ones stay gaps.
+
+    Raises SessionError, RunError, SettingsError.
+    """
+    settings = changed(SmoothingSettings(), knobs or {})
+    return smooth_run(open_run(run), source=source, into=into, settings=settings, replace=replace)
+
+
+@operation
+def check(
+    run: RunName,
+    track: Annotated[TrackName, Terminal("--track", "NAME")] = BEST,
+    *,
+    every: Annotated[int, Field(ge=1, le=10_000, description="Look at so-many-th frames.")] = EVERY,
+    progress: Reporting = None,
+) -> RunCheck:
+    """Tell how well a run fits its pictures: share in the masks, lost frames and limbs, sudden turns, jumps, jitter.
+
+    What was measured is kept beside the run, and shown in the guided way's step Check.
+
+    Raises RunError for a run without frames.
+    """
+    stored = open_run(run)
+    opened = session_of(stored)
+    with reporting(progress, f"{opened.name} / {stored.name}: checking") as report:
+        return check_run(opened, stored, track, every, progress=report)
+
+
+@operation
+def evaluate(
+    run: RunName,
+    *,
+    truth: Annotated[
+        str | Path | None,
+        Field(description="TRC file; default: the session's own truth."),
+        Terminal(kind=Path),
+    ] = None,
+    track: TrackName = BEST,
+    progress: Reporting = None,
+) -> Evaluation:
+    """Measure a run against the true markers: mm without alignment, root-aligned, after Procrustes.
+
+    Raises TruthError.
+    """
+    stored = open_run(run)
+    opened = session_of(stored)
+    path = Path(truth) if truth is not None else opened.truth_path
+    if path is None:
+        raise TruthError(f"Session '{opened.name}' has no truth.", "Give one with --truth FILE.trc.")
+    if track == BEST:
+        best = best_track(stored)
+        track = best.name
+        say(progress, [best.note] if best.note else [])
+    chosen = read_stored_track(stored, track)
+    return evaluate_poses(chosen.poses, chosen.frames, stored.body(), read_trc(path), stored.record.fps)
+
+
+@operation
+def export_run(
+    run: RunName,
+    to: Annotated[
+        str | Path,
+        Field(description=f"The file; its ending is the format: {', '.join(FORMATS)}."),
+        Terminal("--to", "FILE", kind=Path),
+    ],
+    *,
+    progress: Reporting = None,
+    **options: Annotated[object, Knobs(lambda: knobs_of(ExportOptions), with_defaults=False)],
+) -> ExportReport:
+    """Write the motion of a run to a file that other programs open.
+
+    The file is read back and compared before it takes its place; Ctrl-C leaves nothing behind.
+
+    Raises ExportError, SettingsError.
+    """
+    place = Path(to)
+    stored, form = open_run(run), format_of_file(place)
+    with reporting(progress, f"{stored.session_name} / {stored.name}: {form.title}") as report:
+        done = write_run(
+            session_of(stored), stored, form, options, place, progress=report, record_scene=scene_writer()
+        )
+    say(progress, done.notes)
+    return done
+
+
+def scene_writer() -> Writer:
+    """What writes a run's scene as a recording; found by name, since the scene is a door like those above."""
+    return importlib.import_module("studio.scene.recording").record_scene
+
+
+@dataclass(frozen=True, slots=True)
+class Verified:
+    """found : what was read, and what is wrong after repairs. repaired : runs that were."""
+
+    found: Verification
+    repaired: tuple[Repair, ...] = ()
+
+
+@operation
+def verify(
+    session: SessionName,
+    *,
+    mend: Annotated[
+        bool,
+        Field(description="Track damaged frames again, bit for bit where nothing else has changed."),
+        Terminal("--repair"),
+    ] = False,
+    progress: Reporting = None,
+) -> Verified:
+    """Compare all that a session stores with its checksums, and name what is damaged.
+
+    The command ends with 1 where something is damaged and was not repaired.
+    """
+    opened = open_session(session)
+    repaired: tuple[Repair, ...] = ()
+    with reporting(progress, f"{opened.name}: verifying") as report:
+        found = verify_session(opened, report)
+        if mend and any(fault.run for fault in found.faults):
+            repaired = repair(opened, found.faults, report)
+            found = verify_session(opened, report)
+    say(progress, [f"damaged: {fault.place}: {fault.what}. {fault.remedy}" for fault in found.faults])
+    return Verified(found, repaired)

@@ -1,0 +1,343 @@
+"""Tracking: from footage or live cameras, gone on with, again without the clock, corrected."""
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Concatenate, ParamSpec, TypeVar
+
+from pydantic import Field
+
+from studio.declaring import Body, Despite, Knobs, Model, OneOf, Seed, Terminal, Values, Web, operation
+from studio.errors import RunError, SettingsError
+from studio.operations.footage import Cameras, addresses_of
+from studio.operations.opening import RunName, SessionName, Tracked, open_run, open_session, session_of
+from studio.operations.progress import Reporting, reporting, say
+from studio.runs.correcting import prepare_correction, track_backwards
+from studio.runs.live_replay import Comparison, prepare_replay
+from studio.runs.live_request import last_of
+from studio.runs.live_summary import LiveSummary, in_words, summary_of
+from studio.runs.new_run import DESPITE, Numbers, Pose, given_pose, own_knobs, prepare_run
+from studio.runs.tracks import pose_in_track, read_track
+from studio.sessions.names import free_name
+from studio.sessions.session import Session
+from studio.sessions.stored_run import StoredRun
+from studio.sessions.workspace import Workspace
+from studio.tracking.catalogue import TRACKERS
+from studio.weighting.catalogue import WEIGHTINGS
+from studio.worker.batch import BatchResult, track_to_end
+from studio.worker.camera_tracking import TakeWish, track_cameras
+from studio.worker.live_tracking import replay_live, track_live
+from studio.worker.take_recording import TakeStanding
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def of_new_run(
+    make: Callable[Concatenate[Session, P], StoredRun],
+) -> Callable[[Callable[..., R]], Callable[Concatenate[SessionName, P], R]]:
+    """Let a verb take what a new run is made of, of a session by its name."""
+    own = {"session": SessionName, "progress": Reporting}
+
+    def take(function: Callable[..., R]) -> Callable[Concatenate[SessionName, P], R]:
+        function.__annotations__ = {
+            **make.__annotations__,
+            **own,
+            "return": function.__annotations__["return"],
+        }
+        shown, kept = inspect.signature(make), inspect.signature(function).parameters
+        entries = [kept.get(name, entry) for name, entry in shown.parameters.items()]
+        function.__signature__ = shown.replace(parameters=entries)  # pyright: ignore[reportFunctionMemberAccess]
+        return function
+
+    return take
+
+
+@operation
+@of_new_run(prepare_run)
+def new_run(session: SessionName, *, progress: Reporting = None, **asked: object) -> StoredRun:
+    """A new run, ready to be tracked; what is left out is the session's own or the studio's default.
+
+    Raises StudioError naming what is wrong; then nothing was made.
+    """
+    opened = open_session(session)
+    with reporting(progress, f"{opened.name}: preparing") as report:
+        return prepare_run(opened, **asked, progress=report)  # pyright: ignore[reportArgumentType]
+
+
+@operation
+@of_new_run(prepare_run)
+def track(session: SessionName, *, progress: Reporting = None, **asked: object) -> Tracked:
+    """Track a session and store the run; Ctrl-C cancels, what was tracked stays and can be gone on with.
+
+    The same seed gives the same run.
+
+    Raises StudioError.
+    """
+    return go_on(new_run(session, progress=progress, **asked), progress=progress)  # pyright: ignore[reportArgumentType]
+
+
+@operation
+def go_on(run: RunName, *, progress: Reporting = None) -> Tracked:
+    """Track a run on that was interrupted: bit for bit what it would have been."""
+    stored = open_run(run)
+    opened = session_of(stored)
+    _say_notes(stored, progress)
+    try:
+        with reporting(progress, f"{opened.name} / {stored.name}") as report:
+            return _tracked(stored, track_to_end(opened, stored, report))
+    except KeyboardInterrupt:
+        done = stored.summary().done
+        say(
+            progress,
+            [f"{opened.name} / {stored.name}: {done} of {stored.record.frame_count} frames tracked."],
+        )
+        raise
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackedLive:
+    """A live run that was tracked. summary : which frames came, how fast. standing : of the cameras, where there were
+    any; their session is then a new one.
+    """
+
+    session: Session
+    run: StoredRun
+    summary: LiveSummary
+    standing: TakeStanding | None = None
+
+
+@operation
+def live(
+    session: SessionName,
+    *,
+    tracker: Annotated[str, Field(description="What searches."), OneOf(TRACKERS)] = "behaviour",
+    weighting: Annotated[str, Field(description="What tells poses apart."), OneOf(WEIGHTINGS)] = "blobs",
+    body: Body = "",
+    behaviour: Model = "",
+    first: Annotated[int, Field(ge=0, description="The frame that comes first."), Terminal("--from")] = 0,
+    seconds: Annotated[
+        float | None, Field(gt=0, le=86400, description="Track for so long; default: to the footage's end.")
+    ] = None,
+    repeat: Annotated[
+        bool, Field(description="Go forth and back through the footage; needs a time to end.")
+    ] = False,
+    seed: Seed = 0,
+    knobs: Annotated[
+        Values, Field(description="Any other knob."), Knobs(own_knobs, others=True, with_defaults=False)
+    ] = None,
+    name: Annotated[str, Field(description="Of the run; default: numbered.")] = "",
+    despite_findings: Despite = False,
+    cameras: Annotated[Cameras, Web(left_out=True)] = (),
+    into: Annotated[
+        str | Path | None,
+        Field(description="With cameras: the session that keeps what they saw."),
+        Terminal(kind=str, metavar="SESSION"),
+    ] = None,
+    keep_start: Annotated[
+        bool,
+        Field(
+            description="With cameras: the person begins in the session's start pose; else it is sought in the first"
+            " pictures."
+        ),
+        Terminal("--keep-start/--seek-start"),
+    ] = True,
+    progress: Reporting = None,
+) -> TrackedLive:
+    """Track a session as its pictures come: at the footage's own rate, dropping frames rather than falling behind.
+
+    With cameras these are tracked with the session's calibration, empty room and person, and recorded at once into a
+    session of their own, where the run is tracked again bit for bit with `replay`. Ctrl-C ends it and keeps what was
+    tracked.
+
+    Raises StudioError.
+    """
+    opened = open_session(session)
+    asked = {
+        "tracker": tracker,
+        "weighting": weighting,
+        "body": body,
+        "behaviour": behaviour,
+        "seed": seed,
+        "knobs": knobs,
+        "name": name,
+        "despite_findings": despite_findings,
+        "live": True,
+    }
+    if cameras:
+        if repeat or first:
+            raise RunError(
+                "Live cameras have no footage to begin in, repeat or go on with.", "Leave that out."
+            )
+        wish = TakeWish(_place(opened, into), seconds, keep_start=keep_start)
+        with reporting(progress, wish.into.name) as report:
+            found = track_cameras(opened, addresses_of(cameras), wish, asked, report)
+        _say_notes(found.run, progress)
+        say(progress, [notice.in_words for notice in found.standing.notices])
+        return TrackedLive(found.session, found.run, found.summary, found.standing)
+    if into or not keep_start:
+        raise RunError("--into and --seek-start are for live cameras.", "Give them with --camera.")
+    if repeat and seconds is None:
+        raise RunError("Footage that repeats has no end.", "Say how long with --seconds.")
+    with reporting(progress, f"{opened.name}: getting ready") as report:
+        last = last_of(opened, first, seconds, repeat)
+        run = prepare_run(opened, **asked, first=first, last=last, to_and_fro=repeat, progress=report)  # pyright: ignore[reportArgumentType]
+    return resume_live(run, progress=progress)
+
+
+@operation
+def resume_live(run: RunName, *, progress: Reporting = None) -> TrackedLive:
+    """Go on with a live run that was ended."""
+    stored = open_run(run)
+    opened = session_of(stored)
+    _say_notes(stored, progress)
+    try:
+        with reporting(progress, f"{opened.name} / {stored.name}") as report:
+            return TrackedLive(opened, stored, track_live(opened, stored, report))
+    except KeyboardInterrupt:
+        say(progress, [f"{opened.name} / {stored.name}: {live_words(summary_of(stored))}"])
+        raise
+
+
+@dataclass(frozen=True, slots=True)
+class Replayed:
+    """run : that was made. of : the live one. compared : what differs."""
+
+    run: StoredRun
+    of: StoredRun
+    compared: Comparison
+
+
+@operation
+def replay(
+    run: RunName,
+    *,
+    name: Annotated[str, Field(description="Of the run that is made; default: numbered.")] = "",
+    progress: Reporting = None,
+) -> Replayed:
+    """Track a live run's frames again, without the clock, and compare the two."""
+    stored = open_run(run)
+    opened = session_of(stored)
+    made = prepare_replay(opened, stored, name)
+    with reporting(progress, f"{opened.name} / {made.name}") as report:
+        return Replayed(made, stored, replay_live(opened, stored, made, report))
+
+
+@operation
+def correct(
+    run: RunName,
+    frame: Annotated[int, Field(ge=0, description="The frame that is corrected."), Terminal("--at", "K")],
+    pose: Annotated[
+        Pose | None,
+        Field(description="Its pose: radians and mm in the body's order, or a file: a CSV row, a TRC."),
+        Terminal("--pose", kind=Path),
+        Web(kind=Numbers),
+    ] = None,
+    *,
+    from_track: Annotated[
+        str,
+        Field(description="Take its pose from a track of the run."),
+        Terminal(metavar="NAME"),
+        Web("track"),
+    ] = "",
+    back_to: Annotated[
+        int | None,
+        Field(
+            ge=0,
+            description="Track backwards to this frame; all others stay. Default: forwards to the run's end.",
+        ),
+        Terminal(metavar="J"),
+    ] = None,
+    name: Annotated[str, Field(description="Of the corrected run; default: numbered.")] = "",
+    progress: Reporting = None,
+) -> Tracked:
+    """Give a run the right pose in one frame and track on from there, into a new run; the old one stays.
+
+    Ctrl-C stops; what was tracked stays, and forwards the new run can be gone on with.
+
+    Raises SettingsError unless exactly one pose is given.
+    """
+    stored = open_run(run)
+    new = corrected_run(stored, frame, pose, from_track, back_to, name)
+    if back_to is None:
+        return go_on(new, progress=progress)
+    opened, done = session_of(stored), [0]
+
+    def counted(step: str, count: int, total: int) -> None:
+        done[0] = count
+        report(step, count, total)
+
+    with reporting(progress, f"{opened.name} / {new.name}") as report:
+        try:
+            track_backwards(opened, new, counted)
+        except KeyboardInterrupt:
+            words = f"{done[0]} frames tracked backwards, the others are the old run's."
+            say(progress, [f"{opened.name} / {new.name}: {words}"])
+            raise
+    return _tracked(new, None)
+
+
+def corrected_run(
+    run: StoredRun,
+    frame: int,
+    pose: Pose | None = None,
+    from_track: str = "",
+    back_to: int | None = None,
+    name: str = "",
+    source: str = "",
+) -> StoredRun:
+    """The run that `correct` makes, before anything of it is tracked. source : where the pose came from, in words."""
+    if (pose is None) == (not from_track):
+        raise SettingsError("A corrected frame needs a pose.", "Give one, or the track to take it from.")
+    if pose is None:
+        given, source = pose_in_track(run, from_track, frame), f"track {from_track}"
+    else:
+        given, source, _ = given_pose(pose, source, run.body(), run.record.fps, frame)
+    return prepare_correction(
+        session_of(run), run, frame, given, source=source, backwards_to=back_to, name=name
+    )
+
+
+def _place(session: Session, into: str | Path | None) -> Path:
+    """Where the take of live cameras is made: beside its session unless said otherwise."""
+    if into:
+        return Workspace().place_for(into)
+    taken = {path.name for path in session.path.parent.iterdir()}
+    return session.path.with_name(free_name(f"{session.name}-live", taken))
+
+
+def _say_notes(run: StoredRun, progress: Reporting) -> None:
+    """A run's notes: what holds for the session once, what was accepted for this run always."""
+    accepted = [line for line in run.record.notes if line.startswith(DESPITE)]
+    say(progress, [line for line in run.record.notes if line not in accepted], run.folder.parent.parent)
+    say(progress, accepted)
+
+
+def _tracked(run: StoredRun, result: BatchResult | None) -> Tracked:
+    fresh = StoredRun(run.folder)
+    record = fresh.record
+    return Tracked(
+        fresh,
+        read_track(fresh),
+        tuple(record.parameters),
+        tuple(record.notes),
+        result.seconds if result else float("nan"),
+        result.evaluations_per_frame if result else 0,
+        result.last_beta if result else float("nan"),
+    )
+
+
+def live_words(found: LiveSummary) -> str:
+    """How a live run went, for a person."""
+    if not found.tracked:
+        return "nothing was tracked."
+    words = f"{len(found.tracked)} frames tracked, {found.frames_per_second:.1f} a second"
+    if found.dropped:
+        words += f"; {len(found.dropped)} dropped ({found.dropped_share:.1%}): {in_words(found.dropped)}"
+    else:
+        words += "; none dropped"
+    if found.incomplete:
+        words += f"; {len(found.incomplete)} sets of pictures incomplete: {in_words(found.incomplete)}"
+    latency = " / ".join(f"{found.latency(share):.0f}" for share in (0.5, 0.95, 1.0))
+    return f"{words}; picture to pose {latency} ms (median / 95 % / worst)"

@@ -1,0 +1,149 @@
+"""Every verb is declared once: Python, command line and HTTP take the same entries with the same defaults and help."""
+
+import importlib
+import inspect
+from typing import Any
+
+import click
+import pytest
+from fastapi import FastAPI
+
+import studio
+from studio.cli.main import COMMANDS
+from studio.declaring import REQUIRED, Knobs, Operation, Parameter, declared
+from studio.web import app, guide_routes
+from studio.web.requests import MADE
+
+NAMED = {
+    "import_footage": "import",
+    "export_run": "export",
+    "new_session": "new",
+    "mask_quality": "background",
+}
+OF_ANOTHER = {
+    "unalign": "align",
+    "mask_quality": "background",
+    "new_run": "track",
+    "go_on": "track",
+    "resume_live": "live",
+    "replay": "live",
+}
+"""Verbs that are options of another one's command: --undo, --quality, --resume, --replay."""
+OWN_WORDS = {
+    "track": {"first", "last"},
+    "background": {"source", "plates", "exclude", "exclude_unused"},
+    "compare": {"trackers", "first", "last", "changes"},
+}
+"""Parameters that the terminal writes in another way: --frames A:B, --exclude CAMERA=…"""
+VERBS = {
+    name: declared(getattr(studio, name))
+    for name in dir(studio)
+    if hasattr(getattr(studio, name), "__operation__")
+}
+
+
+def command_of(verb: str) -> click.Command:
+    module, name, _ = COMMANDS[NAMED.get(verb, verb.replace("_", "-"))]
+    return getattr(importlib.import_module(f"studio.cli.{module}"), name)
+
+
+@pytest.fixture(scope="module")
+def schemas() -> dict[str, Any]:
+    made = FastAPI()
+    for router in app.ROUTERS:
+        made.include_router(router)
+    return made.openapi()["components"]["schemas"]
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_entry_has_a_help_and_every_verb_says_what_it_does(verb: str) -> None:
+    assert VERBS[verb].about
+    for entry in VERBS[verb].parameters.values():
+        assert entry.whose or entry.any_name or entry.help, f"{verb}: {entry.name}"
+
+
+@pytest.mark.parametrize("verb", [name for name in VERBS if name not in OF_ANOTHER])
+def test_the_command_line_takes_what_python_takes(verb: str) -> None:
+    command = command_of(verb)
+    assert inspect.cleandoc(command.help or "").startswith(VERBS[verb].about[:60])
+    options = {str(option.name): option for option in command.params}
+    for entry in VERBS[verb].parameters.values():
+        if entry.terminal.left_out or entry.name in OWN_WORDS.get(verb, ()):
+            continue
+        if entry.whose:
+            assert set(options) >= {"session", "run"} if entry.whose == "run" else {"session"}
+        elif knobs := entry.mark(Knobs):
+            assert {one.name for one in knobs.listed()} <= set(options)
+            assert ("changes" in options) == knobs.others
+        else:
+            agrees(entry, options[entry.name])
+
+
+def agrees(entry: Parameter, option: click.Parameter) -> None:
+    """The option of a parameter says and means what was declared."""
+    if not isinstance(option, click.Option):
+        assert entry.default is REQUIRED
+        return
+    assert (option.help or "").startswith(entry.help.removesuffix("."))
+    assert not option.required or entry.default is REQUIRED
+    if entry.default not in (None, "", (), REQUIRED):
+        assert option.default == entry.default
+
+
+@pytest.mark.parametrize("body", MADE)
+def test_a_body_takes_what_python_takes(body: str, schemas: dict[str, Any]) -> None:
+    verb, _, entries = MADE[body]
+    schema = schemas[body]
+    assert schema["additionalProperties"] is False
+    for key, name in entries.items():
+        entry, said = VERBS[verb].parameters[name], schema["properties"][key]
+        assert said["description"] == entry.help
+        assert key == (entry.web.name or name)
+        if entry.default is REQUIRED:
+            assert key in schema["required"]
+        elif entry.default not in (None, "", ()) and "anyOf" not in said:
+            assert said["default"] == entry.default
+
+
+def test_no_body_names_a_file_of_this_machine(schemas: dict[str, Any]) -> None:
+    """Text that is no name: what a person reads, boards, and footage under the roots, which routes check."""
+    free = {
+        ("calibrate", "board"),
+        ("new_session", "title"),
+        ("new_run", "start_source"),
+        *((verb, name) for verb in ("import_footage", "add_footage") for name in ("calibration", "trial")),
+    }
+    for body, (verb, _, entries) in MADE.items():
+        for key, name in entries.items():
+            said = schemas[body]["properties"][key]
+            for kind in said.get("anyOf", [said]):
+                if kind.get("type") == "string":
+                    assert "pattern" in kind or "enum" in kind or (verb, name) in free, f"{verb}: {name}"
+
+
+def test_what_is_wrong_is_said_with_the_verb_the_entry_and_its_help() -> None:
+    wrong: list[tuple[Any, dict[str, Any], str]] = [
+        (studio.track, {"session": "walk", "seed": -1}, "track: 'seed' cannot be -1"),
+        (studio.check, {"run": "walk/one", "every": 0}, "check: 'every' cannot be 0"),
+        (studio.background, {"session": "walk", "source": "none"}, "background: 'source' cannot be 'none'"),
+    ]
+    for verb, given, words in wrong:
+        with pytest.raises(studio.StudioError, match=words) as refusal:
+            verb(**given)
+        assert refusal.value.hint
+    with pytest.raises(TypeError, match="sed"):
+        studio.track("walk", sed=3)  # pyright: ignore[reportCallIssue]
+
+
+def test_the_signature_that_an_editor_shows_is_the_declaration() -> None:
+    shown = inspect.signature(studio.track).parameters
+    assert list(shown) == [*Operation(studio.new_run).parameters, "progress"]
+    assert list(VERBS["track"].parameters) == list(VERBS["new_run"].parameters)
+
+
+def test_the_guide_lists_every_verb_with_its_entries() -> None:
+    page = guide_routes.verbs_page()
+    for name, verb in VERBS.items():
+        assert f'id="{name}"' in page
+        for entry in verb.parameters:
+            assert f"<code>{entry}</code>" in page, f"{name}: {entry}"
