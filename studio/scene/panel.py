@@ -18,7 +18,7 @@ from studio.worker.events import StateChanged
 PANEL_WIDTH = 310
 MARKS = {
     LOST: ("bad", "the tracker is off the body and searches for it"),
-    LIMB_LOST: ("warn", "a limb is contradicted by the silhouettes"),
+    LIMB_LOST: ("warn", "a limb is off, contradicted by the silhouettes"),
     NO_EVIDENCE: ("text-quiet", "no evidence, the pose is held"),
     RECOVERED: ("good", "the body was found again"),
 }

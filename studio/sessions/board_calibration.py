@@ -34,7 +34,7 @@ class BoardPlace:
         """
         place = wanted or self.folder / CAMERAS_PATH
         if place.exists() and not replace:
-            raise CalibrationError(f"'{place}' exists already.", "Name another file, or replace it.")
+            raise CalibrationError(f"'{place}' is there already.", "Name another file, or replace it.")
         return place
 
 

@@ -69,7 +69,7 @@ def test_a_standing_person_shows_a_wrong_and_a_right_size(rig: str, factor: floa
     assert sizes_named(RIGS[rig], standing) == ()
     (finding,) = silhouette_findings(of_size(rig, factor), standing, HEIGHT)
     assert finding.code == "square-size"
-    assert "who stands" in finding.message
+    assert "standing person" in finding.message
     assert "Check the height" in finding.remedy
     named = float(finding.remedy.rsplit(" ", 1)[1].rstrip("."))
     assert named == pytest.approx(factor, rel=0.07)

@@ -105,7 +105,7 @@ def test_another_calibration_since_is_not_turned(session: Session, aligned: Sess
     assert turned_from(turned) == ""
     with pytest.raises(NotFoundError, match="kept no calibration 'gone'"):
         restore_calibration(session, "gone", "")
-    with pytest.raises(CalibrationError, match="another one"):
+    with pytest.raises(CalibrationError, match="has changed"):
         turn_cameras(turned, aligned)
 
 

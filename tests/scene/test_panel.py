@@ -159,7 +159,7 @@ def test_a_slider_requests_and_a_changed_value_is_marked(settings: Settings) -> 
     assert settings.panel.inputs["layers"].handle.value == 12
     assert (knob.handle.value, knob.handle.label[:2]) == (DEFAULTS["survival"], "su")
     assert "frame 128, layer 3" in settings.panel.since.content
-    assert "as the run began" in since_in_words(Knobs(default_settings()))
+    assert "from the start of the run" in since_in_words(Knobs(default_settings()))
     assert len(settings.requests) == 2
 
 

@@ -82,7 +82,7 @@ def test_the_remedies_work(tmp_path: Path, up: str, axes: np.ndarray) -> None:
         import_source(source, tmp_path / "made", up=up)
     report = import_source(source, tmp_path / "made", up=up, unit="m")
     assert report.warnings == ()
-    assert any("as asked" in note for note in report.notes)
+    assert any("as requested" in note for note in report.notes)
     for found, wanted in zip(report.session.cameras(), CAMERAS, strict=True):
         np.testing.assert_allclose(found.centre[2], wanted.centre[2], atol=1e-6)
         np.testing.assert_allclose(found.rotation[:, 2], wanted.rotation[:, 2], atol=1e-9)

@@ -168,7 +168,7 @@ def test_frame_rates_must_agree_unless_one_is_given(tmp_path: Path) -> None:
         import_source(source, tmp_path / "made")
     report = import_source(source, tmp_path / "made", fps=60.0)
     assert report.session.manifest.fps == 60.0
-    assert "as asked" in report.warnings[0]
+    assert "as requested" in report.warnings[0]
 
 
 def test_a_variable_frame_rate_is_refused_unless_one_is_given(tmp_path: Path) -> None:
