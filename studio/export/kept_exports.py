@@ -106,7 +106,7 @@ def stale_export(run: StoredRun, kept: KeptExport) -> str:
 
 
 def exported_files(run: StoredRun) -> tuple[ExportedFile, ...]:
-    """The run's exports as the guided way wants them."""
+    """The run's exports, for the guided set-up."""
     return tuple(ExportedFile(kept.file, stale_export(run, kept)) for kept in kept_exports(run))
 
 

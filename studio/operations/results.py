@@ -122,7 +122,7 @@ def check(
 ) -> RunCheck:
     """Tell how well a run fits its pictures: share in the masks, lost frames and limbs, sudden turns, jumps, jitter.
 
-    What was measured is kept beside the run, and shown in the guided way's step Check.
+    What was measured is kept beside the run, and shown in the guided set-up's step Check.
 
     Raises RunError for a run without frames.
     """

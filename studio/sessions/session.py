@@ -113,7 +113,7 @@ class Session:
         if not self.has_footage:
             raise SessionError(
                 f"Session '{self.name}' has no footage yet.",
-                "Add it in the guided way, or with 'studio add-footage'.",
+                "Add it in the guided set-up, or with 'studio add-footage'.",
             )
 
     def _check_begun(self) -> None:
@@ -121,7 +121,7 @@ class Session:
         if not self.is_calibrated:
             raise SessionError(
                 f"Session '{self.name}' has no calibration yet.",
-                "Calibrate its cameras in the guided way, or with 'studio calibrate'.",
+                "Calibrate its cameras in the guided set-up, or with 'studio calibrate'.",
             )
 
     @cached_property
