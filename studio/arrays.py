@@ -25,5 +25,9 @@ def read_archive(source: Path | IO[bytes]) -> dict[str, NDArray[Any]]:
     Raises OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile for what is damaged or none; AttributeError or
     TypeError for a file of a single array.
     """
+    if isinstance(source, Path):
+        # What NumPy opens itself stays open where the archive is damaged.
+        with source.open("rb") as stream:
+            return read_archive(stream)
     with _one_at_a_time, np.load(source, allow_pickle=False) as archive:
         return {name: archive[name] for name in archive.files}

@@ -74,13 +74,19 @@ def knobs_of(settings_type: type) -> tuple[Knob, ...]:
     return tuple(found)
 
 
+LONGEST_SHOWN = 80
+"""Characters of a refused value that are shown."""
+
+
 def checked(declared: Knob, value: object) -> Value:
     """The value as the knob's type; strings (from a command line) are read as numbers or yes/no.
 
     Raises SettingsError naming the knob, the value and what is allowed.
     """
     hint = f"Allowed: {allowed(declared)}."
-    wrong = SettingsError(f"Setting '{declared.name}' cannot be {value!r}.", hint)
+    shown = repr(value)
+    shown = shown if len(shown) <= LONGEST_SHOWN else f"{shown[:LONGEST_SHOWN]}…"
+    wrong = SettingsError(f"Setting '{declared.name}' cannot be {shown}.", hint)
     if declared.kind is bool:
         word = str(value).strip().lower()
         if word not in ("true", "false", "on", "off", "yes", "no", "1", "0"):
@@ -92,7 +98,7 @@ def checked(declared: Knob, value: object) -> Value:
         return value
     try:
         number = float(value)  # pyright: ignore[reportArgumentType]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise wrong from None
     inside = (declared.low is None or number >= declared.low) and (
         declared.high is None or number <= declared.high

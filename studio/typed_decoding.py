@@ -21,22 +21,24 @@ _one_at_a_time = threading.Lock()
 
 @contextmanager
 def _refusals_as_one_kind() -> Iterator[None]:
-    """What parsers raise of texts that are nested too deep, or of numbers with thousands of digits, as DecodeError."""
+    """What parsers raise of bytes that are no UTF-8, texts that are nested too deep, or numbers with thousands of
+    digits, as DecodeError.
+    """
     try:
         yield
-    except (UnicodeDecodeError, msgspec.DecodeError):
+    except msgspec.DecodeError:
         raise
     except (RecursionError, ValueError, OverflowError) as problem:
         raise msgspec.DecodeError(str(problem)) from None
 
 
 def decode_toml(content: bytes | str, wanted: type[T]) -> T:
-    """The value in a TOML text. Raises msgspec.DecodeError, UnicodeDecodeError."""
+    """The value in a TOML text. Raises msgspec.DecodeError."""
     with _one_at_a_time, _refusals_as_one_kind():
         return msgspec.toml.decode(content, type=wanted)
 
 
 def decode_json(content: bytes | str, wanted: type[T]) -> T:
-    """The value in a JSON text. Raises msgspec.DecodeError, UnicodeDecodeError."""
+    """The value in a JSON text. Raises msgspec.DecodeError."""
     with _one_at_a_time, _refusals_as_one_kind():
         return msgspec.json.decode(content, type=wanted)

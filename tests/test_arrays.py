@@ -1,8 +1,10 @@
 """Archives are read one at a time, whichever threads want them: NumPy's reading of heads is not safe otherwise."""
 
 import io
+import os
 import threading
 import time
+import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -49,3 +51,14 @@ def test_archives_are_never_read_by_two_threads_at_once(monkeypatch: pytest.Monk
         read = list(threads.map(lambda _: read_archive(io.BytesIO(stream.getvalue())), range(12)))
     assert all(np.array_equal(arrays["values"], np.arange(5.0)) for arrays in read)
     assert most == [1] * 12
+
+
+def test_a_damaged_archive_does_not_stay_open(tmp_path: Path) -> None:
+    place = tmp_path / "damaged.npz"
+    np.savez(place, one=np.arange(6.0))
+    place.write_bytes(place.read_bytes()[:-20])
+    with pytest.raises(zipfile.BadZipFile):
+        read_archive(place)
+    assert str(place) not in [
+        os.path.realpath(f"/proc/self/fd/{number}") for number in os.listdir("/proc/self/fd")
+    ]

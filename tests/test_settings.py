@@ -163,3 +163,9 @@ def test_history_tells_what_was_in_use() -> None:
     assert set(history.changes()[0]) == set(values(first))
     encoded = msgspec.json.encode(history.entries)
     assert msgspec.json.decode(encoded, type=tuple[SettingsEntry, ...]) == history.entries
+
+
+def test_a_number_beyond_all_numbers_is_refused_in_few_words() -> None:
+    with pytest.raises(SettingsError, match="'particles' cannot be 999") as caught:
+        changed_settings(default_settings(), {"particles": 10**400 - 1})
+    assert len(caught.value.message) < 200

@@ -21,3 +21,11 @@ def test_threads_may_meet_a_type_together() -> None:
 def test_what_does_not_fit_is_refused() -> None:
     with pytest.raises(msgspec.ValidationError, match="int"):
         decode_toml('a = "x"', dict[str, int])
+
+
+@pytest.mark.parametrize("content", [b'"\xff"', b"[" * 20_000, b"9" * 5000], ids=["no UTF-8", "deep", "long"])
+def test_whatever_a_parser_raises_is_a_decode_error(content: bytes) -> None:
+    with pytest.raises(msgspec.DecodeError):
+        decode_json(content, dict[str, int])
+    with pytest.raises(msgspec.DecodeError):
+        decode_toml(b"a = " + content, dict[str, int])

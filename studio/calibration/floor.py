@@ -29,6 +29,8 @@ from studio.geometry.projection import project
 from studio.geometry.rigid import best_fit, compose, inverse, rigid, transform
 
 FEWEST_POINTS = 3
+FARTHEST_PIXEL = 1e6
+"""Wider than any picture: what lies beyond is no click."""
 STRETCHED = 1e-2
 """Three points lie on a line if the second extent is less than this share of the first."""
 FAR_OFF = 0.05
@@ -81,6 +83,11 @@ def triangulated(cameras: Sequence[Camera], clicks: Mapping[str, Array]) -> Arra
         if name not in known:
             raise CalibrationError(
                 f"Points were given in '{name}', which is no camera.", "Name a calibrated camera."
+            )
+        if (np.abs(clicks[name]) > FARTHEST_PIXEL).any():
+            raise CalibrationError(
+                f"A point in '{name}' lies more than {FARTHEST_PIXEL:g} pixels outside its picture.",
+                "Click each point where it is seen.",
             )
     points = []
     for number in range(len(next(iter(clicks.values()), np.zeros((0, 2))))):

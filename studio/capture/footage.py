@@ -183,6 +183,11 @@ def open_footage(source: FootageSource, session_folder: Path) -> Footage:
                     f"Footage '{entry}' of camera {camera.name} is not there.",
                     "Put the file back, or import the session again.",
                 )
+        if min(camera.width, camera.height) < 1:
+            raise FootageError(
+                f"The pictures of camera {camera.name} are said to be {camera.width}x{camera.height} pixels.",
+                "Import the session again.",
+            )
         if not 0 <= camera.offset <= camera.frame_count - source.frame_count:
             raise FootageError(
                 f"Camera {camera.name} has {camera.frame_count} frames, which {source.frame_count} from frame"

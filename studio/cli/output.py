@@ -21,6 +21,7 @@ from studio.operations.progress import Display, bar
 from studio.progress import Progress, TimeLeft, left_in_words
 from studio.registry import Registry
 from studio.sessions.atomic_files import write_bytes
+from studio.typed_decoding import decode_json
 
 P = ParamSpec("P")
 
@@ -170,12 +171,12 @@ def notes(lines: Iterable[str], once_in: Path | None = None) -> None:
     said = set[str]()
     if once_in is not None:
         with suppress(OSError, msgspec.DecodeError):
-            said = set(msgspec.json.decode((once_in / SAID).read_bytes(), type=list[str]))
+            said = set(decode_json((once_in / SAID).read_bytes(), list[str]))
     new = [line for line in lines if line not in said]
     for line in new:
         note(line)
     if new and once_in is not None:
-        with suppress(OSError):
+        with suppress(StudioError):
             write_bytes(once_in / SAID, msgspec.json.encode(sorted(said.union(new))))
 
 

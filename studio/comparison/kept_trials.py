@@ -54,7 +54,7 @@ class KeptTrials:
         """The outcome of a key; None without a readable file."""
         try:
             return KeptOutcome(**json.loads((self.folder / f"{key}.json").read_text(encoding="utf-8")))
-        except (OSError, ValueError, TypeError):
+        except (OSError, ValueError, TypeError, RecursionError):
             return None
 
     def write(self, key: str, outcome: KeptOutcome) -> None:

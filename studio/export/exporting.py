@@ -131,15 +131,10 @@ def _damage(run: StoredRun) -> tuple[str, ...]:
 
 
 def _working_folder(place: Path) -> Path:
-    """A hidden folder beside the place. Raises ExportError where nothing can be written."""
+    """A hidden folder beside the place. Raises ExportError, SessionError where nothing can be written."""
     if place.is_dir():
         raise ExportError(f"'{place.name}' is a folder.", "Name a file.")
-    try:
-        return new_folder_beside(place)
-    except OSError as error:
-        raise ExportError(
-            f"Nothing can be written beside '{place.name}' ({error.strerror}).", "Choose another folder."
-        ) from None
+    return new_folder_beside(place)
 
 
 def _packed(written: Written, place: Path) -> tuple[Path, ...]:

@@ -16,6 +16,7 @@ from studio.sessions.atomic_files import write_bytes
 from studio.sessions.calibration_changes import CalibrationChange, earlier_calibration, restore_calibration
 from studio.sessions.made_from import changed_inputs, note, origin_of
 from studio.sessions.session import CAMERAS_PATH, Session
+from studio.typed_decoding import decode_json
 
 RECORD_PATH = CAMERAS_PATH.with_name("cameras.alignment.json")
 PART = "alignment"
@@ -118,7 +119,7 @@ def is_of(session: Session, aligned: SessionAlignment) -> bool:
 
 def _turned(session: Session) -> Turned | None:
     try:
-        found = msgspec.json.decode((session.path / RECORD_PATH).read_bytes(), type=Turned)
+        found = decode_json((session.path / RECORD_PATH).read_bytes(), Turned)
         earlier_calibration(session, found.before)
     except (OSError, msgspec.DecodeError, NotFoundError):
         return None

@@ -21,18 +21,20 @@ PARTIAL_PREFIX = ".partial-"
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write `content` to `path`, atomically. Raises OSError; then the old file is unchanged."""
-    handle, temporary = tempfile.mkstemp(prefix=PARTIAL_PREFIX, dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    """Write `content` to `path`, atomically. Raises SessionError; then the old file is unchanged."""
+    with writing("The file", path):
+        handle, temporary = tempfile.mkstemp(prefix=PARTIAL_PREFIX, dir=path.parent)
+        try:
+            with os.fdopen(handle, "wb") as stream:
+                stream.write(content)
+                stream.flush()
+                os.fsync(stream.fileno())
+            os.chmod(temporary, 0o644)
+            os.replace(temporary, path)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                os.unlink(temporary)
+            raise
     sync_folder(path.parent)
 
 
@@ -42,24 +44,33 @@ def write_text(path: Path, content: str) -> None:
 
 
 def copy_file(source: Path, path: Path) -> None:
-    """A byte-for-byte copy of `source` at `path`, in one step."""
-    write_bytes(path, source.read_bytes())
+    """A byte-for-byte copy of `source` at `path`, in one step. Raises SessionError."""
+    try:
+        content = source.read_bytes()
+    except OSError as error:
+        raise SessionError(
+            f"'{source}' cannot be read ({_reason(error)}).", "Check the disk and the folder's permissions."
+        ) from None
+    write_bytes(path, content)
 
 
 def new_folder_beside(path: Path) -> Path:
-    """An empty hidden folder next to `path`, to be filled and then given to `move_into_place`."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    made = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=path.parent))
-    made.chmod(0o755)
+    """An empty hidden folder next to `path`, to be filled and then given to `move_into_place`. Raises SessionError."""
+    with writing("What belongs beside", path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        made = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=path.parent))
+        made.chmod(0o755)
     return made
 
 
 def move_into_place(folder: Path, path: Path) -> None:
-    """Rename a finished folder to its place. Raises FileExistsError if something is there; nothing is
-    overwritten."""
+    """Rename a finished folder to its place. Raises FileExistsError if something is there (nothing is overwritten),
+    SessionError.
+    """
     if path.exists() or path.is_symlink():
         raise FileExistsError(path)
-    os.rename(folder, path)
+    with writing("The folder", path):
+        os.rename(folder, path)
     sync_folder(path.parent)
 
 
@@ -109,7 +120,7 @@ NO_ROOM_BYTES = 64 * 1024
 """SQLite makes its shared memory in steps of 32 KiB, and says "disk I/O error" where there is no room for one."""
 
 
-def unwritable(what: str, path: Path, error: OSError | sqlite3.Error) -> SessionError:
+def unwritable(what: str, path: Path, error: OSError | sqlite3.Error | UnicodeDecodeError) -> SessionError:
     """The error to raise. what : "The results in", to be followed by the path."""
     if is_full(path, error):
         return SessionError(
@@ -123,17 +134,19 @@ def unwritable(what: str, path: Path, error: OSError | sqlite3.Error) -> Session
 
 
 @contextmanager
-def room_for(what: str, path: Path) -> Iterator[None]:
-    """Where the disk fills while something is made, that in words; other errors pass. Raises SessionError."""
+def writing(what: str, path: Path) -> Iterator[None]:
+    """What the disk refuses inside, in words; that something is there already passes. what : as of `unwritable`. Raises
+    SessionError.
+    """
     try:
         yield
+    except FileExistsError:
+        raise
     except OSError as error:
-        if not is_full(path, error):
-            raise
         raise unwritable(what, path, error) from None
 
 
-def is_full(path: Path, error: OSError | sqlite3.Error) -> bool:
+def is_full(path: Path, error: OSError | sqlite3.Error | UnicodeDecodeError) -> bool:
     """Whether there was no room left."""
     if isinstance(error, OSError):
         return error.errno in NO_ROOM
@@ -146,5 +159,5 @@ def is_full(path: Path, error: OSError | sqlite3.Error) -> bool:
     return code == sqlite3.SQLITE_FULL
 
 
-def _reason(error: OSError | sqlite3.Error) -> str:
-    return str(error.strerror if isinstance(error, OSError) else error)
+def _reason(error: OSError | sqlite3.Error | UnicodeDecodeError) -> str:
+    return str((error.strerror if isinstance(error, OSError) else "") or error)

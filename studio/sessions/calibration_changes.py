@@ -31,6 +31,7 @@ from studio.sessions.manifest import SessionManifest
 from studio.sessions.names import inside
 from studio.sessions.run_record import CAMERAS_NAME
 from studio.sessions.session import CAMERAS_PATH, THUMBNAIL_NAME, Session, described_anew
+from studio.typed_decoding import decode_json
 
 EARLIER = "earlier"
 REPORT_NAME = "cameras.report.json"
@@ -191,7 +192,7 @@ def _write(place: Path, new: NewCalibration) -> None:
 def _correct_report(path: Path, new: NewCalibration) -> None:
     """The board calibration of the same cameras, with their places in the new world."""
     try:
-        report = msgspec.json.decode(path.read_bytes(), type=dict[str, object])
+        report = decode_json(path.read_bytes(), dict[str, object])
     except (OSError, msgspec.DecodeError):
         return
     places = {camera.name: np.round(camera.centre, 3).tolist() for camera in new.cameras}

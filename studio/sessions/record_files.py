@@ -55,7 +55,7 @@ class RecordFile(Generic[Record]):
             ) from None
         try:
             written = decode_json(content, _Head).schema
-        except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        except msgspec.DecodeError as error:
             raise SessionError(f"'{path}' cannot be read: {error}.", self.remedy) from None
         if written > self.version:
             raise SessionError(

@@ -29,6 +29,8 @@ from studio.settings import SettingsEntry
 from studio.tracking.tracker import TRACKED, FrameResult, LayerRecord
 
 FILE_NAME = "results.sqlite"
+UNREADABLE = (sqlite3.DatabaseError, UnicodeDecodeError)
+"""What reading a damaged store raises: SQLite quotes damaged names, which Python cannot decode."""
 SCHEMA_VERSION = 2
 """Stores of version 1 hold npz archives, which `results_codec.unpack` reads too, and may lack later tables; writing to
 one converts it to this version.
@@ -391,7 +393,7 @@ class ResultsReader:
                         return []
                     self._connection = _open_to_read(self._folder / FILE_NAME)
                 return self._connection.execute(sql, values).fetchall()
-            except sqlite3.DatabaseError as error:
+            except UNREADABLE as error:
                 raise SessionError(
                     f"The results in '{self._folder / FILE_NAME}' cannot be read ({error}).",
                     "Put back a copy of the file, or start the run again.",
@@ -423,7 +425,7 @@ def _open_to_read(path: Path) -> sqlite3.Connection:
 
 def check_version(connection: sqlite3.Connection, path: Path) -> None:
     """Raises SessionError for a store of a newer studio; an unreadable one is reported elsewhere."""
-    with suppress(sqlite3.DatabaseError):
+    with suppress(*UNREADABLE):
         row = connection.execute("SELECT value FROM meta WHERE key = 'schema'").fetchone()
         if row is not None and str(row[0]).isdigit() and int(row[0]) > SCHEMA_VERSION:
             connection.close()

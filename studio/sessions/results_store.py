@@ -30,7 +30,7 @@ from studio.sessions.results_codec import (
     pack_result,
     sums_text,
 )
-from studio.sessions.results_reader import FILE_NAME, SCHEMA_VERSION, ResultsReader, check_version
+from studio.sessions.results_reader import FILE_NAME, SCHEMA_VERSION, UNREADABLE, ResultsReader, check_version
 from studio.tracking.tracker import FrameResult, LayerRecord
 
 Value = bool | int | float | str
@@ -103,7 +103,7 @@ def copy_frames(source: Path, into: Path, last: int | None = None) -> None:
                 (FRAME, end, SETTINGS),
             )
         connection.execute("COMMIT")
-    except sqlite3.DatabaseError as error:
+    except UNREADABLE as error:
         raise SessionError(
             f"The results in '{source / FILE_NAME}' cannot be copied ({error}).",
             "Check the free disk space, or track the run again.",
@@ -150,7 +150,7 @@ class ResultsWriter:
             except BaseException:
                 connection.close()
                 raise
-        except sqlite3.DatabaseError as error:
+        except UNREADABLE as error:
             raise unwritable(RESULTS, self._path, error) from None
         return connection
 

@@ -9,7 +9,7 @@ from studio.errors import RunError, SessionError
 from studio.sessions.atomic_files import unwritable
 from studio.sessions.process_lock import ProcessLock
 from studio.sessions.results_codec import FRAME, GIVEN_UP
-from studio.sessions.results_reader import FILE_NAME
+from studio.sessions.results_reader import FILE_NAME, UNREADABLE
 from studio.sessions.results_store import LOCK_NAME, SCHEMA
 
 WHOLE = ("meta", "settings")
@@ -27,7 +27,7 @@ def faults_of_database(run_folder: Path) -> list[str]:
             sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)
         ) as connection:
             found = [str(row[0]) for row in connection.execute("PRAGMA integrity_check(20)")]
-    except sqlite3.DatabaseError as error:
+    except UNREADABLE as error:
         return [str(error)]
     return [] if found == ["ok"] else found
 
@@ -104,7 +104,7 @@ def _rows(connection: sqlite3.Connection, sql: str) -> list[tuple] | None:
     """The rows, None where they cannot be read."""
     try:
         return connection.execute(sql).fetchall()
-    except sqlite3.DatabaseError as error:
+    except UNREADABLE as error:
         return [] if "no such table" in str(error) else None
 
 

@@ -21,7 +21,7 @@ from studio.capture.footage import Footage, open_footage
 from studio.errors import NotFoundError, SessionError, StudioError
 from studio.geometry.camera import Camera
 from studio.sessions import atomic_files
-from studio.sessions.atomic_files import room_for
+from studio.sessions.atomic_files import writing
 from studio.sessions.file_checksums import note_files
 from studio.sessions.manifest import SessionManifest, read_manifest, write_manifest
 from studio.sessions.named_rows import Array, pose_frame, read_pose, read_sigma
@@ -241,7 +241,7 @@ class Session:
         place = self.path / RUNS_NAME / checked_name(record.name, "run")
         if place.exists():
             raise SessionError(f"Session '{self.name}' has a run '{record.name}'.", "Choose another name.")
-        with room_for("The run", place), atomic_files.made_whole(place) as folder:
+        with writing("The run", place), atomic_files.made_whole(place) as folder:
             atomic_files.copy_file(self.path / CAMERAS_PATH, folder / CAMERAS_NAME)
             if body_text:
                 (folder / BODY_FOLDER).mkdir()

@@ -26,6 +26,7 @@ from studio.capture.live_cameras import PictureSet, SpreadFigures, spread_figure
 from studio.capture.pictures import picture_path
 from studio.capture.stream_files import jpeg_of
 from studio.errors import FootageError, SessionError
+from studio.foreign_files import foreign_file
 from studio.sessions import atomic_files
 from studio.sessions.background_files import BACKGROUND_NAME, EVIDENCE_NAME, read_evidence
 from studio.sessions.manifest import now, write_manifest
@@ -170,17 +171,17 @@ def begin_take(
 
 
 def read_sets(folder: Path) -> TakenSets:
-    """The sets of a take so far; a line that is not whole yet is left for the next look."""
+    """The sets of a take so far; a line that is not whole yet is left for the next look. Raises SessionError."""
     path = folder / LIVE / SETS_NAME
     if not path.exists():
         return TakenSets((), "")
-    text = path.read_text(encoding="utf-8")
-    lines = csv.reader(text[: text.rfind("\n") + 1].splitlines()[1:])
     sets: list[TakenSet] = []
-    for row in lines:
-        if row[0] == END:
-            return TakenSets(tuple(sets), row[5])
-        sets.append(taken_set(row))
+    with foreign_file(path, SessionError, "a take's list of sets", "Put back a copy of it, or record again."):
+        text = path.read_text(encoding="utf-8")
+        for row in csv.reader(text[: text.rfind("\n") + 1].splitlines()[1:]):
+            if row[0] == END:
+                return TakenSets(tuple(sets), row[5])
+            sets.append(taken_set(row))
     return TakenSets(tuple(sets), "")
 
 

@@ -119,7 +119,7 @@ def build_app(
     doors = Doors(workspace, control, scenes, EventStream(control), footage_roots, log_path)
     app = FastAPI(
         title="Capture studio",
-        responses={status: {"model": ErrorAnswer} for status in (403, 404, 409, 422, 500)},
+        responses={status: {"model": ErrorAnswer} for status in (400, 403, 404, 409, 422, 500)},
         description=DESCRIPTION,
         lifespan=_lifespan,
         docs_url=None,

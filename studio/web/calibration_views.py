@@ -13,6 +13,7 @@ from studio.capture.calibration_files import CALIBRATION_FORMATS
 from studio.errors import CalibrationError
 from studio.sessions.calibration_changes import earlier_calibrations, stale_runs
 from studio.sessions.session import CAMERAS_PATH, Session
+from studio.typed_decoding import decode_json
 from studio.web.calibration_proposals import Proposal, proposal_in_use
 from studio.web.calibration_schemas import (
     CalibratedCamera,
@@ -115,7 +116,7 @@ def _kept_report(session: Session) -> Report:
     """The report beside the calibration in use, {} where there is none or it cannot be read."""
     path = session.path / CAMERAS_PATH.with_name("cameras.report.json")
     try:
-        return msgspec.json.decode(path.read_bytes(), type=dict[str, object])
+        return decode_json(path.read_bytes(), dict[str, object])
     except (OSError, msgspec.DecodeError):
         return {}
 

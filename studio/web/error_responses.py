@@ -78,6 +78,12 @@ def add_error_handlers(app: FastAPI) -> None:
 
     async def http_error(request: Request, error: Exception) -> Response:
         status = error.status_code if isinstance(error, HTTPException) else 500
+        if status == 400:
+            wrong = StudioError(
+                "The request's body cannot be read.", "Send it as /api/openapi.json says, as UTF-8."
+            )
+            wrong.status, wrong.code = 422, "request"
+            return error_response(wrong)
         if status == 404:
             message = f"There is nothing at '{request.url.path[:200]}'."
         else:

@@ -36,6 +36,7 @@ TEXTS = {
     "": ("guide.md", "Guide"),
     "python": ("python.md", "Python"),
     "adding": ("adding.md", "Adding your own"),
+    "commands": ("commands.md", "Commands"),
     "figures": ("figures.md", "How well, how fast"),
 }
 """The packaged texts and their titles, by the addresses below /guide."""

@@ -15,6 +15,7 @@ from studio.runs.session_settings import session_settings
 from studio.runs.tracks import RAW, pose_in_track
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
+from studio.typed_decoding import decode_json
 from studio.web.run_routes import RUN, OpenRun
 from studio.web.session_routes import OpenSession
 
@@ -84,7 +85,7 @@ def knob_changes(text: str) -> dict[str, object]:
     if not text:
         return {}
     try:
-        return msgspec.json.decode(text, type=dict[str, object])
+        return decode_json(text, dict[str, object])
     except msgspec.DecodeError:
         raise SettingsError(
             "The settings are no JSON object of knobs.", 'Write them like {"mask_threshold": 6}.'

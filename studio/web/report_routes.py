@@ -35,7 +35,7 @@ def reports(doors: Door) -> Reports:
         return Reports()
     try:
         return decode_json(path.read_bytes(), _Results).as_reports()
-    except (msgspec.DecodeError, UnicodeDecodeError, OSError) as error:
+    except (msgspec.DecodeError, OSError) as error:
         raise SessionError(
             f"'{path}' cannot be read: {error}.", "Run 'studio reproduce' again; what is measured is kept."
         ) from None

@@ -93,6 +93,8 @@ def test_clicks_that_cannot_be_used(rig: Rig, tmp_path: Path) -> None:
         triangulated(CAMERAS, {"cam9": np.zeros((3, 2))})
     with pytest.raises(CalibrationError, match="Point 1 is given in fewer than two"):
         triangulated(CAMERAS, {"cam1": np.zeros((3, 2))})
+    with pytest.raises(CalibrationError, match=r"'cam1' lies more than 1e\+06 pixels outside"):
+        triangulated(CAMERAS, {"cam1": np.array([[1e308, 2.0]]), "cam2": np.zeros((1, 2))})
     with pytest.raises(CalibrationError, match="on a line"):
         floor_from_points(np.array([[0.0, 0, 0], [100, 0, 0], [300, 0, 0]]), CAMERAS)
 

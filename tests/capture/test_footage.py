@@ -76,3 +76,10 @@ def test_files_that_are_gone_or_changed(tmp_path: Path) -> None:
     write_pictures(tmp_path / "p", [numbered_frame(0)[:-2]] * 2)
     with pytest.raises(FootageError, match="128x94"):
         open_footage(FootageSource(30.0, 2, (source,)), tmp_path).picture("a", 0)
+
+
+def test_pictures_of_no_size_are_refused(tmp_path: Path) -> None:
+    write_pictures(tmp_path / "a", [numbered_frame(0)])
+    source = CameraSource("a", "pictures", "a", WIDTH, 0, 1)
+    with pytest.raises(FootageError, match=r"camera a are said to be 128x0 pixels"):
+        open_footage(FootageSource(30.0, 1, (source,)), tmp_path)

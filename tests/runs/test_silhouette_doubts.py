@@ -122,7 +122,7 @@ def test_a_session_whose_footage_contradicts_its_cameras_is_not_tracked(walk: Se
     (note,) = prepare_run(spoilt, last=2, fit_shape=False, despite_findings=True).record.notes
     assert note.startswith("Tracked despite: ")
     step = next(step for step in way_of(spoilt).steps if step.step == "calibration")
-    assert (step.state, "speaks against" in step.why) == ("stale", True)
+    assert (step.state, "contradicts" in step.why) == ("stale", True)
 
     write_calibration(sound, walk.path / CAMERAS_PATH)
     assert prepare_run(Session(walk.path), last=2, fit_shape=False).record.notes == ()

@@ -10,11 +10,11 @@ from flipped_bytes import flip_in_file, flip_stored
 from toy_session import true_poses
 from tracked_runs import finish, opened, poses_of
 
-from studio.errors import DamagedError
+from studio.errors import DamagedError, SessionError
 from studio.runs.new_run import prepare_run
 from studio.runs.verifying import repair, verify
 from studio.sessions.file_checksums import note_files
-from studio.sessions.results_reader import FILE_NAME
+from studio.sessions.results_store import FILE_NAME, ResultsWriter
 from studio.sessions.session import Session
 from studio.sessions.stored_run import StoredRun
 
@@ -195,7 +195,7 @@ def test_first_settings_and_a_half_searched_frame(session_on_disk: Session, run:
     )
     finish(session_on_disk, other, layers=3)
     change(other, "UPDATE partial SET blob = zeroblob(30)")
-    assert ["the frame at hand" in fault.place for fault in verify(session_on_disk).faults] == [True]
+    assert ["the unfinished frame" in fault.place for fault in verify(session_on_disk).faults] == [True]
     assert np.array_equal(finish(session_on_disk, other), wanted)
 
 
@@ -210,3 +210,26 @@ def test_what_is_written_again_is_no_damage_but_footage_is(session_on_disk: Sess
     assert len(verify(session_on_disk).faults) == 1
     picture.unlink()
     assert [fault.what for fault in verify(session_on_disk).faults] == ["is gone"]
+
+
+def test_a_database_whose_names_are_damaged_is_named(session_on_disk: Session, run: StoredRun) -> None:
+    """SQLite quotes them as they are, and they are no text any more."""
+    whole = content(run)
+    change(run, "CREATE TABLE odd_name (one INTEGER)")
+    change(run, "PRAGMA wal_checkpoint(TRUNCATE)")
+    store = run.folder / FILE_NAME
+    damaged = (
+        store.read_bytes()
+        .replace(b"CREATE TABLE odd", b"CREATX TABLE odd")
+        .replace(b"odd_name", b"odd_\xffame")
+    )
+    store.write_bytes(damaged)
+    with pytest.raises(SessionError, match="cannot be read"):
+        run.summary()
+    with pytest.raises(SessionError, match="cannot be written"):
+        ResultsWriter(run.folder)
+    found = verify(session_on_disk).faults
+    assert any("the database is damaged" in fault.what for fault in found)
+    repair(session_on_disk, found)
+    finish(session_on_disk, run)
+    assert content(run) == whole

@@ -177,7 +177,7 @@ def test_refining_reports_shows_and_can_fail(
     better = swaying_pose(human, 1)
     requested: list[int] = []
 
-    def found(session, frame, pose, *, run, progress, cancelled):
+    def found(session, frame, pose, *, run, progress):
         requested.append(frame)
         progress("searching", 1, 2)
         return SimpleNamespace(pose=better, gain=1.0, overlap_before=0.5, overlap=0.9)

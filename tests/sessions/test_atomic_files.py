@@ -1,13 +1,16 @@
 """A file is the old one or the new one."""
 
+import errno
 import os
 import subprocess
 import sys
 import textwrap
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from studio.errors import SessionError
 from studio.sessions import atomic_files
 
 
@@ -27,7 +30,7 @@ def test_a_failure_keeps_the_old_file(tmp_path: Path, monkeypatch: pytest.Monkey
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full_disk)
-    with pytest.raises(OSError, match="No space"):
+    with pytest.raises(SessionError, match=r"The file '.*a\.json' cannot be written: disk full \(No space"):
         atomic_files.write_text(path, "new")
     assert path.read_text() == "old"
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.json"]
@@ -59,3 +62,33 @@ def test_folders_take_their_place_whole(tmp_path: Path) -> None:
     with pytest.raises(FileExistsError):
         atomic_files.move_into_place(second, tmp_path / "run")
     assert (tmp_path / "run" / "x").read_text() == "1"
+
+
+def refuse(*_: object, **__: object) -> None:
+    raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+
+@pytest.mark.parametrize(
+    ("step", "do"),
+    [
+        ("mkdir", lambda folder: atomic_files.new_folder_beside(folder / "new" / "run")),
+        ("rename", lambda folder: atomic_files.move_into_place(folder / "kept", folder / "run")),
+        ("replace", lambda folder: atomic_files.write_text(folder / "a.json", "new")),
+        ("unlink", lambda folder: atomic_files.write_text(folder / "a.json" / "b", "new")),
+    ],
+)
+def test_what_the_disk_refuses_is_said_in_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str, do: Callable[[Path], object]
+) -> None:
+    (tmp_path / "kept").mkdir()
+    (tmp_path / "a.json").write_text("old")
+    monkeypatch.setattr(os, step, refuse)
+    with pytest.raises(SessionError, match="cannot be written") as caught:
+        do(tmp_path)
+    assert caught.value.hint
+    assert (tmp_path / "a.json").read_text() == "old"
+
+
+def test_what_cannot_be_copied_is_named(tmp_path: Path) -> None:
+    with pytest.raises(SessionError, match=r"'.*a' cannot be read \(No such file"):
+        atomic_files.copy_file(tmp_path / "a", tmp_path / "b")

@@ -259,7 +259,7 @@ def test_an_archive_is_imported_like_its_folder(tmp_path: Path, kind: str) -> No
 def test_an_archive_cannot_stay_where_it_is_and_a_broken_one_leaves_nothing(tmp_path: Path) -> None:
     packed = tmp_path / "take.tar.gz"
     packed.write_bytes(b"no tar")
-    with pytest.raises(FootageError, match=r"'take\.tar\.gz' cannot stay"):
+    with pytest.raises(FootageError, match=r"'take\.tar\.gz' cannot be used in place"):
         import_source(packed, tmp_path / "sessions" / "made", copy=False)
     with pytest.raises(ArchiveError, match=r"take\.tar\.gz"):
         import_source(packed, tmp_path / "sessions" / "made")

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from toy_problems import Bowl, toy_space
 
+from studio.errors import RunError
 from studio.knobs import knobs_of
 from studio.tracking.catalogue import TRACKERS
 from studio.tracking.frame_loop import FrameSearch, SearchState, search_frame
@@ -259,3 +260,44 @@ def test_a_start_without_a_pose(name: str) -> None:
     )
     # A uniform draw's mean distance from the centre is about √(9 · 25/3) = 8.7.
     assert np.linalg.norm(result.estimate.pose) < 5.0
+
+
+def weights_gone_wrong(kind: str, poses: np.ndarray) -> np.ndarray:
+    """Log-weights (N,) as a scene without evidence gives them."""
+    if kind == "all equal":
+        return np.full(len(poses), -3.0)
+    if kind == "one survivor":
+        return np.where(np.arange(len(poses)) == len(poses) // 2, 0.0, -1e6)
+    if kind == "far below":
+        return -1e12 - np.arange(len(poses))
+    return np.full(len(poses), {"none possible": -np.inf, "no number": np.nan}[kind])
+
+
+@pytest.mark.parametrize("kind", ["all equal", "one survivor", "far below"])
+def test_weights_that_say_little_leave_a_defined_answer(name: str, kind: str) -> None:
+    """And whatever is drawn around them: a set whose covariance is singular is one of these."""
+
+    class Little(Bowl):
+        def weigh(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
+            return weights_gone_wrong(kind, poses)
+
+    results, records = run(name, 3, problem=Little(np.zeros(COUNT)), **sizes(name, 12))
+    for result in results:
+        assert np.isfinite(result.estimate.pose).all()
+        assert np.isfinite(result.estimate.log_weight)
+        particles = result.carried.particles
+        assert particles is not None
+        assert np.isfinite(particles.poses).all()
+        assert np.exp(particles.log_weights).sum() == pytest.approx(1.0)
+    assert all(np.isfinite(record.poses).all() for record in records)
+
+
+@pytest.mark.parametrize("kind", ["none possible", "no number"])
+def test_without_a_finite_weight_the_frame_is_refused_in_words(name: str, kind: str) -> None:
+    class Nothing(Bowl):
+        def weigh(self, poses: np.ndarray, stage: int = 0) -> np.ndarray:
+            return weights_gone_wrong(kind, poses)
+
+    with pytest.raises(RunError) as caught:
+        run(name, 1, problem=Nothing(np.zeros(COUNT)), **sizes(name, 12))
+    assert caught.value.hint

@@ -50,6 +50,13 @@ def test_a_body_that_is_no_json_is_named(studio: Studio) -> None:
     assert set(answer.json()) == ENTRIES
 
 
+@pytest.mark.parametrize("content", [b"\xef\xeb", b"\xff" * 9, b"[" * 200_000], ids=["cut", "bytes", "deep"])
+def test_a_body_that_is_no_text_is_answered_as_the_api_declares(studio: Studio, content: bytes) -> None:
+    answer = studio.client.post("/api/imports", content=content, headers={"content-type": "application/json"})
+    assert answer.status_code == 422
+    assert answer.json()["hint"]
+
+
 def test_a_wrong_entry_is_named_with_its_place(studio: Studio) -> None:
     told = studio.client.post("/api/imports", json={"name": "a", "source": "/x", "fps": "fast"}).json()
     assert "'fps'" in told["message"]

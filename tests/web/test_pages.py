@@ -97,7 +97,10 @@ def test_every_page_that_the_guide_refers_to_is_there(studio: Studio) -> None:
         assert answer.status_code == 200, place
         seen[place] = answer.text
         left += set(re.findall(r'href="(/guide(?:/[a-z]+)?)"', answer.text)) - set(seen) - set(left)
-    assert set(seen) == {"/guide", *(f"/guide/{name}" for name in ("python", "verbs", "adding", "figures"))}
+    assert set(seen) == {
+        "/guide",
+        *(f"/guide/{name}" for name in ("python", "verbs", "commands", "adding", "figures")),
+    }
     assert studio.client.get("/guide/nothing").status_code == 404
 
 

@@ -160,3 +160,11 @@ def test_what_a_take_needs_is_asked_for_first(base: Session, tmp_path: Path) -> 
     (tmp_path / "take.recording").mkdir()
     with pytest.raises(FootageError, match="unfinished recording"):
         recording_folder(tmp_path / "take")
+
+
+@pytest.mark.parametrize("line", [b"0,1\xff,0,,,front=1\n", b"0\n", b"0,1,x,,,front=1\n", b"\n"])
+def test_a_damaged_list_of_sets_is_refused_by_name(tmp_path: Path, line: bytes) -> None:
+    (tmp_path / "live").mkdir()
+    (tmp_path / "live" / "sets.csv").write_bytes(b"frame,moment,spread_ms,lagging,left_out,arrivals\n" + line)
+    with pytest.raises(SessionError, match=r"'sets\.csv' is not a take's list of sets"):
+        read_sets(tmp_path)
