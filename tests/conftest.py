@@ -1,14 +1,27 @@
 """Fixtures that every room's tests share."""
 
 import os
+import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Browser, Playwright, sync_playwright
 from toy_session import make_session
 
 from studio.sessions.session import Session
 from studio.sessions.workspace import Workspace
 
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+ARGUMENTS = [
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+]
 ROOT = Path(__file__).resolve().parent.parent
 
 
@@ -32,3 +45,25 @@ def session_on_disk(_own_workspace: None) -> Session:
     """A small session of a planar arm, named "toy", in this test's own workspace."""
     workspace = Workspace()
     return make_session(workspace.place_for("toy"))
+
+
+def chromium(playwright: Playwright) -> str:
+    """The system's Chromium, else the one that Playwright downloaded; without either the tests fail."""
+    found = next((path for name in BROWSERS if (path := shutil.which(name))), None)
+    own = playwright.chromium.executable_path
+    if found is None and not Path(own).is_file():
+        pytest.fail("No Chromium is installed: run 'make browser' first.", pytrace=False)
+    return found or own
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """Chromium, drawing in software: one for all files, as a thread has room for one Playwright; each
+    window in a context of its own.
+    """
+    with sync_playwright() as playwright:
+        launched = playwright.chromium.launch(
+            executable_path=chromium(playwright), headless=True, args=ARGUMENTS
+        )
+        yield launched
+        launched.close()

@@ -80,7 +80,7 @@ def test_a_corrected_frame_is_tracked_on_and_backwards(
     window.key("Home")
     window.key("n")
     window.until("get('frame') === 4")
-    window.page.get_by_text("stays as it was").wait_for()
+    window.page.get_by_text("is unchanged").wait_for()
     window.shoot(artefacts / "corrected-timeline-dark.png", part=".timeline")
     studio.until(lambda state: state["state"] == "finished")
     put_right(window, studio, made, 4)

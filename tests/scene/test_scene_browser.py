@@ -2,7 +2,6 @@
 
 import math
 import os
-import shutil
 import socket
 import threading
 import time
@@ -15,7 +14,7 @@ import numpy as np
 import pytest
 import uvicorn
 from fastapi import FastAPI
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Browser, Page
 from scene_fakes import FakeControl
 from swaying_session import cloud_record
 
@@ -28,16 +27,6 @@ from studio.worker.events import LayerFinished, SettingsApplied
 
 pytestmark = pytest.mark.browser
 
-ARGUMENTS = [
-    "--no-sandbox",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--no-first-run",
-]
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 PATIENCE = 60.0
 
 
@@ -68,12 +57,10 @@ def address(stage: SceneServer) -> Iterator[str]:
 
 
 @pytest.fixture
-def page() -> Iterator[Page]:
-    found = next((path for name in BROWSERS if (path := shutil.which(name))), None)
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=found, headless=True, args=ARGUMENTS)
-        yield browser.new_page(viewport={"width": 1280, "height": 800})
-        browser.close()
+def page(browser: Browser) -> Iterator[Page]:
+    made = browser.new_page(viewport={"width": 1280, "height": 800})
+    yield made
+    made.close()
 
 
 def colours_of(path: Path) -> np.ndarray:
