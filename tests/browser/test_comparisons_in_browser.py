@@ -90,7 +90,7 @@ def test_what_cannot_be_compared_is_told_in_the_form(window: StudioPage) -> None
     form.locator(".wrong", has_text="too few").wait_for()
     form.locator("[aria-label=Knobs]").first.fill("survival")
     form.get_by_role("button", name="Compare", exact=True).click()
-    form.locator(".wrong", has_text="'survival' is not an assignment").wait_for()
+    form.locator(".wrong", has_text="“survival” is not a knob with a value").wait_for()
     form.locator("[aria-label=Knobs]").first.fill("survival=7")
     fill(window, evaluations="200")
     form.get_by_role("button", name="Compare", exact=True).click()
