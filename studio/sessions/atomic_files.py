@@ -6,6 +6,7 @@ Copies of whole folders are made beside their place under a hidden name and rena
 """
 
 import contextlib
+import errno
 import os
 import shutil
 import sqlite3
@@ -57,7 +58,11 @@ def copy_file(source: Path, path: Path) -> None:
 def new_folder_beside(path: Path) -> Path:
     """An empty hidden folder next to `path`, to be filled and then given to `move_into_place`. Raises SessionError."""
     with writing("What belongs beside", path):
-        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except FileExistsError as error:
+            # A file stands where a folder would have to be.
+            raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), error.filename) from None
         made = Path(tempfile.mkdtemp(prefix=PARTIAL_PREFIX, dir=path.parent))
         made.chmod(0o755)
     return made

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from export_runs import MADE, moving_poses, track_of
 
-from studio.errors import ExportError, NotFoundError, SettingsError, WorkCancelledError
+from studio.errors import ExportError, NotFoundError, SessionError, SettingsError, WorkCancelledError
 from studio.export.exporting import export_run, settled
 from studio.export.formats import FORMATS, format_of_file
 from studio.export.kept_exports import discard_export, export_into_run, kept_exports, kept_file
@@ -105,7 +105,7 @@ def test_a_place_that_cannot_be_written(arm, tmp_path: Path) -> None:
     with pytest.raises(ExportError, match="is a folder"):
         export_run(*arm, FORMATS["csv"], {"track": MADE}, tmp_path)
     (tmp_path / "file").write_text("")
-    with pytest.raises(ExportError, match=r"(c|C)annot be written|Nothing can be written"):
+    with pytest.raises(SessionError, match="cannot be written"):
         export_run(*arm, FORMATS["csv"], {"track": MADE}, tmp_path / "file" / "arm.csv")
 
 
